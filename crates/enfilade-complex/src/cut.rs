@@ -1,16 +1,16 @@
-//! Borders put where they are smallest.
+//! Moves borders to where they are smallest.
 //!
-//! Growing leaves together along their widest openings finds *a* border between two cells that leak
-//! into each other, but one made of whatever planes the tree has there: over a flight of stairs that
-//! can be a hundred small portals. Here each such border is moved to the minimum of
+//! Growing leaves together along their widest openings finds *a* border between two cells that leak into each other,
+//! but it consists of whatever planes the tree has there: over a flight of stairs that can be a hundred small
+//! portals. Here each such border is moved to the minimum of
 //!
-//! > open area that lies on no candidate + [`PER_FACET`] for each piece + [`VOTE`] × volume of votes overruled
+//! > open area on no candidate + [`PER_FACET`] for each piece + [`VOTE`] × volume of votes overruled
 //!
-//! by a minimum cut (Boykov, Veksler & Zabih 2001 move labels in the same way) among the leaves around the border. Candidates cost next to nothing, so a border that can be
-//! moved into its candidate is.
+//! by a minimum cut among the leaves around the border (Boykov, Veksler & Zabih 2001 move labels in the same way).
+//! Candidates cost next to nothing, so a border moves into its candidate if it can.
 //!
-//! Time: `O(V²E)` at worst and near-linear in practice for each pair of cells that leak; at most
-//! [`MAX_LEAVES`] leaves take part.
+//! Time: `O(V²E)` at worst and near-linear in practice for each pair of cells that leak; at most [`MAX_LEAVES`]
+//! leaves take part.
 
 use std::collections::BTreeMap;
 
@@ -20,15 +20,15 @@ use super::flow::Flow;
 use super::graph::{LeafGraph, NO_CANDIDATE};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
 
-/// What a piece of a border costs besides its area. [Units: wu²]
+/// Cost of a piece of a border besides its area. [Units: wu²]
 const PER_FACET: f64 = 0.002;
-/// What it costs to overrule votes. [Units: 1/wu]
+/// Cost of overruling votes. [Units: 1/wu]
 const VOTE: f64 = 0.5;
 /// Borders that leak less than this stay as they are. [Units: wu²]
 const MIN_LEAK: f64 = 0.01;
 /// Most leaves that take part in one cut.
 const MAX_LEAVES: usize = 20_000;
-/// Capacities are counted in this. [Units: wu²]
+/// Unit of capacities. [Units: wu²]
 const UNIT: f64 = 1e-7;
 const INFINITE: u64 = 1 << 60;
 
@@ -58,7 +58,7 @@ pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: 
     let mut node_of = vec![NO_NODE; graph.volumes.len()];
     let mut moves: Vec<(u32, u32)> = Vec::new();
     for (pair, (_, facets)) in &leaks {
-        // Earlier moves may have changed whose leaf it is.
+        // Earlier moves may have changed the leaf's cell.
         for (leaf, to) in cut(
             graph,
             &cells.cell_of_leaf,
@@ -76,10 +76,10 @@ pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: 
     cells.drop_empty(&graph.volumes);
 }
 
-/// Gives chips of a cell that hang together with nothing else of it, and are less than `min_volume`, to the cell
-/// that they open to most. [Units: wu³]
+/// Gives chips of a cell, which are disconnected from the rest of it and smaller than `min_volume`, to the cell that
+/// they open to most. [Units: wu³]
 ///
-/// Borders that moved can cut a chip off, and a chip has portals all around. O(leaves + facets).
+/// A moved border can cut a chip off, and a chip has portals all around. O(leaves + facets).
 pub(super) fn absorb_chips(graph: &LeafGraph<'_>, cells: &mut LeafCells, min_volume: f64) {
     if !graph.spend_pass() {
         return;
@@ -104,7 +104,7 @@ pub(super) fn absorb_chips(graph: &LeafGraph<'_>, cells: &mut LeafCells, min_vol
         let best = largest
             .entry(cells.cell_of_leaf[leaf as usize])
             .or_insert(part);
-        // Equal volumes: the least leaf.
+        // For equal volumes, the least leaf.
         if part.0 > best.0 || part.0 == best.0 && root < best.1 {
             *best = part;
         }
@@ -145,13 +145,13 @@ pub(super) fn absorb_chips(graph: &LeafGraph<'_>, cells: &mut LeafCells, min_vol
     cells.drop_empty(&graph.volumes);
 }
 
-/// Cells of less are what rounding leaves between surfaces that all but touch: no room, however small, and too thin for
+/// Smaller cells are left by rounding between surfaces that all but touch: not rooms, however small, and too thin for
 /// a portal. [Units: wu³]
 const SLIVER: f64 = 1e-4;
 
-/// Gives the leaves of slivers to the cells that they open to most; those that open to none are solid.
+/// Gives the leaves of slivers to the cells that they open to most; slivers without openings become solid.
 ///
-/// O(leaves + facets), but for chains of slivers.
+/// O(leaves + facets), except for chains of slivers.
 pub(super) fn dissolve_slivers(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     let is_sliver: Vec<bool> = (0..)
         .zip(&cells.volumes)
@@ -204,7 +204,7 @@ pub(super) fn dissolve_slivers(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     cells.drop_empty(&graph.volumes);
 }
 
-/// Open facets by leaf, for leaves of cells that leak.
+/// Open facets of each leaf, for leaves of cells that leak.
 struct Adjacency {
     start: Vec<u32>,
     facets: Vec<u32>,
@@ -251,10 +251,11 @@ impl Adjacency {
     }
 }
 
-/// Number of a leaf that takes no part in a cut.
+/// Node of a leaf that takes no part in a cut.
 const NO_NODE: u32 = u32::MAX;
 
-/// The leaves that change sides, with the cell they go to. `node_of` has no node for any leaf, before and after.
+/// Returns the leaves that change sides, each with its new cell. `node_of` is [`NO_NODE`] for every leaf, before and
+/// after.
 fn cut(
     graph: &LeafGraph<'_>,
     cell_of_leaf: &[u32],
@@ -314,14 +315,14 @@ fn cut(
             } else {
                 f.leaves[0]
             };
-            // A gap makes no portal: a border of many is better than one that shows.
+            // A gap makes no portal, so a border of many gaps is better than one that makes a portal.
             let shows = f.candidate == NO_CANDIDATE && !f.is_gap;
             let each = if shows { PER_FACET } else { 0.0 };
             let cost = units(f.cost() + each);
             match node_of[other as usize] {
-                // What lies beyond keeps its side.
+                // A leaf outside the cut keeps its side.
                 NO_NODE if is_ours(other) => add(cell(other), cost),
-                // To a third cell the border stays a border on either side.
+                // A border to a third cell stays a border either way.
                 NO_NODE => {}
                 j if (j as usize) > i => {
                     flow.add(i, j as usize, cost, cost);
@@ -359,7 +360,7 @@ mod tests {
 
     #[test]
     fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
-        // Rooms 0 and 2; cell 1 is made of three slivers: beside both rooms, behind that, and closed.
+        // Rooms 0 and 2; cell 1 consists of three slivers: one beside both rooms, one behind that, and a closed one.
         let facet = |a, b, area| OpenFacet {
             leaves: [a, b],
             width: area,

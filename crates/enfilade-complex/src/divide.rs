@@ -1,9 +1,9 @@
-//! One cell of a finished world, cut in two by a candidate.
+//! Divides one cell of a finished world by a candidate.
 //!
 //! The complex is built from the cell's own triangles, the new candidates (which come first: one in a plane, or the
-//! sides of a box) and the pieces of the cell's portals (all others). What of the cell hangs together other than
-//! through candidates is one part; the two parts that the new candidates have most of their opening between are the two new
-//! cells, and whatever else they cut off joins one of them.
+//! sides of a box) and the pieces of the cell's portals (all other candidates). Leaves connected without crossing a
+//! candidate form one part. The two parts with most of the new candidates' opening between them become the two new
+//! cells, and any other part that the candidates cut off joins one of them.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
@@ -16,16 +16,16 @@ use super::graph::{box_faces, sides_of_border};
 use super::leaf_cells::{LeafCells, SOLID};
 use super::partition::{self, Partition};
 
-/// The cell of [`Complex::divided`] before the candidate's plane.
+/// The cell of [`Complex::divided`] in front of the candidate's plane.
 pub const FRONT: u32 = 0;
 /// The cell of [`Complex::divided`] behind it.
 pub const BACK: u32 = 1;
 
-/// What cuts a cell.
+/// The candidates that divide a cell.
 pub struct Cutter<'a> {
-    /// The candidates up to this number are the cutter's.
+    /// Candidates with a smaller index belong to the cutter.
     pub n_candidates: u32,
-    /// How far a point lies before all of them; less than 0 behind. [Units: wu]
+    /// Returns the distance of a point in front of the cutter; negative behind it. [Units: wu]
     pub distance: &'a dyn Fn(DVec3) -> f64,
 }
 
@@ -34,20 +34,20 @@ impl Cutter<'_> {
         candidate.is_some_and(|s| s < self.n_candidates)
     }
 
-    /// Whether a leaf's middle lies before the candidates.
+    /// Returns `true` if a leaf's middle lies in front of the cutter.
     fn is_before(&self, middle: Option<DVec3>) -> bool {
         middle.is_some_and(|p| (self.distance)(p) >= 0.0)
     }
 }
 
-/// Why a candidate does not part a cell.
+/// The reasons why a candidate does not divide a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Undivided {
     /// No opening of the candidate has the cell on both sides.
     Aside,
-    /// Both sides reach the border of the box, behind which all is one cell.
+    /// Both sides reach the border of the box; everything beyond it is one cell.
     Endless,
-    /// Both sides are one: here the candidate's plane is passed beside the candidate.
+    /// Both sides are connected: at this point, a path passes the candidate's plane beside the candidate.
     Around(DVec3),
 }
 
@@ -60,12 +60,13 @@ struct LeafOpening {
 }
 
 impl Complex<'_> {
-    /// Parts what `is_ours` holds of by the cutter's candidates.
+    /// Divides the part of space in which `is_ours` holds by the cutter's candidates.
     ///
-    /// The partition has two cells, [`FRONT`] and [`BACK`]; all else counts as solid. Linear in leaves and openings.
+    /// The partition has two cells, [`FRONT`] and [`BACK`]; everything else counts as solid. Linear in leaves and
+    /// openings.
     ///
     /// # Errors
-    /// When the candidates do not part it in two.
+    /// If the candidates do not divide it in two.
     pub fn divided(
         &self,
         cutter: &Cutter<'_>,
@@ -80,7 +81,7 @@ impl Complex<'_> {
                 sets.join(o.leaves[0], o.leaves[1]);
             }
         }
-        // Between which parts the new candidate lies, and with how much of its opening.
+        // For each pair of parts, in front and behind, the area of the cutter's openings between them.
         let mut between: BTreeMap<[u32; 2], f64> = BTreeMap::new();
         for o in openings.iter().filter(is_inner) {
             if cutter.is_own(o.candidate) {
@@ -97,7 +98,7 @@ impl Complex<'_> {
             let around = Self::way_around(cutter, &openings, &ours, &middles, &mut sets, front);
             return Err(around.map_or(Undivided::Aside, Undivided::Around));
         }
-        // The rest goes to one of the two, by the widest way.
+        // The other parts join one of the two by their widest openings.
         let mut by_area: Vec<([u32; 2], f64)> = Vec::new();
         for o in openings.iter().filter(is_inner) {
             by_area.push((o.leaves, o.area));
@@ -115,7 +116,7 @@ impl Complex<'_> {
         for (leaf, cell) in cell_of_leaf.iter_mut().enumerate() {
             if ours[leaf] {
                 let set = sets.find(leaf as u32);
-                // What nothing opens to is a sliver at a wall: either will do.
+                // A leaf without openings is a sliver at a wall; either cell will do.
                 let is_behind = set == k || (set != f && !cutter.is_before(middles[leaf]));
                 *cell = if is_behind { BACK } else { FRONT };
             }
@@ -147,7 +148,8 @@ impl Complex<'_> {
         ))
     }
 
-    /// Where the shortest way within a part, from one side of the cutter to the other, passes between them.
+    /// Returns the point where the shortest path within a part, from one side of the cutter to the other, crosses
+    /// between them.
     fn way_around(
         cutter: &Cutter<'_>,
         openings: &[LeafOpening],
@@ -184,7 +186,7 @@ impl Complex<'_> {
         }
         while let Some(leaf) = queue.pop_front() {
             if is_goal[leaf as usize] {
-                // Back along the way: from middle to opening to middle, until the side changes.
+                // Back along the path, from middle to opening to middle, until the side changes.
                 let mut points = vec![middles[leaf as usize]?];
                 let mut at = leaf;
                 while from[at as usize] < u32::MAX - 1 {
@@ -209,8 +211,8 @@ impl Complex<'_> {
         None
     }
 
-    /// The openings of all leaves, and a point well inside each leaf; none for those that rounding
-    /// has left without a corner.
+    /// Returns the openings of all leaves, and a point well inside each leaf; `None` if rounding has left it without
+    /// vertices.
     fn openings(&self) -> (Vec<LeafOpening>, Vec<Option<DVec3>>) {
         let visitor = Visitor {
             tree: &self.tree,
@@ -245,7 +247,7 @@ struct OpeningSink<'a> {
     visitor: &'a Visitor<'a>,
     first_leaf: u32,
     openings: Vec<LeafOpening>,
-    /// Sum and number of corners, of the leaves from `first_leaf` on.
+    /// Sum and number of vertices, for the leaves from `first_leaf` on.
     sums: Vec<(DVec3, f64)>,
 }
 
@@ -266,7 +268,7 @@ impl FacetSink for OpeningSink<'_> {
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         for (piece, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let at = piece.iter().sum::<DVec3>() / piece.len() as f64;
-            // A piece too narrow for the candidate that it lies on goes by none; it must not lead around it.
+            // A piece too narrow for its candidate is listed without one; it must not lead around the candidate.
             let is_on = |cover: &&Cover| {
                 let outline = Winding::new(cover.points.to_vec());
                 cover.candidate.is_some() && outline.contains_in_plane(at, 0.0)

@@ -1,9 +1,8 @@
 //! The facets between leaves: every node's plane polygon, pushed down both subtrees.
 //!
-//! This is how portals of a BSP are made (Lefebvre & Hornus 2003, in the notes on BSP construction
-//! that follow §3.0.2: clip the plane by its parents, split it by its children). No polygon outlives its
-//! visit: the first visit keeps a few numbers a facet, the second makes the polygons again where
-//! two cells meet.
+//! Portals of a BSP are made this way (Lefebvre & Hornus 2003, in the notes on BSP construction that follow §3.0.2:
+//! clip the plane by its parents, split it by its children). No polygon outlives its visit: the first visit keeps a
+//! few numbers per facet, the second makes the polygons again where two cells meet.
 
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Purse};
@@ -12,19 +11,19 @@ use smallvec::SmallVec;
 use super::surface::{MIN_AREA, Source, Surface, Tolerance, projected};
 use super::tree::{Tree, leaf_index};
 
-/// Subtrees of more leaves are visited in parallel.
+/// Larger subtrees, in leaves, are visited in parallel.
 const PARALLEL_LEAVES: u32 = 2048;
 
 /// The part of a surface that may cover a facet, in the facet's plane.
 pub(super) struct Cover {
-    /// Candidate, or `None` for a structural triangle.
+    /// The candidate, or `None` for a structural triangle.
     pub(super) candidate: Option<u32>,
-    /// Where it is, counter-clockwise about the plane's normal.
+    /// Vertices, counter-clockwise about the plane's normal.
     pub(super) points: Poly,
     bounds: Aabb,
 }
 
-/// One polygon between two leaves, nothing subtracted yet.
+/// The polygon between two leaves, with nothing subtracted yet.
 pub(super) struct RawFacet<'a> {
     /// The node's plane, an index into [`Tree::planes`].
     pub(super) plane: u32,
@@ -32,11 +31,11 @@ pub(super) struct RawFacet<'a> {
     pub(super) leaves: [u32; 2],
     /// Counter-clockwise seen from the positive side.
     pub(super) points: &'a [DVec3],
-    /// Surfaces in the plane that come near it.
+    /// Surfaces in the plane that come near the polygon.
     pub(super) covers: Covers<'a>,
 }
 
-/// Some of the surfaces in a plane. What a facet's parts are near is a list of places: surfaces are not copied.
+/// Some of the surfaces in a plane, as a list of indices, so that surfaces are not copied.
 #[derive(Clone, Copy)]
 pub(super) struct Covers<'a> {
     all: &'a [Cover],
@@ -44,12 +43,12 @@ pub(super) struct Covers<'a> {
 }
 
 impl<'a> Covers<'a> {
-    /// Each in turn.
+    /// Iterates over the surfaces.
     pub(super) fn iter(self) -> impl Iterator<Item = &'a Cover> {
         self.near.iter().map(move |&i| &self.all[i as usize])
     }
 
-    /// Those that come near a part of the facet.
+    /// Returns the indices of the surfaces that come near a part of the facet.
     fn near(self, part: &[DVec3], reach: f64) -> SmallVec<[u32; 16]> {
         if self.near.is_empty() {
             return SmallVec::new();
@@ -60,34 +59,34 @@ impl<'a> Covers<'a> {
     }
 }
 
-/// What is done with the facets. Forked and joined along the tree, never along threads.
+/// Receiver of facets. It is forked and joined along the tree, never along threads.
 pub(super) trait FacetSink: Send + Sized {
-    /// Whether facets within this subtree matter.
+    /// Returns `true` if facets within this subtree matter.
     fn wants_subtree(&self, _child: i32) -> bool {
         true
     }
-    /// Whether facets between two subtrees matter.
+    /// Returns `true` if facets between two subtrees matter.
     fn wants_pair(&self, _front: i32, _back: i32) -> bool {
         true
     }
-    /// Takes a facet.
+    /// Receives a facet.
     fn take(&mut self, facet: &RawFacet<'_>);
-    /// A sink for one subtree.
+    /// Makes a sink for one subtree.
     fn fork(&self, leaves: std::ops::Range<u32>) -> Self;
-    /// Takes over what the forks of both subtrees, front then back, gathered.
+    /// Merges the results of both subtrees' forks, front then back.
     fn join(&mut self, front: Self, back: Self);
 }
 
-/// Everything that a visit needs.
+/// Input of a visit.
 pub(super) struct Visitor<'a> {
     pub(super) tree: &'a Tree,
     pub(super) surfaces: &'a [Surface],
     pub(super) tolerance: Tolerance,
-    /// What a visit may cost; facets are left out once that is over.
+    /// Bounds the work of a visit; once it is spent, facets are skipped.
     pub(super) purse: Purse<'a>,
 }
 
-/// A node's region: a box, cut by the oblique planes above the node, facing inwards.
+/// A node's region: a box, cut by the oblique planes above the node, which face inwards.
 #[derive(Clone)]
 pub(super) struct CutBox {
     pub(super) bounds: Aabb,
@@ -95,7 +94,7 @@ pub(super) struct CutBox {
 }
 
 impl CutBox {
-    /// Its parts on the positive and on the negative side of a plane.
+    /// Returns its parts on the positive and on the negative side of a plane.
     pub(super) fn split(&self, plane: &Plane) -> [Self; 2] {
         let (mut front, mut back) = (self.clone(), self.clone());
         match (0..3).find(|&a| plane.normal[a] == 1.0) {
@@ -113,7 +112,7 @@ impl CutBox {
 }
 
 impl Visitor<'_> {
-    /// Hands every facet of the tree to `sink`. Time is the number of facets times the depth.
+    /// Passes every facet of the tree to `sink`. Time: the number of facets times the depth.
     pub(super) fn visit<S: FacetSink + Sync>(&self, sink: &mut S) {
         let region = CutBox {
             bounds: self.tree.bounds,
@@ -218,7 +217,7 @@ impl Visitor<'_> {
             Sides::Front => self.push_down(plane, points, covers, with(0), sink),
             Sides::Back => self.push_down(plane, points, covers, with(1), sink),
             Sides::On => {
-                // In the node's plane but for rounding: what little there is decides.
+                // In the node's plane up to rounding: the sum of the small distances decides.
                 let sum: f64 = points.iter().map(|&p| cut.signed_distance(p)).sum();
                 self.push_down(plane, points, covers, with(usize::from(sum < 0.0)), sink);
             }
@@ -236,20 +235,20 @@ impl Visitor<'_> {
     }
 }
 
-/// What is open of a facet.
+/// The open part of a facet.
 #[derive(Default)]
 pub(super) struct OpenPieces {
-    /// Convex pieces, with the candidate that each lies on.
+    /// Convex pieces, each with the candidate that it lies on.
     pub(super) pieces: Vec<(Poly, Option<u32>)>,
 }
 
 impl OpenPieces {
     /// Subtracts the structural covers and divides the rest by the candidates.
     ///
-    /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], are closed.
+    /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], count as closed.
     pub(super) fn of(facet: &RawFacet<'_>, normal: DVec3, tolerance: &Tolerance) -> Self {
-        // Beside a triangle that was moved into its plane, a gap may be nothing but that move; away
-        // from triangles a sliver is as open as any facet, and closing it would part a cell.
+        // Beside a triangle that was moved into its plane, a gap may be an artifact of that move. Away from triangles
+        // a sliver is as open as any facet, and closing it would divide a cell.
         let is_bare = facet.covers.iter().all(|c| c.candidate.is_some());
         let (min_area, min_width) = if is_bare {
             (0.0, 2.0 * tolerance.cut)
@@ -291,7 +290,7 @@ impl OpenPieces {
 mod tests {
     use super::*;
 
-    /// Open pieces of a facet in z = 0, 1 m long and a fourth of the tolerance wide.
+    /// Returns the number of open pieces of a facet in z = 0, 1 m long and a fourth of the tolerance wide.
     fn pieces_of_sliver(covers: &[Cover]) -> usize {
         let tolerance = Tolerance::for_extent(10.0);
         let w = 0.25 * tolerance.width;

@@ -1,33 +1,35 @@
 //! The minimum cut of a graph between two terminals.
 //!
-//! Two trees grow toward each other, from the source and from the sink, along arcs with capacity left; where they meet, flow is
-//! pushed, and what that cuts off is adopted by the rest of its tree (Boykov & Kolmogorov, "An Experimental Comparison of
-//! Min-Cut/Max-Flow Algorithms for Energy Minimization in Vision", 2004). Trees are kept from one path to the next: on graphs of
-//! neighbors in space, each tied to both terminals, that is several times as fast as a flow by levels.
+//! Two trees grow toward each other, from the source and from the sink, along arcs with capacity left. Where they
+//! meet, flow is pushed, and the nodes that this cuts off find new parents in their tree (Boykov & Kolmogorov, "An
+//! Experimental Comparison of Min-Cut/Max-Flow Algorithms for Energy Minimization in Vision", 2004). Trees are kept
+//! from one path to the next: on graphs of neighbors in space, each tied to both terminals, that is several times as
+//! fast as a flow by levels.
 //!
-//! Capacities are whole numbers, so no rounding can loop. The cut is the same whatever way the flow takes: of all least
-//! ones that with the fewest nodes on the source's side.
+//! Capacities are integers, so rounding cannot cause loops. The cut does not depend on the path of the flow: among
+//! all minimum cuts it is the one with the fewest nodes on the source's side.
 //!
-//! Time `O(V²EC)` at worst, with the cut's cost `C`, and about linear in practice; memory 24 bytes an edge and 33 a node.
+//! Time: `O(V²EC)` at worst, with the cut's cost `C`, and about linear in practice. Memory: 24 bytes per edge, 33 per
+//! node.
 
 use std::collections::VecDeque;
 
 use enfilade_geom::Purse;
 
 const NONE: u32 = u32::MAX;
-/// Parent of a node that hangs on its terminal.
+/// Parent of a node attached to its terminal.
 const ROOT: u32 = u32::MAX - 1;
-/// Parent of a node that has lost it and waits for another.
+/// Parent of a node that has lost its own and waits for another.
 const LOST: u32 = u32::MAX - 2;
 
-/// Where a tree grows from: which one a node is in, if it has a parent.
+/// The root of a tree. A node with a parent belongs to one of the two trees.
 #[derive(Clone, Copy, PartialEq)]
 enum Terminal {
     Source,
     Sink,
 }
 
-/// Half of an edge; the other half is its neighbor in [`Flow::arcs`] by [`Flow::twin`].
+/// Half of an edge; [`Arc::twin`] is the other half.
 #[derive(Clone, Copy)]
 struct Arc {
     to: u32,
@@ -35,17 +37,17 @@ struct Arc {
     capacity: u64,
 }
 
-/// A graph to be cut.
+/// A graph under construction.
 pub(super) struct Flow {
     edges: Vec<([u32; 2], [u64; 2])>,
-    /// What is left from the source, or, below zero, to the sink.
+    /// Remaining capacity from the source, or, if negative, to the sink.
     terminal: Vec<i64>,
-    /// Flow that goes straight from source to sink through a node.
+    /// Flow straight from source to sink through a node.
     total: u64,
 }
 
 impl Flow {
-    /// `n` nodes without edges.
+    /// Makes a graph of `n` nodes without edges.
     pub(super) fn new(n: usize) -> Self {
         Self {
             edges: Vec::new(),
@@ -54,21 +56,21 @@ impl Flow {
         }
     }
 
-    /// An edge with capacities both ways.
+    /// Adds an edge with capacities for both directions.
     pub(super) fn add(&mut self, a: usize, b: usize, forward: u64, backward: u64) {
         if forward > 0 || backward > 0 {
             self.edges.push(([a as u32, b as u32], [forward, backward]));
         }
     }
 
-    /// Capacities from the source to a node and from there to the sink; once for each node. [Limit: below 2⁶³]
+    /// Sets the capacities from the source to a node and from there to the sink; once per node. [Limit: below 2⁶³]
     pub(super) fn tie(&mut self, node: usize, from_source: u64, to_sink: u64) {
         self.total = self.total.saturating_add(from_source.min(to_sink));
         self.terminal[node] = from_source as i64 - to_sink as i64;
     }
 
-    /// The cost of the minimum cut, and whether each node is on the source's side of it.
-    /// No minimum once the purse is empty.
+    /// Returns the cost of the minimum cut, and for each node `true` if it is on the source's side. The cut is not
+    /// minimal if the purse runs out.
     pub(super) fn cut(self, purse: Purse<'_>) -> (u64, Vec<bool>) {
         let total = self.total;
         let mut search = Search::of(self);
@@ -81,13 +83,13 @@ impl Flow {
 
 struct Search {
     arcs: Vec<Arc>,
-    /// First arc of each node, and the number of arcs.
+    /// First arc of each node, then the number of arcs.
     start: Vec<u32>,
     terminal: Vec<i64>,
     tree: Vec<Terminal>,
     /// The arc to the parent; [`ROOT`], [`LOST`], or [`NONE`] outside the trees.
     parent: Vec<u32>,
-    /// When the distance was last known to be right, and the distance to the terminal.
+    /// Time at which the distance was last known to be right, and the distance to the terminal.
     stamp: Vec<u32>,
     distance: Vec<u32>,
     active: VecDeque<u32>,
@@ -168,7 +170,7 @@ impl Search {
         self.start[node as usize]..self.start[node as usize + 1]
     }
 
-    /// Whether flow can pass from the parent's end of an arc to the child's in a tree: from `from` along the arc, or, in the
+    /// Returns `true` if flow can pass from the parent's end of an arc to the child's: along the arc, or, in the
     /// sink's tree, against it.
     fn is_open(&self, arc: u32, tree: Terminal) -> bool {
         let arc = self.arcs[arc as usize];
@@ -190,7 +192,7 @@ impl Search {
                 self.grow(node)
             };
             let Some(arc) = meeting else {
-                // Nothing is left to do from here, until it is reached anew.
+                // Nothing is left to do here until the node is reached again.
                 self.active.pop_front();
                 self.is_active[node as usize] = false;
                 continue;
@@ -205,7 +207,7 @@ impl Search {
         total
     }
 
-    /// Takes free neighbors into the tree. Returns an arc from the source's tree to the sink's once there is one.
+    /// Takes free neighbors into the tree. Returns an arc from the source's tree to the sink's once one exists.
     fn grow(&mut self, node: u32) -> Option<u32> {
         let tree = self.tree[node as usize];
         for arc in self.arcs_of(node) {
@@ -221,7 +223,7 @@ impl Search {
             } else if self.tree[t] != tree {
                 return Some(if tree == Terminal::Source { arc } else { twin });
             } else if self.stamp[t] <= self.stamp[n] && self.distance[t] > self.distance[n] {
-                // Shorter that way.
+                // That way is shorter.
                 self.hang(to, twin, node);
             }
         }
@@ -235,7 +237,7 @@ impl Search {
         self.distance[node as usize] = self.distance[parent as usize] + 1;
     }
 
-    /// Pushes what fits along the path through `middle`, and leaves as orphans what hung on arcs that are full now.
+    /// Pushes the most flow possible along the path through `middle`; nodes that hung on full arcs become orphans.
     fn augment(&mut self, middle: u32) -> u64 {
         let twin = self.arcs[middle as usize].twin;
         let ends = [
@@ -262,7 +264,7 @@ impl Search {
             while self.parent[node] != ROOT {
                 let up = self.parent[node] as usize;
                 let down = self.arcs[up].twin as usize;
-                // Toward the node from the source, and away from it to the sink.
+                // Flow runs toward the node in the source's tree, and away from it in the sink's.
                 let (with, against) = match tree {
                     Terminal::Source => (down, up),
                     Terminal::Sink => (up, down),
@@ -290,7 +292,7 @@ impl Search {
         self.orphans.push_back(node);
     }
 
-    /// Finds an orphan the parent nearest to the terminal, or lets it go free and its children with it.
+    /// Gives an orphan the parent nearest to the terminal; without one, frees it and orphans its children.
     fn adopt(&mut self, node: u32) {
         let tree = self.tree[node as usize];
         self.parent[node as usize] = NONE;
@@ -326,7 +328,7 @@ impl Search {
         }
     }
 
-    /// How far a node's terminal is, if its way there is still whole. Marks the way.
+    /// Returns the distance of a node from its terminal, if the way there is intact. Marks that way.
     fn distance_to_terminal(&mut self, from: u32) -> Option<u32> {
         let (mut node, mut steps) = (from as usize, 0);
         loop {
@@ -382,7 +384,7 @@ mod tests {
                 });
                 tied.sum::<u64>() + cut.sum::<u64>()
             };
-            // Every cut, tried one by one.
+            // Try every cut.
             let all = (0..1_u32 << n).map(|set| (cost(&|v| set >> v & 1 == 1), set));
             let least = all.clone().map(|(cost, _)| cost).min().unwrap();
             let common = all.filter(|c| c.0 == least).fold(u32::MAX, |common, c| common & c.1);

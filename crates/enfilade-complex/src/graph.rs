@@ -1,4 +1,4 @@
-//! The first visit: which leaves are open to each other, how widely, and how large they are.
+//! The first visit: which leaves are open to each other, how wide those openings are, and the volume of each leaf.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use smallvec::SmallVec;
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
 use super::tree::{Tree, leaf_index};
 
-/// Openings up to so many gaps wide are cracks, with the default gap as wide as [`CRACK_WIDTH`](super::CRACK_WIDTH).
+/// Openings up to this many gaps wide are cracks; for the default gap that is [`CRACK_WIDTH`](super::CRACK_WIDTH).
 const CRACK_GAPS: f64 = 5.0;
 
-/// What a border on a candidate costs, per area: so little that it is only a tie-breaker.
+/// Cost per area of a border on a candidate: only a tie-breaker.
 const CANDIDATE: f64 = 0.01;
 
 /// No candidate.
@@ -28,17 +28,17 @@ pub(super) struct OpenFacet {
     pub(super) width: f32,
     /// Area of all its pieces.
     pub(super) area: f32,
-    /// The candidate that it lies on, or [`NO_CANDIDATE`].
+    /// Its candidate, or [`NO_CANDIDATE`].
     pub(super) candidate: u32,
     /// No piece of it is wider than a crack.
     pub(super) is_narrow: bool,
-    /// No piece of it lets a ball of the smallest hole pass: it may be sealed.
+    /// No piece of it lets a ball of the smallest hole pass, so it may be sealed.
     pub(super) is_gap: bool,
 }
 
 impl OpenFacet {
-    /// What a border between two cells costs here: its area, and next to nothing on a candidate, where it is meant to be.
-    /// [Units: wu²]
+    /// Returns the cost of a border between two cells here: its area, or next to nothing on a candidate, where a
+    /// border belongs. [Units: wu²]
     pub(super) fn cost(&self) -> f64 {
         let share = if self.candidate == NO_CANDIDATE {
             1.0
@@ -49,21 +49,21 @@ impl OpenFacet {
     }
 }
 
-/// What the first visit finds out.
+/// Result of the first visit.
 pub(super) struct LeafGraph<'a> {
     /// Openings, in the order of the tree.
     pub(super) facets: Vec<OpenFacet>,
     /// Volume of each leaf.
     pub(super) volumes: Vec<f64>,
-    /// Area of the largest face of each leaf; volume by that is a leaf's thickness within a factor of three.
+    /// Area of the largest face of each leaf. Volume divided by it is the leaf's thickness, within a factor of three.
     pub(super) faces: Vec<f32>,
-    /// Whether each leaf touches the border of the box.
+    /// For each leaf, `true` if it touches the border of the box.
     pub(super) at_border: Vec<bool>,
-    /// Openings through which no ball of this diameter passes are narrow. [Units: wu]
+    /// Diameter of the smallest hole: openings through which no such ball passes are narrow. [Units: wu]
     pub(super) hole: f64,
-    /// Openings narrower than this may be steps between surfaces that were put into planes. [Units: wu]
+    /// Openings narrower than this may be steps between surfaces that were moved into planes. [Units: wu]
     pub(super) rounding: f64,
-    /// What those who go through it spend from.
+    /// Pays for later passes over the graph.
     pub(super) purse: Purse<'a>,
 }
 
@@ -101,7 +101,7 @@ impl<'a> LeafGraph<'a> {
                 },
             );
         }
-        // Degenerate leaves come out as noise about zero.
+        // The volumes of degenerate leaves are noise around zero.
         for v in &mut volumes {
             *v = v.max(0.0);
         }
@@ -124,20 +124,20 @@ impl<'a> LeafGraph<'a> {
         graph
     }
 
-    /// Spends what one pass over all leaves and openings costs; says whether to go on.
+    /// Spends the cost of one pass over all leaves and openings; returns `false` once the purse is empty.
     pub(super) fn spend_pass(&self) -> bool {
         let n = self.volumes.len() + self.facets.len();
         self.purse.spend(n as u64 / 4)
     }
 
-    /// Whether an opening of this width, narrower than `limit`, is at the rim of a leaf thinner than that, or no wider than
-    /// a rounding. Nothing that has room passes there: it passes through the wide faces of the leaf.
+    /// Returns `true` if an opening narrower than `limit` is at the rim of a leaf thinner than `limit`, or no wider
+    /// than rounding. Nothing passes there: anything that fits passes through the wide faces of the leaf.
     pub(super) fn is_rim(&self, leaves: [u32; 2], width: f64, limit: f64) -> bool {
         let is_thin = |&l: &u32| self.is_thinner(l, limit);
         width < limit && (width < self.rounding || leaves.iter().any(is_thin))
     }
 
-    /// Whether no ball of the smallest hole fits into a leaf, but for a factor of three.
+    /// Returns `true` if no ball of the smallest hole fits into a leaf, within a factor of three.
     pub(super) fn is_thin(&self, leaf: u32) -> bool {
         self.is_thinner(leaf, self.hole)
     }
@@ -147,25 +147,24 @@ impl<'a> LeafGraph<'a> {
     }
 }
 
-/// How much room there is around openings.
+/// Measures the free space around openings.
 #[derive(Clone, Copy)]
 pub(super) struct Clearance<'a> {
     /// The structural triangles.
     pub(super) bvh: &'a Bvh,
     /// Diameter of the smallest hole. [Units: wu]
     pub(super) hole: f64,
-    /// What looking may cost.
+    /// Pays for queries.
     pub(super) purse: Purse<'a>,
 }
 
 impl Clearance<'_> {
-    /// Whether an opening, a convex polygon, lets no ball of the smallest hole pass: no point of it is farther than
-    /// half the hole's width from matter.
+    /// Returns `true` if an opening, a convex polygon, lets no ball of the smallest hole pass: none of its points is
+    /// farther than half the hole's width from solids.
     ///
-    /// Sampled at its middle, its corners, the middles of its edges and half way. The width of the polygon says nothing:
-    /// cuts of the tree make narrow ones in the middle of the air, and beside a gap between two nearly parallel planes
-    /// there are wide ones.
-    /// One query of the triangles in the open, at most `4n + 1` in a gap.
+    /// Samples its middle, and points between it and the vertices and the middles of edges. The polygon's width does
+    /// not matter: cuts of the tree make narrow ones in open air, and beside a gap between two nearly parallel planes
+    /// there are wide ones. One query of the triangles in the open, at most `4n + 1` in a gap.
     pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
         let mut series = NearSeries::default();
         let is_gap = self.is_narrower(points, self.hole, true, &mut series);
@@ -173,11 +172,11 @@ impl Clearance<'_> {
         is_gap
     }
 
-    /// Whether an opening is narrow, no wider than a crack, and whether it is a gap. Of pieces narrower than what is asked
-    /// for, which cuts of the tree make, the middle alone is looked at.
+    /// Returns two flags for an opening: narrow, that is, no wider than a crack; and gap. Of pieces narrower than the
+    /// respective diameter, which cuts of the tree make, only the middle is tested.
     fn narrowness(&self, points: &[DVec3], width: f64) -> [bool; 2] {
         let (crack, mut series) = (CRACK_GAPS * self.hole, NearSeries::default());
-        // Most are in the open: one query.
+        // Most are in the open and take one query.
         let in_middle = self
             .bvh
             .any_within(middle_of(points), 0.5 * crack, &mut series);
@@ -192,12 +191,12 @@ impl Clearance<'_> {
         [is_narrow, is_gap]
     }
 
-    /// Takes what queries cost from what may be spent.
+    /// Spends the cost of queries.
     fn spend(&self, series: &NearSeries) {
         self.purse.spend(series.n_looked / 4);
     }
 
-    /// Whether an opening lets no ball of so large a diameter pass; by its middle alone where the rest does not count.
+    /// Returns `true` if an opening lets no ball of this diameter pass; tests only its middle unless `is_whole`.
     fn is_narrower(
         &self,
         points: &[DVec3],
@@ -211,11 +210,11 @@ impl Clearance<'_> {
         let reach = 0.5 * diameter;
         let (n, middle) = (points.len(), middle_of(points));
         let between = (0..n).map(|i| points[i].midpoint(points[(i + 1) % n]));
-        // Corners are where matter is: a tenth of the way to the middle tells more.
+        // Vertices touch solids, so points a tenth of the way to the middle are more telling.
         let inner = points.iter().copied().chain(between);
         let inner = inner.flat_map(|p| [0.1, 0.5].map(|t| p.lerp(middle, t)));
         let inner = inner.filter(|_| is_whole);
-        // Distances change no faster than places do, so near a point that is known to be close no other is asked.
+        // Distances change no faster than positions, so points near one known to be close need no query.
         let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
         std::iter::once(middle).chain(inner).all(|p| {
             if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
@@ -228,17 +227,18 @@ impl Clearance<'_> {
     }
 }
 
-/// Mean of the corners.
+/// Returns the mean of the vertices.
 fn middle_of(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len() as f64
 }
 
-/// Signed volume of the cone from `origin` over a polygon: what divergence sums up.
+/// Returns the signed volume of the cone from `origin` over a polygon; over a closed surface, these add up to its
+/// volume.
 fn cone_volume(points: &[DVec3], normal: DVec3, origin: DVec3) -> f64 {
     poly::area(points) * normal.dot(points[0] - origin) / 3.0
 }
 
-/// The six faces of a box with their outward normals.
+/// Returns the six faces of a box with their outward normals.
 pub(super) fn box_faces(b: &Aabb) -> [(Poly, DVec3); 6] {
     std::array::from_fn(|i| {
         let (axis, high) = (i % 3, i >= 3);
@@ -255,7 +255,7 @@ pub(super) fn box_faces(b: &Aabb) -> [(Poly, DVec3); 6] {
     })
 }
 
-/// Pushes a polygon down the tree and hands out its piece of every leaf.
+/// Pushes a polygon down the tree and passes on its piece in every leaf.
 pub(super) fn sides_of_border(
     tree: &Tree,
     child: i32,
@@ -283,9 +283,9 @@ struct LeafSink<'a> {
     origin: DVec3,
     first_leaf: u32,
     facets: Vec<OpenFacet>,
-    /// Of the leaves from `first_leaf` on.
+    /// For the leaves from `first_leaf` on.
     volumes: Vec<f64>,
-    /// Likewise.
+    /// For the same leaves.
     faces: Vec<f32>,
 }
 

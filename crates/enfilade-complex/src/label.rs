@@ -1,17 +1,18 @@
-//! From votes to cells: which leaves make up which cell.
+//! Groups leaves into cells by votes.
 //!
 //! 1. Leaves connected without crossing a candidate portal or a gap form components. A gap is an opening through
-//!    which no ball of the smallest hole passes. Where rooms run into each other so, cracks are left out as well, which
-//!    are a few times as wide.
-//! 2. A component in which one label rules belongs to it. One with several strong labels has a
-//!    leak: it is grown together along its openings, widest first, unless that would join two
-//!    labels (Kruskal's forest), so that cells meet at the narrowest places.
-//! 3. Parts of one label that open to each other are one again, candidate or not.
-//! 4. What has no label, or too little volume to be a cell, joins the neighbor that a border with would cost most: that it
-//!    opens to most, through a candidate if need be. What opens nowhere but through gaps and nobody votes for is matter.
-//! 5. Crumbs, too thin for a ball of the smallest hole, go to what they have the largest gaps to, matter included.
+//!    which no ball of the smallest hole passes. Where rooms leak into each other in this way, cracks, which are a
+//!    few times as wide, are not crossed either.
+//! 2. A component with one dominant label belongs to it. One with several strong labels has a leak: it is grown
+//!    together along its openings, widest first, unless that would join two labels (Kruskal's forest), so that cells
+//!    meet at the narrowest places.
+//! 3. Parts of one label that open to each other are rejoined, across candidates too.
+//! 4. Groups without a label, or with too little volume for a cell, join the neighbor with which a border would cost
+//!    most: the one they open to most, through a candidate if need be. Groups without votes that open only through
+//!    gaps are solid.
+//! 5. Crumbs, too thin for a ball of the smallest hole, join the cell or solid to which they have the largest gaps.
 //!
-//! Time `O(F log F)` in open facets. Every merge lowers the number of groups, so it ends.
+//! Time: `O(F log F)` in open facets. Every merge reduces the number of groups, so it ends.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -32,27 +33,27 @@ fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
     out
 }
 
-/// A maximal set of leaves that is to be one cell, or part of one.
+/// A maximal set of leaves that will be one cell, or part of one.
 struct Group {
-    /// Its least leaf. Merging names a group by what that was at first, so that a large one need not tell all its
-    /// neighbors of each that it takes in.
+    /// Its least leaf. Merging keeps the id of a group, so that a large group need not update all its neighbors
+    /// whenever it takes in another.
     root: u32,
     label: Option<u32>,
-    /// It is a cell whatever happens around it.
+    /// It is a cell, whatever happens around it.
     keeps: bool,
     volume: f64,
-    /// What borders with other groups cost.
+    /// For each neighboring group, the cost of a border with it.
     neighbors: BTreeMap<u32, f64>,
     /// Open area to other groups.
     open: f64,
-    /// How much of that lies on no candidate.
+    /// The part of `open` that lies on no candidate.
     leak: f64,
 }
 
-/// What it costs to locate a vote and to count it, in units of [`enfilade_geom::Allowance`].
+/// Cost of locating and counting a vote, in units of [`enfilade_geom::Allowance`].
 const WORK_A_VOTE: u64 = 2;
 
-/// Divides the leaves among cells. `leaf_of` locates votes.
+/// Divides the leaves among cells. `leaf_of` returns the leaf of a vote.
 pub(super) fn label_leaves(
     graph: &LeafGraph<'_>,
     votes: &[Vote],
@@ -62,7 +63,7 @@ pub(super) fn label_leaves(
 ) -> LeafCells {
     let n_leaves = graph.volumes.len();
     let mut tally = Tally::new();
-    // Located in parallel, counted in order, so that sums round alike on any number of threads.
+    // Located in parallel but counted in order, so that sums round alike for any number of threads.
     let leaf_of = |v: &Vote| {
         let may_look = graph.purse.spend(WORK_A_VOTE);
         may_look.then(|| leaf_of(v)).flatten()
@@ -80,13 +81,13 @@ pub(super) fn label_leaves(
     let has_leak =
         |strong: &BTreeMap<u32, Vec<u32>>, c: u32| strong.get(&c).is_some_and(|s| s.len() > 1);
     if strong.keys().any(|&c| has_leak(&strong, c)) {
-        // Rooms that run into each other: perhaps through nothing but cracks.
+        // Rooms leak into each other, perhaps only through cracks.
         let leaked: Vec<bool> = component_of.iter().map(|&c| has_leak(&strong, c)).collect();
         component_of = components(graph, |leaf| leaked[leaf as usize]);
         strong = strong_labels(graph, &tally, &component_of, settings);
     }
 
-    // Leaves of components with several strong labels are grown together; all others at once.
+    // Leaves of components with several strong labels are grown together; all others are joined at once.
     let mut sets = Sets::new(n_leaves);
     let mut label_of_set: Vec<u32> = vec![SOLID; n_leaves];
     let leaked = |leaf: u32| {
@@ -133,7 +134,7 @@ pub(super) fn label_leaves(
     cells
 }
 
-/// Gives leaves at the border that came to other cells back to the outside.
+/// Returns leaves at the border that ended up in other cells to the outside.
 fn keep_border_outside(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     let Some(outside) = cells.outside else { return };
     for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
@@ -147,8 +148,8 @@ fn keep_border_outside(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     }
 }
 
-/// The component of each leaf: what hangs together other than through candidates, gaps and, where `parts_cracks` says so of
-/// a leaf, cracks.
+/// Returns the component of each leaf: leaves connected without crossing candidates, gaps or, where `parts_cracks`
+/// returns `true` for a leaf, cracks.
 fn components(graph: &LeafGraph<'_>, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
     graph.spend_pass();
     let n_leaves = graph.volumes.len() as u32;
@@ -162,7 +163,7 @@ fn components(graph: &LeafGraph<'_>, parts_cracks: impl Fn(u32) -> bool) -> Vec<
     (0..n_leaves).map(|l| sets.find(l)).collect()
 }
 
-/// The labels that stand for a region in each component; components without any are left out.
+/// Returns the strong labels in each component, and leaves out components without any.
 fn strong_labels(
     graph: &LeafGraph<'_>,
     tally: &Tally,
@@ -182,8 +183,8 @@ fn strong_labels(
     }
     let mut strong: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (&(c, label), &w) in &by_component {
-        // A share of the label, not of the component: a toilet that leaks into a hall is a small
-        // part of both together, yet all of the toilet.
+        // A share of the label, not of the component: a toilet that leaks into a hall is a small part of both
+        // together, yet all of the toilet.
         let main = w >= settings.strong_share * of_label[&label];
         let rules = w >= (1.0 - settings.dominance) * of_component[&c]
             && of_component[&c] >= 0.25 * volume[&c];
@@ -194,7 +195,7 @@ fn strong_labels(
     strong
 }
 
-/// Kruskal's forest over the openings of leaked components, two labels never in one tree.
+/// Grows Kruskal's forest over the openings of leaked components, never with two labels in one tree.
 fn grow_together(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
@@ -225,7 +226,7 @@ fn grow_together(
     }
 }
 
-/// Joins parts of one region that only a candidate parts: a candidate reaches beyond its opening, and two
+/// Joins parts of one region that only a candidate separates: a candidate reaches beyond its opening, and two
 /// candidates of one opening have a slice of a room between them.
 fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [u32]) {
     for f in &graph.facets {
@@ -237,7 +238,7 @@ fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [u32]) {
     }
 }
 
-/// The sets that have a label, or an opening to another set that is no gap: by their least leaves.
+/// Returns, by least leaf, the sets that have a label or an opening other than a gap to another set.
 fn open_sets(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
     graph.spend_pass();
     let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != SOLID).collect();
@@ -251,13 +252,13 @@ fn open_sets(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &[u32]) -> Ve
     is_open
 }
 
-/// Spends what it costs to merge two groups; says whether to go on.
+/// Spends the cost of merging two groups; returns `false` once the purse is empty.
 fn may_merge(graph: &LeafGraph<'_>, a: &Group, b: &Group) -> bool {
     let n_neighbors = a.neighbors.len() + b.neighbors.len();
     graph.purse.spend(2 + n_neighbors as u64)
 }
 
-/// Lets groups without a label, and small doubles of a label, join their neighbors.
+/// Merges groups without a label, and small duplicates of a label, into their neighbors.
 fn merge_groups(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
@@ -297,7 +298,7 @@ fn merge_groups(
             }
         }
     }
-    // The largest group of each label keeps it whatever its size.
+    // The largest group of each label keeps it, whatever its size.
     let mut main: BTreeMap<u32, (f64, Reverse<u32>)> = BTreeMap::new();
     for (&id, group) in &groups {
         if let Some(label) = group.label {
@@ -309,13 +310,13 @@ fn merge_groups(
         }
     }
     for (&id, group) in &mut groups {
-        // A closet has a door, a shaft nothing; a hollow in furniture leaks all over.
+        // A closet opens at its door and a shaft not at all, but a hollow in furniture leaks all over.
         let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * group.open;
         let is_part = group.volume >= settings.min_volume
             && (settings.keeps_closed || !group.neighbors.is_empty());
         group.keeps = !is_cavity && group.label.is_some_and(|l| main[&l].1.0 == id || is_part);
     }
-    // Smallest first; volumes are not negative, so their bits compare like the numbers.
+    // Smallest first; volumes are not negative, so their bits compare like numbers.
     let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), group.root, id));
     let mut queue: BinaryHeap<Reverse<(u64, u32, u32)>> = groups
         .iter()
@@ -359,11 +360,11 @@ fn merge_groups(
     groups.into_values().map(|g| (g.root, g)).collect()
 }
 
-/// Gives crumbs, in which nothing has room, to what they have the largest gaps to; where gaps are not to be sealed,
-/// all that opens nowhere but through gaps.
+/// Merges crumbs, which have room for nothing, into the cell or solid to which they have the largest gaps; without
+/// seals, does so for everything that opens only through gaps.
 ///
-/// Kruskal's forest over the gaps, largest first, never two in one tree that are cells or matter: little is left to be
-/// sealed. `O(F log F)` in gaps.
+/// Kruskal's forest over the gaps, largest first, never with two cells or solids in one tree, so that little is left
+/// to be sealed. `O(F log F)` in gaps.
 fn give_away_crumbs(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
@@ -381,7 +382,7 @@ fn give_away_crumbs(
             stays[sets.find(leaf) as usize] = true;
         }
     }
-    // Areas are not negative, so their bits compare like the numbers.
+    // Areas are not negative, so their bits compare like numbers.
     let gaps = graph.facets.iter().filter(|f| f.is_gap);
     let mut gaps: Vec<(Reverse<u32>, [u32; 2])> = gaps
         .map(|f| (Reverse(f.area.to_bits()), f.leaves))
@@ -408,7 +409,7 @@ fn give_away_crumbs(
     out
 }
 
-/// Numbers the groups that are cells by label, then by falling volume; the rest is solid.
+/// Numbers the groups that are cells by label, then by falling volume; all others are solid.
 fn number_cells(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
@@ -421,7 +422,7 @@ fn number_cells(
             .then(b.1.volume.total_cmp(&a.1.volume))
             .then(a.0.cmp(b.0))
     });
-    // What reaches the border is open to all that lies beyond, and that is one cell.
+    // Groups at the border are all open to the space beyond it, so they are one cell.
     let mut border: BTreeMap<u32, f64> = BTreeMap::new();
     for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
         *border.entry(sets.find(leaf as u32)).or_default() += graph.volumes[leaf];
@@ -468,7 +469,7 @@ mod tests {
     use super::*;
     use enfilade_geom::Purse;
 
-    /// A band above the floor of one room, which only cracks join to the rest of it, beneath a door to another.
+    /// A band above the floor of one room, beneath a door to another, joined to the rest of its room only by cracks.
     #[test]
     fn what_has_no_label_goes_to_what_it_opens_to_beside_a_candidate() {
         let facet = |other: u32, candidate: u32, area: f32| OpenFacet {
@@ -495,7 +496,7 @@ mod tests {
             (0..2).find(|&room| sets.find(room) == sets.find(2))
         };
         assert_eq!(home(&graph), Some(0));
-        // Through a candidate only where nothing else is open.
+        // It passes through a candidate only if nothing else is open.
         let shut = LeafGraph {
             facets: vec![facet(1, 0, 0.1)],
             ..graph

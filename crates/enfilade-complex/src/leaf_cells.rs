@@ -1,28 +1,28 @@
-//! Which cell each leaf belongs to, and what votes said about it.
+//! Assignment of leaves to cells, and tallies of votes.
 
 use std::collections::BTreeMap;
 
 /// The label of leaves in no cell.
 pub(super) const SOLID: u32 = u32::MAX;
 
-/// Leaves by cell.
+/// The cell of each leaf.
 #[derive(Clone, Debug)]
 pub struct LeafCells {
     /// Cell of each leaf, or [`SOLID`].
     pub(super) cell_of_leaf: Vec<u32>,
-    /// The vote label that each cell goes by; several cells may share one.
+    /// The vote label of each cell; several cells may share one.
     pub label_of_cell: Vec<u32>,
     /// Volume of each cell.
     pub(super) volumes: Vec<f64>,
-    /// The cell with most leaves at the border of the box by volume, if any touches it.
+    /// The cell with the largest volume of leaves at the border of the box, if any touches it.
     pub(super) outside: Option<u32>,
 }
 
-/// Votes of one leaf or component for one label.
+/// Weight of the votes of a leaf or component for a label.
 pub(super) type Tally = BTreeMap<(u32, u32), f64>;
 
 impl LeafCells {
-    /// Numbers the cells anew without those that lost every leaf, and sums their volumes anew from those of the leaves.
+    /// Renumbers the cells without those that lost every leaf, and recomputes their volumes from the leaves.
     pub(super) fn drop_empty(&mut self, volume_of_leaf: &[f64]) {
         let n = self.label_of_cell.len();
         let mut volumes = vec![0.0; n];

@@ -1,11 +1,9 @@
-//! The exact convex cell complex: the watershed decides where portals are, the complex makes them
-//! exact.
+//! The exact convex cell complex. The watershed decides where portals are; the complex makes them exact.
 //!
-//! Structural triangles and *candidate portals* (each a planar convex polygon a bit larger
-//! than its opening) cut a box into convex leaves; what is open between two leaves is known
-//! exactly. Votes from outside (voxel centers with region labels) then say which leaves belong
-//! together, and the openings between leaves of different cells are the portals: the openings
-//! under the candidates, and every crack that nobody foresaw.
+//! Structural triangles and *candidate portals* (each a planar convex polygon slightly larger than its opening) cut a
+//! box into convex leaves, so that the open part between two leaves is known exactly. Votes of the caller (voxel
+//! centers with region labels) decide which leaves belong together. The openings between leaves of different cells
+//! are the portals: the openings under the candidates, and all cracks that no candidate covers.
 //!
 //! | stage | file | source |
 //! | --- | --- | --- |
@@ -14,26 +12,25 @@
 //! | facets between leaves, minus the triangles in them | `facet`, `graph` | ibid., notes after §3.0.2 |
 //! | leaves to cells | `label` | ours; votes take the place of the grouping of §2.1 |
 //! | borders without a candidate, made small | `cut` | minimum cuts, Boykov, Veksler & Zabih 2001 |
-//! | portals, what each cell sees, the locator | `partition`, `pieces`, `seen`, `tagged` | ours |
-//! | later: one cell cut in two by a new portal | `divide` | ours |
+//! | portals, the cells that see each triangle, the locator | `partition`, `pieces`, `seen`, `tagged` | ours |
+//! | later: one cell divided by a new portal | `divide` | ours |
 //!
-//! Where it departs from Lefebvre & Hornus: their cells are grown by choosing among separators that
-//! the subdivision happens to make. Ours come from the volume and are only *realized* in the
-//! subdivision, so that the quality of a portal does not depend on the order of splits, and
-//! completeness of the cut does not depend on having found every opening: whatever is left open
-//! between two cells is found by the facets and becomes a portal.
+//! Departs from Lefebvre & Hornus, who grow cells by choosing among separators that the subdivision happens to
+//! make. Our separators come from the volume and are only *realized* in the subdivision. So the quality of a portal
+//! does not depend on the order of splits, and the cut is complete even if some openings have no candidate: the
+//! facets find everything left open between two cells, and it becomes a portal.
 //!
-//! **Which way it errs:** openings too narrow to be told from the rounding of `f32` corners (see
-//! [`Complex::opening_tolerance`]) are closed; surfaces that are too thin, or too dense to be cut,
-//! do not block. The second joins cells or adds portals and keeps every promise; through the first
-//! only a sight line within that tolerance of an edge could pass. Slivers away from triangles stay
-//! open whatever their width; those of them where cells meet are kept as [`Partition::hairlines`].
+//! **Which way it errs:** openings too narrow to be told from the rounding of `f32` vertices (see
+//! [`Complex::opening_tolerance`]) are closed; surfaces that are too thin, or too dense to be cut, do not block. The
+//! latter joins cells or adds portals and keeps every promise; the former loses only sight lines within that
+//! tolerance of an edge. Slivers away from triangles stay open whatever their width; those where cells meet are kept
+//! as [`Partition::hairlines`].
 //!
-//! **Complexity:** `n` surfaces make `O(n)` leaves and facets where surfaces are spread out, and up
-//! to `k²` where `k` of them pass through one small box; time `O(n log n)`, about 20 bytes a facet.
-//! **What can go wrong:** many crossing surfaces in a knot below 2 cm, and scenes so large that
-//! `f32` steps reach the width of real cracks (beyond about 1 km). Moving corners into shared planes
-//! opens wedges along shallow creases; seams close them (`surface`), all but a few hair-fine ones.
+//! **Complexity:** `n` surfaces make `O(n)` leaves and facets where surfaces are spread out, and up to `k²` where `k`
+//! of them pass through one small box; time `O(n log n)`, about 20 bytes per facet. **What can go wrong:** many
+//! crossing surfaces in a knot below 2 cm, and scenes so large that `f32` steps reach the width of real cracks
+//! (beyond about 1 km). Moving vertices into shared planes opens wedges along shallow creases; seams close all but a
+//! few hair-fine ones (`surface`).
 
 mod cut;
 pub mod divide;
@@ -61,47 +58,47 @@ use graph::{Clearance, LeafGraph};
 use surface::{NO_PLANE, Source, Surface, SurfaceSet, Tolerance};
 use tree::Tree;
 
-/// The polygons of the complex.
+/// Polygon functions used by the complex.
 pub use enfilade_geom::poly;
 pub use leaf_cells::LeafCells;
 pub use partition::{Leak, Partition, PartitionPortal, Seal};
 pub use seen::TriangleCells;
 
-/// Openings narrower than this that no candidate foresaw are cracks. [Units: wu]
+/// Openings narrower than this are cracks, unless they lie on a candidate. [Units: wu]
 pub const CRACK_WIDTH: f64 = 0.05;
 
-/// What the complex is built from.
+/// Input of [`build_complex`].
 #[derive(Clone, Copy, Debug)]
 pub struct ComplexInput<'a> {
     /// Structural triangles in world space, coordinates representable as `f32`. [Units: wu]
     ///
-    /// Triangles with coordinates that are not finite block nothing and are seen by nobody.
+    /// Triangles with coordinates that are not finite block nothing, and no cell sees them.
     pub triangles: &'a [Triangle],
     /// Candidate portals: planar, convex, a bit larger than their openings.
     pub candidates: &'a [Winding],
-    /// Triangles that are missing in the structure: they part cells as candidates do, but what opens there was not meant to.
+    /// Triangles missing from the structure. They separate cells as candidates do, but their openings are unintended.
     pub missing: &'a [Triangle],
-    /// What to partition; grown to hold the triangles with a margin.
+    /// The box to partition; grown to hold the triangles with a margin.
     pub bounds: Aabb,
-    /// Openings through which no ball of this diameter passes are gaps: they join no cells; 0 where there are none.
-    /// [Units: wu] [Limit: at least 0]
+    /// Diameter of the smallest hole. Openings through which no such ball passes are gaps and join no cells; with 0,
+    /// there are no gaps. [Units: wu] [Limit: at least 0]
     pub gap: f64,
-    /// Whether gaps are closed by seals. If not, they are portals, and matter behind them belongs to a cell.
+    /// Close gaps with seals. Otherwise they are portals, and the space behind them belongs to a cell.
     pub has_seals: bool,
 }
 
 /// A statement that a point belongs to a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vote {
-    /// Where, e.g. the center of a voxel. [Units: wu]
+    /// A position, e.g. the center of a voxel. [Units: wu]
     pub point: DVec3,
-    /// The region; `u32::MAX` is no region and does not count.
+    /// The region. Votes with `u32::MAX` do not count.
     pub label: u32,
     /// The volume that it stands for. [Units: wu³]
     pub weight: f32,
 }
 
-/// How much two cells are open to each other, but for cracks.
+/// Area of the openings, other than cracks, between two cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// Area on candidates. [Units: wu²]
@@ -110,20 +107,19 @@ pub struct Contact {
     pub beside: f64,
 }
 
-/// How leaves are divided among cells.
+/// Settings for grouping leaves into cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LabelSettings {
-    /// A smaller part of a region, apart from its main part, joins what it opens to. [Units: wu³]
+    /// A smaller part of a region, apart from its main part, joins the neighbor it opens to most. [Units: wu³]
     pub min_volume: f64,
-    /// A smaller region that opens to others beside its candidates, too, is a cavity and joins them.
-    /// [Units: wu³]
+    /// A smaller region that also opens to others beside its candidates is a cavity and joins them. [Units: wu³]
     pub min_room: f64,
-    /// A part of a region that opens nowhere, apart from its main part, is a cell of its own. Otherwise it is solid: where
-    /// votes come from air that is connected, they got there through what the complex closes.
+    /// Make a part of a region that opens nowhere, apart from its main part, a cell of its own. Otherwise it is
+    /// solid: if votes come from connected air, they got there through openings that the complex closes.
     pub keeps_closed: bool,
-    /// A label with this share of a component's votes has it alone, unless another is strong there.
+    /// A label with this share of a component's votes owns it, unless another label is strong there.
     pub dominance: f64,
-    /// A label is strong where this share of all its votes is.
+    /// A label is strong in a component with this share of all its votes.
     pub strong_share: f64,
 }
 
@@ -146,23 +142,23 @@ pub struct Complex<'a> {
     graph: LeafGraph<'a>,
     tolerance: Tolerance,
     n_triangles: usize,
-    /// Those after them stand for triangles that are missing.
+    /// Number of candidates before those that stand for missing triangles.
     n_candidates: u32,
     bvh: Bvh,
-    /// Whether narrow openings are closed by seals.
+    /// `true` if seals close narrow openings.
     has_seals: bool,
 }
 
-/// Builds the complex. The order of the triangles has no say in the result.
+/// Builds the complex. The result does not depend on the order of the triangles.
 ///
-/// Time `O(n log n)` for `n` surfaces spread out in space; uses rayon's current pool, and the
-/// result is the same for any number of threads.
+/// Time: `O(n log n)` for `n` surfaces spread out in space. Uses rayon's current pool; the result is the same for any
+/// number of threads.
 #[must_use]
 pub fn build_complex(input: &ComplexInput<'_>) -> Complex<'static> {
     build_complex_of(input, Purse::endless())
 }
 
-/// [`build_complex`], as far as an allowance goes: once that is over, the complex is not to be used, nor what is made of it.
+/// Does [`build_complex`] within an allowance. Once that is used up, neither the complex nor its results are valid.
 #[must_use]
 pub fn build_complex_within<'a>(input: &ComplexInput<'_>, allowance: &'a Allowance) -> Complex<'a> {
     build_complex_of(input, allowance.into())
@@ -198,7 +194,7 @@ fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'
         .fold(Aabb::EMPTY, |b, &p| b.including(p));
     let mut bounds = input.bounds;
     if !inner.is_empty() {
-        // Something must lie around the outermost wall, so that its outer side is seen.
+        // Leave space around the outermost wall, so that its outer side is seen.
         bounds = bounds.union(inner.expanded(0.05 + 0.001 * inner.size().max_element()));
     }
     if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
@@ -235,19 +231,19 @@ fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'
 }
 
 impl Complex<'_> {
-    /// The box that the leaves fill.
+    /// Returns the box that the leaves fill.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.tree.bounds
     }
 
-    /// Number of convex leaves.
+    /// Returns the number of convex leaves.
     #[must_use]
     pub fn n_leaves(&self) -> usize {
         self.tree.n_leaves as usize
     }
 
-    /// The leaf that holds `p`; `None` outside the box. Points in a plane belong to its front.
+    /// Returns the leaf that holds `p`; `None` outside the box. Points in a plane belong to its front.
     #[must_use]
     pub fn leaf_of(&self, p: DVec3) -> Option<u32> {
         self.tree.bounds.contains(p).then(|| self.tree.leaf_of(p))
@@ -261,7 +257,7 @@ impl Complex<'_> {
         }
     }
 
-    /// Openings narrower than this count as closed. [Units: wu]
+    /// Returns the width below which openings count as closed. [Units: wu]
     #[must_use]
     pub fn opening_tolerance(&self) -> f64 {
         self.tolerance.width
@@ -269,23 +265,23 @@ impl Complex<'_> {
 
     /// Divides the leaves among cells by votes.
     ///
-    /// Time: one look-up a vote, and `O(F log F)` for `F` openings. Deterministic for any number of threads.
+    /// Time: one look-up per vote, and `O(F log F)` for `F` openings. Deterministic for any number of threads.
     #[must_use]
     pub fn label(&self, votes: &[Vote], settings: &LabelSettings) -> LeafCells {
         let leaf_of = |v: &Vote| self.leaf_of(v.point);
         label::label_leaves(&self.graph, votes, settings, self.has_seals, leaf_of)
     }
 
-    /// The cell at a point; `None` in matter. What is outside the box is outdoors.
+    /// Returns the cell at a point; `None` in solids. Everything outside the box is outdoors.
     #[must_use]
     pub fn cell_at(&self, cells: &LeafCells, p: DVec3) -> Option<u32> {
         let leaf = self.leaf_of(p).map(|l| cells.cell_of_leaf[l as usize]);
         leaf.map_or(cells.outside, |c| (c != leaf_cells::SOLID).then_some(c))
     }
 
-    /// How much each two cells are open to each other. What is no wider than a crack does not count.
+    /// Returns the area of the openings between each two cells, not counting cracks.
     ///
-    /// Time: `O(F log F)` for `F` openings; no polygon is made.
+    /// Time: `O(F log F)` for `F` openings; makes no polygons.
     #[must_use]
     pub fn contacts(&self, cells: &LeafCells) -> BTreeMap<[u32; 2], Contact> {
         let mut contacts: BTreeMap<[u32; 2], Contact> = BTreeMap::new();
@@ -302,7 +298,7 @@ impl Complex<'_> {
         contacts
     }
 
-    /// Finds the portals between cells, what each triangle is seen from, and the locator.
+    /// Finds the portals between cells, the cells that see each triangle, and the locator.
     ///
     /// Time: a visit of the parts of the tree where cells meet. Deterministic for any number of threads.
     #[must_use]
@@ -310,7 +306,7 @@ impl Complex<'_> {
         partition::realize(self, cells)
     }
 
-    /// Divides the leaves among cells by votes, and realizes them.
+    /// Divides the leaves among cells by votes, and realizes the result.
     #[must_use]
     pub fn partition(&self, votes: &[Vote], settings: &LabelSettings) -> Partition {
         self.realize(self.label(votes, settings))

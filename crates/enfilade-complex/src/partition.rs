@@ -1,4 +1,4 @@
-//! The second visit: cells, portals and locator from labelled leaves.
+//! The second visit: makes cells, portals and locator from labeled leaves.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,29 +15,29 @@ use super::surface::{NO_PLANE, Source, Surface};
 use super::tagged::{MIXED, TaggedTree};
 use super::{CRACK_WIDTH, Complex};
 
-/// Cells and portals, exactly.
+/// Exact cells and portals.
 #[derive(Clone, Debug)]
 pub struct Partition {
-    /// The vote label that each cell goes by; several cells may share one.
+    /// The vote label of each cell; several cells may share one.
     pub label_of_cell: Vec<u32>,
     /// Volume of each cell. [Units: wu³]
     pub volumes: Vec<f64>,
     /// Box of each cell.
     pub aabbs: Vec<Aabb>,
-    /// The cell that reaches the border of the box; no other does.
+    /// The only cell that reaches the border of the box.
     pub outside: Option<u32>,
     /// All openings between different cells.
     pub portals: Vec<PartitionPortal>,
-    /// Openings narrower than [`Complex::opening_tolerance`]: slivers between planes that nearly
-    /// coincide. Following sight lines to the last bit needs them; an `f32` file cannot hold them.
+    /// Openings narrower than [`Complex::opening_tolerance`]: slivers between planes that nearly coincide. Following
+    /// sight lines to the last bit needs them; an `f32` file cannot hold them.
     pub hairlines: Vec<PartitionPortal>,
-    /// Gaps that are closed: what a bake adds to the model's own surfaces.
+    /// Gaps that are closed; a bake adds these polygons to the model's own surfaces.
     pub seals: Vec<Seal>,
-    /// The portals that lie on no candidate: where cells leak into each other.
+    /// The portals that lie on no candidate, where cells leak into each other.
     pub leaks: Vec<Leak>,
     /// The cells that see each triangle.
     pub triangle_cells: TriangleCells,
-    /// Point to cell.
+    /// Finds the cell of a point.
     pub locator: Locator,
 }
 
@@ -50,24 +50,24 @@ pub struct PartitionPortal {
     pub plane: Plane,
     /// Convex hull of the pieces, counter-clockwise seen from the second cell.
     pub outline: Winding,
-    /// The opening itself, as disjoint convex polygons turning as the outline does.
+    /// The opening itself: disjoint convex polygons, oriented like the outline.
     pub pieces: Vec<Winding>,
-    /// The candidate that it, or its largest part on any, lies on.
+    /// The candidate with the largest part of its area, if any.
     pub candidate: Option<u32>,
     /// Total area of the pieces. [Units: wu²]
     pub area: f64,
     /// Width of the widest piece. [Units: wu]
     pub width: f64,
-    /// [`PortalKind::Open`], or [`PortalKind::Crack`] where narrow and on no candidate.
+    /// [`PortalKind::Open`], or [`PortalKind::Crack`] if narrow and on no candidate.
     pub kind: PortalKind,
     /// It lies on no candidate.
     pub is_leak: bool,
 }
 
-/// A polygon that closes a gap, through which no ball of the smallest hole passes.
+/// A polygon that closes a gap. No ball of the smallest hole passes through the gap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seal {
-    /// The cells on its two sides, ascending; [`u32::MAX`] is matter.
+    /// The cells on its two sides, ascending; [`u32::MAX`] is solid.
     pub cells: [u32; 2],
     /// Its plane; the normal points from the first side to the second.
     pub plane: Plane,
@@ -75,14 +75,14 @@ pub struct Seal {
     pub outline: Winding,
 }
 
-/// A place where two cells meet though no candidate is there.
+/// A place where two cells meet without a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leak {
     /// Index into [`Partition::portals`].
     pub portal: u32,
     /// The two cells.
     pub cells: [u32; 2],
-    /// Middle of the largest piece. [Units: wu]
+    /// Centroid of the largest piece. [Units: wu]
     pub position: DVec3,
     /// Width of the widest piece. [Units: wu]
     pub width: f64,
@@ -94,7 +94,7 @@ struct PieceSink<'a> {
     tagged: &'a TaggedTree<'a>,
     visitor: &'a Visitor<'a>,
     has_seals: bool,
-    /// The plane of each candidate's surface.
+    /// For each candidate, the plane of its surface.
     plane_of_candidate: &'a [u32],
     graph: &'a LeafGraph<'a>,
     clearance: Clearance<'a>,
@@ -126,7 +126,7 @@ impl FacetSink for PieceSink<'_> {
         if cells[0] == cells[1] {
             return;
         }
-        // Where a cell reaches farthest, it borders on something else.
+        // A cell's extreme points lie on facets to something else.
         for cell in cells {
             self.grow_box(cell, facet.points);
         }
@@ -140,7 +140,8 @@ impl FacetSink for PieceSink<'_> {
             let is_narrow = self.clearance.is_gap(&points);
             let (width, hole) = (poly::width(&points), self.graph.hole);
             let is_rim = !is_narrow && self.graph.is_rim(facet.leaves, width, hole);
-            // Where surfaces lie within a tolerance of it, parts of a candidate were put into their planes; a portal has one.
+            // Where other surfaces lie within the tolerance, parts of a candidate were moved into their planes; a
+            // portal has only one plane.
             let own = candidate.and_then(|s| self.plane_of_candidate.get(s as usize).copied());
             let plane = own.filter(|&p| p != NO_PLANE).unwrap_or(facet.plane);
             let turns = self.visitor.tree.planes[plane as usize].normal.dot(normal) < 0.0;
@@ -180,7 +181,7 @@ impl FacetSink for PieceSink<'_> {
     }
 }
 
-/// Makes the partition that a labelling stands for.
+/// Makes the partition for a labeling.
 pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
     let tagged = TaggedTree::new(&complex.tree, &cells.cell_of_leaf);
     let (pieces, boxes) = gather_pieces(complex, &tagged);
@@ -227,7 +228,7 @@ pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
     }
 }
 
-/// The open pieces between leaves of different cells, and the box of each cell.
+/// Returns the open pieces between leaves of different cells, and the box of each cell.
 fn gather_pieces(
     complex: &Complex<'_>,
     tagged: &TaggedTree<'_>,
@@ -263,7 +264,7 @@ fn gather_pieces(
     (sink.pieces, sink.boxes)
 }
 
-/// The plane of each candidate's surface, by the candidate's index.
+/// Returns for each candidate the plane of its surface.
 fn planes_of_candidates(surfaces: &[Surface]) -> Vec<u32> {
     let mut out: Vec<u32> = Vec::new();
     for surface in surfaces {
@@ -276,7 +277,7 @@ fn planes_of_candidates(surfaces: &[Surface]) -> Vec<u32> {
     out
 }
 
-/// An opening that is no gap, as a portal.
+/// Converts an opening, other than a gap, to a portal.
 fn portal_of(opening: Opening) -> PartitionPortal {
     let is_leak = opening.candidate.is_none();
     PartitionPortal {
@@ -296,14 +297,14 @@ fn portal_of(opening: Opening) -> PartitionPortal {
     }
 }
 
-/// Where the portals are that lie on no candidate.
+/// Returns the places of the portals that lie on no candidate.
 fn leaks_of(portals: &[PartitionPortal]) -> Vec<Leak> {
     let leaks = (0..).zip(portals).filter(|(_, p)| p.is_leak);
     leaks
         .map(|(portal, p)| Leak {
             portal,
             cells: p.cells,
-            // Pieces come largest first.
+            // Pieces are sorted, largest first.
             position: p.pieces.first().map_or(DVec3::ZERO, Winding::centroid),
             width: p.width,
             area: p.area,
@@ -311,7 +312,7 @@ fn leaks_of(portals: &[PartitionPortal]) -> Vec<Leak> {
         .collect()
 }
 
-/// A seal for each piece of a gap.
+/// Makes a seal for each piece of a gap.
 fn seals_of(gap: Opening) -> impl Iterator<Item = Seal> {
     let Opening {
         cells,

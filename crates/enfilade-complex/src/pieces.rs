@@ -1,11 +1,10 @@
 //! Open pieces to portals: grouped by plane and cells, merged where their union is convex.
 //!
-//! The tree cuts an opening wherever its planes happen to run; those cuts mean nothing and are
-//! taken back here.
+//! The tree cuts an opening wherever its planes happen to run; merging undoes those arbitrary cuts.
 //!
-//! What lies beside a candidate, and gaps, through which no ball of the smallest hole passes, belong to an opening only where
-//! they hardly widen its outline: the slit under a wall is no part of the door in it. All others are seals. Cracks, and gaps where
-//! nothing is sealed, are one portal a plane and pair of cells.
+//! Pieces beside a candidate, and gaps, through which no ball of the smallest hole passes, belong to an opening only
+//! if they hardly widen its outline: the slit under a wall is not part of the door in it. All other gaps are seals.
+//! Cracks, and gaps if nothing is sealed, form one portal for each plane and pair of cells.
 
 use std::collections::BTreeMap;
 
@@ -16,28 +15,28 @@ use rayon::prelude::*;
 use super::CRACK_WIDTH;
 use super::leaf_cells::SOLID;
 
-/// Pieces of one plane this near to each other are one portal. [Units: wu]
+/// Pieces in one plane that are this close form one portal. [Units: wu]
 const TOGETHER: f64 = 0.01;
 
-/// Corners this near to a line lie on it; the tree's own cuts are good to 1e-9. [Units: wu]
+/// Vertices this near to a line lie on it; the tree's own cuts are accurate to 1e-9. [Units: wu]
 const STRAIGHT: f64 = 1e-7;
 
 /// A convex opening between two leaves of different cells.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
-    /// Ascending.
+    /// The cells on its two sides, ascending.
     pub(super) cells: [u32; 2],
     /// Index of its plane.
     pub(super) plane: u32,
-    /// The plane's normal points to the first cell, not to the second.
+    /// `true` if the plane's normal points to the first cell, not to the second.
     pub(super) is_flipped: bool,
-    /// The candidate that it lies on.
+    /// The candidate that it lies on, if any.
     pub(super) candidate: Option<u32>,
-    /// It is a gap, see [`Clearance`](super::graph::Clearance).
+    /// `true` for a gap, see [`Clearance`](super::graph::Clearance).
     pub(super) is_gap: bool,
-    /// A gap only because it is at the rim of a thin leaf: several together may be wider than a gap.
+    /// `true` for a gap only because it is at the rim of a thin leaf: several together may be wider than a gap.
     pub(super) is_rim: bool,
-    /// Counter-clockwise about the plane's normal.
+    /// Vertices, counter-clockwise about the plane's normal.
     pub(super) points: Poly,
 }
 
@@ -50,26 +49,26 @@ pub(super) struct Opening {
     pub(super) candidate: Option<u32>,
     pub(super) area: f64,
     pub(super) width: f64,
-    /// A gap, to be sealed.
+    /// `true` for a gap that is to be sealed.
     pub(super) is_seal: bool,
 }
 
-/// What openings are told by.
+/// Input of [`group`].
 pub(super) struct Rules<'a> {
     pub(super) planes: &'a [Plane],
     /// Diameter of the smallest hole. [Units: wu]
     pub(super) hole: f64,
-    /// Whether gaps are closed by seals.
+    /// `true` if seals close gaps.
     pub(super) has_seals: bool,
-    /// Candidates from this number on stand for triangles that are missing.
+    /// Candidates from this number on stand for missing triangles.
     pub(super) n_candidates: u32,
-    /// What grouping spends from.
+    /// Pays for grouping.
     pub(super) purse: Purse<'a>,
 }
 
 /// Groups pieces into openings, ordered by cells, then plane, then the order of the tree.
 pub(super) fn group(mut pieces: Vec<Piece>, rules: &Rules<'_>) -> Vec<Opening> {
-    // Stable: within a key, the order of the tree stays.
+    // A stable sort keeps the order of the tree within a key.
     pieces.sort_by_key(|p| (p.cells, p.plane, p.is_flipped));
     let groups: Vec<&[Piece]> = pieces
         .chunk_by(|a, b| (a.cells, a.plane, a.is_flipped) == (b.cells, b.plane, b.is_flipped))
@@ -109,7 +108,7 @@ impl Flat {
         (self.min - slack).cmple(other.max).all() && other.min.cmple(self.max + slack).all()
     }
 
-    /// Whether an edge of it has all of `other` farther than `slack` outside.
+    /// Returns `true` if all of `other` is farther than `slack` outside of one of its edges.
     fn has_edge_apart(&self, other: &Self, slack: f64) -> bool {
         (0..self.points.len()).any(|i| {
             let (a, b) = (self.points[i], self.points[(i + 1) % self.points.len()]);
@@ -126,7 +125,7 @@ impl Flat {
             && !other.has_edge_apart(self, TOGETHER)
     }
 
-    /// Whether a point is inside, or at most `slack` outside of each edge.
+    /// Returns `true` if a point is inside, or at most `slack` outside of each edge.
     fn is_within(&self, p: DVec2, slack: f64) -> bool {
         let n = self.points.len();
         (0..n).all(|i| {
@@ -154,7 +153,7 @@ impl Flat {
     }
 }
 
-/// Convex hull, counter-clockwise; corners within [`STRAIGHT`] of a side are left out.
+/// Returns the convex hull, counter-clockwise, without vertices within [`STRAIGHT`] of a side.
 fn hull(points: impl Iterator<Item = DVec2>) -> Flat {
     let mut at: Vec<DVec2> = points.collect();
     at.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
@@ -176,8 +175,8 @@ fn hull(points: impl Iterator<Item = DVec2>) -> Flat {
     };
     half(&mut at.iter().copied());
     half(&mut at.iter().rev().copied());
-    // Only now the nearly straight corners, each against its neighbors that stay: dropping while
-    // the ring is wound could let many small turns add up.
+    // Drop nearly straight vertices only now, each tested against the neighbors that stay: dropping them while
+    // building the ring could let many small turns add up.
     let mut i = 0;
     while ring.len() > 3 && i < ring.len() {
         let n = ring.len();
@@ -192,7 +191,7 @@ fn hull(points: impl Iterator<Item = DVec2>) -> Flat {
     Flat::new(ring)
 }
 
-/// The union of two disjoint convex polygons where it is convex too.
+/// Returns the union of two disjoint convex polygons if it is convex.
 fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
     if !a.touches(b, STRAIGHT) {
         return None;
@@ -202,8 +201,8 @@ fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
     (union.area - a.area - b.area <= STRAIGHT * size).then_some(union)
 }
 
-/// Merges until no two neighbors have a convex union. Candidates come from a sweep, each piece
-/// tried with the next few only, so that a crack in a thousand pieces stays affordable.
+/// Merges until no two neighbors have a convex union. A sweep proposes pairs, each piece with only the next few, so
+/// that a crack in a thousand pieces stays affordable.
 fn merge_convex(mut flats: Vec<Flat>, purse: Purse<'_>) -> Vec<Flat> {
     const NEXT: usize = 48;
     loop {
@@ -241,7 +240,7 @@ fn merge_convex(mut flats: Vec<Flat>, purse: Purse<'_>) -> Vec<Flat> {
     }
 }
 
-/// How much more than its own area something may widen the outline of the opening beside it.
+/// Largest growth of an opening's outline by a part beside it, as a multiple of the part's own area.
 const WIDENING: f64 = 2.0;
 
 /// Pieces of one plane, one pair of cells and one direction, in the plane's own coordinates.
@@ -289,14 +288,14 @@ impl<'a> Sheet<'a> {
         hull(points.copied())
     }
 
-    /// Whether a piece is where a triangle is missing.
+    /// Returns `true` if a piece lies where a triangle is missing.
     fn is_missing(&self, i: usize) -> bool {
         let is_beyond = |candidate| candidate >= self.rules.n_candidates;
         self.pieces[i].candidate.is_some_and(is_beyond)
     }
 
-    /// Pieces near each other, those on one candidate together wherever they are; what is missing in a wall is no part of an
-    /// opening beside it. Ordered by their least members.
+    /// Returns groups of pieces near each other; those on one candidate are together wherever they are. A hole in a
+    /// wall does not join an opening beside it. Ordered by their least members.
     fn clusters(&self, among: &[usize]) -> Vec<Vec<usize>> {
         let mut sets = Sets::new(self.flats.len());
         let mut first_on_candidate = BTreeMap::new();
@@ -331,8 +330,8 @@ impl<'a> Sheet<'a> {
         members.into_values().collect()
     }
 
-    /// Gives each part to the opening beside it whose outline it widens least, if by no more than `widening` times its own
-    /// area or by less than the hole; the parts that are left.
+    /// Adds each part to the opening beside it whose outline it widens least, if by at most `widening` times its own
+    /// area or by less than the hole. Returns the parts left.
     fn adopt(
         &self,
         openings: &mut [Vec<usize>],
@@ -390,7 +389,7 @@ impl<'a> Sheet<'a> {
             .into_iter()
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
             .map(|(candidate, _)| candidate);
-        // No seal is wider than a gap.
+        // Rim pieces stay apart, so that no seal is wider than a gap.
         let (apart, together): (Vec<usize>, Vec<usize>) = members
             .iter()
             .partition(|&&i| is_seal && self.pieces[i].is_rim);
@@ -411,16 +410,16 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The openings among pieces of one plane, one pair of cells and one direction.
+/// Returns the openings among pieces of one plane, one pair of cells and one direction.
 fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     let sheet = Sheet::new(group, rules);
     let all: Vec<usize> = (0..group.len()).collect();
-    // Whatever opens to matter is to be closed, but for what nothing could close.
+    // Openings to solids are all to be closed.
     if group[0].cells[1] == SOLID {
         return vec![sheet.opening(&all, true)];
     }
     let (gaps, wide): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|&i| group[i].is_gap);
-    // What lies on candidates or is missing makes the openings; what is open beside them belongs to them or stands for itself.
+    // Pieces on candidates or missing triangles make the openings; wide pieces beside them join them or stand alone.
     let (foreseen, beside): (Vec<usize>, Vec<usize>) = wide
         .into_iter()
         .partition(|&i| group[i].candidate.is_some());
@@ -428,7 +427,7 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     let beside = sheet.adopt(&mut openings, sheet.clusters(&beside), WIDENING);
     openings.extend(beside);
     let gaps = gaps.into_iter().map(|i| vec![i]).collect();
-    // A gap beside a door can be as large as the wall: the sliver between two triangles of it.
+    // A gap beside a door can be as large as the wall: the sliver between two of its triangles.
     let gaps = sheet.adopt(&mut openings, gaps, 0.0);
     let mut gaps = gaps.concat();
     let (mut out, mut cracks): (Vec<Opening>, Vec<usize>) = Default::default();
@@ -455,7 +454,7 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
 mod tests {
     use super::*;
 
-    /// A rectangle in the plane `z = 0`, by its low and high corner.
+    /// A rectangle in the plane `z = 0`, given by its minimum and maximum.
     fn piece(candidate: u32, [x0, y0, x1, y1]: [f64; 4]) -> Piece {
         let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
         Piece {
@@ -484,7 +483,7 @@ mod tests {
             n_candidates: 2,
             purse: Purse::endless(),
         };
-        // A window on two candidates, and triangles that are missing below.
+        // A window on two candidates, and missing triangles below it.
         let pieces = vec![
             piece(0, [0.0, 0.0, 0.9, 2.0]),
             piece(1, [0.9, 0.0, 1.8, 2.0]),

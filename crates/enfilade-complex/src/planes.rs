@@ -1,26 +1,26 @@
-//! Surfaces that lie in one plane share it: a list of distinct planes.
+//! A list of distinct planes, shared by the surfaces that lie in them.
 
 use std::collections::HashMap;
 
 use enfilade_geom::{DVec3, Plane};
 
-/// Distinct planes, found again by rounded normal and offset.
+/// Distinct planes, looked up by rounded normal and offset.
 ///
-/// Both neighbors are tried where a value is near a step. A pair missed by that (tiny polygon, far from the center)
-/// makes two planes of one.
+/// Tries both neighbors where a value is near a step. A pair missed even so (tiny polygon, far from the center) makes
+/// two planes of one.
 pub struct PlaneList {
     planes: Vec<Plane>,
     buckets: HashMap<[i32; 4], Vec<u32>>,
     /// Offsets are measured from here, so that they change little with the normal. [Units: wu]
     center: DVec3,
-    /// What lies this near to a plane lies in it. [Units: wu]
+    /// Points this near to a plane lie in it. [Units: wu]
     tolerance: f64,
     n_looked: u64,
 }
 
 impl PlaneList {
-    /// No planes yet. `center` is the middle of what lies in them, and points up to `tolerance` from a plane lie in it.
-    /// [Units: wu]
+    /// Makes an empty list. `center` is the middle of the surfaces to come, and points up to `tolerance` from a plane
+    /// lie in it. [Units: wu]
     #[must_use]
     pub fn new(center: DVec3, tolerance: f64) -> Self {
         Self {
@@ -32,27 +32,29 @@ impl PlaneList {
         }
     }
 
-    /// The planes, by id.
+    /// Returns the planes, by id.
     #[must_use]
     pub fn planes(&self) -> &[Plane] {
         &self.planes
     }
 
-    /// How many buckets and planes were looked at so far: what it cost.
+    /// Returns the number of buckets and planes examined so far, as a measure of work.
     #[must_use]
     pub fn n_looked(&self) -> u64 {
         self.n_looked
     }
 
-    /// The planes, by id.
+    /// Returns the planes, by id.
     #[must_use]
     pub fn into_planes(self) -> Vec<Plane> {
         self.planes
     }
 
-    /// Id of the plane that holds all of a polygon's corners best; where there is none, of `plane`, which is added.
+    /// Returns the id of the plane that best holds all vertices of a polygon; if none does, adds `plane` and returns
+    /// its id.
     ///
-    /// `plane` is the polygon's own, [`faces_ahead`] being true of its normal. Of planes that hold it as well, the first.
+    /// `plane` is the polygon's own, with a normal for which [`faces_ahead`] is `true`. Among equally good planes,
+    /// returns the first.
     pub fn find_or_add(&mut self, plane: &Plane, points: &[DVec3]) -> u32 {
         let at = [
             plane.normal.x * 256.0,
@@ -88,9 +90,9 @@ impl PlaneList {
     }
 }
 
-/// Whether a normal is the one of the two of a plane that lists hold.
+/// Returns `true` for one of the two normals of a plane, the one used in lists.
 ///
-/// An odd direction decides: the largest component would tie on every 45 degree wall.
+/// Compares with an odd direction: the largest component would tie on every 45 degree wall.
 #[must_use]
 pub fn faces_ahead(normal: DVec3) -> bool {
     normal.dot(DVec3::new(1.0, 0.618_034, 0.324_718)) >= 0.0

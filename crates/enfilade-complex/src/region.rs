@@ -1,4 +1,4 @@
-//! Convex regions by their faces: a box, cut by planes.
+//! Convex regions given by their faces: a box, cut by planes.
 
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane};
@@ -6,16 +6,16 @@ use enfilade_geom::{Aabb, DVec3, Plane};
 /// A region's measures.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
-    /// Mean of its corners.
+    /// Mean of its vertices.
     pub middle: DVec3,
     /// [Units: wu³]
     pub volume: f64,
 }
 
-/// A convex region by its faces, each with the plane that looks inwards.
+/// A convex region, given by its faces, each with its inward plane.
 pub type Region = Vec<(Plane, Poly)>;
 
-/// A box as a region.
+/// Returns a box as a region.
 #[must_use]
 pub fn whole(b: &Aabb, eps: f64) -> Region {
     let mut region = Region::new();
@@ -29,7 +29,7 @@ pub fn whole(b: &Aabb, eps: f64) -> Region {
     region
 }
 
-/// The parts before and behind a plane.
+/// Returns the parts in front of and behind a plane.
 #[must_use]
 pub fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region; 2] {
     let mut sides = [Region::new(), Region::new()];
@@ -65,7 +65,7 @@ pub fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region
     sides
 }
 
-/// Measures of a region.
+/// Returns the measures of a region.
 #[must_use]
 pub fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
     let corners = || region.iter().flat_map(|(_, points)| points.iter().copied());

@@ -1,6 +1,6 @@
-//! Which cells see a triangle: those whose leaves a part of it borders on.
+//! The cells that see each triangle: those with a leaf that borders on part of it.
 //!
-//! **Errs to "seen":** where a triangle lies nearly in a plane of the tree, both sides see it.
+//! **Errs to "seen":** if a triangle lies nearly in a plane of the tree, both sides see it.
 
 use enfilade_geom::poly::{self, Sides};
 use enfilade_geom::{DVec3, Plane, Purse};
@@ -11,50 +11,50 @@ use super::leaf_cells::SOLID;
 use super::surface::{NO_PLANE, PARALLEL, Source, Surface, SurfaceSet, Tolerance};
 use super::tagged::{MIXED, TaggedTree};
 
-/// The cells that see each triangle, its front and its back apart, each list ascending.
+/// The cells that see each triangle, separately for its front and its back, each list ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TriangleCells {
-    /// Two entries a triangle, front then back, and one more: where its list starts in `cells`.
+    /// Start of each list in `cells`: two entries per triangle, front then back, and one at the end.
     offsets: Vec<u32>,
     cells: Vec<u32>,
 }
 
 impl TriangleCells {
-    /// Number of triangles.
+    /// Returns the number of triangles.
     #[must_use]
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1) / 2
     }
 
-    /// Whether there are no triangles.
+    /// Returns `true` if there are no triangles.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Cells that see the side from which the corners turn counter-clockwise.
+    /// Returns the cells that see the side from which the vertices run counter-clockwise.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     #[must_use]
     pub fn front(&self, triangle: usize) -> &[u32] {
         &self.cells[self.offsets[2 * triangle] as usize..self.offsets[2 * triangle + 1] as usize]
     }
 
-    /// Cells that see the other side.
+    /// Returns the cells that see the other side.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     #[must_use]
     pub fn back(&self, triangle: usize) -> &[u32] {
         &self.cells
             [self.offsets[2 * triangle + 1] as usize..self.offsets[2 * triangle + 2] as usize]
     }
 
-    /// The same with each cell `c` called `number[c]`; several may become one.
+    /// Returns a copy in which each cell `c` becomes `number[c]`; several may become one.
     ///
     /// # Panics
-    /// When a cell has no number.
+    /// If a cell has no number.
     #[must_use]
     pub fn renumbered(&self, number: &[u32]) -> Self {
         let mut out = Self {
@@ -73,10 +73,10 @@ impl TriangleCells {
         out
     }
 
-    /// Cells that see either side, ascending, none twice.
+    /// Returns the cells that see either side, ascending, without duplicates.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     #[must_use]
     pub fn both(&self, triangle: usize) -> Vec<u32> {
         let mut all = [self.front(triangle), self.back(triangle)].concat();
@@ -88,7 +88,8 @@ impl TriangleCells {
 
 type Sides2 = [SmallVec<[u32; 2]>; 2];
 
-/// Time: the pieces that triangles fall into where cells meet, times the depth.
+/// Finds the cells that see each triangle. Time: the pieces that triangles are cut into where cells meet, times the
+/// depth.
 pub(super) fn cells_of_triangles(
     tagged: &TaggedTree<'_>,
     set: &SurfaceSet,
@@ -128,7 +129,7 @@ struct Descent<'a> {
     purse: Purse<'a>,
     plane: u32,
     normal: DVec3,
-    /// Parts narrower than this are rounding.
+    /// Narrower parts are the result of rounding.
     min_width: f64,
     found: Sides2,
 }
@@ -167,7 +168,7 @@ impl<'a> Descent<'a> {
         found
     }
 
-    /// `side` is set where the points lie in a plane above: 0 for the triangle's front.
+    /// `side` is set if the points lie in a plane above: 0 for the triangle's front.
     fn go(&mut self, child: i32, points: &[DVec3], side: Option<usize>) {
         if !self.purse.spend(1) {
             return;
@@ -189,7 +190,7 @@ impl<'a> Descent<'a> {
             return self.both_sides(node.children, &plane, points);
         }
         if self.normal.cross(plane.normal).length_squared() < PARALLEL * PARALLEL {
-            // What lies in the plane within tolerance was not cut there: see both sides of it.
+            // Points within the tolerance of the plane were not cut there: visit both sides.
             let eps = self.tolerance.plane;
             let shifted = |by: f64| Plane {
                 normal: plane.normal,
@@ -234,8 +235,8 @@ impl<'a> Descent<'a> {
     }
 
     fn both_sides(&mut self, children: [i32; 2], plane: &Plane, points: &[DVec3]) {
-        // A triangle that was moved into the plane may be met just behind a portal beside it: what
-        // sees one side of it then sees the other.
+        // A triangle moved into the plane may be hit just behind a portal beside it, so each side of it may be seen
+        // from both sides of the plane.
         if points
             .iter()
             .any(|&p| plane.signed_distance(p).abs() > self.tolerance.cut)

@@ -1,4 +1,4 @@
-//! Surfaces (triangles and candidates) and the one list of planes that they share.
+//! Surfaces (triangles and candidates) and their shared list of planes.
 
 use std::collections::HashSet;
 
@@ -8,32 +8,32 @@ use rayon::prelude::*;
 
 use super::planes::{PlaneList, faces_ahead};
 
-/// What a surface is.
+/// Origin of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Source {
     /// A structural triangle, by its index in the input.
     Triangle(u32),
     /// A candidate, by its index in the input.
     Candidate(u32),
-    /// A seam, see [`seams`]: it blocks and is no part of the scene.
+    /// A seam, see [`seams`]: it blocks, but is not part of the scene.
     Seam,
 }
 
-/// A triangle or a candidate.
+/// A triangle, a candidate or a seam.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
-    /// What it is.
+    /// Its origin.
     pub(super) source: Source,
     /// Index into the list of planes, or [`NO_PLANE`].
     pub(super) plane: u32,
-    /// Corners as given.
+    /// Vertices as given.
     pub(super) points: SurfacePoints,
 }
 
-/// Corners of a surface; triangles stay inline.
+/// Vertices of a surface; triangles stay inline.
 pub(super) type SurfacePoints = smallvec::SmallVec<[DVec3; 3]>;
 
-/// The plane of a surface too thin to have one.
+/// Plane of a surface too thin to have one.
 pub(super) const NO_PLANE: u32 = u32::MAX;
 
 /// Tolerances of one complex. [Units: wu]
@@ -41,28 +41,28 @@ pub(super) const NO_PLANE: u32 = u32::MAX;
 pub(super) struct Tolerance {
     /// Surfaces this near to a plane lie in it.
     pub(super) plane: f64,
-    /// Corners this near to a cutting plane are on it.
+    /// Vertices this near to a cutting plane are on it.
     pub(super) cut: f64,
     /// Openings narrower than this are closed.
     pub(super) width: f64,
 }
 
-/// Openings of less area are closed. [Units: wu²]
+/// Openings with less area are closed. [Units: wu²]
 pub(super) const MIN_AREA: f64 = 1e-8;
 
-/// Planes whose normals differ by less than this (radians) may hold each other's surfaces.
+/// Planes whose normals differ by less may hold each other's surfaces. [Units: rad]
 pub(super) const PARALLEL: f64 = 0.02;
 
-/// Sine of the largest angle at which edges come apart, see [`seams`]; beyond it, the wedges are
-/// hardly wider than what counts as closed.
+/// Sine of the largest angle at which edges come apart, see [`seams`]; beyond it, the wedges are hardly wider than
+/// openings that count as closed.
 const SHALLOW: f64 = 0.35;
 
 impl Tolerance {
-    /// For coordinates up to `extent` from the origin.
+    /// Returns the tolerances for coordinates up to `extent` from the origin.
     pub(super) fn for_extent(extent: f64) -> Self {
         let plane = plane_tolerance(extent);
-        // f64 noise is 1e-15 of the extent; the planes that meet differ by more than plane / size,
-        // so cut corners are good to about 1e-9 of the extent.
+        // f64 noise is 1e-15 of the extent. Intersecting planes differ by more than plane / size, so cut vertices are
+        // accurate to about 1e-9 of the extent.
         let cut = (1e-10 * extent).max(1e-9);
         Self {
             plane,
@@ -72,24 +72,24 @@ impl Tolerance {
     }
 }
 
-/// The plane list and who lies in it.
+/// Surfaces and the list of their planes.
 pub(super) struct SurfaceSet {
-    /// Surfaces, largest first, then by coordinates: the same for any order of the input.
+    /// Surfaces, largest first, then by coordinates: independent of the order of the input.
     pub(super) surfaces: Vec<Surface>,
     /// Distinct planes.
     pub(super) planes: Vec<Plane>,
-    /// Triangles left out of `surfaces` because others are the very same, with the planes of these.
+    /// Triangles left out of `surfaces` as copies of others, with the planes of those.
     pub(super) copies: Vec<Surface>,
 }
 
-/// Most triangles with the very same corners that are cut with. Doubled faces are ordinary, and where the tree is cut takes
-/// account of them; more only cost.
+/// Most identical triangles that take part in cutting. Doubled faces are common, and the choice of splitters accounts
+/// for them; more only add cost.
 const MOST_COPIES: usize = 4;
 
-/// What a surface, or an edge of it, costs to look at, in units of [`enfilade_geom::Allowance`].
+/// Cost of examining a surface, or an edge of it, in units of [`enfilade_geom::Allowance`].
 const WORK_A_SURFACE: u64 = 2;
 
-/// Orders by area, then coordinates, so that the input's order has no say.
+/// Sorts by area, then coordinates, so that the order of the input does not matter.
 fn canonical_order(surfaces: &mut [Surface]) {
     let key = |s: &Surface| {
         (
@@ -104,14 +104,14 @@ fn canonical_order(surfaces: &mut [Surface]) {
             .iter()
             .map(|p| p.to_array().map(ordered_bits))
             .collect();
-        // Duplicates may start at different corners or turn the other way.
+        // Duplicates may start at different vertices or have the opposite orientation.
         corners.sort_unstable();
         let by_area = std::cmp::Reverse(ordered_bits(area));
         (candidate, by_area, corners, s.source)
     });
 }
 
-/// Bits that compare like the number.
+/// Returns bits that compare like the number.
 fn ordered_bits(x: f64) -> u64 {
     let bits = (x + 0.0).to_bits();
     if bits >> 63 == 1 {
@@ -121,9 +121,9 @@ fn ordered_bits(x: f64) -> u64 {
     }
 }
 
-/// The plane of a polygon, its normal's sign chosen by the normal alone.
+/// Returns the plane of a polygon; the sign of its normal depends on the normal alone.
 ///
-/// Axis-aligned planes come out exact: the normal a unit axis, the offset a corner's coordinate.
+/// Axis-aligned planes are exact: the normal is a unit axis, the offset a vertex's coordinate.
 fn own_plane(points: &[DVec3]) -> Option<Plane> {
     let n = poly::area_normal(points).try_normalize()?;
     for axis in 0..3 {
@@ -141,10 +141,10 @@ fn own_plane(points: &[DVec3]) -> Option<Plane> {
     Some(Plane::through(mean, n))
 }
 
-/// Gives every surface its plane: one that exists and holds all its corners, or a new one.
+/// Gives every surface its plane: an existing one that holds all its vertices, or a new one.
 ///
-/// A pair of surfaces in one plane that [`PlaneList`] misses still meets in the tree, where a surface
-/// that lies in a splitter within tolerance is taken to be in it.
+/// A pair of surfaces in one plane that [`PlaneList`] misses still meets in the tree, where a surface that lies in a
+/// splitter within tolerance counts as in it.
 pub(super) fn gather(
     mut surfaces: Vec<Surface>,
     bounds: &Aabb,
@@ -172,7 +172,7 @@ pub(super) fn gather(
     }
 }
 
-/// Takes out triangles of which there are [`MOST_COPIES`] before them, in canonical order.
+/// Removes and returns triangles with [`MOST_COPIES`] identical ones before them, in canonical order.
 fn take_copies(surfaces: &mut Vec<Surface>) -> Vec<Surface> {
     let corners = |s: &Surface| {
         let mut bits: Vec<[u64; 3]> = s
@@ -201,7 +201,7 @@ fn take_copies(surfaces: &mut Vec<Surface>) -> Vec<Surface> {
     copies
 }
 
-/// The plane in the list of a polygon; [`NO_PLANE`] where it is too thin to have one.
+/// Returns the plane of a polygon in the list; [`NO_PLANE`] if it is too thin to have one.
 fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> u32 {
     if poly::width(points) < tolerance.plane {
         return NO_PLANE;
@@ -209,13 +209,12 @@ fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> 
     own_plane(points).map_or(NO_PLANE, |plane| planes.find_or_add(&plane, points))
 }
 
-/// Seams along the edges that come apart as their triangles move into planes.
+/// Returns seams along the edges that come apart as their triangles move into planes.
 ///
-/// A triangle's corners are moved by up to a tolerance into its plane. Where another triangle begins
-/// at an edge so moved, in a plane at a shallow angle, the two planes cross not at the edge but far
-/// beside it, and between them is a wedge: at the edge thinner than any opening, yet open to one side
-/// before it and to the other behind it. A strip across the edge, a little higher than the
-/// wedge, closes it where the scene is closed. One query of a box tree for each edge moved.
+/// A triangle's vertices move by up to a tolerance into its plane. If another triangle begins at such an edge, in a
+/// plane at a shallow angle, the two planes cross far beside the edge, and a wedge lies between them: at the edge
+/// thinner than any opening, yet open to one side in front of it and to the other behind it. A strip across the edge,
+/// slightly higher than the wedge, closes it where the scene is closed. One query of a box tree for each edge moved.
 fn seams(
     surfaces: &[Surface],
     planes: &[Plane],
@@ -276,7 +275,7 @@ fn seams(
             })
         })
         .collect();
-    // Both triangles at an edge may want one. The order is that of the surfaces, whatever the threads.
+    // Both triangles at an edge may propose one. Their order is that of the surfaces for any number of threads.
     let mut seen: HashSet<EdgeKey> = HashSet::new();
     seams
         .into_iter()
@@ -285,7 +284,7 @@ fn seams(
         .collect()
 }
 
-/// Whether a polygon has an edge on the segment from `a` to `b`, at least in part.
+/// Returns `true` if a polygon has an edge that overlaps the segment from `a` to `b`.
 fn run_along(points: &[DVec3], a: DVec3, b: DVec3, width: f64) -> bool {
     let length = a.distance(b);
     let along = (b - a) / length;
@@ -309,8 +308,8 @@ fn edge_key(a: DVec3, b: DVec3) -> EdgeKey {
     key
 }
 
-/// Whether a surface lies in the plane of id `plane_id`, all of it: were fragments moved one by one,
-/// they would come apart where their regions meet.
+/// Returns `true` if all of a surface lies in the plane `plane_id`. Fragments moved one by one would come apart where
+/// their regions meet.
 pub(super) fn lies_in(
     surface_plane: u32,
     points: &[DVec3],
@@ -322,7 +321,7 @@ pub(super) fn lies_in(
         return true;
     }
     let plane = &planes[plane_id as usize];
-    // Only near-parallel ones: the tip of a steep wall is near the floor, and must stay a wall.
+    // Only near-parallel planes: the tip of a steep wall is near the floor, and must stay a wall.
     planes[surface_plane as usize]
         .normal
         .cross(plane.normal)
@@ -333,7 +332,7 @@ pub(super) fn lies_in(
             .all(|&p| plane.signed_distance(p).abs() <= tolerance.plane)
 }
 
-/// Corners moved onto `plane`, counter-clockwise seen from its positive side.
+/// Returns the vertices moved onto `plane`, counter-clockwise seen from its positive side.
 pub(super) fn projected(points: &[DVec3], plane: &Plane) -> Poly {
     let mut poly: Poly = points.iter().map(|&p| plane.project(p)).collect();
     if poly::area_normal(&poly).dot(plane.normal) < 0.0 {

@@ -1,4 +1,4 @@
-//! Which parts of the tree lie in one cell.
+//! The tree with the cell of each subtree that lies in one.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::tree::{Tree, leaf_index};
 /// The tag of a subtree whose leaves are not all in one cell.
 pub(super) const MIXED: u32 = u32::MAX - 1;
 
-/// The tree with the cell of each subtree that has but one.
+/// The tree, with a tag for each subtree.
 pub(super) struct TaggedTree<'a> {
     pub(super) tree: &'a Tree,
     pub(super) cell_of_leaf: &'a [u32],
@@ -32,7 +32,7 @@ impl<'a> TaggedTree<'a> {
         tagged
     }
 
-    /// The cell of everything below, [`SOLID`], or [`MIXED`].
+    /// Returns the common cell of all leaves below, [`SOLID`], or [`MIXED`].
     pub(super) fn tag(&self, child: i32) -> u32 {
         if child >= 0 {
             self.tags[child as usize]
@@ -41,7 +41,7 @@ impl<'a> TaggedTree<'a> {
         }
     }
 
-    /// The point location tree of the cells: as much of the tree as they need.
+    /// Returns the point location tree of the cells: only as much of the tree as they need.
     pub(super) fn locator(&self, outside: Option<u32>) -> Locator {
         let mut locator = Locator {
             bounds: self.tree.bounds,

@@ -1,5 +1,4 @@
-//! The promises, checked against brute force: segments against all triangles, nothing shared with
-//! the complex but the types.
+//! Tests of the promises by brute force: segments against all triangles, sharing only the types with the complex.
 
 use enfilade_cpg::PortalKind;
 use enfilade_geom::{Aabb, DMat3, DVec3, Triangle, Winding, triangle_area_normal};
@@ -16,7 +15,7 @@ fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z).as_vec3().as_dvec3()
 }
 
-/// A box, its faces turned outwards.
+/// Adds a box whose faces point outwards.
 fn block(out: &mut Vec<Triangle>, a: [f64; 3], b: [f64; 3]) {
     let pick = |i: usize, axis: usize| if i >> axis & 1 == 0 { a[axis] } else { b[axis] };
     let corner = |i: usize| v(pick(i, 0), pick(i, 1), pick(i, 2));
@@ -25,7 +24,7 @@ fn block(out: &mut Vec<Triangle>, a: [f64; 3], b: [f64; 3]) {
     }
 }
 
-/// A vertical rectangle of no thickness at `x`.
+/// Adds a vertical rectangle without thickness at `x`.
 fn sheet(out: &mut Vec<Triangle>, x: f64, y: [f64; 2], z: [f64; 2]) {
     quad(
         out,
@@ -63,7 +62,7 @@ impl Random {
     }
 }
 
-/// Where along `a + d`, 0 to 1, a triangle is hit (Möller and Trumbore).
+/// Returns the position along `a + d`, 0 to 1, where a triangle is hit (Möller and Trumbore).
 fn hit(t: &Triangle, a: DVec3, d: DVec3) -> Option<f64> {
     let (e1, e2) = (t[1] - t[0], t[2] - t[0]);
     let p = d.cross(e2);
@@ -79,7 +78,7 @@ fn hit(t: &Triangle, a: DVec3, d: DVec3) -> Option<f64> {
     (u >= 0.0 && w >= 0.0 && u + w <= 1.0 && (0.0..=1.0).contains(&at)).then_some(at)
 }
 
-/// What a walk along many segments found.
+/// Counts of a walk along many segments.
 #[derive(Debug, Default)]
 struct Walk {
     n_through: usize,
@@ -88,7 +87,7 @@ struct Walk {
     n_hits: usize,
 }
 
-/// Walks random segments: through portals to their end, or to the first triangle.
+/// Follows random segments through portals to their end, or to the first triangle.
 fn walk(triangles: &[Triangle], partition: &Partition, bounds: &Aabb, n: usize, seed: u64) -> Walk {
     let mut random = Random(seed | 1);
     let mut found = Walk::default();
@@ -167,14 +166,14 @@ fn assert_promises(triangles: &[Triangle], partition: &Partition, bounds: &Aabb,
     assert_eq!((found.n_unsealed, found.n_incomplete), (0, 0), "{found:?}");
 }
 
-/// Votes on a grid, labelled by the caller.
+/// Votes on a grid, labeled by the caller.
 fn votes(b: &Aabb, step: f64, label: impl Fn(DVec3) -> Option<u32>) -> Vec<Vote> {
     let n = (b.size() / step).as_uvec3();
     let mut out = Vec::new();
     for z in 0..n.z {
         for y in 0..n.y {
             for x in 0..n.x {
-                // Off the round numbers that walls stand on.
+                // Off the round numbers at which walls stand.
                 let offset = DVec3::new(0.4567, 0.4321, 0.5678);
                 let point = b.min + (DVec3::new(x.into(), y.into(), z.into()) + offset) * step;
                 if let Some(label) = label(point) {
@@ -206,8 +205,8 @@ fn build(triangles: &[Triangle], candidates: &[Winding]) -> Complex<'static> {
     })
 }
 
-/// Two rooms of 3 x 2.5 x 4 m, x in 0..3 and 3.2..6.2, in walls of 0.2 m, with a door of 0.9 x 2.1 m
-/// in between, its lower edge on the floor, z in 1..1.9. A slit may be cut at z in 3..3+slit.
+/// Two rooms of 3 x 2.5 x 4 m, x in 0..3 and 3.2..6.2, in walls of 0.2 m, with a door of 0.9 x 2.1 m between them,
+/// its lower edge on the floor, z in 1..1.9. A slit may be cut at z in 3..3+slit.
 fn two_rooms(slit: f64) -> Vec<Triangle> {
     let mut t = Vec::new();
     block(&mut t, [-0.2, -0.2, -0.2], [6.4, 0.0, 4.2]);
@@ -255,7 +254,7 @@ fn a_door_between_two_rooms_is_one_portal_of_the_exact_area() {
         (portal.cells, portal.candidate, portal.is_leak),
         ([0, 1], Some(0), false)
     );
-    // Corners are f32: 1e-6 of meters times a few meters of edge.
+    // Vertices are f32: 1e-6 of meters times a few meters of edge.
     assert!((portal.area - 0.9 * 2.1).abs() < 2e-6, "{}", portal.area);
     assert_eq!(portal.pieces.len(), 1);
     assert!(
@@ -354,7 +353,7 @@ fn a_crack_beside_the_door_becomes_a_portal_of_its_own() {
             .max_element()
             < 0.11
     );
-    // Segments that meet a slit of 5 mm are rare; aim some at it.
+    // Few segments meet a slit of 5 mm; aim some at it.
     let slit = Aabb::new(DVec3::new(2.7, 0.0, 2.95), DVec3::new(3.5, 2.5, 3.06));
     let found = walk(&t, &p, &slit, 40_000, 7);
     assert_eq!((found.n_unsealed, found.n_incomplete), (0, 0), "{found:?}");
@@ -375,7 +374,7 @@ fn a_candidate_that_misses_part_of_the_door_leaves_a_leak_and_no_hole() {
 #[test]
 fn walls_without_thickness_part_rooms_and_show_both_sides() {
     let mut t = Vec::new();
-    // One closed box of sheets, faces inwards or outwards makes no difference.
+    // One closed box of sheets, with faces inwards or outwards alike.
     block(&mut t, [0.0, 0.0, 0.0], [6.0, 2.5, 4.0]);
     sheet(&mut t, 3.0, [0.0, 2.5], [0.0, 1.0]);
     sheet(&mut t, 3.0, [2.0, 2.5], [1.0, 2.0]);
@@ -400,8 +399,8 @@ fn walls_without_thickness_part_rooms_and_show_both_sides() {
     assert_promises(&t, &p, &c.bounds(), 20_000);
 }
 
-/// The planes of two sheets cross in the opening between them at an angle of 3e-6: too steep to be
-/// one plane, and the wedges between them are thinner than the tolerance.
+/// The planes of two sheets cross in the opening between them at an angle of 3e-6: too large to be one plane, and the
+/// wedges between them are thinner than the tolerance.
 #[test]
 fn slivers_in_an_opening_are_as_open_as_the_rest() {
     let mut t = Vec::new();
@@ -417,7 +416,7 @@ fn slivers_in_an_opening_are_as_open_as_the_rest() {
             v(x(4.0), 0.0, 4.0),
         ],
     );
-    // Things beside the opening, so that boxes are cut across it.
+    // Objects beside the opening, so that boxes are cut across it.
     for i in 0..8 {
         let z = 1.1 + 0.2 * f64::from(i);
         block(&mut t, [0.5, 0.4, z], [0.6, 0.5, z + 0.1]);
@@ -456,7 +455,7 @@ fn votes_that_got_into_a_closed_hollow_make_a_cell_of_it_only_if_asked() {
     let mut t = two_rooms(0.0);
     block(&mut t, [1.0, 0.5, 1.0], [2.0, 1.5, 2.0]);
     let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
-    // Voters of the room see no block.
+    // The room's votes ignore the block.
     let votes = room_votes(&c.bounds());
     let at = |keeps_closed| {
         let settings = LabelSettings {
@@ -496,8 +495,8 @@ fn what_rounding_leaves_between_surfaces_is_no_cell() {
     assert_eq!(p.locator.locate(between), None);
 }
 
-/// A closed box of 4 x 4 x 2 m whose top is a pyramid of 1 cm, all of it in small triangles, turned
-/// about `axis`; its corners are rounded to `f32` after that.
+/// A closed box of 4 x 4 x 2 m whose top is a pyramid of 1 cm, all in small triangles, turned about `axis`; then its
+/// vertices are rounded to `f32`.
 fn turned_box(axis: DVec3, angle: f64) -> Vec<Triangle> {
     const N: usize = 6;
     let turn = DMat3::from_axis_angle(axis.normalize(), angle);
@@ -543,7 +542,7 @@ fn a_closed_surface_of_nearly_flat_triangles_lets_nothing_through() {
         });
         let partition = build(&triangles, &[]).partition(&ballots, &LabelSettings::default());
         assert_eq!(partition.label_of_cell.len(), 2, "{axis} {angle}");
-        // Slopes that differ by 0.5 % and corners moved by a tolerance: wedges 0.4 mm wide.
+        // Slopes that differ by 0.5 % and vertices moved by a tolerance make wedges 0.4 mm wide.
         for p in &partition.portals {
             assert!(p.width < 1e-4, "{axis} {angle}: {p:?}");
         }
@@ -596,7 +595,7 @@ fn hostile_triangles_are_survived() {
     assert_promises(&t[..n], &p, &bounds, 2_000);
 }
 
-/// A hundred triangles that meet in one point make a knot which boxes cannot undo.
+/// A hundred triangles that meet in one point make a knot that boxes cannot undo.
 #[test]
 fn a_cone_of_many_triangles_is_cut_in_full() {
     let mut t = Vec::new();
@@ -627,7 +626,7 @@ fn a_cone_of_many_triangles_is_cut_in_full() {
     assert_promises(&t, &p, &c.bounds(), 5_000);
 }
 
-/// A partition in a form that does not depend on anything but geometry.
+/// Summarizes a partition by its geometry alone.
 fn summary(p: &Partition) -> Vec<String> {
     let mut out: Vec<String> = p.portals.iter().map(|q| format!("{q:?}")).collect();
     out.push(format!(
@@ -666,7 +665,7 @@ fn the_order_of_triangles_and_the_number_of_threads_change_nothing() {
         })
     };
     let (n_leaves, one) = run(&t, 1);
-    // Enough for several parallel subtrees, or this would prove nothing.
+    // Otherwise there are too few parallel subtrees to prove anything.
     assert!(n_leaves > 5_000, "{n_leaves}");
     for n_threads in [2, 16] {
         let (_, other) = run(&t, n_threads);
@@ -688,7 +687,7 @@ fn the_order_of_triangles_and_the_number_of_threads_change_nothing() {
 
 fn soup() -> impl Strategy<Value = Vec<Triangle>> {
     let coordinate = prop_oneof![
-        // Round values make coplanar, overlapping and duplicate triangles; the others none.
+        // Round values make coplanar, overlapping and duplicate triangles; the others do not.
         (0..5i32).prop_map(f64::from),
         (0.0..4.0f64).prop_map(|x| f64::from(x as f32)),
     ];
@@ -730,12 +729,12 @@ proptest! {
             let slack = 6.0 * (share / n as f64).sqrt() + 6.0 / n as f64;
             prop_assert!((count as f64 / n as f64 - share).abs() < slack, "{count} {share}");
         }
-        // Corners are cut at 1e-9; thousands of facets add up to this.
+        // Vertices are cut at 1e-9; thousands of facets add up to this.
         prop_assert!((sum - 1.0).abs() < 1e-6, "{sum}");
     }
 }
 
-/// Beyond the box is one cell: whatever votes say, what reaches its border is part of that.
+/// The space beyond the box is one cell: whatever the votes, everything that reaches its border is part of that.
 #[test]
 fn two_regions_at_the_border_are_one_outside() {
     let mut t = two_rooms(0.0);

@@ -1,21 +1,21 @@
-//! Thin leaves, cut where a face of them turns from closed to open.
+//! Cuts thin leaves where one of their faces turns from closed to open.
 //!
-//! Two triangles of one wall that do not share their corners to the last bit lie in two planes A and B
-//! that are nearly parallel. Over the one triangle the order is room, A closed, sliver, B open, wall;
-//! over the other room, A open, sliver, B closed, wall: one convex leaf, a hair thick, is widely open
-//! to both sides, and no facet of it is narrow. A plane across the sliver, through the edge where A turns from
-//! closed to open, parts it into one leaf of the room and one of the wall, and the facet between
-//! these two is as narrow as the gap is, so that what closes a gap is as small as the gap. Which leaves belong together does
-//! not rest on these cuts, see [`Clearance`](super::graph::Clearance).
+//! Two triangles of one wall whose vertices are not identical to the last bit lie in two planes A and B that are
+//! nearly parallel. Across the first triangle the order is room, A closed, sliver, B open, wall; across the other it
+//! is room, A open, sliver, B closed, wall. So one convex leaf, a hair thick, is wide open to both sides, and none of
+//! its facets is narrow. A plane across the sliver, through the edge where A turns from closed to open, divides it
+//! into a leaf of the room and one of the wall. The facet between these is as narrow as the gap, so the seal that
+//! closes the gap is as small. The grouping of leaves does not depend on these cuts, see
+//! [`Clearance`](super::graph::Clearance).
 //!
-//! **Which edges:** those between the closed and the open part of a facet at which the leaf behind the facet is thinner
-//! than a gap somewhere. Walls that end in the open are left alone, and so are edges shorter than a gap: what they leave
-//! uncut is no wider. An edge that two triangles share lies there twice, a bit apart: what is nearer to a cut than a quarter of a gap is
-//! not cut again, and what closes a gap may be that much larger.
+//! **Which edges:** those between the closed and the open part of a facet, where the leaf behind the facet is thinner
+//! than a gap somewhere. Not walls that end in open air, and not edges shorter than a gap, which leave nothing wider
+//! uncut. An edge that two triangles share appears twice, slightly apart: edges within a quarter of a gap of a cut
+//! are not cut again, and seals may be that much larger.
 //!
-//! **Complexity:** one visit of all facets, one clip for each such edge and side; `k` edges in one leaf make up
-//! to `k²` leaves of it, at most [`MAX_CUTS`] are made. **What can go wrong:** cuts within a rounding
-//! of each other leave columns narrower than what counts as open; these are crumbs, which the labelling gives away.
+//! **Complexity:** one visit of all facets, one clip for each such edge and side; `k` edges in one leaf make up to
+//! `k²` leaves of it, with at most [`MAX_CUTS`] cuts. **What can go wrong:** cuts within rounding of each other leave
+//! columns narrower than an opening; these are crumbs, which the grouping merges.
 
 use std::ops::Range;
 
@@ -26,14 +26,14 @@ use super::facet::{CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::surface::Tolerance;
 use super::tree::{Node, Tree, leaf_index};
 
-/// Most cuts through one leaf; the longest are made.
+/// Most cuts through one leaf; the longest come first.
 const MAX_CUTS: usize = 256;
 
-/// Edges within this share of a gap of a cut are not cut again. The more, the fewer leaves and the larger the seals: at a half,
-/// seals have two fifths more area; at a tenth, there are a seventh more leaves.
+/// Edges within this share of a gap of a cut are not cut again. A larger share makes fewer leaves and larger seals:
+/// at a half, seals have two fifths more area; at a tenth, there are a seventh more leaves.
 const ALIKE: f64 = 0.25;
 
-/// Where a facet turns from closed to open, seen from one of its leaves.
+/// An edge where a facet turns from closed to open, seen from one of its leaves.
 struct Edge {
     leaf: u32,
     from: DVec3,
@@ -48,7 +48,7 @@ struct Strip {
     points: Poly,
 }
 
-/// The tree with its thin leaves cut. The order of the surfaces has no say.
+/// Returns the tree with its thin leaves cut. The result does not depend on the order of the surfaces.
 pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     let mut sink = Edges {
         visitor,
@@ -57,7 +57,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     };
     visitor.visit(&mut sink);
     let mut edges = sink.found;
-    // Stable: the order of the tree stays.
+    // A stable sort keeps the order of the tree.
     edges.sort_by_key(|e| e.leaf);
     let tree = visitor.tree;
     let mut cutter = LeafCutter {
@@ -89,10 +89,10 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     }
 }
 
-/// Gathers the edges between the closed and the open parts of facets.
+/// Collects the edges between the closed and the open parts of facets.
 struct Edges<'a> {
     visitor: &'a Visitor<'a>,
-    /// Shorter edges do not count. [Units: wu]
+    /// Shorter edges are ignored. [Units: wu]
     gap: f64,
     found: Vec<Edge>,
 }
@@ -113,14 +113,15 @@ impl FacetSink for Edges<'_> {
         for (piece, _) in OpenPieces::of(facet, normal, tolerance).pieces {
             for (k, &a) in piece.iter().enumerate() {
                 let b = piece[(k + 1) % piece.len()];
-                // Shorter ones leave nothing uncut that is wider than a gap.
+                // Shorter edges leave nothing uncut that is wider than a gap.
                 if (b - a).length() <= self.gap {
                     continue;
                 }
                 let Some(outward) = (b - a).cross(normal).try_normalize() else {
                     continue;
                 };
-                // Beyond the facet as well: behind its other leaf, a plane of the tree may end it right there.
+                // Test points beyond the facet too: behind its other leaf, a plane of the tree may end it right
+                // there.
                 let is_closed = |t: f64| {
                     let beyond = a.lerp(b, t) + outward * tolerance.width;
                     closed.iter().any(|c| is_within(c, normal, beyond))
@@ -153,7 +154,7 @@ impl FacetSink for Edges<'_> {
     }
 }
 
-/// Whether a point in the plane of a convex polygon, counter-clockwise about `normal`, is inside.
+/// Returns `true` if a point in the plane of a convex polygon, counter-clockwise about `normal`, is inside.
 fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
     (0..points.len()).all(|i| {
         let (a, b) = (points[i], points[(i + 1) % points.len()]);
@@ -167,7 +168,7 @@ fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
 struct LeafCutter<'a> {
     tree: &'a Tree,
     edges: &'a [Edge],
-    /// Leaves are cut where they are thinner. [Units: wu]
+    /// Leaves are cut where they are thinner than this. [Units: wu]
     gap: f64,
     tolerance: Tolerance,
     purse: Purse<'a>,
@@ -183,7 +184,7 @@ impl LeafCutter<'_> {
         &self.edges[at(leaves.start)..at(leaves.end)]
     }
 
-    /// Copies a subtree, cutting its leaves; the new root of it.
+    /// Copies a subtree and cuts its leaves; returns its new root.
     fn copy(&mut self, child: i32, region: &CutBox) -> i32 {
         if child < 0 {
             let strips = self.strips(leaf_index(child), region);
@@ -201,7 +202,7 @@ impl LeafCutter<'_> {
                 self.copy(node.children[1], &back),
             ]
         } else {
-            // Nothing below is cut, so no region is asked for.
+            // Nothing below is cut, so the region does not matter.
             node.children.map(|c| self.copy(c, region))
         };
         self.nodes[at].children = children;
@@ -217,7 +218,7 @@ impl LeafCutter<'_> {
         self.nodes.len() - 1
     }
 
-    /// The strips that are to cut a leaf.
+    /// Returns the strips that will cut a leaf.
     fn strips(&mut self, leaf: u32, region: &CutBox) -> Vec<Strip> {
         let mut found: Vec<(f64, Plane, Poly)> = self
             .edges_of(leaf..leaf + 1)
@@ -227,11 +228,11 @@ impl LeafCutter<'_> {
                 let quad = [e.from, e.to, e.to + depth, e.from + depth];
                 let points = region.clip(&quad, self.tolerance.cut)?;
                 let length = e.from.distance(e.to);
-                // Whole strips are where the leaf is thick; the rest is for the corners of leaves.
+                // A whole strip means a thick leaf; smaller ones are parts near the ends of leaves.
                 let is_thin = poly::area(&points) < 0.99 * length * self.gap;
                 let normal = (e.to - e.from).cross(e.inward).try_normalize()?;
                 let is_there = poly::width(&points) > 2.0 * self.tolerance.cut;
-                // Not along a side of the leaf.
+                // Skip strips along a side of the leaf.
                 let middle = points.iter().sum::<DVec3>() / points.len() as f64;
                 let beside = normal * (2.0 * self.tolerance.width);
                 let is_across =
@@ -240,7 +241,7 @@ impl LeafCutter<'_> {
                     .then(|| (length, Plane::through(e.from, normal), points))
             })
             .collect();
-        // Longest first; what is alike comes from both sides of one edge.
+        // Longest first. Equal lengths come from both sides of one edge.
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found.truncate(MAX_CUTS);
         found
@@ -255,7 +256,7 @@ impl LeafCutter<'_> {
             .collect()
     }
 
-    /// Splits a leaf by the planes of strips, each only where it lies.
+    /// Splits a leaf by the planes of strips, each only where the strip lies.
     fn split(&mut self, mut strips: Vec<Strip>) -> i32 {
         if strips.is_empty() || !self.purse.spend(2 * strips.len() as u64) {
             self.n_leaves += 1;
@@ -297,7 +298,7 @@ impl CutBox {
         self.bounds.contains(p) && self.cuts.iter().all(|c| c.signed_distance(p) >= 0.0)
     }
 
-    /// The part of a polygon in it.
+    /// Returns the part of a polygon inside.
     fn clip(&self, points: &[DVec3], eps: f64) -> Option<Poly> {
         let mut points = poly::clip_to_box(points, &self.bounds, eps)?;
         let mut cuts = self.cuts.iter();
@@ -311,11 +312,11 @@ mod tests {
     use super::super::{ComplexInput, build_complex};
     use super::*;
 
-    /// A wall whose triangles miss each other by a millimeter: a sliver between two of them is cut once at the edge that they
-    /// share, not at both copies of it.
+    /// A wall whose triangles miss each other by a millimeter: a sliver between two of them is cut once at the edge
+    /// that they share, not at both copies of it.
     #[test]
     fn edges_nearer_to_each_other_than_a_gap_are_cut_once() {
-        // Any numbers without pattern do: fractions of multiples of the golden section.
+        // Any numbers without a pattern: fractions of multiples of the golden section.
         let mut n = 0.0;
         let mut next = || {
             n += 1.0;
@@ -342,7 +343,7 @@ mod tests {
             gap: 0.01,
             has_seals: true,
         });
-        // 17 leaves a triangle; 25 with cuts at both.
+        // 17 leaves per triangle; 25 if both copies were cut.
         let n = complex.n_leaves();
         assert!(n < 20 * triangles.len(), "{n}");
     }

@@ -1,11 +1,9 @@
-//! The plane tree: axis-aligned splits while a box holds many surfaces, then the planes of the
-//! surfaces themselves.
+//! The plane tree: axis-aligned splits while a box holds many surfaces, then splits by the planes of the surfaces.
 //!
-//! The lower part is the BSP of Lefebvre & Hornus 2003 (§2, step 1), split by the surfaces' own
-//! planes; that one may begin with given planes, such as a grid's, is in their notes after §3.0.2.
-//! A pure autopartition lets every wall's plane cut the whole building; boxes first keep each plane local, which is
-//! what makes the number of leaves near-linear. A box side is put on a large axis-aligned surface
-//! where there is one, as that surface then needs no split of its own.
+//! The lower part is the BSP of Lefebvre & Hornus 2003 (§2, step 1), split by the surfaces' own planes; their notes
+//! after §3.0.2 mention that it may begin with given planes, such as a grid's. A pure autopartition lets every wall's
+//! plane cut the whole building. Boxes first keep each plane local, which makes the number of leaves near-linear. If
+//! possible, a box side lies on a large axis-aligned surface, which then needs no split of its own.
 
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Purse};
@@ -14,7 +12,7 @@ use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
 /// A box with this many fragments or fewer is split by their own planes.
 ///
-/// Fewer makes more boxes, more makes planes cut more of each other.
+/// With fewer, there are more boxes; with more, planes cut more of each other.
 const MAX_BOX_FRAGMENTS: usize = 8;
 
 /// Boxes are not split below this edge length. [Units: wu]
@@ -22,30 +20,30 @@ const MIN_BOX: f64 = 0.02;
 
 /// In boxes that cannot be split any more, fragments beyond this number stay in leaves uncut.
 ///
-/// An uncut fragment does not block: cells grow together there, which keeps every promise.
+/// An uncut fragment does not block: cells join there, which keeps every promise.
 const MAX_BSP_FRAGMENTS: usize = 512;
 
-/// Subtrees with more fragments are built in parallel; a fixed number, so that the tree is the
-/// same for any number of threads.
+/// Subtrees with more fragments are built in parallel. A fixed number, so that the tree is the same for any number of
+/// threads.
 const PARALLEL_FRAGMENTS: usize = 1000;
 
-/// Splits of larger sets are chosen by this many of their fragments.
+/// Larger sets choose splits by a sample of this many fragments.
 const SAMPLE: usize = 1024;
 
-/// An inner node. Children: a node index (`>= 0`) or `-1 - leaf`.
+/// An inner node. A child is a node index (`>= 0`) or `-1 - leaf`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     /// Index into [`Tree::planes`].
     pub(super) plane: u32,
-    /// Where its surfaces start in [`Tree::on_plane`]; they end where the next node's start.
+    /// Start of its surfaces in [`Tree::on_plane`]; they end where the next node's start.
     pub(super) on_start: u32,
-    /// Positive and negative side.
+    /// Children on the positive and on the negative side.
     pub(super) children: [i32; 2],
 }
 
-/// The plane tree. Nodes are in preorder, leaves numbered from left to right.
+/// The plane tree. Nodes are in preorder, leaves are numbered from left to right.
 pub(super) struct Tree {
-    /// What it covers.
+    /// The box that it covers.
     pub(super) bounds: Aabb,
     /// Planes of surfaces, then of box sides.
     pub(super) planes: Vec<Plane>,
@@ -60,7 +58,7 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// The surfaces that lie in a node's plane.
+    /// Returns the surfaces that lie in a node's plane.
     pub(super) fn surfaces_on(&self, node: usize) -> &[u32] {
         let end = self
             .nodes
@@ -69,7 +67,7 @@ impl Tree {
         &self.on_plane[self.nodes[node].on_start as usize..end]
     }
 
-    /// The leaf that holds `p`; points in a plane count as in front.
+    /// Returns the leaf that holds `p`; points in a plane count as in front.
     pub(super) fn leaf_of(&self, p: DVec3) -> u32 {
         let mut at = self.root;
         while at >= 0 {
@@ -82,7 +80,7 @@ impl Tree {
         leaf_index(at)
     }
 
-    /// First leaf below `child` and one past the last.
+    /// Returns the range of the leaves below `child`.
     pub(super) fn leaf_range(&self, child: i32) -> std::ops::Range<u32> {
         let end = |side: usize| {
             let mut at = child;
@@ -95,18 +93,18 @@ impl Tree {
     }
 }
 
-/// The leaf that a child value stands for.
+/// Returns the leaf of a child value.
 pub(super) fn leaf_index(child: i32) -> u32 {
     (-1 - child) as u32
 }
 
-/// A piece of a surface in a box or in a region of it.
+/// A piece of a surface in a box or a region of it.
 struct Fragment {
     surface: u32,
     points: Poly,
 }
 
-/// A subtree under construction; box-side planes are numbered after the surfaces' planes.
+/// A subtree under construction. Planes of box sides are numbered after those of surfaces.
 #[derive(Default)]
 struct Part {
     nodes: Vec<Node>,
@@ -121,7 +119,7 @@ impl Part {
         -(self.n_leaves as i32)
     }
 
-    /// Appends a part built on its own; returns what its root is here.
+    /// Appends a part built separately; returns its root in this one.
     fn append(&mut self, part: &Part, root: i32, n_surface_planes: u32) -> i32 {
         let (node0, on0) = (self.nodes.len() as i32, self.on_plane.len() as u32);
         let (side0, leaf0) = (self.sides.len() as u32, self.n_leaves as i32);
@@ -148,8 +146,8 @@ impl Part {
     }
 }
 
-/// Builds the tree. Near-linear in fragments for scenes whose surfaces are spread out; a knot of
-/// `k` surfaces through one point makes up to `k²` leaves.
+/// Builds the tree. Near-linear in fragments for scenes with surfaces spread out; a knot of `k` surfaces through one
+/// point makes up to `k²` leaves.
 pub(super) fn build(
     set: &SurfaceSet,
     bounds: Aabb,
@@ -180,7 +178,7 @@ pub(super) fn build(
     let mut part = Part::default();
     let root = builder.split_box(fragments, bounds, &mut part);
     let mut planes = set.planes.clone();
-    // Boxes beside each other are often split at the same place; one plane, one id.
+    // Adjacent boxes are often split at the same place; keep each plane once.
     let mut distinct: Vec<(u8, u64)> = part.sides.iter().map(|&(a, x)| (a, x.to_bits())).collect();
     distinct.sort_unstable();
     distinct.dedup();
@@ -217,7 +215,7 @@ struct Builder<'a> {
     purse: Purse<'a>,
 }
 
-/// How a box is to be split.
+/// A split of a box.
 struct BoxSplit {
     axis: usize,
     at: f64,
@@ -286,7 +284,7 @@ impl Builder<'_> {
         node as i32
     }
 
-    /// Sorts fragments to the sides of a plane; those in it are noted in `on_plane`.
+    /// Distributes fragments to the sides of a plane; records those in it in `on_plane`.
     fn distribute(
         &self,
         fragments: Vec<Fragment>,
@@ -323,11 +321,11 @@ impl Builder<'_> {
                         points: b,
                     });
                 }
-                // Too small to tell: nothing of it is left.
+                // Too small to have a side; nothing of it is left.
                 Sides::On => {}
             }
         }
-        // A surface may arrive in several fragments where regions were cut before.
+        // A surface may arrive in several fragments if regions were cut before.
         on_plane[on_start..].sort_unstable();
         let mut kept = on_start;
         for i in on_start..on_plane.len() {
@@ -340,7 +338,7 @@ impl Builder<'_> {
         (front, back)
     }
 
-    /// The split of least surface-area cost; `None` where the box had better not be split.
+    /// Returns the split with the least surface-area cost; `None` if splitting the box does not pay.
     fn choose_box_split(&self, fragments: &[Fragment], bounds: &Aabb) -> Option<BoxSplit> {
         let stride = fragments.len().div_ceil(SAMPLE);
         let sample: Vec<&Fragment> = fragments.iter().step_by(stride).collect();
@@ -348,7 +346,7 @@ impl Builder<'_> {
         let total = sample.len() as f64;
         let size = bounds.size();
         let mut best: Option<(f64, BoxSplit)> = None;
-        // Away from the corners of surfaces, lest a cut shaves off what is thinner than an epsilon.
+        // Stay away from vertices of surfaces, so that no cut shaves off a part thinner than an epsilon.
         let gap = 50.0 * self.tolerance.plane;
         for axis in 0..3 {
             if size[axis] < MIN_BOX {
@@ -366,7 +364,7 @@ impl Builder<'_> {
                 let n_front = total - maxs.partition_point(|&x| x <= at + slack) as f64;
                 (share(at - lo) * n_back + share(hi - at) * n_front) / share(hi - lo)
             };
-            // The planes of axis-aligned surfaces; what covers much of the section comes first.
+            // The planes of axis-aligned surfaces; those that cover much of the section are preferred.
             let mut flat: Vec<(f64, u32, f64)> = sample
                 .iter()
                 .filter(|f| self.axis_of[self.plane_of(f) as usize] == Some(axis as u8))
@@ -422,7 +420,7 @@ impl Builder<'_> {
         let Some((cost, split)) = best else {
             return self.halve(fragments.len(), bounds);
         };
-        // A split that separates next to nothing only multiplies fragments.
+        // A split that separates almost nothing only multiplies fragments.
         let useful =
             cost < 0.9 * total || (fragments.len() > 4 * MAX_BOX_FRAGMENTS && cost < 0.99 * total);
         if useful {
@@ -432,8 +430,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Middle of the longest side, for what is too dense for its own planes and cannot be split
-    /// well: costly, but it ends at [`MIN_BOX`].
+    /// Returns a split in the middle of the longest side, for boxes too dense for their surfaces' planes and without
+    /// a good split: costly, but it ends at [`MIN_BOX`].
     fn halve(&self, n_fragments: usize, bounds: &Aabb) -> Option<BoxSplit> {
         let size = bounds.size();
         let axis = (0..3)
@@ -442,7 +440,7 @@ impl Builder<'_> {
         if n_fragments <= MAX_BSP_FRAGMENTS || size[axis] < MIN_BOX {
             return None;
         }
-        // Not the very middle: corners like to be there.
+        // Not the exact middle, where vertices are common.
         let at = bounds.min[axis] + 0.483_217 * size[axis];
         Some(BoxSplit {
             axis,
@@ -451,13 +449,13 @@ impl Builder<'_> {
         })
     }
 
-    /// Splits a convex region by the planes of what is in it.
+    /// Splits a convex region by the planes of its surfaces.
     fn split_by_planes(&self, fragments: Vec<Fragment>, out: &mut Part) -> i32 {
         if fragments.is_empty() {
             return out.leaf();
         }
         let fragments = bounded(fragments);
-        // Choosing a plane looks at most of them several times.
+        // Choosing a plane examines most fragments several times.
         if !self.purse.spend(3 * fragments.len() as u64) {
             return out.leaf();
         }
@@ -478,12 +476,12 @@ impl Builder<'_> {
         node as i32
     }
 
-    /// The plane that splits least, then balances best, then covers most, then comes first.
+    /// Returns the plane that splits the fewest fragments, then balances best, then covers most, then comes first.
     fn choose_plane(&self, fragments: &[Fragment]) -> u32 {
         let mut ids: Vec<u32> = fragments.iter().map(|f| self.plane_of(f)).collect();
         ids.sort_unstable();
         ids.dedup();
-        // Ids are in order of falling area: the first few are the large surfaces.
+        // Ids are in order of falling area, so the first few are the large surfaces.
         ids.truncate(16);
         let mut best: Option<(i64, u32)> = None;
         for &id in &ids {

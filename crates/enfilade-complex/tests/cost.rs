@@ -1,4 +1,4 @@
-//! What the complex costs: copies of triangles, and what an allowance bounds.
+//! Cost of the complex: copies of triangles, and bounds by an allowance.
 
 use enfilade_complex::{ComplexInput, LabelSettings, Vote, build_complex_within};
 use enfilade_geom::{Aabb, Allowance, DVec3, Triangle};
@@ -16,7 +16,7 @@ impl Random {
     }
 }
 
-/// A quad that is level with no axis.
+/// A quad that is not parallel to any axis.
 fn tilted() -> Vec<Triangle> {
     let corner = |x: f32, y: f32, z: f32| DVec3::new(x.into(), y.into(), z.into());
     let [a, b, c, d] = [
@@ -83,7 +83,7 @@ fn an_allowance_ends_the_work_soon() {
     };
     let (is_over, all) = spent(u64::MAX);
     assert!(!is_over && all > 500_000, "{all}");
-    // The sum is the same on any number of threads, so whether it suffices is, too.
+    // The sum is the same for any number of threads, so whether it suffices is too.
     assert_eq!(spent(all), (false, all));
     assert!(spent(all - 1).0);
     for most in [0, 1000, all / 4] {

@@ -1,4 +1,4 @@
-//! Ways into a graph: by id, by name, from cell to cell.
+//! Access to a graph: by id, by name, from cell to cell.
 
 use std::ops::{Index, IndexMut};
 
@@ -6,7 +6,7 @@ use enfilade_geom::DVec3;
 
 use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, World};
 
-/// A portal as left from one of its cells.
+/// A portal seen from one of its cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exit<'a> {
     /// The portal's id.
@@ -18,10 +18,10 @@ pub struct Exit<'a> {
 }
 
 impl Portal {
-    /// The cell on the other side, seen from `cell`. O(1).
+    /// Returns the cell on the other side of `cell`. O(1).
     ///
-    /// `cell` must be one of its two; for any other the answer is the first of these. A debug build
-    /// panics then.
+    /// `cell` must be one of the portal's two; otherwise a debug build panics, and a release build returns the first
+    /// of them.
     #[inline]
     #[must_use]
     pub fn beyond(&self, cell: CellId) -> CellId {
@@ -31,18 +31,18 @@ impl Portal {
 }
 
 impl CellPortalGraph {
-    /// The ids of all cells, ascending.
+    /// Returns the ids of all cells, ascending.
     pub fn cell_ids(&self) -> impl ExactSizeIterator<Item = CellId> + use<> {
         (0..self.cells.len() as u32).map(CellId)
     }
 
-    /// The ids of all portals, ascending.
+    /// Returns the ids of all portals, ascending.
     pub fn portal_ids(&self) -> impl ExactSizeIterator<Item = PortalId> + use<> {
         (0..self.portals.len() as u32).map(PortalId)
     }
 
-    /// The portals of a cell, ascending, each with the cell behind it. Ends in time linear in their number; empty for
-    /// a cell that does not exist.
+    /// Returns the portals of a cell, ascending, each with the cell behind it; none for a cell that does not exist.
+    /// Linear in their number.
     pub fn exits(&self, cell: CellId) -> impl Iterator<Item = Exit<'_>> + Clone {
         let ids = self.cells.get(cell.idx()).map_or(&[][..], |c| &c.portals);
         ids.iter().map(move |&id| {
@@ -55,25 +55,26 @@ impl CellPortalGraph {
         })
     }
 
-    /// The cells but for the outdoors, ascending. O(cells).
+    /// Returns all cells but the outdoors, ascending. O(cells).
     pub fn indoor_cells(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
         let numbered = (0..).map(CellId).zip(&self.cells);
         numbered.filter(|(_, cell)| !cell.outdoor)
     }
 
-    /// The cell that is the outdoors, if there is one. O(cells).
+    /// Returns the outdoors, if there is one. O(cells).
     #[must_use]
     pub fn outdoors(&self) -> Option<CellId> {
         self.cell_ids().find(|&c| self[c].outdoor)
     }
 
-    /// The cell of a name, such as `cell-3` or `outdoors`; its name is `graph[cell].name`. O(cells).
+    /// Returns the cell with a name, such as `cell-3` or `outdoors`; the inverse of `graph[cell].name`. O(cells).
     #[must_use]
     pub fn cell_named(&self, name: &str) -> Option<CellId> {
         self.cell_ids().find(|&c| self[c].name == name)
     }
 
-    /// The cell of a point; `None` in solid matter, and for what is no number. About 100 ns. [Units: wu]
+    /// Returns the cell of a point; `None` in solids and for coordinates that are not finite. About 100 ns.
+    /// [Units: wu]
     #[must_use]
     pub fn locate(&self, p: [f32; 3]) -> Option<CellId> {
         let is_point = p.iter().all(|x| x.is_finite());
@@ -81,7 +82,7 @@ impl CellPortalGraph {
         self.locator.locate(p).filter(|_| is_point)
     }
 
-    /// The portals that join two cells, ascending; none for cells that are not neighbors.
+    /// Returns the portals that join two cells, ascending; none if the cells are not neighbors.
     pub fn portals_between(&self, a: CellId, b: CellId) -> impl Iterator<Item = PortalId> {
         self.exits(a).filter(move |e| e.to == b).map(|e| e.id)
     }
@@ -89,7 +90,7 @@ impl CellPortalGraph {
 
 /// # Panics
 ///
-/// When the graph has no such cell.
+/// If the graph does not have the cell.
 impl Index<CellId> for CellPortalGraph {
     type Output = Cell;
 
@@ -101,7 +102,7 @@ impl Index<CellId> for CellPortalGraph {
 
 /// # Panics
 ///
-/// When the graph has no such cell.
+/// If the graph does not have the cell.
 impl IndexMut<CellId> for CellPortalGraph {
     #[inline]
     fn index_mut(&mut self, cell: CellId) -> &mut Cell {
@@ -111,7 +112,7 @@ impl IndexMut<CellId> for CellPortalGraph {
 
 /// # Panics
 ///
-/// When the graph has no such portal.
+/// If the graph does not have the portal.
 impl Index<PortalId> for CellPortalGraph {
     type Output = Portal;
 
@@ -123,7 +124,7 @@ impl Index<PortalId> for CellPortalGraph {
 
 /// # Panics
 ///
-/// When the graph has no such portal.
+/// If the graph does not have the portal.
 impl IndexMut<PortalId> for CellPortalGraph {
     #[inline]
     fn index_mut(&mut self, portal: PortalId) -> &mut Portal {
@@ -132,7 +133,7 @@ impl IndexMut<PortalId> for CellPortalGraph {
 }
 
 impl World {
-    /// The batches that one cell sees without passing a portal, in the order of the file. O(batches).
+    /// Returns the batches that one cell sees without passing a portal, in the order of the file. O(batches).
     pub fn batches_of(&self, cell: CellId) -> impl Iterator<Item = &Batch> {
         let sees = move |b: &&Batch| b.cells.binary_search(&cell).is_ok();
         self.batches.iter().filter(sees)

@@ -1,8 +1,8 @@
-//! Sets of cells, a bit each.
+//! Sets of cells as bits.
 
 use crate::CellId;
 
-/// A set of cells of one graph. [Shape: a bit a cell, 64 a word, least significant first]
+/// A set of cells of one graph. [Shape: one bit per cell, 64 per word, least significant first]
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct CellSet {
     n_cells: u32,
@@ -10,11 +10,11 @@ pub struct CellSet {
 }
 
 impl CellSet {
-    /// The empty set in a graph of `n_cells` cells.
+    /// Makes an empty set for a graph of `n_cells` cells.
     ///
     /// # Panics
     ///
-    /// When ids cannot count that many.
+    /// If there are more cells than ids.
     #[must_use]
     pub fn new(n_cells: usize) -> Self {
         Self {
@@ -23,7 +23,7 @@ impl CellSet {
         }
     }
 
-    /// All cells of a graph of `n_cells` cells.
+    /// Makes the set of all cells of a graph of `n_cells` cells.
     #[must_use]
     pub fn all(n_cells: usize) -> Self {
         let mut set = Self::new(n_cells);
@@ -31,36 +31,36 @@ impl CellSet {
         set
     }
 
-    /// Number of cells of the graph.
+    /// Returns the number of cells of the graph.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.n_cells as usize
     }
 
-    /// Number of cells in the set.
+    /// Returns the number of cells in the set.
     #[must_use]
     pub fn len(&self) -> usize {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
     }
 
-    /// Whether no cell is in it.
+    /// Returns `true` if the set has no cells.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.words.iter().all(|&w| w == 0)
     }
 
-    /// Whether a cell is in it; false for ids beyond the graph.
+    /// Returns `true` if a cell is in the set; `false` for ids beyond the graph.
     #[must_use]
     pub fn contains(&self, cell: CellId) -> bool {
         let i = cell.0 as usize;
         cell.0 < self.n_cells && self.words[i / 64] >> (i % 64) & 1 != 0
     }
 
-    /// Adds a cell; says whether it is new.
+    /// Adds a cell; returns `true` if it is new.
     ///
     /// # Panics
     ///
-    /// When the graph has no such cell.
+    /// If the graph does not have the cell.
     pub fn insert(&mut self, cell: CellId) -> bool {
         assert!(
             cell.0 < self.n_cells,
@@ -73,7 +73,7 @@ impl CellSet {
         is_new
     }
 
-    /// Takes a cell out.
+    /// Removes a cell.
     pub fn remove(&mut self, cell: CellId) {
         if cell.0 < self.n_cells {
             self.words[cell.0 as usize / 64] &= !(1 << (cell.0 % 64));
@@ -91,7 +91,7 @@ impl CellSet {
         }
     }
 
-    /// Takes all cells out.
+    /// Removes all cells.
     pub fn clear(&mut self) {
         self.words.fill(0);
     }
@@ -103,14 +103,14 @@ impl CellSet {
         }
     }
 
-    /// Keeps the cells that another set of the same graph has too.
+    /// Keeps only the cells that are also in another set of the same graph.
     pub fn intersect_with(&mut self, other: &Self) {
         for (a, b) in self.words.iter_mut().zip(&other.words) {
             *a &= b;
         }
     }
 
-    /// Whether each cell is in the other set too.
+    /// Returns `true` if each cell is also in the other set.
     #[must_use]
     pub fn is_subset(&self, other: &Self) -> bool {
         self.words
@@ -119,7 +119,7 @@ impl CellSet {
             .all(|(a, b)| a & !b == 0)
     }
 
-    /// The cells, ascending.
+    /// Returns the cells, ascending.
     pub fn iter(&self) -> impl Iterator<Item = CellId> + '_ {
         self.words.iter().enumerate().flat_map(|(i, &word)| {
             let mut rest = word;
@@ -133,7 +133,7 @@ impl CellSet {
         })
     }
 
-    /// Runs of neighboring ids, the end not included, ascending.
+    /// Returns runs of consecutive ids, end excluded, ascending.
     #[must_use]
     pub fn ranges(&self) -> Vec<(u32, u32)> {
         let mut ranges: Vec<(u32, u32)> = Vec::new();
@@ -148,7 +148,7 @@ impl CellSet {
 }
 
 impl FromIterator<CellId> for CellSet {
-    /// A set in the smallest graph that has the cells.
+    /// Makes a set in the smallest graph that has the cells.
     fn from_iter<T: IntoIterator<Item = CellId>>(cells: T) -> Self {
         let cells: Vec<CellId> = cells.into_iter().collect();
         let n = cells.iter().map(|c| c.0 as usize + 1).max().unwrap_or(0);

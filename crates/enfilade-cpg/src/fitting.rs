@@ -1,4 +1,4 @@
-//! What fills an opening: the leaf of a door, its frame, a pane; and how a leaf moves.
+//! Objects that fill an opening: the leaf of a door, its frame, a pane; and the motion of a leaf.
 
 use enfilade_geom::{DMat4, DQuat, DVec3};
 
@@ -7,37 +7,37 @@ use enfilade_geom::{DMat4, DQuat, DVec3};
 pub struct Fitting {
     /// The object. Index into [`World::details`](crate::World::details).
     pub detail: u32,
-    /// What it is to the opening.
+    /// Its role in the opening.
     pub part: FittingPart,
-    /// How it opens and shuts; only leaves move.
+    /// Its motion between open and shut; only leaves move.
     pub motion: Option<Motion>,
 }
 
-/// What an object is to the opening that it stands in.
+/// The role of an object in the opening where it stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FittingPart {
-    /// What shuts the opening, and moves to open it.
+    /// Shuts the opening, and moves to open it.
     Leaf,
-    /// What runs around the opening, and stays.
+    /// Runs around the opening, and does not move.
     Frame,
-    /// What fills the opening and stays: glass, a panel.
+    /// Fills the opening and does not move: glass, a panel.
     Pane,
 }
 
-/// How a leaf moves between shut and open, from where the model has it.
+/// The motion of a leaf between shut and open, relative to its pose in the model.
 ///
-/// Amounts are in radians of a turn and in world units of a slide, 0 being the pose of the model.
+/// Amounts are in radians for a turn and in world units for a slide; 0 is the pose of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Along which way.
+    /// Path of the motion.
     pub kind: MotionKind,
-    /// How far to where it shuts the opening. [Units: rad or wu]
+    /// Amount at which it shuts the opening. [Units: rad or wu]
     pub shut: f32,
-    /// How far to where it is fully open. [Units: rad or wu]
+    /// Amount at which it is fully open. [Units: rad or wu]
     pub open: f32,
 }
 
-/// The way along which a leaf moves.
+/// The path along which a leaf moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionKind {
     /// Around a hinge.
@@ -47,15 +47,15 @@ pub enum MotionKind {
         /// Its direction, of unit length; turns are counter-clockwise around it.
         axis: [f32; 3],
     },
-    /// Straight on.
+    /// Along a straight line.
     Slide {
-        /// Where to, of unit length.
+        /// Direction, of unit length.
         along: [f32; 3],
     },
 }
 
 impl Motion {
-    /// The share of the way from shut (0) to open (1) at which the model has it.
+    /// Returns the share of the way from shut (0) to open (1) that is the pose of the model.
     #[must_use]
     pub fn share_of_model(&self) -> f32 {
         let way = self.open - self.shut;
@@ -66,12 +66,12 @@ impl Motion {
         }
     }
 
-    /// What moves the leaf from the model's pose to a share of the way from shut (0) to open (1), in world space.
+    /// Returns the transform, in world space, from the model's pose to a share of the way from shut (0) to open (1).
     #[must_use]
     pub fn at(&self, share: f32) -> DMat4 {
         let share = f64::from(share);
         let (shut, open) = (f64::from(self.shut), f64::from(self.open));
-        // Exactly 0 where the model has it, whatever rounding makes of the share.
+        // Exactly 0 at the model's pose, regardless of how the share was rounded.
         let amount = if share == f64::from(self.share_of_model()) {
             0.0
         } else {
@@ -88,7 +88,7 @@ impl Motion {
         }
     }
 
-    /// What is wrong with it, if anything.
+    /// Returns a problem of the motion, if any.
     pub(crate) fn problem(&self) -> Option<&'static str> {
         let direction = match self.kind {
             MotionKind::Turn { through, axis } => {
@@ -99,7 +99,7 @@ impl Motion {
             }
             MotionKind::Slide { along } => along,
         };
-        // What rounding to `f32` leaves, as for normals of portals.
+        // Allows for rounding to `f32`, as for normals of portals.
         if (vector(direction).length() - 1.0).abs() > 1e-3 || !vector(direction).is_finite() {
             return Some("its direction is not of unit length");
         }
@@ -111,7 +111,7 @@ impl Motion {
         };
         let is_amount = |x: f32| x.is_finite() && x.abs() <= most;
         if !is_amount(self.shut) || !is_amount(self.open) {
-            return Some("it moves by no number, or around more than once");
+            return Some("its amounts must be finite, and turns at most a full circle");
         }
         None
     }
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_leaf_turns_around_its_hinge_from_where_the_model_has_it() {
-        // Modeled ajar by 30 degrees.
+        // Modeled 30 degrees ajar.
         let ajar = door(-FRAC_PI_2 / 3.0, FRAC_PI_2 * 2.0 / 3.0);
         assert!((ajar.share_of_model() - 1.0 / 3.0).abs() < 1e-6);
         assert_eq!(ajar.at(ajar.share_of_model()), DMat4::IDENTITY);

@@ -11,17 +11,17 @@ use crate::{CellId, Fitting, Locator, PortalId, Pvs, SourceRuns};
 pub struct Cell {
     /// Name, unique in the graph: `cell-0`, `cell-1`, … or `outdoors`.
     pub name: String,
-    /// Least and greatest corner. [Units: wu] For outdoors, the scene's padded box.
+    /// Minimum and maximum. For outdoors, the scene's padded box. [Units: wu]
     pub aabb: [[f32; 3]; 2],
     /// Volume of the air in it. [Units: wu³]
     pub volume: f32,
-    /// Structural triangles that can be seen from it without passing a portal.
+    /// Number of structural triangles seen from it without passing a portal.
     pub n_triangles: u32,
-    /// Triangles of the detail objects that stand in it.
+    /// Number of triangles of the detail objects that stand in it.
     pub n_detail_triangles: u32,
     /// Its portals, ascending.
     pub portals: Vec<PortalId>,
-    /// The space around the building, all in one cell.
+    /// `true` for the space around the building, which is all one cell.
     pub outdoor: bool,
 }
 
@@ -30,7 +30,7 @@ pub struct Cell {
 pub struct Portal {
     /// The two cells; the normal points from the first to the second. Never equal.
     pub cells: [CellId; 2],
-    /// What kind of opening it is.
+    /// Kind of the opening.
     pub kind: PortalKind,
     /// Unit normal of its plane.
     pub normal: [f32; 3],
@@ -40,11 +40,11 @@ pub struct Portal {
     pub pieces: Vec<Vec<[f32; 3]>>,
     /// Area of the true opening, the sum over the pieces. [Units: wu²]
     pub area: f32,
-    /// The objects that stand in it: leaves of a door, frames, panes. Ascending by object, none twice.
+    /// The objects that stand in it: leaves of a door, frames, panes. Ascending by object, without duplicates.
     pub fittings: Vec<Fitting>,
 }
 
-/// What kind of opening a portal is.
+/// Kind of a portal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PortalKind {
     /// An opening to walk or look through.
@@ -53,26 +53,26 @@ pub enum PortalKind {
     Door,
     /// An opening with glass, or above a parapet.
     Window,
-    /// A gap of the model too narrow to be meant: light passes, so it is a portal.
+    /// A gap of the model that is too narrow to be intended. Light passes it, so it is a portal.
     Crack,
 }
 
-/// The cells, the portals, and where every point belongs.
+/// The cells, the portals, and the locator.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CellPortalGraph {
-    /// By [`CellId`].
+    /// Indexed by [`CellId`].
     pub cells: Vec<Cell>,
-    /// By [`PortalId`].
+    /// Indexed by [`PortalId`].
     pub portals: Vec<Portal>,
-    /// Point to cell.
+    /// Finds the cell of a point.
     pub locator: Locator,
-    /// How the graph came to be.
+    /// Origin of the graph.
     pub provenance: Provenance,
-    /// What the bake counted and timed.
+    /// Counts from the bake.
     pub statistics: Statistics,
 }
 
-/// What made a graph, and from what.
+/// The program, settings and input that a graph was made with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
     /// Program and version, e.g. `enfilade 0.1.0`.
@@ -85,7 +85,7 @@ pub struct Provenance {
     pub input_hash: String,
 }
 
-/// What the bake counted. Timings are left out of the file so that equal input gives equal bytes.
+/// Counts from the bake. The file holds no timings, so that equal input gives equal bytes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
     /// Named counts, e.g. `input_triangles`, `voxels`, `leaks`.
@@ -97,7 +97,7 @@ pub struct Statistics {
 pub struct World {
     /// Cells, portals and locator.
     pub graph: CellPortalGraph,
-    /// Structural geometry; each triangle, or piece of one, stands in exactly one batch.
+    /// Structural geometry; each triangle, or piece of one, is in exactly one batch.
     pub batches: Vec<Batch>,
     /// Detail objects with the cells they touch.
     pub details: Vec<DetailObject>,
@@ -109,29 +109,30 @@ pub struct World {
     pub textures: Vec<Texture>,
     /// Pictures.
     pub images: Vec<Image>,
-    /// A line for people to look at: the way out of air that should be a room, where it is widest. Of two points or more, in
-    /// world space; empty where none was asked for. No matter to anything that reads a world. [Units: wu]
+    /// A polyline for people: the path along which air leaks out of a place that should be a room, where it is
+    /// widest. In world space; at least two points, or empty if not requested. Readers of worlds ignore it.
+    /// [Units: wu]
     pub leak_path: Vec<[f32; 3]>,
-    /// The input's own tree of names, which triangles and details refer to. A node comes after the one above it.
+    /// The input's own tree of names, referenced by triangles and details. A node comes after its parent.
     pub sources: Vec<SourceNode>,
     /// The input's lights, cameras and marked places.
     pub fixtures: Vec<Fixture>,
-    /// What the input says of itself as a whole.
+    /// Information of the input about itself as a whole.
     pub about: About,
-    /// What can be seen from each cell, if it was computed. What changes cells or portals drops it.
+    /// Cells visible from each cell, if computed. Changes of cells or portals drop it.
     pub pvs: Option<Pvs>,
 }
 
-/// Structural triangles of one material that are seen from exactly the same cells.
+/// Structural triangles of one material that exactly the same cells see.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// The cells that see them, ascending, none twice. Empty for what no cell sees (inside walls).
+    /// The cells that see them, ascending, without duplicates. Empty for triangles that no cell sees (inside walls).
     pub cells: Vec<CellId>,
     /// The triangles, in world space.
     pub primitive: Primitive,
-    /// Which of [`World::sources`] each triangle comes from; empty where that is not known.
+    /// For each triangle, its source in [`World::sources`]; empty if unknown.
     pub sources: SourceRuns,
-    /// They are seals: no part of the model, but added to close gaps of it. Matter to every consumer.
+    /// `true` for seals: triangles that are not part of the model but close gaps of it. Solid for every consumer.
     pub is_seal: bool,
 }
 
@@ -146,9 +147,9 @@ pub struct DetailObject {
     pub transform: [f32; 16],
     /// The cells it touches, ascending.
     pub cells: Vec<CellId>,
-    /// What it comes from. Index into [`World::sources`].
+    /// Its source. Index into [`World::sources`].
     pub source: Option<u32>,
-    /// The object that it was taken out of, as a leaf is out of a door modeled in one piece with its frame. Index into
+    /// The object from which it was separated, such as a door modeled in one piece with its frame. Index into
     /// [`World::details`].
     pub part_of: Option<u32>,
 }

@@ -1,19 +1,19 @@
-//! Openings to outdoors that look as if nobody meant them.
+//! Openings to outdoors that look unintended.
 //!
-//! A graph cannot know what was meant. What is reported here are openings to outdoors that are
-//! neither shaped nor placed as doors and windows are; errs to saying nothing.
+//! A graph does not record intentions. This reports openings to outdoors whose shape or place does not fit doors and
+//! windows; in doubt, it reports nothing.
 
 use crate::{CellPortalGraph, Portal, PortalId, PortalKind};
 use enfilade_geom::DVec3;
 
-/// Nobody looks or climbs through less. [Units: wu]
+/// Least width of a window. [Units: wu]
 const NARROW: f32 = 0.3;
-/// What fills less of its rectangle is no rectangle, arch or circle (0.785), even behind a cross.
+/// Least share of its bounding rectangle that a rectangle, arch or circle (0.785) fills, even behind a cross.
 const REGULAR: f32 = 0.6;
-/// Steeper than this (the sine of 45 degrees) reads as a floor or a ceiling.
+/// Openings with a larger vertical part of the normal (the sine of 45 degrees) count as in a floor or ceiling.
 const LEVEL: f32 = 0.707;
 
-/// Why an opening may be a hole of the model.
+/// The reason why an opening may be a hole of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum HoleReason {
     /// It lies in a floor, ceiling or roof, and no pane closes it.
@@ -37,19 +37,20 @@ impl std::fmt::Display for HoleReason {
 /// An opening to outdoors that may be a hole of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hole {
-    /// Which opening.
+    /// The opening.
     pub portal: PortalId,
     /// Middle of its outline. [Units: wu]
     pub position: [f32; 3],
-    /// What looks wrong with it.
+    /// The reason for suspicion.
     pub reason: HoleReason,
 }
 
 impl CellPortalGraph {
-    /// Openings to outdoors that may be holes of the model, the largest first.
+    /// Returns openings to outdoors that may be holes of the model, the largest first.
     ///
-    /// Cracks are left out: they are known by their kind. So is what opens to an outdoors that sees no triangle, where the
-    /// air around the scene was parted from the air beyond: that lies in no wall. O(n log n) for n portal corners.
+    /// Leaves out cracks, which have a kind of their own, and openings to an outdoors that sees no triangle, where
+    /// the air around the scene was divided from the air beyond: those are not in a wall. O(n log n) for n portal
+    /// vertices.
     #[must_use]
     pub fn suspected_holes(&self) -> Vec<Hole> {
         let is_outdoor = |p: &Portal| {
@@ -92,8 +93,8 @@ fn reason(p: &Portal) -> Option<HoleReason> {
 }
 
 impl Portal {
-    /// Width and height of the outline: across and up as one who stands before it would say; for a
-    /// hole in a floor, along x and z. [Units: wu]
+    /// Returns the width and height of the outline, seen by someone who stands in front of it; for a hole in a floor,
+    /// its size along x and z. [Units: wu]
     #[must_use]
     pub fn size(&self) -> [f32; 2] {
         let normal = DVec3::from(self.normal.map(f64::from));
@@ -116,7 +117,7 @@ impl Portal {
         })
     }
 
-    /// Mean of the outline's corners. [Units: wu]
+    /// Returns the mean of the outline's vertices. [Units: wu]
     #[must_use]
     pub fn center(&self) -> [f32; 3] {
         let sum = self
@@ -132,7 +133,7 @@ mod tests {
     use super::*;
     use crate::{Cell, CellId};
 
-    /// Area of a convex polygon.
+    /// Returns the area of a convex polygon.
     fn area(outline: &[[f32; 3]]) -> f32 {
         let at = |c: &[f32; 3]| DVec3::from(c.map(f64::from));
         let twice: f64 = outline
@@ -145,7 +146,7 @@ mod tests {
         (0.5 * twice) as f32
     }
 
-    /// One room and outdoors, joined by these outlines.
+    /// Makes a graph of one room and outdoors, joined by these outlines.
     fn graph(portals: Vec<(PortalKind, [f32; 3], Vec<[f32; 3]>)>) -> CellPortalGraph {
         let cell = |outdoor| Cell {
             outdoor,

@@ -1,4 +1,4 @@
-//! The numbers that cells and portals go by, and the names that are printed for them.
+//! Ids of cells and portals, and their printed names.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ pub struct CellId(pub u32);
 pub struct PortalId(pub u32);
 
 impl CellId {
-    /// Its position in [`CellPortalGraph::cells`](crate::CellPortalGraph::cells).
+    /// Returns its index in [`CellPortalGraph::cells`](crate::CellPortalGraph::cells).
     #[inline]
     #[must_use]
     pub fn idx(self) -> usize {
@@ -20,7 +20,7 @@ impl CellId {
 }
 
 impl PortalId {
-    /// Its position in [`CellPortalGraph::portals`](crate::CellPortalGraph::portals).
+    /// Returns its index in [`CellPortalGraph::portals`](crate::CellPortalGraph::portals).
     #[inline]
     #[must_use]
     pub fn idx(self) -> usize {

@@ -1,4 +1,4 @@
-//! Where a leaf stands, and whether one sees through it.
+//! Poses of detail objects, and whether they are see-through.
 
 use enfilade_geom::DMat4;
 
@@ -6,14 +6,14 @@ use crate::fitting::vector;
 use crate::{DetailObject, Motion, World};
 
 impl DetailObject {
-    /// From its mesh to the world, as [`DetailObject::transform`] says it.
+    /// Returns the transform from its mesh to the world, the same as [`DetailObject::transform`].
     #[must_use]
     pub fn placement(&self) -> DMat4 {
         DMat4::from_cols_array(&self.transform.map(f64::from))
     }
 
-    /// Its transform once `motion` has moved it to a share of the way from shut (0) to open (1); column-major, as
-    /// [`DetailObject::transform`], and the same where the model has it there.
+    /// Returns its transform after `motion` to a share of the way from shut (0) to open (1); column-major, as
+    /// [`DetailObject::transform`], and equal to that at the model's pose.
     #[must_use]
     pub fn transform_at(&self, motion: &Motion, share: f32) -> [f32; 16] {
         if share == motion.share_of_model() {
@@ -24,15 +24,16 @@ impl DetailObject {
     }
 }
 
-/// Surfaces of this share of a leaf or more let one see through it as a whole.
+/// Least share of transparent surface that makes a leaf see-through as a whole.
 const SEE_THROUGH: f64 = 0.25;
 
 impl World {
-    /// Whether one sees through an object, by its materials' `alphaMode`: at least a quarter of its surface. A door of
-    /// glass shuts the way, not the sight. O(triangles of the object).
+    /// Returns `true` if at least a quarter of an object's surface is transparent, by its materials' `alphaMode`. A
+    /// glass door shuts the way, not the view. O(triangles of the object).
     ///
     /// # Panics
     ///
+    /// If the detail object does not exist.
     /// When there is no such detail object.
     #[must_use]
     pub fn is_see_through(&self, detail: u32) -> bool {

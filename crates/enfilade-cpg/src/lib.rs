@@ -1,9 +1,9 @@
-//! The cell-and-portal graph: what every builder of enfilade makes and every consumer reads.
+//! The cell-and-portal graph: made by every builder of enfilade, and read by every consumer.
 //!
-//! A [`World`] is a [`CellPortalGraph`] together with the geometry of its cells. This crate holds
-//! the types, their invariants ([`CellPortalGraph::validate`]), the [`Locator`] (point to cell) and
-//! the file: a GLB with the `ENFILADE_cell_portal_graph` extension ([`wire`]). It does not know how a
-//! graph was made, touches no file system and starts no thread.
+//! A [`World`] is a [`CellPortalGraph`] together with the geometry of its cells. This crate holds the types, their
+//! invariants ([`CellPortalGraph::validate`]), the [`Locator`] (point to cell) and the file: a GLB with the
+//! `ENFILADE_cell_portal_graph` extension ([`wire`]). It does not depend on how a graph was made, does not use the
+//! file system and does not start threads.
 
 mod access;
 mod cell_set;

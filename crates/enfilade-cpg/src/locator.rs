@@ -4,28 +4,28 @@ use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use crate::CellId;
 
-/// What is this close to a plane of the locator touches both its sides. [Units: wu]
+/// Geometry this close to a plane of the locator touches both its sides. [Units: wu]
 const TOUCH: f64 = 1e-4;
 
-/// The corners of `polygon` that lie on `plane`: a corner or an edge of it.
+/// Returns the vertices of `polygon` that lie on `plane`: one of its vertices or edges.
 fn on_plane(polygon: &Winding, plane: &Plane) -> Winding {
     let near = |p: &&DVec3| plane.signed_distance(**p).abs() <= TOUCH;
     Winding::new(polygon.points.iter().filter(near).copied().collect())
 }
 
-/// Answers which cell a point lies in, whatever built the graph.
+/// Finds the cell of a point, for graphs of any builder.
 ///
-/// A binary tree of planes over the box `bounds`; every leaf is one cell or solid matter. Points
-/// outside the box belong to `outside`. Cost: one plane test a level, about 20 levels.
+/// A binary tree of planes over the box `bounds`; every leaf is one cell or solid. Points outside the box belong to
+/// `outside`. Cost: one plane test per level, about 20 levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Locator {
-    /// What the tree covers. [Units: wu]
+    /// The box that the tree covers. [Units: wu]
     pub bounds: Aabb,
     /// The cell of everything beyond `bounds`; `None` for worlds without an outdoors.
     pub outside: Option<CellId>,
     /// Distinct planes as `[nx, ny, nz, d]`.
     pub planes: Vec<[f64; 4]>,
-    /// Inner nodes; children always come after their parent, so that no walk can loop, and each node has one parent.
+    /// Inner nodes. Each has one parent, and children come after it, so that no walk can loop.
     pub nodes: Vec<LocatorNode>,
     /// The tree: a node (`>= 0`) or a leaf (see [`Locator::leaf`]).
     pub root: i32,
@@ -54,11 +54,11 @@ impl Default for Locator {
 }
 
 impl Locator {
-    /// Nodes on a walk from the root to a leaf, at most. Trees of real buildings have some tens; what cuts space by a tree takes
-    /// time by its nodes times its depth, so that a file of a megabyte could ask for hours.
+    /// Most nodes on a walk from the root to a leaf. Trees of real buildings have some tens. Cutting space by a tree
+    /// takes time by its nodes times its depth, so without a limit a file of a megabyte could take hours.
     pub const MAX_DEPTH: u32 = 1024;
 
-    /// The child value that stands for a leaf: `-1` for solid, `-2 - cell` for a cell.
+    /// Returns the child value of a leaf: `-1` for solid, `-2 - cell` for a cell.
     #[must_use]
     pub const fn leaf(cell: Option<CellId>) -> i32 {
         match cell {
@@ -67,10 +67,10 @@ impl Locator {
         }
     }
 
-    /// Adds the cells that a convex polygon touches to `cells`, which stays ascending and without
-    /// repeats. What lies within 0.1 mm of a plane is on both sides of it: errs to "touches".
+    /// Adds the cells that a convex polygon touches to `cells`, which stays ascending and without duplicates. Parts
+    /// within 0.1 mm of a plane are on both sides of it: errs to "touches".
     ///
-    /// `corners` in order; any number of them. Corners that are not finite touch nothing.
+    /// `corners` are its vertices in order, any number of them. Vertices that are not finite touch nothing.
     pub fn cells_touching(&self, corners: &[DVec3], cells: &mut Vec<CellId>) {
         if corners.is_empty() || corners.iter().any(|p| !p.is_finite()) {
             return;
@@ -99,7 +99,7 @@ impl Locator {
             };
             let (front, back) = polygon.split(&plane, TOUCH);
             match (front, back) {
-                // In the plane: both sides.
+                // In the plane: visit both sides.
                 (None, None) => {
                     stack.push((node.children[0], polygon.clone()));
                     stack.push((node.children[1], polygon));
@@ -112,7 +112,7 @@ impl Locator {
                     for (child, part) in node.children.into_iter().zip([front, back]) {
                         match part {
                             Some(part) => stack.push((child, part)),
-                            // Ends at the plane: what is behind it is touched by an edge or corner.
+                            // The polygon ends at the plane: only an edge or vertex of it touches the space behind.
                             None if touches => stack.push((child, on_plane(&polygon, &plane))),
                             None => {}
                         }
@@ -122,17 +122,17 @@ impl Locator {
         }
     }
 
-    /// Adds the cells that the convex hull of `points` may touch, grown by `margin`, to `cells`, which stays ascending and
-    /// without repeats. [Units: wu]
+    /// Adds the cells that the convex hull of `points`, grown by `margin`, may touch to `cells`, which stays
+    /// ascending and without duplicates. [Units: wu]
     ///
-    /// No cell that it touches is missing; a few may be in it that only come near. Points that are not finite touch nothing.
-    /// `O(points)` for each node that the hull reaches.
+    /// Includes every cell that it touches, and may include some that it only comes near. Points that are not finite
+    /// touch nothing. `O(points)` for each node that the hull reaches.
     pub fn cells_near(&self, points: &[DVec3], margin: f64, cells: &mut Vec<CellId>) {
         self.cells_near_with(points, margin, cells, &mut Vec::new());
     }
 
-    /// The same, with a buffer that is kept from question to question: nothing is allocated once it has grown. Its contents
-    /// do not matter.
+    /// Does [`Locator::cells_near`] with a buffer kept between queries, so that nothing is allocated once it has
+    /// grown. The buffer's contents do not matter.
     pub fn cells_near_with(
         &self,
         points: &[DVec3],
@@ -177,8 +177,8 @@ impl Locator {
         }
     }
 
-    /// The cell that `p` lies in, as [`Locator::locate`], and how far from `p` it surely is the same: the distance to the
-    /// nearest plane on the way down the tree. 0 outside the box. [Units: wu]
+    /// Returns the cell of `p`, as [`Locator::locate`], and a distance from `p` within which it is surely the same:
+    /// that to the nearest plane on the way down the tree. 0 outside the box. [Units: wu]
     #[must_use]
     pub fn locate_with_room(&self, p: DVec3) -> (Option<CellId>, f64) {
         if !p.is_finite() || !self.bounds.contains(p) {
@@ -191,14 +191,14 @@ impl Locator {
             let node = &self.nodes[at as usize];
             let [x, y, z, d] = self.planes[node.plane as usize];
             let side = x * p.x + y * p.y + z * p.z + d;
-            // Normals are of unit length, but for rounding.
+            // Normals have unit length only up to rounding.
             room = room.min(side.abs() * (1.0 - 1e-6));
             at = node.children[usize::from(side < 0.0)];
         }
         ((at <= -2).then(|| CellId((-2 - at) as u32)), room)
     }
 
-    /// The cell that `p` lies in; `None` inside solid matter and for points that are not finite.
+    /// Returns the cell of `p`; `None` inside solids and for points that are not finite.
     #[must_use]
     pub fn locate(&self, p: DVec3) -> Option<CellId> {
         if !p.is_finite() {

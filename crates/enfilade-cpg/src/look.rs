@@ -1,4 +1,4 @@
-//! Materials, textures and samplers as the glTF JSON that they are carried through in.
+//! Materials, textures and samplers, kept as their glTF JSON.
 
 use std::collections::BTreeSet;
 
@@ -21,8 +21,11 @@ pub(crate) fn check(world: &World, problem: &mut dyn FnMut(String, String)) {
                     }
                 });
                 if let Some(index) = worst {
-                    let named = index.map_or_else(|| "no number".into(), |t| t.to_string());
-                    broken(format!("names texture {named} of {}", world.textures.len()));
+                    let named = index.map_or_else(|| "without an index".into(), |t| t.to_string());
+                    broken(format!(
+                        "refers to texture {named}, but there are {}",
+                        world.textures.len()
+                    ));
                 }
             }
         }
@@ -30,7 +33,10 @@ pub(crate) fn check(world: &World, problem: &mut dyn FnMut(String, String)) {
     for (i, texture) in world.textures.iter().enumerate() {
         let mut broken = |what| problem(format!("texture {i}"), what);
         if let Some(image) = texture.image.filter(|&m| m as usize >= world.images.len()) {
-            broken(format!("image {image} of {}", world.images.len()));
+            broken(format!(
+                "refers to image {image}, but there are {}",
+                world.images.len()
+            ));
         }
         if let Some(Err(why)) = sampler_text(texture).map(object) {
             broken(format!("its sampler: {why}"));
@@ -38,7 +44,7 @@ pub(crate) fn check(world: &World, problem: &mut dyn FnMut(String, String)) {
     }
 }
 
-/// The material's JSON object, made from the other fields where the input had none.
+/// Returns the material's JSON object, made from the other fields if the input had none.
 pub(crate) fn material_text(material: &Material) -> String {
     let text = material.gltf.trim();
     if !text.is_empty() {
@@ -59,12 +65,12 @@ pub(crate) fn material_text(material: &Material) -> String {
     value.to_string()
 }
 
-/// The sampler's JSON object; `None` for the default.
+/// Returns the sampler's JSON object; `None` for the default.
 pub(crate) fn sampler_text(texture: &Texture) -> Option<&str> {
     Some(texture.sampler.trim()).filter(|s| !s.is_empty())
 }
 
-/// The material that a JSON object describes.
+/// Parses the material in a JSON object.
 pub(crate) fn material_of_text(text: &str) -> Result<Material, String> {
     let value = object(text)?;
     let name = value
@@ -101,7 +107,7 @@ pub(crate) fn material_of_text(text: &str) -> Result<Material, String> {
     })
 }
 
-/// Adds the extensions that a material or sampler uses, wherever in it.
+/// Adds the extensions that a material or sampler uses at any depth.
 pub(crate) fn add_extensions(used: &mut BTreeSet<String>, text: &str) {
     fn visit(used: &mut BTreeSet<String>, value: &Value) {
         match value {
@@ -112,7 +118,7 @@ pub(crate) fn add_extensions(used: &mut BTreeSet<String>, text: &str) {
                     {
                         used.extend(extensions.keys().cloned());
                     }
-                    // Extras are the application's own; what looks like an extension there is none.
+                    // Extras belong to the application; a key `extensions` in them does not count.
                     if key != "extras" {
                         visit(used, inner);
                     }
@@ -127,10 +133,10 @@ pub(crate) fn add_extensions(used: &mut BTreeSet<String>, text: &str) {
     }
 }
 
-/// How many texture coordinate sets a material reads; 0 where it has no texture.
+/// Returns the number of texture coordinate sets that a material reads; 0 without a texture.
 ///
-/// Sets beyond the eighth are not counted: no renderer has as many, and a damaged number must not
-/// have gigabytes of them written.
+/// Ignores sets beyond the eighth: no renderer has as many, and a damaged number must not make the writer fill
+/// gigabytes.
 pub(crate) fn n_texcoord_sets(text: &str) -> usize {
     fn visit(most: &mut u64, value: &Value) {
         match value {
@@ -169,18 +175,17 @@ pub(crate) fn n_texcoord_sets(text: &str) -> usize {
 
 const MAX_TEXCOORD_SETS: u64 = 8;
 
-/// Parses a JSON object. The parser limits nesting to 128 levels, so that recursion over the
-/// result is safe.
+/// Parses a JSON object. The parser limits nesting to 128 levels, so recursion over the result is safe.
 fn object(text: &str) -> Result<Map<String, Value>, String> {
     match serde_json::from_str(text) {
         Ok(Value::Object(map)) => Ok(map),
-        Ok(_) => Err("is no JSON object".into()),
-        Err(why) => Err(format!("is no JSON: {why}")),
+        Ok(_) => Err("is not a JSON object".into()),
+        Err(why) => Err(format!("is not JSON: {why}")),
     }
 }
 
-/// Calls `visit` with the index of every texture reference: glTF, its extensions included, keeps
-/// them in objects whose key ends in `Texture`. `None` where the index is no whole number.
+/// Calls `visit` with the index of every texture reference: glTF, its extensions included, keeps them in objects
+/// whose key ends in `Texture`. `None` if the index is not an integer.
 fn each_texture_reference(value: &Value, visit: &mut dyn FnMut(Option<u64>)) {
     match value {
         Value::Object(map) => {

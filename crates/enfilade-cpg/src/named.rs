@@ -1,11 +1,11 @@
-//! What things were called before the bake, and where they are seen from.
+//! Names from before the bake, and the cells that see each named source.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{Batch, CellId, World};
 
 impl World {
-    /// Names of a source and of all above it, from the top, with `/` between; nodes without a name are left out.
+    /// Returns the names of a source and its ancestors, from the top, joined by `/`; skips nodes without a name.
     #[must_use]
     pub fn source_path(&self, source: u32) -> String {
         let mut names = Vec::new();
@@ -20,8 +20,8 @@ impl World {
         names.join("/")
     }
 
-    /// The sources that a cell sees without passing a portal, with how many of their triangles: structure by the triangles that
-    /// list the cell, details by all of theirs. O(batches + runs + details).
+    /// Returns the sources that a cell sees without passing a portal, each with its number of triangles: for
+    /// structure, those that list the cell; for details, all. O(batches + runs + details).
     #[must_use]
     pub fn sources_in(&self, cell: CellId) -> BTreeMap<u32, u32> {
         let mut found = BTreeMap::new();
@@ -41,14 +41,14 @@ impl World {
         found
     }
 
-    /// The cells from which a source is seen without passing a portal, ascending. O(batches + runs + details).
+    /// Returns the cells that see a source without passing a portal, ascending. O(batches + runs + details).
     #[must_use]
     pub fn cells_of_source(&self, source: u32) -> Vec<CellId> {
         self.cells_of_sources(|s| s == source)
     }
 
-    /// The cells from which any of some sources is seen without passing a portal, ascending; `is_one` says which these are.
-    /// O(batches + runs + details).
+    /// Returns the cells that see any of the sources for which `is_one` is `true` without passing a portal,
+    /// ascending. O(batches + runs + details).
     #[must_use]
     pub fn cells_of_sources(&self, is_one: impl Fn(u32) -> bool) -> Vec<CellId> {
         let holds = |b: &&Batch| b.sources.runs().iter().any(|r| is_one(r[0]));

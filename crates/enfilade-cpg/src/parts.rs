@@ -1,23 +1,23 @@
-//! What of each cell may be seen from each other cell, finer than whole cells: convex volumes, triangles and objects.
+//! Parts of each cell that may be seen from each other cell: convex volumes, triangles and objects.
 //!
-//! After Dirkse 2002, section 7.4 (source and destination clipped along the sequence of portals) and 7.6.2 (objects by cell).
-//! We differ in what is kept: by pair of cells, so that a reader that knows the eye's cell and the cell it looks into needs
-//! nothing else.
+//! After Dirkse 2002, section 7.4 (source and destination clipped along the sequence of portals) and 7.6.2 (objects
+//! by cell). We differ in the index: results are kept by pair of cells, so that a reader needs only the eye's cell
+//! and the cell it looks into.
 //!
-//! Rows are by pair: in the order of [`Pvs::pairs`](crate::Pvs::pairs).
+//! There is one row for each pair, in the order of [`Pvs::pairs`](crate::Pvs::pairs).
 
 use crate::World;
 
-/// How the parts of a world are numbered: the triangles of all batches in order, then the detail objects.
+/// Numbering of a world's parts: the triangles of all batches in order, then the detail objects.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PartNumbers {
-    /// By batch its first triangle, and then the number of all triangles.
+    /// For each batch the number of its first triangle, then the number of all triangles.
     first: Vec<u32>,
     n_details: u32,
 }
 
 impl PartNumbers {
-    /// The numbers of a world's parts. O(batches). A file has less than 2³² of them.
+    /// Numbers a world's parts. O(batches). A file has fewer than 2³² of them.
     #[must_use]
     pub fn new(world: &World) -> Self {
         let mut first = vec![0];
@@ -32,47 +32,48 @@ impl PartNumbers {
         }
     }
 
-    /// The numbers of a batch's triangles.
+    /// Returns the numbers of a batch's triangles.
     ///
     /// # Panics
     ///
-    /// When there is no such batch.
+    /// If the batch does not exist.
     #[must_use]
     pub fn of_batch(&self, batch: usize) -> std::ops::Range<u32> {
         self.first[batch]..self.first[batch + 1]
     }
 
-    /// The number of a detail object.
+    /// Returns the number of a detail object.
     #[must_use]
     pub fn of_detail(&self, detail: u32) -> u32 {
         self.n_triangles() + detail
     }
 
-    /// Number of triangles of all batches; the first detail object has this number.
+    /// Returns the number of triangles of all batches, which is also the number of the first detail object.
     #[must_use]
     pub fn n_triangles(&self) -> u32 {
         self.first.last().copied().unwrap_or(0)
     }
 
-    /// Number of all parts.
+    /// Returns the number of all parts.
     #[must_use]
     pub fn n_parts(&self) -> u32 {
         self.n_triangles().saturating_add(self.n_details)
     }
 }
 
-/// By pair of cells, the first seeing the second: which parts of the second ([`PartNumbers`]) may be seen from somewhere in the
-/// first with all portals open. A superset of the truth.
+/// For each pair of cells, the parts of the second ([`PartNumbers`]) that may be seen from somewhere in the first
+/// with all portals open. A superset of the truth.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VisibleParts {
-    /// By pair: where its runs end in `runs`.
+    /// For each pair, the end of its runs in `runs`.
     pub(crate) ends: Vec<u32>,
-    /// First part and the one after the last; in each row ascending, with a gap between any two.
+    /// First part and one past the last; in each row ascending, with gaps between runs.
     pub(crate) runs: Vec<[u32; 2]>,
 }
 
 impl VisibleParts {
-    /// Rows of parts, each ascending, none twice. Takes no more memory than the runs that they make.
+    /// Makes the table from rows of parts, each ascending without duplicates. Takes no more memory than the resulting
+    /// runs.
     pub fn of_ascending<R: IntoIterator<Item = u32>>(rows: impl IntoIterator<Item = R>) -> Self {
         let mut out = Self::default();
         for row in rows {
@@ -88,20 +89,20 @@ impl VisibleParts {
         out
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn n_pairs(&self) -> usize {
         self.ends.len()
     }
 
-    /// What is seen by a pair, as runs of parts, the end not included; ascending, with a gap between any two. None for a pair that
-    /// is not there.
+    /// Returns the parts that a pair sees as runs, end excluded; ascending, with gaps between runs. Empty for a pair
+    /// that does not exist.
     #[must_use]
     pub fn runs_of(&self, pair: usize) -> &[[u32; 2]] {
         row(&self.ends, &self.runs, pair)
     }
 
-    /// How many triangles of batches and how many detail objects a pair sees. O(runs).
+    /// Returns the number of batch triangles and of detail objects that a pair sees. O(runs).
     #[must_use]
     pub fn count(&self, pair: usize, numbers: &PartNumbers) -> [usize; 2] {
         let split = numbers.n_triangles();
@@ -112,7 +113,7 @@ impl VisibleParts {
         })
     }
 
-    /// The first pair whose row breaks an invariant, and how. Linear.
+    /// Returns the first pair whose row breaks an invariant, and the problem. Linear.
     pub(crate) fn problem(&self, n_pairs: usize, n_parts: u32) -> Option<(usize, &'static str)> {
         if let Some(found) = ends_problem(&self.ends, n_pairs, self.runs.len()) {
             return Some(found);
@@ -123,21 +124,21 @@ impl VisibleParts {
             let is_good = row.iter().all(is_run) && row.windows(2).all(|w| w[0][1] < w[1][0]);
             (!is_good).then_some((
                 pair,
-                "its runs must be of parts that exist, ascending and apart",
+                "its runs must hold existing parts, ascending, with gaps between runs",
             ))
         })
     }
 }
 
-/// By pair of cells, the first seeing the second: the *potentially visible volume*, outside of which nothing of the second is seen
-/// from anywhere in the first with all portals open. It is the union of convex pieces, each of them bounded by planes.
+/// For each pair of cells, the *potentially visible volume*: nothing of the second outside of it is seen from
+/// anywhere in the first with all portals open. A union of convex pieces, each bounded by planes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VisibleVolumes {
-    /// By pair: where its pieces end in `piece_ends`.
+    /// For each pair, the end of its pieces in `piece_ends`.
     pub(crate) ends: Vec<u32>,
-    /// By piece: where its planes end in `planes`.
+    /// For each piece, the end of its planes in `planes`.
     pub(crate) piece_ends: Vec<u32>,
-    /// Unit normal and offset: a point of the piece has `n·p + d >= 0` for each.
+    /// Unit normal and offset: each point of the piece has `n·p + d >= 0` for all its planes.
     pub(crate) planes: Vec<[f64; 4]>,
 }
 
@@ -147,7 +148,7 @@ impl VisibleVolumes {
     /// Most planes of a piece.
     pub const MAX_PLANES: usize = 1024;
 
-    /// The volumes of pairs in order, each a list of pieces, each of these a list of planes.
+    /// Makes the table from the volumes of pairs in order, each a list of pieces, each a list of planes.
     #[must_use]
     pub fn of_pairs(pairs: impl IntoIterator<Item = Vec<Vec<[f64; 4]>>>) -> Self {
         let mut out = Self::default();
@@ -161,20 +162,20 @@ impl VisibleVolumes {
         out
     }
 
-    /// Number of pairs.
+    /// Returns the number of pairs.
     #[must_use]
     pub fn n_pairs(&self) -> usize {
         self.ends.len()
     }
 
-    /// Number of pieces of all pairs.
+    /// Returns the number of pieces of all pairs.
     #[must_use]
     pub fn n_pieces(&self) -> usize {
         self.piece_ends.len()
     }
 
-    /// The pieces of a pair, each by its planes `[nx, ny, nz, d]`: inside, `n·p + d >= 0`. A piece without planes is the whole cell.
-    /// None for a pair that is not there.
+    /// Returns the pieces of a pair, each as planes `[nx, ny, nz, d]`: inside, `n·p + d >= 0`. A piece without planes
+    /// is the whole cell. Empty for a pair that does not exist.
     pub fn pieces_of(&self, pair: usize) -> impl Iterator<Item = &[[f64; 4]]> + Clone + '_ {
         let end = self.ends.get(pair).map_or(0, |&e| e as usize);
         let start = pair.checked_sub(1).and_then(|p| self.ends.get(p));
@@ -182,7 +183,7 @@ impl VisibleVolumes {
         (start..end).map(|piece| row(&self.piece_ends, &self.planes, piece))
     }
 
-    /// The first pair whose pieces break an invariant, and how. Linear.
+    /// Returns the first pair whose pieces break an invariant, and the problem. Linear.
     pub(crate) fn problem(&self, n_pairs: usize) -> Option<(usize, &'static str)> {
         if let Some(found) = ends_problem(&self.ends, n_pairs, self.piece_ends.len()) {
             return Some(found);
@@ -197,17 +198,20 @@ impl VisibleVolumes {
         };
         (0..n_pairs).find_map(|pair| {
             if self.pieces_of(pair).count() > Self::MAX_PIECES {
-                return Some((pair, "it has more pieces than there may be"));
+                return Some((pair, "it has more pieces than the limit"));
             }
             let is_good =
                 |piece: &[[f64; 4]]| piece.len() <= Self::MAX_PLANES && piece.iter().all(is_plane);
             let is_broken = !self.pieces_of(pair).all(is_good);
-            is_broken.then_some((pair, "its planes must be few and have unit normals"))
+            is_broken.then_some((
+                pair,
+                "its planes must have unit normals and stay within the limit",
+            ))
         })
     }
 }
 
-/// The row of a table of rows; empty for one that is not there.
+/// Returns a row of a table of rows; empty for one that does not exist.
 fn row<'a, T>(ends: &[u32], items: &'a [T], i: usize) -> &'a [T] {
     let Some(&end) = ends.get(i) else {
         return &[];
@@ -216,7 +220,7 @@ fn row<'a, T>(ends: &[u32], items: &'a [T], i: usize) -> &'a [T] {
     items.get(first as usize..end as usize).unwrap_or_default()
 }
 
-/// The first row that does not lie in the list behind the one before it.
+/// Returns the first row that does not lie behind the one before it within the list, and the problem.
 fn ends_problem(ends: &[u32], n_rows: usize, n_items: usize) -> Option<(usize, &'static str)> {
     if ends.len() != n_rows {
         return Some((
@@ -231,7 +235,7 @@ fn ends_problem(ends: &[u32], n_rows: usize, n_items: usize) -> Option<(usize, &
         }
         first = end;
     }
-    (first as usize != n_items).then_some((n_rows, "there are items of no row"))
+    (first as usize != n_items).then_some((n_rows, "some items belong to no row"))
 }
 
 #[cfg(test)]

@@ -1,30 +1,30 @@
-//! What can be seen from each cell, as a world may carry it.
+//! The potentially visible set that a world may carry.
 
 use crate::parts::{VisibleParts, VisibleVolumes};
 use crate::{CellId, CellSet};
 
-/// The potentially visible set of a graph: for each cell, the cells of which something may be seen from somewhere in it with
-/// all portals open.
+/// The potentially visible set of a graph: for each cell, the cells of which something may be seen from somewhere in
+/// it with all portals open.
 ///
-/// A superset of the truth: what is not in it is never seen. Kept as runs of neighboring ids, which rooms have because
-/// builders number them by place; a question takes a binary search. Made by `enfilade pvs --into`, or from the answer of
-/// the search in code.
+/// A superset of the truth: cells that are not in it are never seen. Stored as runs of consecutive ids, as builders
+/// number neighboring rooms by place; a query takes a binary search. Made by `enfilade pvs --into`, or in code from
+/// the answer of the search.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pvs {
-    /// By cell: where its runs end in `runs`.
+    /// For each cell, the end of its runs in `runs`.
     pub(crate) ends: Vec<u32>,
-    /// First cell and the one after the last; in each row ascending, with a gap between any two.
+    /// First cell and one past the last; in each row ascending, with gaps between runs.
     pub(crate) runs: Vec<[u32; 2]>,
-    /// By pair of cells, which triangles and objects may be seen, if that was computed.
+    /// For each pair of cells, the triangles and objects that may be seen, if computed.
     pub parts: Option<VisibleParts>,
-    /// By pair of cells, the volume that may be seen, if it is kept.
+    /// For each pair of cells, the volume that may be seen, if kept.
     pub volumes: Option<VisibleVolumes>,
 }
 
 impl Pvs {
-    /// The set of a graph in which `rows[c]` are the cells that may be seen from cell `c`. Linear in the rows.
+    /// Makes the set of a graph in which `rows[c]` are the cells that may be seen from cell `c`. Linear in the rows.
     ///
-    /// Whether each cell sees itself, and all ids exist, [`World::validate`](crate::World::validate) checks.
+    /// [`World::validate`](crate::World::validate) checks that each cell sees itself and that all ids exist.
     #[must_use]
     pub fn of_rows(rows: &[CellSet]) -> Self {
         let mut pvs = Self::default();
@@ -35,8 +35,8 @@ impl Pvs {
         pvs
     }
 
-    /// The set of a graph in which cell `c` may see the cells of `rows[c]`: ascending, none twice. Takes no more memory than
-    /// the runs that they make.
+    /// Makes the set of a graph in which cell `c` may see the cells of `rows[c]`, ascending without duplicates. Takes
+    /// no more memory than the resulting runs.
     pub fn of_ascending<R: IntoIterator<Item = u32>>(rows: impl IntoIterator<Item = R>) -> Self {
         let mut pvs = Self::default();
         for row in rows {
@@ -52,14 +52,14 @@ impl Pvs {
         pvs
     }
 
-    /// Number of cells of its graph.
+    /// Returns the number of cells of its graph.
     #[must_use]
     pub fn n_cells(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether something of `to` may be seen from `from`. O(log runs); allocates nothing. True where it does not know: for a
-    /// cell `from` that its graph does not have.
+    /// Returns `true` if something of `to` may be seen from `from`, and for a cell `from` that its graph does not
+    /// have. O(log runs); allocates nothing.
     #[must_use]
     pub fn sees(&self, from: CellId, to: CellId) -> bool {
         if from.idx() >= self.ends.len() {
@@ -70,40 +70,41 @@ impl Pvs {
         row.get(at).is_some_and(|run| run[0] <= to.0)
     }
 
-    /// The cells that may be seen from a cell, ascending, itself among them; empty for one that its graph does not have.
-    /// Allocates nothing.
+    /// Returns the cells that may be seen from a cell, ascending, including itself; none for a cell that its graph
+    /// does not have. Allocates nothing.
     pub fn visible_from(&self, cell: CellId) -> impl Iterator<Item = CellId> + Clone + '_ {
         let cells = self.row(cell).iter().flat_map(|&[a, b]| a..b);
         cells.map(CellId)
     }
 
-    /// How many cells may be seen from a cell. O(runs).
+    /// Returns the number of cells that may be seen from a cell. O(runs).
     #[must_use]
     pub fn n_visible_from(&self, cell: CellId) -> usize {
         let lengths = self.row(cell).iter().map(|&[a, b]| (b - a) as usize);
         lengths.sum()
     }
 
-    /// Ordered pairs of cells that may see each other, each with itself among them.
+    /// Returns the number of ordered pairs of cells that may see each other, including each cell with itself.
     #[must_use]
     pub fn n_pairs(&self) -> usize {
         self.runs.iter().map(|&[a, b]| (b - a) as usize).sum()
     }
 
-    /// The cells that may be seen from a cell as runs of neighboring ids, the end not included; ascending, with a gap between
-    /// any two. None for a cell that its graph does not have.
+    /// Returns the cells that may be seen from a cell as runs of consecutive ids, end excluded; ascending, with gaps
+    /// between runs. Empty for a cell that its graph does not have.
     #[must_use]
     pub fn runs_from(&self, cell: CellId) -> &[[u32; 2]] {
         self.row(cell)
     }
 
-    /// Ordered pairs of cells, the first seeing the second, ascending: the order of rows in [`Pvs::parts`] and [`Pvs::volumes`].
+    /// Returns ordered pairs of cells, the first seeing the second, ascending: the order of rows in [`Pvs::parts`]
+    /// and [`Pvs::volumes`].
     pub fn pairs(&self) -> impl Iterator<Item = (CellId, CellId)> + '_ {
         let cells = (0..self.ends.len() as u32).map(CellId);
         cells.flat_map(|from| self.visible_from(from).map(move |to| (from, to)))
     }
 
-    /// The runs of a cell; none for one that is not there.
+    /// Returns the runs of a cell; none for one that does not exist.
     fn row(&self, cell: CellId) -> &[[u32; 2]] {
         let Some(&end) = self.ends.get(cell.idx()) else {
             return &[];
@@ -113,8 +114,8 @@ impl Pvs {
         &self.runs[first as usize..end as usize]
     }
 
-    /// The first pair of cells whose parts or volumes break an invariant, and how; the cell numbers of a pair that is not there are
-    /// past the last. Linear. The rows of cells must be right.
+    /// Returns the first pair of cells whose parts or volumes break an invariant, and the problem; a problem outside
+    /// of all pairs has cell numbers past the last. Linear. The rows of cells must be valid.
     pub(crate) fn pair_problem(&self, n_parts: u32) -> Option<([u32; 2], &'static str)> {
         let n_pairs = self.n_pairs();
         let parts = self
@@ -128,7 +129,7 @@ impl Pvs {
         Some((cells.unwrap_or([n_cells; 2]), problem))
     }
 
-    /// The first cell whose row breaks an invariant, and how. Linear.
+    /// Returns the first cell whose row breaks an invariant, and the problem. Linear.
     pub(crate) fn problem(&self, n_cells: usize) -> Option<(u32, &'static str)> {
         if self.ends.len() != n_cells {
             return Some((0, "there must be a row for each cell of the graph"));
@@ -143,7 +144,7 @@ impl Pvs {
             if !row.iter().all(is_run) || row.windows(2).any(|w| w[0][1] >= w[1][0]) {
                 return Some((
                     cell,
-                    "its runs must be of cells that exist, ascending and apart",
+                    "its runs must hold existing cells, ascending, with gaps between runs",
                 ));
             }
             if !row.iter().any(|run| (run[0]..run[1]).contains(&cell)) {
@@ -152,7 +153,7 @@ impl Pvs {
             first = end;
         }
         let is_all = first as usize == self.runs.len();
-        (!is_all).then_some((n_cells as u32, "there are runs of no cell"))
+        (!is_all).then_some((n_cells as u32, "some runs belong to no cell"))
     }
 }
 

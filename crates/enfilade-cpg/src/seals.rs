@@ -1,20 +1,20 @@
-//! What a bake closed that the model leaves open.
+//! Gaps of the model that a bake closed.
 
 use crate::World;
 
-/// The seals of a world, counted and measured.
+/// Number and size of a world's seals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seals {
-    /// How many convex polygons.
+    /// Number of convex polygons.
     pub count: usize,
-    /// Their area. [Units: wu²]
+    /// Their total area. [Units: wu²]
     pub area: f64,
-    /// Area and middle of the largest. [Units: wu², wu]
+    /// Area and centroid of the largest. [Units: wu², wu]
     pub largest: (f64, [f64; 3]),
 }
 
 impl Seals {
-    /// Counts the seals of a world. Linear in their triangles, each polygon being a fan about its first corner.
+    /// Counts the seals of a world. Linear in their triangles; each polygon is a fan about its first vertex.
     #[must_use]
     pub fn of(world: &World) -> Self {
         let mut out = Self::default();

@@ -1,4 +1,4 @@
-//! The least that visibility needs to know of a graph: cells joined by convex openings.
+//! The minimal graph for computing visibility: cells joined by convex openings.
 
 use enfilade_geom::DVec3;
 
@@ -7,20 +7,19 @@ use crate::CellPortalGraph;
 /// A convex opening between two cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SightPortal {
-    /// The two cells; the winding's normal leads from the first to the second.
+    /// The two cells; the winding's normal points from the first to the second.
     pub cells: [u32; 2],
-    /// Corners, counter-clockwise seen from the second cell. [Units: wu]
+    /// Vertices, counter-clockwise seen from the second cell. [Units: wu]
     pub winding: Vec<DVec3>,
-    /// The convex parts of the winding that are truly open, each with at least three corners that run the
-    /// same way; none where all of it is open.
+    /// The open convex parts of the winding, each with at least three vertices in the same orientation; empty if all
+    /// of it is open.
     pub pieces: Vec<Vec<DVec3>>,
 }
 
-/// Cells and the openings between them, whatever they came from: a world, a portal file of a game,
-/// a generator.
+/// Cells and the openings between them, from any source: a world, a portal file of a game, a generator.
 ///
-/// Directions of portals are numbered: `2 i` leads from the first cell of portal `i` to its second,
-/// `2 i + 1` the other way.
+/// Directed portals have numbers: `2 i` leads from the first cell of portal `i` to its second, `2 i + 1` the other
+/// way.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SightGraph {
     /// Number of cells.
@@ -29,68 +28,68 @@ pub struct SightGraph {
     pub portals: Vec<SightPortal>,
 }
 
-/// Why cells and windings are no graph that sight lines can be followed through.
+/// The reasons why cells and windings are not a valid [`SightGraph`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SightGraphError {
-    /// A portal names a cell that is not there.
-    #[error("portal {portal} names cell {cell}, but there are only {n_cells} cells")]
+    /// A portal refers to a cell that does not exist.
+    #[error("portal {portal} refers to cell {cell}, but there are only {n_cells} cells")]
     NoSuchCell {
-        /// Its number.
+        /// The portal's number.
         portal: usize,
-        /// The cell it names.
+        /// The cell that it refers to.
         cell: u32,
-        /// How many there are.
+        /// Number of cells.
         n_cells: u32,
     },
     /// A portal leads from a cell to itself.
     #[error("portal {portal} joins cell {cell} to itself; remove it")]
     SelfLoop {
-        /// Its number.
+        /// The portal's number.
         portal: usize,
         /// The cell.
         cell: u32,
     },
     /// A portal has no area.
-    #[error("portal {portal} has {n} corners, at least 3 are needed; remove it")]
+    #[error("portal {portal} has {n} vertices, but needs at least 3; remove it")]
     TooFewCorners {
-        /// Its number.
+        /// The portal's number.
         portal: usize,
-        /// Its corners.
+        /// Its number of vertices.
         n: usize,
     },
-    /// A coordinate is no number or beyond [`SightGraph::MAX_COORDINATE`].
-    #[error("portal {portal}, corner {corner}: {value} is no usable coordinate")]
+    /// A coordinate is not a number or beyond [`SightGraph::MAX_COORDINATE`].
+    #[error("portal {portal}, vertex {corner}: coordinate {value} is out of range")]
     BadCoordinate {
-        /// Its number.
+        /// The portal's number.
         portal: usize,
-        /// Which corner.
+        /// Index of the vertex.
         corner: usize,
         /// The coordinate.
         value: f64,
     },
-    /// More corners or portals than ids can hold.
+    /// More vertices or portals than ids can hold.
     #[error("{n} {what}, more than the limit of {limit}; split the graph")]
     TooMany {
-        /// What there is too much of.
+        /// Plural name of the items.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         n: usize,
-        /// How many there may be.
+        /// The largest number allowed.
         limit: usize,
     },
 }
 
 impl SightGraph {
-    /// Largest coordinate. [Units: wu] Sums of products of three stay far inside `f64`.
+    /// Largest coordinate. Sums of products of three stay far inside `f64`. [Units: wu]
     pub const MAX_COORDINATE: f64 = 1e9;
-    /// Most portals. Search keeps a bit for each pair of directions.
+    /// Most portals. The search keeps a bit for each pair of directions.
     pub const MAX_PORTALS: usize = 1 << 20;
-    /// Most corners of one portal.
+    /// Most vertices of one portal.
     pub const MAX_CORNERS: usize = 1024;
     /// Most cells.
     pub const MAX_CELLS: usize = 1 << 20;
 
-    /// The graph of a world: each portal by its convex outline.
+    /// Makes the graph of a world: each portal by its convex outline.
     #[must_use]
     pub fn of_graph(graph: &CellPortalGraph) -> Self {
         Self {
@@ -107,8 +106,8 @@ impl SightGraph {
         }
     }
 
-    /// The graph of cells and outlines, as a portal file has them. Outlines of fewer than three corners have no area and are left
-    /// out.
+    /// Makes the graph of cells and outlines, as in a portal file. Leaves out outlines with fewer than three
+    /// vertices, which have no area.
     #[must_use]
     pub fn of_windings(
         n_cells: u32,
@@ -126,9 +125,9 @@ impl SightGraph {
         }
     }
 
-    /// A number that changes with the graph: FNV-1a, 64 bits, over the numbers of cells and portals, then for
-    /// each portal its cells, and for its winding and each of its pieces the number of corners and the
-    /// corners, all little-endian, counts as 32 bits and coordinates as `f64`.
+    /// Returns a hash of the graph: FNV-1a, 64 bits, over the numbers of cells and portals, then for each portal its
+    /// cells, and for its winding and each of its pieces the number of vertices and the vertices, all little-endian,
+    /// counts as 32 bits and coordinates as `f64`.
     #[must_use]
     pub fn content_hash(&self) -> u64 {
         let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
@@ -148,7 +147,7 @@ impl SightGraph {
 
     /// Checks ids, numbers and limits.
     ///
-    /// Windings with area zero are allowed: nothing is seen through them but by touching.
+    /// Windings with area zero are allowed: lines through them only touch.
     ///
     /// # Errors
     ///
@@ -219,7 +218,7 @@ fn check_winding(portal: usize, winding: &[DVec3]) -> Result<(), SightGraphError
     }
     if n > SightGraph::MAX_CORNERS {
         return Err(SightGraphError::TooMany {
-            what: "corners of a portal",
+            what: "vertices of a portal",
             n,
             limit: SightGraph::MAX_CORNERS,
         });

@@ -1,34 +1,34 @@
-//! Which of the input's objects each triangle comes from.
+//! The input's object from which each triangle comes.
 
-/// Which source each of a list of triangles comes from, as runs of triangles of one source.
+/// The source of each triangle of a list, as runs of triangles with one source.
 ///
-/// Triangles of one object mostly follow each other, so that this is far shorter than a number a triangle.
+/// Triangles of one object are mostly consecutive, so this is far shorter than one number per triangle.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SourceRuns {
-    /// Index into [`World::sources`](crate::World::sources), and how many triangles: at least one.
+    /// Index into [`World::sources`](crate::World::sources), and number of triangles, at least one.
     runs: Vec<[u32; 2]>,
 }
 
 impl SourceRuns {
-    /// The runs as they are, e.g. from a file; [`World::validate`](crate::World::validate) judges them.
+    /// Takes runs as they are, e.g. from a file; [`World::validate`](crate::World::validate) checks them.
     #[must_use]
     pub fn from_runs(runs: Vec<[u32; 2]>) -> Self {
         Self { runs }
     }
 
-    /// Source and number of triangles of each run, in the order of the triangles.
+    /// Returns source and number of triangles of each run, in the order of the triangles.
     #[must_use]
     pub fn runs(&self) -> &[[u32; 2]] {
         &self.runs
     }
 
-    /// Whether no triangle has a source.
+    /// Returns `true` if no triangle has a source.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.runs.is_empty()
     }
 
-    /// Says that the next `n` triangles come from `source`.
+    /// Appends `n` triangles from `source`.
     pub fn push(&mut self, source: u32, n: u32) {
         match self.runs.last_mut() {
             _ if n == 0 => {}
@@ -37,14 +37,14 @@ impl SourceRuns {
         }
     }
 
-    /// Puts the runs of other triangles behind these.
+    /// Appends the runs of further triangles.
     pub fn extend(&mut self, other: &Self) {
         for &[source, n] in &other.runs {
             self.push(source, n);
         }
     }
 
-    /// These runs if they are the sources of all of `n_triangles`, and none if some triangles came without.
+    /// Returns these runs if they cover all of `n_triangles`, and no runs otherwise.
     #[must_use]
     pub fn of_all(self, n_triangles: usize) -> Self {
         let n: u64 = self.runs.iter().map(|r| u64::from(r[1])).sum();
@@ -55,13 +55,13 @@ impl SourceRuns {
         }
     }
 
-    /// The source of each triangle, in their order.
+    /// Returns the source of each triangle, in order.
     pub fn of_triangles(&self) -> impl Iterator<Item = u32> {
         let run = |&[source, n]: &[u32; 2]| std::iter::repeat_n(source, n as usize);
         self.runs.iter().flat_map(run)
     }
 
-    /// The source of one triangle. O(runs).
+    /// Returns the source of one triangle. O(runs).
     #[must_use]
     pub fn of(&self, triangle: u32) -> Option<u32> {
         let mut end = 0_u64;
@@ -72,17 +72,19 @@ impl SourceRuns {
         self.runs.iter().find(holds).map(|&[source, _]| source)
     }
 
-    /// What is wrong with them, if they are to be the sources of `n_triangles`.
+    /// Returns a problem of these runs as the sources of `n_triangles`, if any.
     pub(crate) fn problem(&self, n_triangles: usize, n_sources: usize) -> Option<String> {
         if let Some([source, _]) = self.runs.iter().find(|r| r[0] as usize >= n_sources) {
-            return Some(format!("source {source} of {n_sources}"));
+            return Some(format!(
+                "refers to source {source}, but there are {n_sources}"
+            ));
         }
         if self.runs.iter().any(|r| r[1] == 0) {
-            return Some("a run of no triangles".into());
+            return Some("a run of sources is empty".into());
         }
         let n: u64 = self.runs.iter().map(|r| u64::from(r[1])).sum();
         (n != 0 && n != n_triangles as u64)
-            .then(|| format!("sources of {n} triangles, but {n_triangles} triangles"))
+            .then(|| format!("has sources for {n} triangles, but {n_triangles} triangles"))
     }
 }
 

@@ -1,8 +1,8 @@
 //! The invariants of a graph and of a world, checked one by one.
 //!
-//! Everything that reads a graph relies on these: a decoded world passes them or is not returned,
-//! and a world that breaks one is never written. All checks together take time near-linear in the
-//! size of what is checked, so that a hostile file cannot buy hours with a few bytes.
+//! All readers of a graph rely on these: a decoded world satisfies them or is not returned, and a world that breaks
+//! one is never written. All checks together take time near-linear in the size of the input, so that a few bytes of a
+//! hostile file cannot take hours.
 
 mod error;
 mod extent;
@@ -26,11 +26,11 @@ pub use error::{GraphError, MAX_REPORTED};
 impl CellPortalGraph {
     /// Checks every invariant of the graph.
     ///
-    /// Takes time near-linear in cells, portal corners and locator nodes.
+    /// Takes time near-linear in cells, portal vertices and locator nodes.
     ///
     /// # Errors
     ///
-    /// What is broken and where, in the order of the lists; at most [`MAX_REPORTED`] problems.
+    /// The problems and their places, in the order of the lists; at most [`MAX_REPORTED`].
     pub fn validate(&self) -> Result<(), Vec<GraphError>> {
         let mut found = Findings::default();
         self.check(&mut found);
@@ -67,7 +67,7 @@ impl World {
     ///
     /// # Errors
     ///
-    /// What is broken and where; at most [`MAX_REPORTED`] problems.
+    /// The problems and their places; at most [`MAX_REPORTED`].
     pub fn validate(&self) -> Result<(), Vec<GraphError>> {
         let mut found = Findings::default();
         self.graph.check(&mut found);
@@ -140,12 +140,12 @@ fn check_cells(graph: &CellPortalGraph, found: &mut Findings) {
     }
 }
 
-/// Beyond the locator's box is the outdoors, if there is one; else nothing.
+/// The space beyond the locator's box is the outdoors, if there is one; otherwise no cell.
 fn check_outside(graph: &CellPortalGraph, found: &mut Findings) {
     let outside = graph.locator.outside.map(|c| c.0);
     let outdoors = graph.cells.iter().position(|c| c.outdoor);
     let outdoors = outdoors.map(|i| i as u32);
-    // A graph without a locator says nothing of where its outdoors is.
+    // A graph without a locator does not place its outdoors.
     let says = outside.is_some() || !graph.locator.bounds.is_empty();
     if says && outside != outdoors {
         found.push(GraphError::OutsideOutdoors { outside, outdoors });

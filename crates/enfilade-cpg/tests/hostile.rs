@@ -1,5 +1,5 @@
-//! Bytes that nobody vouches for: every prefix errors, every bit flip errors or gives a world that
-//! holds its invariants, and nothing takes more memory than the file justifies.
+//! Untrusted bytes: every prefix is an error, every bit flip is an error or gives a world that satisfies its
+//! invariants, and nothing takes more memory than the file justifies.
 
 mod common;
 
@@ -9,7 +9,7 @@ use enfilade_cpg::{SourceRuns, World};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-/// A GLB of these chunks.
+/// Makes a GLB of these chunks.
 fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     let mut json = json.as_bytes().to_vec();
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -27,7 +27,7 @@ fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The two rooms' JSON and binary chunk.
+/// Returns the two rooms' JSON and binary chunk.
 fn parts() -> (String, Vec<u8>) {
     let bytes = encode_glb(&two_rooms()).unwrap();
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
@@ -38,7 +38,7 @@ fn parts() -> (String, Vec<u8>) {
     )
 }
 
-/// The two rooms with one piece of the JSON replaced.
+/// Decodes the two rooms with one part of the JSON replaced.
 fn with(from: &str, to: &str) -> Result<World, WireError> {
     let (json, bin) = parts();
     assert!(json.contains(from), "{from} is not in {json}");
@@ -48,7 +48,7 @@ fn with(from: &str, to: &str) -> Result<World, WireError> {
 fn check(bytes: &[u8]) {
     if let Ok(world) = decode_glb(bytes) {
         world.validate().unwrap();
-        // What was accepted can be written, and reads back as the same bytes from then on.
+        // An accepted world can be written, and reads back as the same bytes from then on.
         let written = encode_glb(&world).unwrap();
         assert_eq!(encode_glb(&decode_glb(&written).unwrap()).unwrap(), written);
     }
@@ -65,7 +65,7 @@ fn every_prefix_is_an_error() {
     let bytes = encode_glb(&two_rooms_with_parts()).unwrap();
     for n in 0..bytes.len() {
         assert!(decode_glb(&bytes[..n]).is_err(), "{n} bytes decoded");
-        // With the header made to fit, too.
+        // With a corrected header, too.
         if n >= 12 {
             let mut cut = bytes[..n].to_vec();
             cut[8..12].copy_from_slice(&(n as u32).to_le_bytes());
@@ -89,7 +89,7 @@ fn every_bit_flip_is_an_error_or_a_valid_world() {
             n_accepted += 1;
         }
     }
-    // Names and low bits of corners may be anything; most of the rest may not.
+    // Names and low bits of vertices may have any value; most of the rest may not.
     assert!((1..bytes.len() * 8).contains(&n_accepted), "{n_accepted}");
 }
 
@@ -146,7 +146,7 @@ fn a_count_beyond_the_file_is_an_error_before_anything_is_allocated() {
 fn the_same_bytes_cannot_be_decoded_a_thousand_times() {
     let (json, mut bin) = parts();
     let mut root: Value = serde_json::from_str(&json).unwrap();
-    // The chair gets a megabyte of positions, and is named a thousand times.
+    // The chair gets a megabyte of positions, and is used a thousand times.
     let from = bin.len();
     let rows = 87_000;
     bin.resize(from + rows * 12, 0);
@@ -178,7 +178,7 @@ fn the_same_bytes_cannot_be_decoded_a_thousand_times() {
 
 #[test]
 fn a_header_that_tells_another_length_is_an_error() {
-    // A file of one chunk, which nothing else holds against the length.
+    // A file of one chunk, in which nothing else contradicts the length.
     let mut bytes = encode_glb(&World::default()).unwrap();
     bytes[8] ^= 4;
     assert!(matches!(
@@ -202,7 +202,7 @@ fn deep_nesting_is_an_error() {
     assert!(decode_glb(&glb(&format!("{{\"extras\":{deep}"), &[])).is_err());
     let balanced = format!("{}{}", deep, "]".repeat(1_000_000));
     let (json, bin) = parts();
-    // Ignored where it is none of ours, refused where it has to be understood.
+    // Ignored in data of others, refused where we must parse it.
     let ignored = json.replacen('{', &format!("{{\"extras\":{balanced},"), 1);
     check(&glb(&ignored, &bin));
     let material = json.replacen("\"ior\":1.4", &format!("\"ior\":{balanced}"), 1);
@@ -249,7 +249,7 @@ fn a_detail_that_was_moved_out_of_its_box_is_an_error() {
             &bin,
         ))
     };
-    // What rounding may do passes.
+    // Differences by rounding pass.
     moved(1e-6).unwrap();
     for by in [0.001, -0.5, 1e30] {
         assert!(
@@ -313,7 +313,7 @@ fn a_transform_in_parts_is_read_as_a_matrix_is() {
 
 #[test]
 fn a_leak_path_that_is_no_line_is_an_error() {
-    // Node 1 is a cell with triangles, node 0 has no mesh, and the last is not there.
+    // Node 1 is a cell with triangles, node 0 has no mesh, and the last does not exist.
     for node in [1, 0, 999] {
         let bad = with(
             "\"provenance\":",
@@ -333,16 +333,16 @@ fn sources_that_do_not_hold_together_are_errors() {
         decode_glb(&glb(&text.replacen(from, to, 1), &bytes[28 + n..]))
     };
     for (from, to) in [
-        // Runs: more and fewer than there are, and a view of something else.
+        // Runs: more and fewer than exist, and a view of something else.
         ("\"cells\":[1],\"sources\":2", "\"cells\":[1],\"sources\":3"),
         ("\"cells\":[1],\"sources\":2", "\"cells\":[1],\"sources\":1"),
         ("\"cells\":[1],\"sources\":2", "\"cells\":[1]"),
         ("\"sourceRuns\":", "\"sourceRuns\":99"),
         ("\"source\":3", "\"source\":4"),
-        // A parent that is no earlier source, and itself.
+        // A parent that is not an earlier source, and a source as its own parent.
         ("{\"parent\":0,", "{\"parent\":2,"),
         ("{\"parent\":0,", "{\"parent\":77,"),
-        // Fixtures: no such node, no such light, a light that is a camera too.
+        // Fixtures: a missing node, a missing light, a light that is also a camera.
         ("\"fixtures\":[", "\"fixtures\":[999,"),
         ("{\"light\":0}", "{\"light\":7}"),
         ("\"camera\":0", "\"camera\":3"),
@@ -359,7 +359,7 @@ fn sources_that_do_not_hold_together_are_errors() {
 #[test]
 fn broken_parts_and_volumes_are_errors() {
     let mut world = two_rooms_with_parts();
-    // So that the last five buffer views are theirs.
+    // Makes the last five buffer views those of parts and volumes.
     world.batches[0].sources = SourceRuns::default();
     let bytes = encode_glb(&world).unwrap();
     assert_eq!(decode_glb(&bytes).unwrap().pvs, world.pvs);
@@ -394,7 +394,7 @@ fn broken_parts_and_volumes_are_errors() {
 #[test]
 fn a_broken_set_of_what_is_seen_is_an_error() {
     let mut world = two_rooms_with_pvs();
-    // So that the last two buffer views are those of the set.
+    // Makes the last two buffer views those of the set.
     world.batches[0].sources = SourceRuns::default();
     let bytes = encode_glb(&world).unwrap();
     let n = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
@@ -422,7 +422,7 @@ fn a_broken_set_of_what_is_seen_is_an_error() {
             "{bad}"
         );
     }
-    // Each word made large.
+    // Make each word large.
     let at = |view: usize, field: &str| views[view][field].as_u64().unwrap_or_default() as usize;
     for view in [rows, runs] {
         for word in 0..at(view, "byteLength") / 4 {

@@ -1,4 +1,4 @@
-//! Every invariant, broken once; and portals as a builder makes them, which must pass.
+//! Breaks every invariant once, and validates portals as a builder makes them, which must pass.
 
 mod common;
 
@@ -10,7 +10,7 @@ use enfilade_cpg::{
 use enfilade_geom::{DVec3, Plane, Winding};
 use proptest::prelude::*;
 
-/// What `validate` says about the two rooms after `change`.
+/// Returns the first error of the two rooms after `change`.
 fn first(change: impl FnOnce(&mut World)) -> GraphError {
     let mut world = two_rooms();
     world.validate().unwrap();
@@ -151,7 +151,7 @@ breaks! {
     a_frame_stays: |w| w.graph.portals[0].fittings[0].part = FittingPart::Frame
         => GraphError::Fitting { .. },
     a_leaf_moves_in_one_way: |w| {
-        // A leaf of the window, too, but hung on its other side.
+        // Also a leaf of the window, but hung on its other side.
         let mut leaf = w.graph.portals[0].fittings[0].clone();
         leaf.motion.as_mut().unwrap().open = 1.5;
         w.graph.portals[1].fittings.insert(0, leaf);
@@ -216,7 +216,7 @@ fn a_world_broken_everywhere_reports_a_bounded_number() {
     );
 }
 
-/// Two rooms whose locator is a chain of so many nodes.
+/// Makes two rooms whose locator is a chain of `n` nodes.
 fn chain(n: i32) -> World {
     let mut world = two_rooms();
     let node = |i: i32| LocatorNode {
@@ -254,7 +254,7 @@ fn a_locator_whose_nodes_are_children_twice_is_refused() {
         let node = 1;
         assert_eq!(said[0], GraphError::LocatorShared { node }, "{n}");
     }
-    // Nor may a node be the child of two others.
+    // A node must not be the child of two others either.
     let mut world = chain(3);
     world.graph.locator.nodes[0].children[1] = 2;
     let said = world.validate().unwrap_err();
@@ -266,8 +266,8 @@ fn f32s(points: &[DVec3]) -> Vec<[f32; 3]> {
 }
 
 proptest! {
-    /// What a builder does: hull and clip in `f64`, anywhere within some hundred meters and at any
-    /// angle, down to cracks of millimeters, then round to `f32`.
+    /// Works like a builder: hull and clip in `f64`, anywhere within some hundred meters and at any angle, down to
+    /// cracks of millimeters, then round to `f32`.
     #[test]
     fn rounded_portals_pass(
         direction in prop::array::uniform3(-1.0_f64..1.0),
@@ -282,7 +282,7 @@ proptest! {
         let (u, v) = plane.basis();
         let at = |&(a, b): &(f64, f64)| DVec3::from(middle) + u * (a * size.0) + v * (b * size.1);
         let outline = Winding::hull_in_plane(&plane, &corners.iter().map(at).collect::<Vec<_>>());
-        // What rounds to a line is not a portal that a builder would keep.
+        // A builder would not keep a portal that rounds to a line.
         prop_assume!(outline.area() > 1e-4);
         let (sin, cos) = cut.1.sin_cos();
         let knife = Plane::through(at(&(cut.0, cut.0)), u * cos + v * sin);

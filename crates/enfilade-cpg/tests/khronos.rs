@@ -1,7 +1,7 @@
 //! The Khronos validator finds no error in our files.
 //!
-//! Needs node and the npm package `gltf-validator`, found from the project's root or `NODE_PATH`;
-//! says so and passes where they are missing.
+//! Needs node and the npm package `gltf-validator`, found from the project's root or `NODE_PATH`; without them,
+//! prints that and passes.
 
 mod common;
 

@@ -1,6 +1,6 @@
-//! The reader that `docs/format.md` prints reads our files as we do.
+//! The reader printed in `docs/format.md` reads our files as we do.
 //!
-//! Needs node; says so and passes where it is missing.
+//! Needs node; without it, prints that and passes.
 
 mod common;
 
@@ -65,7 +65,7 @@ fn the_reader_in_the_documentation_reads_a_world() {
             .filter(|p| cell.is_some_and(|c| p.cells.contains(&c)))
         {
             let to = p.cells.iter().find(|c| Some(**c) != cell).unwrap();
-            // As doubles, which is what JavaScript prints.
+            // As doubles, like the numbers that JavaScript prints.
             let outline: Vec<_> = p.outline.iter().map(|c| c.map(f64::from)).collect();
             exits.push(json!([to.0, outline]));
         }

@@ -1,7 +1,7 @@
 //! Encoded worlds follow the published JSON schema.
 //!
-//! The interpreter below knows the keywords that our schema uses and panics on any other. A full
-//! schema crate would bring some forty more crates into the build for this one test.
+//! The interpreter below supports the keywords that our schema uses and panics on any other. A full schema crate
+//! would add some forty crates to the build for this one test.
 
 mod common;
 
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 const SCHEMA: &str = include_str!("../../../docs/schema/ENFILADE_cell_portal_graph.schema.json");
 
-/// Checks `value` against `schema`, a part of `root`; says where they differ first.
+/// Checks `value` against `schema`, a part of `root`; returns the first difference.
 fn check(root: &Value, schema: &Value, value: &Value, at: &str) -> Result<(), String> {
     let fail = |why: &str| Err(format!("{at}: {value} {why}"));
     let number = |v: &Value| v.as_f64().expect("a number in the schema");
@@ -44,7 +44,7 @@ fn check(root: &Value, schema: &Value, value: &Value, at: &str) -> Result<(), St
                     other => panic!("type {other}"),
                 };
                 if !is {
-                    return fail(&format!("is no {rule}"));
+                    return fail(&format!("is not of type {rule}"));
                 }
             }
             "const" if value != rule => return fail(&format!("is not {rule}")),
@@ -119,7 +119,7 @@ fn check(root: &Value, schema: &Value, value: &Value, at: &str) -> Result<(), St
                     }
                 }
             }
-            other => panic!("the schema uses {other}, which this test does not know"),
+            other => panic!("the schema uses {other}, which this test does not support"),
         }
     }
     Ok(())
@@ -163,7 +163,7 @@ fn encoded_worlds_follow_the_schema() {
 
 #[test]
 fn the_schema_names_every_field_that_is_written() {
-    // Taking any field away, or adding one, is noticed unless the schema calls it optional.
+    // Removing any field, or adding one, is detected unless the schema makes it optional.
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
     let good = extension(&World {
         leak_path: vec![[0.0; 3], [1.0; 3]],

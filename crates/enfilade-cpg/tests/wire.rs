@@ -1,4 +1,4 @@
-//! The world file: what goes in comes out, equal worlds give equal bytes.
+//! Encoding and decoding the world file preserve the world; equal worlds give equal bytes.
 
 mod common;
 
@@ -10,7 +10,7 @@ use enfilade_geom::{DMat4, DVec3};
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// Everything but materials and images, whose form changes on the first way through.
+/// Everything but materials and images, whose form changes in the first round trip.
 fn geometry(world: &World) -> String {
     format!(
         "{:#?} {:#?} {:#?} {:#?}",
@@ -85,7 +85,7 @@ fn a_leak_path_comes_back_as_a_line_that_is_no_surface() {
     assert_eq!(back.leak_path, world.leak_path);
     assert!(geometry(&back) == geometry(&world));
     assert_eq!(encode_glb(&back).unwrap(), bytes);
-    // Any viewer finds it as a line of its own under the world.
+    // Any viewer finds it as a line of its own in the world.
     let root = json(&bytes);
     let nodes = root["nodes"].as_array().unwrap();
     let node = nodes
@@ -104,7 +104,7 @@ fn a_leak_path_comes_back_as_a_line_that_is_no_surface() {
     assert!(primitive.get("indices").is_none());
     let position = primitive["attributes"]["POSITION"].as_u64().unwrap() as usize;
     assert_eq!(root["accessors"][position]["count"], 3);
-    // Where none is asked for nothing tells of it.
+    // Without a leak path, the file does not mention it.
     assert!(!without.to_string().contains("leak"));
 }
 
@@ -123,10 +123,10 @@ fn what_is_seen_from_each_cell_comes_back_and_costs_nothing_where_there_is_none(
     let read = decode_glb(&bytes).unwrap();
     assert_eq!(read.pvs, world.pvs);
     assert!(json(&without)["extensions"][EXTENSION].get("pvs").is_none());
-    // Everything else is where it was.
+    // Everything else is unchanged.
     let plain = World { pvs: None, ..read };
     assert_eq!(encode_glb(&plain).unwrap(), without);
-    // One of another graph is not written.
+    // The set of another graph is not written.
     world.pvs = Some(Pvs::of_rows(&rows[1..]));
     assert!(matches!(encode_glb(&world), Err(WireError::Invalid(_))));
     let nothing = World {
@@ -192,7 +192,7 @@ fn drawn(world: &World, detail: usize) -> Vec<([DVec3; 3], Option<DVec3>)> {
     for p in &world.detail_meshes[detail.mesh as usize].primitives {
         for t in p.indices.chunks_exact(3) {
             let corners = [0, 1, 2].map(|k| m.transform_point3(vec(p.positions[t[k] as usize])));
-            // By the book: the inverse transpose.
+            // The textbook formula: the inverse transpose.
             let normal = p.normals.get(t[0] as usize).map(|&n| {
                 m.inverse()
                     .transpose()
@@ -227,7 +227,7 @@ fn what_gltf_forbids_is_mended_once() {
     let chair = &back.detail_meshes[0].primitives;
     assert!(chair.len() == 1 && chair[0].tangents.is_empty() && !chair[0].normals.is_empty());
     let counts = &back.graph.statistics.counts;
-    // The vanished and the flat chair lose their normals, too, and every copy its tangents.
+    // The vanished and the flat chair also lose their normals, and every copy loses its tangents.
     assert_eq!(counts["flattened_details"], 5.0);
     assert!(
         counts["dropped_normals"] >= 1.0 && counts["dropped_tangents"] >= 1.0,
@@ -245,8 +245,7 @@ fn a_detail_that_gltf_cannot_place_is_drawn_where_it_was() {
         let m = DMat4::from_cols_array(&detail.transform.map(f64::from));
         for ((a, n), (b, m_n)) in before.iter().zip(&after) {
             let (mut a, b) = (*a, *b);
-            // A mirror that is no longer in the node turns the triangle around, so that its front
-            // stays its front.
+            // A mirror that is no longer in the node flips the triangle, so that its front stays its front.
             let is_flattened = back.details[i].transform != detail.transform;
             if is_flattened && m.determinant() < 0.0 {
                 a.swap(1, 2);
@@ -343,8 +342,8 @@ fn primitive() -> impl Strategy<Value = Primitive> {
 }
 
 proptest! {
-    /// Whatever the geometry: the file reads back, what is drawn is the same triangle by triangle,
-    /// and writing it again changes nothing.
+    /// For any geometry, the file reads back, the drawn triangles are the same one by one, and writing it again
+    /// changes nothing.
     #[test]
     fn any_geometry_comes_back(
         batches in prop::collection::vec(

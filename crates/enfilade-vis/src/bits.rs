@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-/// A square table of bits, a row after the other.
+/// A table of bits, stored row by row.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct BitTable {
     n_words: usize,
@@ -48,7 +48,7 @@ impl BitTable {
         self.row_mut(row)[column / 64] &= !(1 << (column % 64));
     }
 
-    /// Rows as columns; column `k` is row `order[k]`.
+    /// Returns the transpose; column `k` is row `order[k]`.
     pub(crate) fn transposed(&self, order: &[u32]) -> Self {
         let n_rows = order.len();
         let mut out = Self::new(self.n_words * 64, n_rows);
@@ -69,7 +69,7 @@ impl BitTable {
         out
     }
 
-    /// How many bits are set.
+    /// Returns the number of bits set.
     pub(crate) fn count_all(&self) -> u64 {
         let ones = |w: &u64| u64::from(w.count_ones());
         self.words.iter().map(ones).sum()
@@ -84,7 +84,8 @@ impl BitTable {
     }
 }
 
-/// Exchanges halves, then halves of halves, down to single bits. Warren, *Hacker's Delight*, section 7-3.
+/// Transposes a block by exchanging halves, then halves of halves, down to single bits. Warren, *Hacker's Delight*,
+/// section 7-3.
 fn transpose_block(block: &mut [u64; 64]) {
     let mut width = 32;
     let mut mask = u64::MAX >> 32;
@@ -114,7 +115,7 @@ pub(crate) fn clear(row: &mut [u64], column: usize) {
     row[column / 64] &= !(1 << (column % 64));
 }
 
-/// The bits `start..start + 64`; zeros past the row's end.
+/// Returns the bits `start..start + 64`; zeros past the row's end.
 #[inline]
 pub(crate) fn window(row: &[u64], start: usize) -> u64 {
     let (word, shift) = (start / 64, start % 64);
@@ -122,7 +123,7 @@ pub(crate) fn window(row: &[u64], start: usize) -> u64 {
     at(word) >> shift | (at(word + 1) << 1) << (63 - shift)
 }
 
-/// Clears those of the bits `start..start + 64` that are set in `bits`.
+/// Clears the bits of `start..start + 64` that are set in `bits`.
 #[inline]
 pub(crate) fn clear_window(row: &mut [u64], start: usize, bits: u64) {
     let (word, shift) = (start / 64, start % 64);
@@ -134,7 +135,7 @@ pub(crate) fn clear_window(row: &mut [u64], start: usize, bits: u64) {
     }
 }
 
-/// Positions of the bits that are set, ascending, the first of them being `start`.
+/// Returns the positions of the set bits of a word, ascending; its lowest bit has the position `start`.
 #[inline]
 pub(crate) fn ones_from(start: usize, bits: u64) -> impl Iterator<Item = usize> {
     let mut rest = bits;
@@ -147,7 +148,7 @@ pub(crate) fn ones_from(start: usize, bits: u64) -> impl Iterator<Item = usize> 
     })
 }
 
-/// Positions of the bits that are set, ascending.
+/// Returns the positions of the set bits, ascending.
 #[inline]
 pub(crate) fn ones(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
     row.iter()
@@ -160,7 +161,7 @@ pub(crate) fn count(row: &[u64]) -> usize {
     row.iter().map(|w| w.count_ones() as usize).sum()
 }
 
-/// Writes `a & b` where `words` says, and says whether it has a bit there in common with `wanted`.
+/// Writes `a & b` at the positions in `words`; returns `true` if a bit written there is also in `wanted`.
 #[inline]
 pub(crate) fn and_into(
     words: &[u32],
@@ -180,7 +181,7 @@ pub(crate) fn and_into(
     any != 0
 }
 
-/// Takes into a row what another has.
+/// Adds the bits of another row.
 #[inline]
 pub(crate) fn unite(row: &mut [u64], other: &[u64]) {
     for (word, &more) in row.iter_mut().zip(other) {

@@ -1,8 +1,8 @@
-//! The state of a search as bytes, so that it can go on another day.
+//! The state of a search as bytes, so that it can be resumed.
 //!
-//! Taken between rounds, when nothing is under way, so what a resumed search finds is what an uninterrupted one
-//! would have. Bound by a hash to the graph, the settings and what the caller adds, and compressed, with a check
-//! sum; bytes that do not fit are refused, never half used.
+//! Saved between rounds, when nothing is under way, so a resumed search finds the same as an uninterrupted one. A
+//! hash ties the bytes to the graph, the settings and the caller's salt; they are compressed and have a checksum.
+//! Bytes that do not fit are refused as a whole.
 
 use std::io::{Read, Write};
 
@@ -19,7 +19,7 @@ use crate::search::{Rest, Search};
 
 const MAGIC: &[u8; 8] = b"ENFVCHK2";
 
-/// FNV-1a over all that decides what a search does.
+/// Returns the FNV-1a hash of everything that determines a search.
 pub(crate) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
     let far = config.far.unwrap_or(f64::INFINITY).to_bits();
     let clearance = config.clearance.unwrap_or(-1.0).to_bits();
@@ -37,7 +37,7 @@ pub(crate) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
     fnv(&bytes)
 }
 
-/// FNV-1a, 64 bits.
+/// Returns the 64-bit FNV-1a hash.
 pub(crate) fn fnv(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
@@ -61,7 +61,7 @@ pub(crate) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
         words.extend(line.chain.iter().map(|&d| u64::from(d)));
     }
     let body: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-    // Writing to memory cannot fail; were it to, an empty checkpoint is refused later.
+    // Writing to memory cannot fail; if it did, the empty checkpoint would be refused later.
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
     let written = encoder.write_all(&body).and_then(|()| encoder.finish());
     let packed = written.unwrap_or_default();
@@ -72,7 +72,7 @@ pub(crate) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
     out
 }
 
-/// Puts a search back where it was.
+/// Restores a search from bytes; returns the work left.
 pub(crate) fn decode(
     bytes: &[u8],
     search: &mut Search<'_>,
@@ -84,18 +84,18 @@ pub(crate) fn decode(
     let (magic, rest) = head.split_at(8);
     let (key, sum) = rest.split_at(8);
     if magic != MAGIC {
-        return Err(refuse("it is no checkpoint"));
+        return Err(refuse("it is not a checkpoint"));
     }
     if key != expected.to_le_bytes() {
         return Err(refuse("it belongs to another graph or other settings"));
     }
-    // The sum of zlib says nothing of the bits that pad its last byte.
+    // The checksum of zlib ignores the bits that pad its last byte.
     if sum != fnv(body).to_le_bytes() {
         return Err(damaged());
     }
     let n = search.dirs.len() as u64;
     let n_words: usize = search.tables().iter().map(|t| t.words().len()).sum();
-    // Tables and order are as large as the graph says; lines cannot be more than pairs, each of which is new.
+    // The graph fixes the size of tables and order; lines are at most one for each pair, as each proves a new one.
     let n_pairs = (search.dirs.n_cells as u64).saturating_mul(search.dirs.n_cells as u64);
     let limit = (n_words as u64 + 2 * n + 16)
         .saturating_add(n_pairs.saturating_mul(16))

@@ -1,6 +1,6 @@
 //! Polygons clipped by planes.
 //!
-//! Everything here errs outwards: a clip keeps [`Tolerance::outward`] more than the plane says.
+//! Everything here errs outwards: a clip keeps [`Tolerance::outward`] more than the plane's front side.
 
 use enfilade_geom::DVec3;
 
@@ -13,11 +13,11 @@ use crate::tolerance::{HalfSpace, Tolerance};
 pub(crate) struct Poly {
     start: u32,
     len: u32,
-    /// Direction whose opening it is part of.
+    /// The directed portal that it is part of.
     pub(crate) dir: u32,
 }
 
-/// Corners of the polygons of a search path, as a stack.
+/// Vertices of the polygons of a search path, as a stack.
 #[derive(Default)]
 pub(crate) struct Arena {
     points: Vec<DVec3>,
@@ -56,8 +56,8 @@ impl Arena {
         points.iter().sum::<DVec3>() / points.len() as f64
     }
 
-    /// The part of `poly` in a half-space, and [`Tolerance::outward`] more; the same polygon where nothing
-    /// is cut off. `None` where no line with clearance meets it. `turn` is the polygon's unit normal.
+    /// Returns the part of `poly` in a half-space widened by [`Tolerance::outward`]; `poly` itself if nothing is cut
+    /// off. `None` if no line with clearance meets it. `turn` is the polygon's unit normal.
     #[inline]
     pub(crate) fn clip(
         &mut self,
@@ -85,8 +85,8 @@ impl Arena {
         if low >= -tolerance.outward {
             return Some(poly);
         }
-        // A disc of radius `clearance` around the crossing lies inside the opening, so the opening
-        // reaches that far past the plane, foreshortened by the angle between them.
+        // A disc of radius `clearance` around the crossing lies inside the opening, so the opening reaches that far
+        // past the plane, foreshortened by the angle between them.
         if high < tolerance.clearance && high < tolerance.clearance * sine(keep.normal, turn) {
             return None;
         }
@@ -106,7 +106,7 @@ impl Arena {
             }
             if (hi > 0.0 && hj < 0.0) || (hi < 0.0 && hj > 0.0) {
                 let q = self.points[poly.start as usize + j];
-                // From the inner end, so that both directions of an edge give the same point.
+                // Computed from the inner end, so that both directions of an edge give the same point.
                 let cut = if hi > 0.0 {
                     p + (q - p) * (hi / (hi - hj))
                 } else {
@@ -122,9 +122,10 @@ impl Arena {
         })
     }
 
-    /// The part of `poly` on a side of all planes, as [`Arena::clip`] gives it for each in order.
+    /// Returns the part of `poly` on one side of all planes, as [`Arena::clip`] does for each in order.
     ///
-    /// Five of six planes cut nothing off, which is seen four at a time; `ball` (middle, radius) is around `poly`.
+    /// Five of six planes cut nothing off; four are tested for that at a time. `ball` (center, radius) encloses
+    /// `poly`.
     #[inline]
     pub(crate) fn clip_all(
         &mut self,

@@ -1,42 +1,43 @@
-//! What is asked for: settings, surroundings, and why they may be refused.
+//! Settings, context and errors of [`see_all`](crate::see_all).
 
 use std::time::Duration;
 
 use enfilade_cpg::SightGraphError;
 use enfilade_geom::Triangle;
 
-/// Share of the clearance that the search itself uses; a checker's sums may differ in the last digits.
+/// Share of the clearance that the search itself uses; a checker may compute other last digits.
 pub(crate) const KEPT: f64 = 0.9;
 
 const GIB: f64 = (1u64 << 30) as f64;
 
-/// How thoroughly to look.
+/// How thoroughly to search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum VisMode {
-    /// Sides of planes, and planes between two openings in a row: seconds on any graph, a larger answer.
+    /// Sides of planes, and planes between two consecutive openings: seconds on any graph, but a larger answer.
     Fast,
-    /// The search over portal chains.
+    /// A search over portal chains.
     #[default]
     Exact,
 }
 
-/// What to compute.
+/// Settings of [`see_all`](crate::see_all).
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisConfig {
-    /// How thoroughly to look.
+    /// How thoroughly to search.
     pub mode: VisMode,
-    /// Lines that pass nearer to an opening's edge than this may be lost. `None`: 1e-8 of the largest
-    /// coordinate, less than that coordinate's rounding in `f32`. [Units: wu] [Limit: >= 0]
+    /// Lines that pass nearer to an opening's edge than this may be lost. `None`: 1e-8 of the largest coordinate,
+    /// which is less than its rounding in `f32`. [Units: wu] [Limit: >= 0]
     pub clearance: Option<f64>,
-    /// Nothing farther than this is seen. [Units: wu] [Limit: >= 0]
+    /// View distance: nothing farther away is visible. [Units: wu] [Limit: >= 0]
     pub far: Option<f64>,
-    /// Random lines cast from each portal; more are grown from those that find something.
+    /// Random lines cast from each portal. The search grows more from those that find something.
     pub n_rays: usize,
-    /// Pieces that an opening may be split into to settle one chain.
+    /// Most pieces that an opening is split into to settle one chain.
     pub max_pieces: u32,
-    /// Write down proofs: [`crate::VisOutput::evidence`]. Costs about as much again.
+    /// Record proofs in [`crate::VisOutput::evidence`]. About doubles the time.
     pub has_evidence: bool,
-    /// Graphs that are estimated to take more than this are refused before anything is allocated. [Units: bytes]
+    /// Most memory that a graph may be estimated to need. Larger ones are refused before anything is allocated.
+    /// [Units: bytes]
     pub max_memory: u64,
 }
 
@@ -54,63 +55,63 @@ impl Default for VisConfig {
     }
 }
 
-/// Why nothing was computed.
+/// The reasons why nothing was computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VisError {
     /// The graph is broken.
     #[error(transparent)]
     Graph(#[from] SightGraphError),
-    /// A setting makes no sense.
-    #[error("{name} is {value}; a number of at least 0 is needed")]
+    /// A setting is out of range.
+    #[error("{name} is {value}; it must be at least 0")]
     Setting {
-        /// The setting.
+        /// The setting's name.
         name: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
-    /// The graph would take more memory than is allowed.
+    /// The graph needs more memory than the limit.
     #[error(
-        "{n_portals} portals would take about {:.1} GiB, more than the {:.1} GiB that are allowed; allow more with \
-         --max-memory (max_memory), or make fewer and larger portals (detail brushes take no part in them)",
+        "{n_portals} portals need about {:.1} GiB, more than the limit of {:.1} GiB; raise the limit with \
+         --max-memory (max_memory), or make fewer and larger portals (detail brushes make none)",
         *.estimate as f64 / GIB, *.limit as f64 / GIB
     )]
     TooLarge {
-        /// How many portals there are.
+        /// Number of portals.
         n_portals: usize,
-        /// What they would take. [Units: bytes]
+        /// Estimated need. [Units: bytes]
         estimate: u64,
-        /// What is allowed. [Units: bytes]
+        /// [`VisConfig::max_memory`]. [Units: bytes]
         limit: u64,
     },
-    /// A checkpoint does not fit.
-    #[error("the checkpoint cannot be used: {problem}; delete it to start anew")]
+    /// The checkpoint is damaged or belongs to another search.
+    #[error("the checkpoint cannot be used: {problem}; delete it to start over")]
     Checkpoint {
-        /// Why.
+        /// The reason.
         problem: &'static str,
     },
-    /// What was found could not be shown again: a bug, and no evidence is written.
-    #[error("the search could not repeat its proof (a bug); leave the evidence out")]
+    /// A result could not be proved again: a bug. No evidence is written.
+    #[error("the search could not repeat its proof (a bug); run without evidence")]
     Evidence,
 }
 
-/// What surrounds a computation: threads come from the current rayon pool.
+/// Inputs and callbacks of [`see_all`](crate::see_all). Threads come from the current rayon pool.
 pub struct VisContext<'a> {
-    /// Hears work done and work in all, weighted by cost, and says whether to go on.
+    /// Receives work done and total work, weighted by cost; returns `false` to stop.
     pub on_round: &'a mut (dyn FnMut(u64, u64) -> bool + Send),
-    /// What else blocks sight; without it, a line is free wherever it passes openings.
+    /// Triangles that block sight inside cells. Without them, only openings limit lines.
     pub walls: Option<&'a [Triangle]>,
-    /// Where to keep what was found, and what to go on from. Not used by [`VisMode::Fast`].
+    /// Resumes and saves the search. Not used by [`VisMode::Fast`].
     pub checkpoint: Option<VisCheckpoint<'a>>,
 }
 
-/// How a search is kept for another day; what it finds then is what it would have found in one go.
+/// Saves and resumes a search; its result is that of an uninterrupted one.
 pub struct VisCheckpoint<'a> {
-    /// What was saved before. Refused where the graph or the settings were others.
+    /// A saved state. Refused if the graph or the settings differ.
     pub resume: Option<Vec<u8>>,
     /// A number that changes with [`VisContext::walls`].
     pub salt: u64,
-    /// How long to search between saves.
+    /// Time between saves.
     pub every: Duration,
-    /// Takes the state: when it is due, and when [`VisContext::on_round`] stops the search.
+    /// Receives the state whenever a save is due, and when [`VisContext::on_round`] stops the search.
     pub save: &'a mut (dyn FnMut(Vec<u8>) + Send),
 }

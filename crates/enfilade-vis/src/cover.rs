@@ -1,20 +1,20 @@
-//! Occlusion by all walls in one plane together: whether they cross all lines of a beam.
+//! Occlusion by all walls in one plane together: a test whether they cross all lines of a beam.
 //!
-//! A sheet (`sheets`) ends where two walls meet that share no edges: two boxes side by side, a long wall beside two
-//! short ones. Here whatever lies in one plane counts as one occluder, after the fused occluders of Schaufler,
-//! Dorsey, Decoret and Sillion, *Conservative Volumetric Visibility with Occluder Fusion* (SIGGRAPH 2000), but exact:
-//! the beam's section by the plane, a convex polygon, less the triangles in it, is empty. Doorways in the plane are
-//! what is left.
+//! A sheet (`sheets`) ends where two walls meet without shared edges: two boxes side by side, a long wall beside two
+//! short ones. Here all triangles in one plane form one occluder, after the fused occluders of Schaufler, Dorsey,
+//! Decoret and Sillion, *Conservative Volumetric Visibility with Occluder Fusion* (SIGGRAPH 2000), but exact: the
+//! beam's section with the plane is a convex polygon, and the triangles must cover all of it. Doorways in the plane
+//! stay uncovered.
 //!
-//! Errs to visible, but for lines that pass nearer to a wall's edge than the world's tolerance, which are judged
-//! neither way: vertices so near to a plane lie in it, and gaps so narrow are none.
+//! Errs to visible, except for lines that pass nearer to a wall's edge than the world's tolerance, for which either
+//! answer is right: vertices that near to a plane count as in it, and gaps that narrow count as closed.
 
 use enfilade_geom::poly::{Poly, cut_out, is_larger};
 use enfilade_geom::{Aabb, DVec2, DVec3, Plane, Triangle};
 
 use crate::sheets::{Sheets, cut};
 
-/// Triangles in one plane that are looked at, and pieces that they may leave of a section.
+/// Most triangles tested in one plane, and most pieces that they may leave of a section.
 const MAX_TRIANGLES: usize = 256;
 const MAX_LEFT: usize = 32;
 
@@ -22,17 +22,17 @@ const MAX_LEFT: usize = 32;
 pub(crate) enum Cover {
     /// All lines cross them.
     Closed,
-    /// The plane passes through an end of the beam: this one, which goes on behind it.
+    /// The plane passes through this end of the beam; the walls hide the part of it behind the plane.
     Cuts(usize, Plane),
     Open,
 }
 
-/// Distances that count as none, each for its purpose. [Units: wu]
+/// Distances that count as zero, each for its purpose. [Units: wu]
 #[derive(Clone, Copy)]
 pub(crate) struct Near {
-    /// Distances that count as apart.
+    /// Larger distances count as apart.
     pub(crate) apart: f64,
-    /// An end of a beam that lies no farther before a plane, and else behind it, lies behind it.
+    /// An end of a beam that reaches no farther in front of a plane counts as behind it.
     pub(crate) strip: f64,
     /// The world's tolerance: how far planes and vertices may be moved.
     pub(crate) slack: f64,
@@ -47,7 +47,7 @@ impl Sheets<'_> {
         let middle = |end: &[DVec3]| {
             end.iter().map(|&p| plane.signed_distance(p)).sum::<f64>() / end.len() as f64
         };
-        // The first end lies in front.
+        // Turn the plane so that the first end lies in front.
         let plane = if middle(&ends[0]) >= middle(&ends[1]) {
             plane
         } else {
@@ -145,8 +145,8 @@ impl Sheets<'_> {
         Cover::Open
     }
 
-    /// Returns whether a polygon lies in a triangle's plane, within the world's tolerance: the triangle does not hide
-    /// it then, as both may be moved.
+    /// Returns `true` if a polygon lies in a triangle's plane within the world's tolerance. The triangle does not
+    /// hide it then, as both may be moved.
     pub(crate) fn is_in_plane(&self, triangle: u32, polygon: &[DVec3], slack: f64) -> bool {
         let Some(plane) = Plane::of_triangle(self.triangle(triangle)) else {
             return true;
@@ -161,7 +161,7 @@ impl Sheets<'_> {
     }
 }
 
-/// Vertices of the hull, counter-clockwise (Andrew 1979).
+/// Returns the vertices of the convex hull, counter-clockwise (Andrew 1979).
 fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();

@@ -1,4 +1,4 @@
-//! The graph as the search wants it: each portal as two directions, numbered so that the directions out of
+//! The graph in the form that the search uses: two directed portals for each portal, numbered so that those out of
 //! one cell are neighbors.
 
 use std::ops::Range;
@@ -9,65 +9,65 @@ use rayon::prelude::*;
 
 use crate::bits::{self, BitTable};
 
-/// A portal crossed one way.
+/// A directed portal.
 #[derive(Clone, Debug)]
 pub(crate) struct Dir {
     pub(crate) from: u32,
     pub(crate) to: u32,
-    /// Direction in [`SightGraph`]'s numbers.
+    /// Number of the direction in [`SightGraph`].
     pub(crate) id: u32,
-    /// Unit normal, from `from` to `to`; zero where the winding has no area.
+    /// Unit normal, from `from` to `to`; zero if the winding has no area.
     pub(crate) normal: DVec3,
-    /// Least and greatest of `normal · p` over the winding, which is planar only up to rounding.
+    /// Least and greatest `normal · p` over the winding, which is planar only up to rounding.
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Unit normal that the corners run counter-clockwise about: `normal` or its opposite.
+    /// Unit normal about which the vertices run counter-clockwise: `normal` or its opposite.
     pub(crate) turn: DVec3,
     pub(crate) center: DVec3,
     pub(crate) radius: f64,
-    /// Corners in [`Dirs::points`], shared with the opposite direction.
+    /// Range of its vertices in [`Dirs::points`], shared with the opposite direction.
     pub(crate) corners: Range<u32>,
-    /// The convex parts that are truly open, in [`Dirs::pieces`].
+    /// Range of its open convex parts in [`Dirs::pieces`].
     pub(crate) pieces: Range<u32>,
 }
 
-/// All directions.
+/// All directed portals, called directions.
 #[derive(Debug)]
 pub(crate) struct Dirs {
-    /// Number of cells that have a portal. Only these count here, in the graph's order: tables of cells go by what can be
-    /// seen, not by what a file says there is.
+    /// Number of cells that have a portal. Only these are numbered here, in the graph's order, so that tables of
+    /// cells grow with the portals and not with the count in a file.
     pub(crate) n_cells: usize,
-    /// By cell, its number in the graph.
+    /// For each cell, its number in the graph.
     pub(crate) cells: Vec<u32>,
     /// Number of cells of the graph.
     pub(crate) n_all_cells: usize,
     pub(crate) all: Vec<Dir>,
-    /// The same portal the other way.
+    /// For each direction, the same portal the other way.
     pub(crate) reverse: Vec<u32>,
-    /// By direction, the number of its portal.
+    /// For each direction, the number of its portal.
     portals: Vec<u32>,
-    /// By direction, what is looked at most, side by side: the ball around it (middle, radius), its plane (normal, height
-    /// half way between `low` and `high`), and the first exit of the cell it leads into and the one after the last.
+    /// For each direction, the data used most, side by side: the ball around it (center, radius), its plane (normal,
+    /// height half way between `low` and `high`), and the range of exits of the cell that it leads into.
     pub(crate) balls: Vec<[f64; 4]>,
     pub(crate) planes: Vec<[f64; 4]>,
     ahead: Vec<[u32; 2]>,
     /// Directions out of cell `c` are `out_of[c]..out_of[c + 1]`.
     out_of: Vec<u32>,
-    /// Corners of each piece, in `points`.
+    /// Ranges of the vertices of each piece in `points`.
     pub(crate) pieces: Vec<Range<u32>>,
-    /// Corners of all windings and pieces.
+    /// Vertices of all windings and pieces.
     pub(crate) points: Vec<DVec3>,
-    /// By corner of `points`: the inward normal of the edge that starts there, and its offset.
+    /// For each vertex of `points`: the inward normal of the edge that starts there, and its offset.
     pub(crate) edges: Vec<(DVec3, f64)>,
     /// Largest absolute coordinate, at least 1e-300. Errors are relative to it.
     pub(crate) scale: f64,
 }
 
-/// Openings of one normal for which heights of all others are not worth taking once.
+/// Smallest group of openings with one normal for which precomputing the heights of all others pays.
 const FEW: usize = 4;
 
 impl Dirs {
-    /// Takes time and memory linear in the corners, but for a sort of the portals.
+    /// Takes time and memory linear in the vertices, plus the time to sort the portals.
     pub(crate) fn new(graph: &SightGraph) -> Self {
         let mut cells: Vec<u32> = graph.portals.iter().flat_map(|p| p.cells).collect();
         cells.sort_unstable();
@@ -95,7 +95,7 @@ impl Dirs {
                 pieces.push(corners.clone());
             }
             pieces.extend(portal.pieces.iter().map(|piece| add(piece)));
-            // Each is there.
+            // Both cells are in the list.
             let [a, b] = portal
                 .cells
                 .map(|c| cells.partition_point(|&other| other < c) as u32);
@@ -173,31 +173,31 @@ impl Dirs {
         self.all.len()
     }
 
-    /// Number of cells without a portal. Each sees itself.
+    /// Returns the number of cells without a portal. Each sees only itself.
     pub(crate) fn n_alone(&self) -> u64 {
         (self.n_all_cells - self.n_cells) as u64
     }
 
-    /// The directions out of a cell.
+    /// Returns the directions out of a cell.
     #[inline]
     pub(crate) fn exits(&self, cell: u32) -> Range<usize> {
         self.out_of[cell as usize] as usize..self.out_of[cell as usize + 1] as usize
     }
 
-    /// The directions into a cell.
+    /// Returns the directions into a cell.
     #[inline]
     pub(crate) fn entries(&self, cell: u32) -> &[u32] {
         &self.reverse[self.exits(cell)]
     }
 
-    /// The directions out of the cell that a direction leads into.
+    /// Returns the directions out of the cell that a direction leads into.
     #[inline]
     pub(crate) fn after(&self, dir: usize) -> Range<usize> {
         let [start, end] = self.ahead[dir];
         start as usize..end as usize
     }
 
-    /// Of 64 directions from `start` on, those that are in `row` and in a range that starts there, as bits.
+    /// Returns, as bits, which of the 64 directions from `start` on are in `row` and in `range`.
     #[inline]
     pub(crate) fn window(row: &[u64], range: &Range<usize>, start: usize) -> u64 {
         let n = range.end - start;
@@ -211,7 +211,7 @@ impl Dirs {
         &self.points[corners.start as usize..corners.end as usize]
     }
 
-    /// The set of directions that lead into the cells of a set.
+    /// Writes the set of directions that lead into the cells of a set.
     pub(crate) fn entries_of(&self, cells: &[u64], out: &mut [u64]) {
         out.fill(0);
         for cell in bits::ones(cells) {
@@ -221,12 +221,12 @@ impl Dirs {
         }
     }
 
-    /// The directions that a line might cross after each direction, by sides of planes and the far plane alone.
+    /// Returns for each direction those that a line might cross after it, by sides of planes and the far plane alone.
     ///
-    /// Time: the square of the portals, a few nanoseconds each, plus what is reached times the exits of a cell.
+    /// Time: a few nanoseconds for each pair of portals, plus directions reached times the exits of a cell.
     pub(crate) fn might_see(&self, clearance: f64, far: Option<f64>) -> BitTable {
         let past = self.past(clearance);
-        // By portal, the directions whose openings it reaches in front of from behind.
+        // For each portal, the directions that have part of it behind them.
         let behind = past.transposed(&self.reverse);
         let n = self.len();
         let mut might = BitTable::new(n, n);
@@ -251,10 +251,10 @@ impl Dirs {
         Flood { left, stack }: &mut Flood,
     ) {
         let in_front = past.row(first);
-        // It crosses the second from behind.
+        // The line crosses the second opening from behind.
         left.clear();
         left.extend_from_slice(behind.row(self.portals[first] as usize));
-        // A line crosses a plane once, so never an opening twice.
+        // A line crosses a plane once, so it never crosses an opening twice.
         bits::clear(left, first);
         bits::clear(left, self.reverse[first] as usize);
         stack.push(first as u32);
@@ -278,9 +278,10 @@ impl Dirs {
         }
     }
 
-    /// By direction, the portals that reach far enough in front of its plane to let lines with clearance through.
+    /// Returns for each direction the portals that reach far enough in front of its plane to let lines with clearance
+    /// through.
     ///
-    /// Portals are cut from few planes, so heights are taken once for each normal and serve all that share it.
+    /// Portals lie in few planes, so heights are computed once for each normal and shared.
     fn past(&self, clearance: f64) -> BitTable {
         let n_portals = self.len() / 2;
         let mut of_id = vec![0u32; self.len()];
@@ -314,7 +315,7 @@ impl Dirs {
         past
     }
 
-    /// Least and greatest height of an opening along a direction.
+    /// Returns the least and greatest height of an opening along a direction.
     fn extent(&self, d: usize, axis: DVec3) -> [f64; 2] {
         let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
         for &p in self.winding(d) {
@@ -324,7 +325,8 @@ impl Dirs {
         extent
     }
 
-    /// [`Dirs::past_row`] by the balls around openings, and by their corners where those do not say.
+    /// Computes [`Dirs::past_row`] from the balls around openings, and from their vertices where the balls do not
+    /// decide.
     fn past_row_alone(&self, d: usize, of_id: &[u32], clearance: f64) -> Vec<u64> {
         let dir = &self.all[d];
         let slack = 1e-12 * self.scale;
@@ -348,7 +350,7 @@ impl Dirs {
 
     fn past_row(&self, d: usize, heights: &[[f64; 2]], of_id: &[u32], clearance: f64) -> Vec<u64> {
         let dir = &self.all[d];
-        // Where it has no area, it has no sides.
+        // An opening without area has no sides.
         let no_sides = dir.normal == DVec3::ZERO;
         let is_turned = dir.normal != dir.turn;
         let words = heights.chunks(64).enumerate().map(|(w, heights)| {
@@ -374,15 +376,15 @@ impl Dirs {
         words.collect()
     }
 
-    /// A line that leaves the first cell and ends beyond `next` crosses both openings: where the balls around
-    /// them are farther apart than the far plane, no such line is short enough.
+    /// Returns `true` if the balls around two openings are within the far plane's distance of each other. A line from
+    /// the first cell to behind `next` crosses both openings.
     #[inline]
     fn is_near(&self, first: usize, next: usize, far: Option<f64>) -> bool {
         let (a, b) = (&self.all[first], &self.all[next]);
         far.is_none_or(|far| a.center.distance(b.center) - a.radius - b.radius <= far)
     }
 
-    /// Clears what is not seen both ways.
+    /// Clears all pairs that are not visible both ways.
     pub(crate) fn make_symmetric(&self, might: &mut BitTable) {
         let seen_by = might.transposed(&self.reverse);
         let n_words = might.n_words().max(1);
@@ -396,9 +398,9 @@ impl Dirs {
     }
 }
 
-/// By direction: which of the exits behind it a line through it might take, at hand.
+/// For each direction, which of the next exits a line through it might take.
 ///
-/// A copy of some bits of the table of what might be seen, whose rows lie far apart.
+/// A compact copy of some bits of the table of what might be seen, whose rows lie far apart in memory.
 #[derive(Debug)]
 pub(crate) struct Next(Vec<u64>);
 
@@ -411,7 +413,7 @@ impl Next {
         Self(masks.collect())
     }
 
-    /// Of 64 exits behind `d` from `start` on, those that a line through `d` might take, as bits.
+    /// Returns, as bits, which of the 64 exits behind `d` from `start` on a line through `d` might take.
     #[inline]
     pub(crate) fn window(
         &self,
@@ -425,8 +427,7 @@ impl Next {
         Dirs::window(might.row(d), exits, start)
     }
 
-    /// Takes up, in `might` too, that no line passes `source` and then one of `hidden`, nor one of them and then `source`
-    /// the other way.
+    /// Records, in `might` too, that no line passes `source` and then one of `hidden`, nor the same way back.
     pub(crate) fn hide(
         &mut self,
         dirs: &Dirs,
@@ -441,7 +442,7 @@ impl Next {
         for (word, &hidden) in might.row_mut(source).iter_mut().zip(hidden) {
             *word &= !hidden;
         }
-        // Only its next ones, and itself as a next one of theirs, are at hand.
+        // Only the bits of the exits behind `source`, and of the way back from them, are copied here.
         let exits = dirs.after(source);
         self.0[source] &= !bits::window(hidden, exits.start);
         let place = back - exits.start;
@@ -453,23 +454,23 @@ impl Next {
     }
 }
 
-/// What a flood needs, kept between floods.
+/// Buffers of a flood, kept between floods.
 #[derive(Default)]
 struct Flood {
-    /// What was not tested, of what has the first opening behind it.
+    /// Directions not tested yet among those that have the first opening behind them.
     left: Vec<u64>,
     stack: Vec<u32>,
 }
 
-/// Sine of the angle between two planes with unit normals.
+/// Returns the sine of the angle between two planes with unit normals.
 #[inline]
 pub(crate) fn sine(a: DVec3, b: DVec3) -> f64 {
     let cosine = a.dot(b);
     (1.0 - cosine * cosine).max(0.0).sqrt()
 }
 
-/// Unit normal that the corners run counter-clockwise about, by Newell's sum; zero where their area is lost
-/// in rounding.
+/// Returns the unit normal about which the vertices run counter-clockwise, by Newell's sum; zero if rounding swamps
+/// their area.
 fn unit_normal(winding: &[DVec3]) -> DVec3 {
     let o = winding[0];
     let sum: DVec3 = winding.windows(2).map(|e| (e[0] - o).cross(e[1] - o)).sum();
@@ -491,8 +492,8 @@ mod tests {
     use super::*;
     use crate::rng::Rng;
 
-    /// A chain of cells joined by random triangles, or as many cells around one; some triangles lie on one plane, some
-    /// a hair from another's.
+    /// A chain of cells joined by random triangles, or as many cells around one. Some triangles lie in one plane,
+    /// some a hair from another's.
     fn random_dirs(seed: u64, n_portals: usize, is_star: bool) -> Dirs {
         let mut rng = Rng::new(seed);
         let mut portals = Vec::new();
@@ -545,7 +546,7 @@ mod tests {
     #[test]
     fn exits_at_hand_are_those_of_the_table() {
         for seed in 0..20 {
-            // More exits than a mask holds, every other time.
+            // Every other time, use more exits than a mask holds.
             let dirs = random_dirs(seed, 80, seed % 2 == 0);
             let n = dirs.len();
             let mut rng = Rng::new(seed + 100);

@@ -1,4 +1,4 @@
-//! Evidence as bytes; `docs/evidence.md` describes them.
+//! Evidence as bytes; `docs/evidence.md` describes the format.
 
 use std::io::Write;
 
@@ -15,7 +15,7 @@ use crate::{checkpoint, prove};
 
 const MAGIC: &[u8; 8] = b"ENFEVID4";
 
-/// Writes down what a search found and why.
+/// Encodes the results of a search with their proofs.
 pub(crate) fn encode(
     graph: &SightGraph,
     search: &Search<'_>,
@@ -38,7 +38,7 @@ pub(crate) fn encode(
 
     let mut body = Vec::new();
     body.extend(graph.content_hash().to_le_bytes());
-    // What is promised, not what the search kept to.
+    // The promised clearance, not the smaller one that the search used.
     body.extend((search.tolerance.clearance / KEPT).to_le_bytes());
     body.extend(config.far.unwrap_or(f64::INFINITY).to_le_bytes());
     body.extend(n_visible.to_le_bytes());
@@ -92,7 +92,7 @@ fn n_undecided(search: &Search<'_>, visible: &BitTable) -> u64 {
         .sum()
 }
 
-/// A table with rows and columns in the graph's numbers of directions, each row padded to a byte.
+/// Appends a table with rows and columns in the graph's numbers of directions, each row padded to a byte.
 fn put_table(body: &mut Vec<u8>, search: &Search<'_>, table: &BitTable) {
     let dirs = search.dirs;
     let n_bytes = dirs.len().div_ceil(8);

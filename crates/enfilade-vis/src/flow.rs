@@ -1,17 +1,17 @@
 //! The search from one opening: a walk over all chains of portals that a line might pass.
 //!
-//! After Dirkse, section 7.4, and the level-4 flow of the Quake tools, with four departures that make it
-//! fast and exact:
+//! After Dirkse, section 7.4, and the level-4 flow of the Quake tools, with four departures that make it fast and
+//! exact:
 //!
-//! - *Lines first.* Where a line passes a chain, everything on it is proved visible and needs no search; a
-//!   step goes on only while something undecided might lie behind it, by the openings' own bounds and by
-//!   the planes at hand. Most chains that exist are never walked.
-//! - *Openings, not cells.* What might be seen is kept by direction of portals, so that a result also serves
-//!   the opposite question, and an opening that cannot be reached is not even clipped.
-//! - *Splitting.* Where planes leave a chain open and no line passes, the source is halved and each half
-//!   asked again: the smaller the source, the nearer planes come to the truth.
-//! - *What a few halves leave in Plücker coordinates* (`stabbing`): chains that only lines along an edge or a plane
-//!   would pass are not closed by any number of them.
+//! - *Lines first.* A line that passes a chain proves everything on it visible without a search. A step continues
+//!   only while something undecided might lie behind it, by the openings' own bounds and by the current planes. Most
+//!   chains that exist are never walked.
+//! - *Openings, not cells.* The sets of what might be seen are kept per directed portal, so that a result also serves
+//!   the opposite direction, and an unreachable opening is not even clipped.
+//! - *Splitting.* Where planes leave a chain open and no line passes, the source is halved and each half is tested
+//!   again: the smaller the source, the tighter the planes.
+//! - *Plücker coordinates* (`stabbing`) for chains that a few halves leave open: no amount of splitting closes a
+//!   chain that only lines along an edge or in a plane pass.
 //!
 //! Errs to visible: a chain that neither a plane nor a line settles counts as seen.
 
@@ -27,38 +27,38 @@ use crate::planes::{Facing, Four, Side, admits, hide, separators};
 use crate::rays::{Blocker, Line};
 use crate::tolerance::{HalfSpace, Tolerance};
 
-/// Longest chain followed; what might lie beyond counts as seen. Bounds the stack.
+/// Longest chain followed; everything that might lie beyond counts as seen. Bounds the stack.
 const MAX_CHAIN: usize = 512;
 
-/// Pieces that a source is split into before a linear programme is asked, and into more only where that does not tell.
+/// Pieces that a source is split into before the linear program runs; more are tried only if that does not decide.
 pub(crate) const FEW_PIECES: u32 = 4;
 
-/// What stays the same during a round.
+/// Data that does not change during a round.
 pub(crate) struct Shared<'a> {
     pub(crate) dirs: &'a Dirs,
     pub(crate) might: &'a BitTable,
     pub(crate) next: &'a Next,
-    /// Pairs of cells that are decided to be visible.
+    /// Pairs of cells already decided to be visible.
     pub(crate) seen: &'a BitTable,
     pub(crate) tolerance: Tolerance,
     pub(crate) blocker: Option<Blocker<'a>>,
-    /// Pieces that a source may be split into to settle one chain.
+    /// Most pieces that a source is split into to settle one chain.
     pub(crate) max_pieces: u32,
 }
 
-/// What the search from one opening found.
+/// Results of the search from one opening.
 #[derive(Default)]
 pub(crate) struct Found {
     pub(crate) source: usize,
-    /// Openings proved to be out of sight, as bits.
+    /// Openings proved to be hidden, as bits.
     pub(crate) hidden: Vec<u64>,
     pub(crate) lines: Vec<Line>,
-    /// Cells that could not be decided, and count as seen.
+    /// Cells that could not be decided and count as seen.
     pub(crate) undecided: Vec<u32>,
     pub(crate) effort: Effort,
 }
 
-/// How much was done.
+/// Counts of the work done.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Effort {
     pub(crate) steps: u64,
@@ -78,17 +78,17 @@ impl Effort {
     }
 }
 
-/// What a search needs besides, kept between searches.
+/// Buffers and state of a search, reused by the next.
 #[derive(Default)]
 pub(crate) struct Flow {
     pub(crate) arena: Arena,
-    /// By depth: what all openings of the chain might see.
+    /// For each depth, the openings that all openings of the chain might see.
     pub(crate) reach: Vec<Vec<u64>>,
-    /// Words of the first row of reach that are not zero. The rows of other depths are right in these alone.
+    /// Indices of the nonzero words of the first row of `reach`. The rows of other depths are valid only there.
     pub(crate) words: Vec<u32>,
     /// The openings still to be settled from this source.
     pub(crate) wanted: Vec<u64>,
-    /// By depth: the chain's openings as clipped.
+    /// For each depth, the chain's opening as clipped.
     pub(crate) chain: Vec<Poly>,
     pub(crate) planes: Vec<Four>,
     walked: Vec<u32>,
@@ -97,7 +97,7 @@ pub(crate) struct Flow {
     found: Found,
 }
 
-/// Answer to whether a line passes a chain.
+/// Result of the test whether a line passes a chain.
 #[derive(PartialEq)]
 enum Stab {
     Line(DVec3, DVec3),
@@ -106,7 +106,7 @@ enum Stab {
 }
 
 impl Flow {
-    /// Settles everything that `source` might see.
+    /// Settles every opening that `source` might see.
     pub(crate) fn search(&mut self, shared: &Shared<'_>, source: usize) -> Found {
         let dirs = shared.dirs;
         let dir = &dirs.all[source];
@@ -131,8 +131,8 @@ impl Flow {
         std::mem::take(&mut self.found)
     }
 
-    /// Drops from reach what no chain of openings that might see each other leads to: other
-    /// searches may have settled it.
+    /// Drops from `reach` the openings that no chain of openings that might see each other leads to any more; other
+    /// searches may have hidden some.
     fn drop_unreached(&mut self, shared: &Shared<'_>, source: usize) {
         let dirs = shared.dirs;
         let row = shared.might.row(source);
@@ -155,7 +155,7 @@ impl Flow {
         }
     }
 
-    /// Starts a chain with the whole of an opening.
+    /// Starts a chain with a whole opening.
     pub(crate) fn begin(&mut self, shared: &Shared<'_>, source: usize) -> Poly {
         self.arena.release(0);
         self.planes.clear();
@@ -173,7 +173,7 @@ impl Flow {
         self.reach[depth].extend_from_slice(row);
     }
 
-    /// Sets [`Flow::words`].
+    /// Fills [`Flow::words`].
     pub(crate) fn find_words(&mut self) {
         self.words.clear();
         let row = self.reach[0].iter().enumerate();
@@ -181,7 +181,7 @@ impl Flow {
             .extend(row.filter(|&(_, &word)| word != 0).map(|(i, _)| i as u32));
     }
 
-    /// Goes on from the end of the chain, `source` being what is left of its first opening.
+    /// Continues from the end of the chain; `source` is the part left of its first opening.
     fn visit(&mut self, shared: &Shared<'_>, source: Poly) {
         let dirs = shared.dirs;
         let depth = self.chain.len() - 1;
@@ -232,7 +232,7 @@ impl Flow {
         self.words.iter().any(at)
     }
 
-    /// Counts all that might lie beyond the chain as seen.
+    /// Counts everything that might lie beyond the chain as seen.
     fn give_up(&mut self, shared: &Shared<'_>, depth: usize) {
         let mut beyond = vec![0; self.wanted.len()];
         let rows = (&self.reach[depth][..], &self.wanted[..]);
@@ -244,7 +244,7 @@ impl Flow {
         }
     }
 
-    /// Settles the chain's end where it is wanted, then goes on behind it while that can matter.
+    /// Settles the chain's end if it is wanted, then continues behind it while that can matter.
     fn enter(&mut self, shared: &Shared<'_>, source: Poly, target: Poly, leads_on: bool) {
         let q = target.dir as usize;
         if bits::get(&self.wanted, q) {
@@ -264,7 +264,7 @@ impl Flow {
         }
     }
 
-    /// Whether a line passes the chain: by the cheapest way that tells.
+    /// Decides whether a line passes the chain, by the cheapest test that can.
     fn decide(&mut self, shared: &Shared<'_>, source: Poly, target: Poly) -> Stab {
         let mut answer = self.stab(shared, source, target);
         if answer == Stab::Unknown {
@@ -318,7 +318,7 @@ impl Flow {
         answer
     }
 
-    /// The source in two, across its longest side; `None` where it is too small to split.
+    /// Returns the two halves of the source across its longest axis; `None` if it is too small to split.
     pub(crate) fn halves(
         &mut self,
         shared: &Shared<'_>,
@@ -340,7 +340,7 @@ impl Flow {
         }
         let middle = axis.dot(low + high) * 0.5;
         let turn = shared.dirs.all[source.dir as usize].turn;
-        // The halves together must be the whole, so nothing is dropped for being thin.
+        // The halves together must make the whole, so neither is dropped for being thin.
         let whole = Tolerance {
             clearance: 0.0,
             ..shared.tolerance
@@ -354,7 +354,7 @@ impl Flow {
         }))
     }
 
-    /// Clips the whole chain by all planes between the source and it; `None` where nothing is left.
+    /// Clips the whole chain by all planes between it and the source; `None` if nothing is left.
     pub(crate) fn tighten(&mut self, shared: &Shared<'_>, source: Poly) -> Option<Poly> {
         let first_plane = self.planes.len();
         let source = self.tighten_by(shared, source, first_plane);
@@ -376,7 +376,7 @@ impl Flow {
             let turn = dirs.all[dir].turn;
             arena.clip_all(poly, (planes, side), dirs.balls[dir], turn, tolerance)
         };
-        // The last opening by each set of planes at once: most chains end with that.
+        // Clip the last opening by each set of planes at once: that closes most chains.
         for k in 1..last {
             let planes = &self.planes[first_plane..];
             self.chain[k] = clip(&mut self.arena, self.chain[k], planes, Side::After)?;
@@ -393,7 +393,7 @@ impl Flow {
         clip(&mut self.arena, source, planes, Side::Before)
     }
 
-    /// Drops what is wanted and lies behind a plane; says whether anything is left.
+    /// Drops wanted openings behind a plane; returns `true` if any is left.
     pub(crate) fn check_wanted(
         &mut self,
         shared: &Shared<'_>,
@@ -439,7 +439,7 @@ impl Flow {
         );
     }
 
-    /// What is left of the source and of the opening `q` when the chain goes on through it.
+    /// Returns the parts left of the source and of the opening `q` when the chain continues through it.
     pub(crate) fn narrow(
         &mut self,
         shared: &Shared<'_>,
@@ -451,7 +451,7 @@ impl Flow {
         let dirs = shared.dirs;
         let tolerance = &shared.tolerance;
         self.found.effort.clips += 1;
-        // A ball around the opening settles most of it without looking at corners.
+        // A ball around the opening decides most cases without its vertices.
         let ball = dirs.balls[q];
         if hide(&self.planes[first_plane..], ball) {
             return None;
@@ -496,7 +496,7 @@ impl Flow {
         Some((source, target))
     }
 
-    /// Wants no opening into a cell any more; says whether any was wanted.
+    /// Removes all openings into a cell from `wanted`; returns `true` if any was there.
     fn settle_cell(&mut self, dirs: &Dirs, cell: u32) -> bool {
         let mut any = false;
         for &d in dirs.entries(cell) {
@@ -516,7 +516,7 @@ pub(crate) fn facing(dirs: &Dirs, dir: u32) -> Facing {
     }
 }
 
-/// Where a line that has crossed an opening goes.
+/// Returns the half-space into which a line goes after crossing an opening.
 #[inline]
 pub(crate) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
     let dir = &dirs.all[dir as usize];
@@ -526,7 +526,7 @@ pub(crate) fn front_of(dirs: &Dirs, dir: u32) -> HalfSpace {
     }
 }
 
-/// Where a line that will cross an opening comes from.
+/// Returns the half-space from which a line comes before crossing an opening.
 #[inline]
 pub(crate) fn back_of(dirs: &Dirs, dir: usize) -> HalfSpace {
     let dir = &dirs.all[dir];

@@ -1,8 +1,8 @@
-//! Lines grown from lines: what one just misses, its neighbor may hit.
+//! Lines grown from lines: where one just misses, a neighbor may hit.
 //!
-//! A random line rarely slips through five doorways. One that did is turned a little, about a point where it
-//! crosses an opening, towards an exit beside the place where it ends. After Wonka and others, *Guided
-//! Visibility Sampling* (SIGGRAPH 2006), section 4, whose borders of triangles are our exits of cells.
+//! A random line rarely slips through five doorways. One that did is turned a little, about a point where it crosses
+//! an opening, towards an exit beside the place where it ends. After Wonka and others, *Guided Visibility Sampling*
+//! (SIGGRAPH 2006), section 4; exits of cells take the place of their triangle borders.
 
 use enfilade_geom::DVec3;
 use rayon::prelude::*;
@@ -13,11 +13,11 @@ use crate::rays::{Line, walk};
 use crate::rng::Rng;
 use crate::search::Search;
 
-/// Lines a round. Those of one round know nothing of each other.
+/// Lines per round. Lines of one round do not see each other's results.
 const ROUND: usize = 512;
 
 impl Search<'_> {
-    /// Grows all lines, and those grown from them, until nothing new comes of it.
+    /// Grows all lines, and those grown from them, until they find nothing new.
     pub(crate) fn grow(&mut self) {
         let mut first = self.n_grown;
         while first < self.lines.len() {
@@ -33,11 +33,11 @@ impl Search<'_> {
         self.n_grown = first;
     }
 
-    /// Tries more lines, so many in a round, between cells that count as seen only because nothing was proved.
+    /// Tries more random lines between cells that count as seen only because nothing is proved, `n_lines` for each
+    /// pair and round.
     ///
-    /// Among openings alone few such pairs are left. Walls inside cells leave more: no plane between openings
-    /// speaks of those, but lines that pass between them can still be found.
-    /// Goes on while `on_round` says so.
+    /// Openings alone leave few such pairs. Walls inside cells leave more: planes between openings ignore walls, but
+    /// lines that pass beside them can still be found. Stops when `on_round` returns `false`.
     pub(crate) fn insist(
         &mut self,
         n_lines: usize,
@@ -76,7 +76,7 @@ impl Search<'_> {
         }
     }
 
-    /// The first of some random lines that leads from one cell into another.
+    /// Returns the first of some random lines that leads from one cell into another.
     fn line_between(&self, a: usize, b: usize, n_lines: usize, rng: &mut Rng) -> Option<Line> {
         let dirs = self.dirs;
         let entries = dirs.entries(b as u32).iter();
@@ -196,13 +196,13 @@ impl Search<'_> {
 }
 
 impl Dirs {
-    /// Where a line meets the plane of an opening, in lengths of `direction`.
+    /// Returns the place where a line meets the plane of an opening, in lengths of `direction`.
     pub(crate) fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> f64 {
         let dir = &self.all[d];
         ((dir.low + dir.high) * 0.5 - dir.normal.dot(origin)) / dir.normal.dot(direction)
     }
 
-    /// A point of an opening that a line misses: `share` of the way from its nearest one to its middle.
+    /// Returns a point of an opening that a line misses: `share` of the way from its nearest point to its center.
     fn toward(&self, d: usize, line: &Line, share: f64) -> DVec3 {
         let dir = &self.all[d];
         let winding = self.winding(d);

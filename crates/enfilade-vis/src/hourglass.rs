@@ -1,11 +1,12 @@
-//! The hourglass of a sequence of portals: what bounds all lines that pass them one after the other.
+//! The hourglass of a sequence of portals: the bounds of all lines that pass them in order.
 //!
-//! After Gjørup 1999, section 2.2.2, who builds it portal by portal, and Dirkse 2002, section 7.4, who clips source and
-//! destination along the sequence. Here the waist is kept as two polygons, what is left of the first portal and of the last, and the planes
-//! that separate them; each portal that is pushed clips both. What lies behind the last portal and in front of all these planes is
-//! convex, and exactly what lines through the two polygons reach: portals between them narrow the polygons, and so the planes.
+//! After Gjørup 1999, section 2.2.2, who builds it portal by portal, and Dirkse 2002, section 7.4, who clips source
+//! and destination along the sequence. Here the waist consists of two polygons, the remaining parts of the first and
+//! the last portal, and the planes that separate them; each pushed portal clips both. The space behind the last
+//! portal and in front of all these planes is convex, and is exactly the space that lines through the two polygons
+//! reach. Portals between them narrow the polygons, and so the planes.
 //!
-//! Errs outwards, as everything here: a line that passes all portals at least the clearance inside their edges is never lost.
+//! Errs outwards: a line that passes all portals at least the clearance inside their edges is never lost.
 
 use enfilade_cpg::{SightGraph, SightGraphError};
 use enfilade_geom::{DVec3, Plane};
@@ -17,15 +18,15 @@ use crate::flow::{back_of, facing, front_of};
 use crate::planes::{Four, LANES, Side, pack, separators};
 use crate::tolerance::{HalfSpace, Tolerance};
 
-/// Makes hourglasses in one graph.
+/// Builds the hourglasses of one graph.
 pub struct Hourglasses {
     dirs: Dirs,
     tolerance: Tolerance,
-    /// By direction in the graph's numbers, its place in `dirs`.
+    /// For each direction in the graph's numbers, its index in `dirs`.
     place: Vec<u32>,
 }
 
-/// What bounds the lines through a sequence of portals.
+/// Bounds of all lines through a sequence of portals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hourglass {
     sequence: Vec<u32>,
@@ -35,31 +36,31 @@ pub struct Hourglass {
 }
 
 impl Hourglass {
-    /// The portals, as directions of [`SightGraph`], in the order in which lines pass them.
+    /// Returns the portals, as directions of [`SightGraph`], in the order in which lines pass them.
     #[must_use]
     pub fn sequence(&self) -> &[u32] {
         &self.sequence
     }
 
-    /// What of the first portal lines may pass that pass all of them: a convex polygon.
+    /// Returns the convex part of the first portal that lines through all portals may pass.
     #[must_use]
     pub fn first(&self) -> &[DVec3] {
         &self.first
     }
 
-    /// What of the last portal lines may pass that pass all of them: a convex polygon.
+    /// Returns the convex part of the last portal that lines through all portals may pass.
     #[must_use]
     pub fn last(&self) -> &[DVec3] {
         &self.last
     }
 
-    /// The planes that bound what lines reach behind the last portal: it is in front of each of them.
+    /// Returns the planes that bound the space that lines reach behind the last portal. It lies in front of each.
     #[must_use]
     pub fn planes(&self) -> &[Plane] {
         &self.planes
     }
 
-    /// Whether a line through the portals may reach a point behind the last of them, or one so near to it. [Units: wu]
+    /// Returns `true` if a line through the portals may reach a point behind the last, within `slack`. [Units: wu]
     #[must_use]
     pub fn reaches(&self, p: DVec3, slack: f64) -> bool {
         self.planes
@@ -69,12 +70,12 @@ impl Hourglass {
 }
 
 impl Hourglasses {
-    /// Takes the portals of a graph, each as its convex winding. Lines that pass nearer to an edge than 1e-8 of the largest coordinate may
-    /// be lost, as in [`see_all`](crate::see_all).
+    /// Takes each portal of a graph as its convex winding. Lines that pass nearer to an edge than 1e-8 of the largest
+    /// coordinate may be lost, as in [`see_all`](crate::see_all).
     ///
     /// # Errors
     ///
-    /// A graph that is broken.
+    /// A broken graph.
     pub fn new(graph: &SightGraph) -> Result<Self, SightGraphError> {
         graph.validate()?;
         let dirs = Dirs::new(graph);
@@ -93,7 +94,7 @@ impl Hourglasses {
         &self.dirs
     }
 
-    /// Where a direction of the graph is among [`Hourglasses::dirs`].
+    /// Returns the index in [`Hourglasses::dirs`] of a direction of the graph.
     pub(crate) fn place(&self, direction: u32) -> usize {
         self.place[direction as usize] as usize
     }
@@ -106,8 +107,8 @@ impl Hourglasses {
         &self.tolerance
     }
 
-    /// The hourglass of a portal alone: all that is in front of it. `None` for a direction that the graph does not have, and a portal without
-    /// area.
+    /// Returns the hourglass of a single portal: the whole space in front of it. `None` if the graph does not have
+    /// the direction, or the portal has no area.
     #[must_use]
     pub fn of_portal(&self, direction: u32) -> Option<Hourglass> {
         let at = *self.place.get(direction as usize)?;
@@ -123,10 +124,10 @@ impl Hourglasses {
         })
     }
 
-    /// The hourglass of a sequence and one more portal at its end. `None` where no line passes all of them, and where the portal does not lead
-    /// out of the cell that the sequence leads into, or leads back through its last portal.
+    /// Returns the hourglass of a sequence extended by one portal. `None` if no line passes all of them, or if the
+    /// portal does not lead out of the cell that the sequence leads into, or leads straight back.
     ///
-    /// Time: the product of the corners of two polygons.
+    /// Time: the product of the vertex counts of two polygons.
     #[must_use]
     pub fn push(&self, through: &Hourglass, direction: u32) -> Option<Hourglass> {
         let dirs = &self.dirs;
@@ -139,7 +140,8 @@ impl Hourglasses {
         self.narrow(through, q)
     }
 
-    /// The hourglass of two portals, whatever lies between them: it holds that of each sequence from one to the other.
+    /// Returns the hourglass of two portals, regardless of those between: it encloses that of each sequence that
+    /// joins them.
     pub(crate) fn between(&self, first: u32, last: u32) -> Option<Hourglass> {
         self.narrow(&self.of_portal(first)?, self.place[last as usize])
     }
@@ -172,7 +174,7 @@ impl Hourglasses {
             for half_space in half_spaces(&planes, Side::Before) {
                 source = arena.clip(source, half_space, source_turn, tolerance)?;
             }
-            // What is left of the source narrows the last portal in its turn.
+            // The remaining part of the source narrows the last portal in turn.
             planes.clear();
             self.separate(&arena, source, pass, &mut planes);
             for half_space in half_spaces(&planes, Side::After) {
@@ -204,7 +206,7 @@ impl Hourglasses {
     }
 }
 
-/// The planes that are there, each as what lies on a side of it.
+/// Returns the actual planes, each as the half-space on one side of it.
 fn half_spaces(planes: &[Four], side: Side) -> impl Iterator<Item = HalfSpace> + '_ {
     let lanes = planes
         .iter()

@@ -1,23 +1,23 @@
-//! Visibility before run-time: which cells can be seen from which.
+//! Precomputed visibility: which cells can be seen from which.
 //!
-//! Works on a [`SightGraph`]: cells and convex openings, from a world, a portal file or a generator.
-//! [`see_all`] runs the stages in order:
+//! Works on a [`SightGraph`]: cells and convex openings, from a world, a portal file or a generator. [`see_all`] runs
+//! the stages in order:
 //!
-//! 1. `dirs`: each portal as two directions; what lies on the right sides of planes *might* be seen.
-//! 2. `narrow`: planes between two openings in a row cut most of that.
+//! 1. `dirs`: splits each portal into two directions; everything on the right sides of planes *might* be seen.
+//! 2. `narrow`: planes between two consecutive openings rule out most of that.
 //! 3. `rays`, `grow`: random lines, and lines turned from those, prove most of what is visible.
-//! 4. `flow`: a search over portal chains settles the rest, chain by chain, by planes, lines and
-//!    splitting, and at last by `stabbing`, a linear programme. This is the heart; start reading there.
-//! 5. `occlude`: where walls are known, beams settle what they hide inside cells.
+//! 4. `flow`: a search over portal chains settles the rest, chain by chain, with planes, lines and splitting, and
+//!    finally with `stabbing`, a linear program. This is the heart; start reading there.
+//! 5. `occlude`: if walls are given, beams settle what they hide inside cells.
 //!
-//! What is seen of each cell, finer than whole cells, comes after: [`see_parts`], by the hourglasses of sequences of portals
-//! ([`Hourglasses`]), and by what walls hide from the last of them (`shade`).
+//! `search` runs the stages in rounds, so that results do not depend on threads.
 //!
-//! `search` puts them together in rounds, so that results do not depend on threads.
+//! Afterwards [`see_parts`] finds the parts of each cell that can be seen: from the hourglasses of sequences of
+//! portals ([`Hourglasses`]), less the parts that walls hide from the first or the last of them (`shade`).
 //!
-//! **The answer is a superset of the truth.** Sight is symmetric and so is the answer. A line that passes
-//! every opening on its way at least [`VisConfig::clearance`] inside its edges is never lost; whatever a
-//! plane or a line cannot settle counts as visible and is counted in [`VisOutput::undecided`].
+//! **The answer is a superset of the truth.** It is symmetric, as sight is. A line that passes every opening on its
+//! way at least [`VisConfig::clearance`] inside its edges is never lost. Everything that neither a plane nor a line
+//! settles counts as visible and appears in [`VisOutput::undecided`].
 
 mod bits;
 mod checkpoint;
@@ -63,18 +63,19 @@ pub use output::{VisOutput, Witness};
 pub use parts::see_parts;
 pub use volumes::piece_faces;
 
-/// Lines tried between cells that walls may hide from each other, and how often, before each beam is looked at.
+/// Lines tried between each two cells that only walls may hide from each other, and rounds of that, before beams.
 const INSIST_LINES: usize = 50;
 const INSIST_ROUNDS: u64 = 2;
 
-/// Finds what can be seen from every cell.
+/// Finds the cells that can be seen from every cell.
 ///
-/// Memory: a bit for each pair of directions, three times over for short; cells without a portal take none. Time grows with
-/// what is to be told apart: a map of 3,000 portals takes a second, one of 10,000 a minute.
+/// Memory: three bits for each pair of directions, for a short time; cells without a portal take none. Time grows
+/// with the pairs to decide: a map of 3,000 portals takes a second, one of 10,000 a minute.
 ///
 /// # Errors
 ///
-/// A broken graph, one whose tables would be larger than [`VisConfig::max_memory`], a setting that is negative or no number, or a checkpoint that does not fit.
+/// A broken graph, one whose tables would exceed [`VisConfig::max_memory`], a setting that is negative or not a
+/// number, or a checkpoint that does not fit.
 pub fn see_all(
     graph: &SightGraph,
     config: &VisConfig,
@@ -93,7 +94,7 @@ pub fn see_all(
         });
     }
     let clearance = config.clearance.unwrap_or(1e-8 * dirs.scale);
-    // The search keeps more than it promises, so that a checker that rounds otherwise still closes every chain.
+    // The search keeps more than it promises, so that a checker that rounds differently still closes every chain.
     let bvh = context.walls.map(Bvh::build);
     let is_blocked = bvh
         .as_ref()
@@ -155,7 +156,7 @@ pub fn see_all(
     })
 }
 
-/// What the tables of a search take. [Units: bytes]
+/// Returns the estimated memory of a search's tables. [Units: bytes]
 fn estimate(dirs: &Dirs, has_evidence: bool) -> u64 {
     let square = |n: usize| (n as u64).saturating_mul(n as u64);
     let n_tables = if has_evidence { 5 } else { 3 };
@@ -163,7 +164,7 @@ fn estimate(dirs: &Dirs, has_evidence: bool) -> u64 {
     bits.saturating_add(square(dirs.n_cells).saturating_mul(4)) / 8
 }
 
-/// Searches, and saves what was found now and then, and when told to stop.
+/// Runs the search; saves its state from time to time and when `on_round` stops it. Returns `true` if it is complete.
 fn run(
     search: &mut Search<'_>,
     config: &VisConfig,
@@ -200,7 +201,7 @@ fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
     let visible = search.visible();
     let names = &search.dirs.cells;
     let is_undecided = |a: usize, b: usize| !search.seen.get(a, b) || search.undecided.get(a, b);
-    // A cell without a portal sees itself alone.
+    // A cell without a portal sees only itself.
     let rows = |is_alone_in: bool, keep: &dyn Fn(usize, usize) -> bool| {
         let mut next = 0;
         let rows = (0..search.dirs.n_all_cells as u32).map(|name| {

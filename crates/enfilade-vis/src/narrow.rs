@@ -1,8 +1,8 @@
-//! What might be seen through two openings in a row.
+//! Bounds of what might be seen through two consecutive openings.
 //!
-//! Between the flood over sides of planes and the search lies a step that costs little and spares the search
-//! most of its work: the planes that separate an opening from each of its next ones bound all that lies
-//! behind both. (The Quake tools go straight to the search.)
+//! This step comes between the flood over sides of planes and the search. It is cheap and saves the search most of
+//! its work: the planes that separate an opening from each of its next ones bound everything behind both. (The Quake
+//! tools go straight to the search.)
 
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
@@ -14,13 +14,13 @@ use crate::flow::{back_of, facing, front_of};
 use crate::planes::{Four, admits, pack, separators};
 use crate::tolerance::Tolerance;
 
-/// Openings a round; see [`crate::search`].
+/// Openings per round; see [`crate::search`].
 const ROUND: usize = 128;
 
-/// Clears from `might` what no line through two openings in a row can reach.
+/// Clears from `might` everything that no line through two consecutive openings can reach.
 ///
-/// Goes from the openings that might see least to the others, and what is cleared for one serves the rest.
-/// Time: openings, times their next ones, times what those might see.
+/// Starts with the openings that might see least; the others use the results. Time: openings times their next ones
+/// times the openings that those might see.
 pub(crate) fn narrow_might(
     dirs: &Dirs,
     might: &mut BitTable,
@@ -98,7 +98,7 @@ impl Work {
         row
     }
 
-    /// Collects what lies behind `pass` in front of all planes.
+    /// Collects the openings behind `pass` that lie in front of all planes.
     fn flood(
         &mut self,
         dirs: &Dirs,
@@ -132,7 +132,7 @@ impl Work {
                 let window =
                     ahead.window((might, at), &exits, start) & bits::window(&self.allowed, start);
                 bits::clear_window(&mut self.allowed, start, window);
-                // A closure would not be compiled for the processor that `simd` stands for.
+                // A loop, as a closure would not be compiled for the processor that `simd` stands for.
                 let mut rest = window;
                 while rest != 0 {
                     let q = start + rest.trailing_zeros() as usize;

@@ -1,15 +1,16 @@
-//! Walls inside cells: whether all lines from one opening to another end at them.
+//! Occlusion by walls inside cells: a test whether all lines from one opening to another end at them.
 //!
-//! Planes between openings say nothing of a wall that juts into a cell. Here the lines from a piece of one opening
-//! to a piece of another, a *beam*, are held against the triangles themselves. A *sheet* is a set of triangles that
-//! share edges; its rim are the edges that an odd number of them have. Where the rim does not touch the hull of
-//! the two pieces, no triangle touches the pieces, and one line of the beam crosses the sheet an odd number of times,
-//! every line does: lines change into each other without leaving the beam, and the number can only change by two.
-//! Otherwise the larger piece is halved. A line that is free on the way shows that the cells see each other.
+//! Planes between openings ignore a wall that juts into a cell. Here the lines from a piece of one opening to a piece
+//! of another, a *beam*, are tested against the triangles themselves. A *sheet* is a set of triangles that share
+//! edges; its rim consists of the edges that an odd number of them have. Suppose that the rim does not touch the hull
+//! of the two pieces, no triangle touches the pieces, and one line of the beam crosses the sheet an odd number of
+//! times. Then every line does: lines can be moved into each other inside the beam, and the number changes only by
+//! two. Otherwise the larger piece is halved. A line that is free all the way shows that the cells see each other.
 //!
-//! The question is that of Nirenstein, Blake and Gain, *Exact From-Region Visibility Culling* (EGWR 2002), who
-//! subtract polyhedra in Plücker space. Halving needs no five-dimensional hulls, each leaf can be checked
-//! by itself, and what it cannot settle in [`MAX_BEAMS`] pieces stays visible: it errs to visible. Beams and sheets are in `sheets`.
+//! The problem is that of Nirenstein, Blake and Gain, *Exact From-Region Visibility Culling* (EGWR 2002), who
+//! subtract polyhedra in Plücker space. Halving needs no five-dimensional hulls, and each leaf can be checked by
+//! itself. Errs to visible: lines not settled within [`MAX_BEAMS`] pieces count as free. Beams and sheets are in
+//! `sheets`.
 
 use enfilade_geom::{DVec3, Ray};
 use rayon::prelude::*;
@@ -20,24 +21,24 @@ use crate::rays::{Line, walk};
 use crate::search::{Closed, Search};
 use crate::sheets::{Beam, Hull, Part, Sheets, cut, halves, inner_point, size, write_tree};
 
-/// Pieces that the lines between two openings may be cut into: at first, when a line that is easily found
-/// spares the rest, and then.
+/// Most pieces that the lines between two openings are cut into: in the first pass, in which a line that is easily
+/// found saves the rest, and in the second.
 const FEW_BEAMS: usize = 300;
 const MAX_BEAMS: usize = 20_000;
-/// Places along a line from which a sheet is grown.
+/// Places along a line from which sheets are grown.
 const MAX_SEEDS: usize = 6;
-/// Distances that count as apart, in roundings; a checker asks for half of it.
+/// Distances that count as apart, in multiples of the rounding; a checker requires half of it.
 pub(crate) const APART: f64 = 16.0;
 
-/// What the lines from one opening to another meet.
+/// Result for the lines from one opening to another.
 enum Verdict {
-    /// By a tree of beams, or because neighbors are.
+    /// Proved by a tree of beams; `None` if it follows from neighbors.
     Closed(Option<Vec<u8>>),
     Line(Line),
     Unknown,
 }
 
-/// What is known of two cells: openings between which no line leads, how that is shown, and a line.
+/// Results for two cells: pairs of openings between which no line leads, with their proofs, and a free line.
 #[derive(Default)]
 struct Settled {
     closed: Vec<(usize, usize, Option<Vec<u8>>)>,
@@ -45,7 +46,8 @@ struct Settled {
 }
 
 impl Dirs {
-    /// Where lines may cross the pieces of an opening: on its plane, so far inside their edges.
+    /// Returns the polygons in which lines may cross the pieces of an opening: on its plane, `inset` inside their
+    /// edges.
     pub(crate) fn open_parts(&self, d: usize, inset: f64) -> Vec<Vec<DVec3>> {
         let dir = &self.all[d];
         let height = (dir.low + dir.high) * 0.5;
@@ -64,7 +66,7 @@ impl Dirs {
         pieces.iter().map(part).collect()
     }
 
-    /// Pairs of polygons that every line through one opening and a later one passes.
+    /// Returns pairs of polygons such that every line through one opening and a later one passes both of a pair.
     fn beams(&self, s: usize, t: usize, inset: f64) -> Vec<[Vec<DVec3>; 2]> {
         let (a, b) = (&self.all[s], &self.all[t]);
         let height = |d: &crate::dirs::Dir| (d.low + d.high) * 0.5;
@@ -85,8 +87,8 @@ impl Dirs {
 
 impl Search<'_> {
     /// Settles pairs of cells that only walls inside other cells can hide from each other: by a line, or by beams
-    /// that sheets of triangles close. Near pairs first, as what they settle serves those beyond.
-    /// Goes on while `on_round` says so.
+    /// that sheets of triangles close. Near pairs come first, as their results help those beyond. Stops when
+    /// `on_round` returns `false`.
     pub(crate) fn settle_by_walls(
         &mut self,
         sheets: &Sheets<'_>,
@@ -132,7 +134,7 @@ impl Search<'_> {
         }
     }
 
-    /// Least number of openings between a cell and each other one.
+    /// Returns the least number of openings between a cell and each other one.
     fn steps_from(&self, cell: usize) -> Vec<u32> {
         let mut steps = vec![u32::MAX; self.dirs.n_cells];
         let mut queue = std::collections::VecDeque::from([cell as u32]);
@@ -173,7 +175,7 @@ impl Search<'_> {
                         settled.line = Some(line);
                         return settled;
                     }
-                    // The cells count as seeing each other, whatever the rest say.
+                    // The cells now count as seeing each other, whatever the other openings give.
                     Verdict::Unknown if most == MAX_BEAMS => return settled,
                     Verdict::Unknown => left.push((s, t)),
                 }
@@ -183,7 +185,7 @@ impl Search<'_> {
         settled
     }
 
-    /// Whether each way on after the first opening, or each way to the second, is known to be closed.
+    /// Returns `true` if each way on after the first opening, or each way to the second, is known to be closed.
     fn follows_from_neighbors(&self, s: usize, t: usize) -> bool {
         let (dirs, might) = (self.dirs, &self.might);
         if dirs.all[t].from == dirs.all[s].to {
@@ -216,7 +218,7 @@ impl Search<'_> {
         Verdict::Closed(Some(tree))
     }
 
-    /// Breadth first: lines of large beams are tried before those of small ones.
+    /// Works breadth first, so that lines of large beams are tried before those of small ones.
     fn settle_beams(
         &self,
         sheets: &Sheets<'_>,
@@ -261,7 +263,7 @@ impl Search<'_> {
                     let end = usize::from(size(&beams[at].ends[1]) > size(&beams[at].ends[0]));
                     let mut next = [None, None];
                     for (half, points) in next.iter_mut().zip(halves(&beams[at].ends[end])) {
-                        // Nothing is left of a polygon as thin as rounding, and nothing leads through it.
+                        // A polygon as thin as rounding leaves an empty half, through which nothing leads.
                         let is_empty = points.is_empty();
                         if !is_empty && size(&points) < 1e3 * apart {
                             return Err(Verdict::Unknown);
@@ -307,7 +309,7 @@ impl Search<'_> {
     }
 }
 
-/// Some of so many places, the ends first.
+/// Returns up to [`MAX_SEEDS`] of `n` places, from both ends inwards.
 pub(crate) fn spread(n: usize) -> impl Iterator<Item = usize> {
     let front = 0..n.min(MAX_SEEDS);
     front.map(move |i| if i % 2 == 0 { i / 2 } else { n - 1 - i / 2 })

@@ -1,7 +1,8 @@
-//! Which triangles and objects of each cell may be seen from each other cell: those that its visible volume meets.
+//! Triangles and objects of each cell that may be seen from each other cell: those that its visible volume meets.
 //!
-//! After Dirkse 2002, section 7.6.2 (objects by cell), by the triangles themselves rather than by boxes.
-//! Errs to visible: a triangle counts as seen where it touches a piece of the volume; all in a cell counts as seen from the cell itself.
+//! After Dirkse 2002, section 7.6.2 (objects by cell), but by the triangles themselves rather than by boxes. Errs to
+//! visible: a triangle counts as seen if it touches a piece of the volume, and everything in a cell counts as seen
+//! from the cell itself.
 
 use enfilade_cpg::{
     Batch, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes, World,
@@ -15,21 +16,22 @@ use crate::shade::Shade;
 use crate::sheets::Sheets;
 use crate::volumes::{ANY_PORTAL, volumes_of};
 
-/// Rounding of what is computed here. [Units: wu] The volumes hold the world's tolerance themselves.
+/// Rounding of computations here. The volumes already include the world's tolerance. [Units: wu]
 const EPS: f64 = 1e-9;
 
-/// What of each cell can be seen from each other, by pair of cells in the order of `pvs`: volumes, and the triangles and objects that they
-/// meet, less what walls hide from the first or the last of the portals on the way.
+/// Returns the visible volumes for each pair of cells, in the order of `pvs`, and the triangles and objects that they
+/// meet, less those that walls hide from the first or the last portal on the way.
 ///
-/// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth. Walls are the world's structural
-/// triangles, but those that light passes; details hide nothing, as they may be moved.
+/// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth. Walls are
+/// the world's opaque structural triangles; details hide nothing, as they may be moved.
 ///
-/// Time grows with the sequences of portals that lines may pass, and with pairs of portals and what is in front of them; a building of 300 portals
-/// takes seconds. Threads come from the current rayon pool; the result does not depend on their number.
+/// Time grows with the sequences of portals that lines may pass, and with the pairs of portals and parts in front of
+/// them; a building of 300 portals takes seconds. Threads come from the current rayon pool; the result does not
+/// depend on their number.
 ///
 /// # Errors
 ///
-/// A graph that is broken.
+/// A broken graph.
 pub fn see_parts(
     world: &World,
     pvs: &Pvs,
@@ -76,7 +78,8 @@ pub fn see_parts(
     Ok((volumes, parts))
 }
 
-/// By pair of cells, which parts of the second its pieces meet: the first portal and the last through which a piece is seen, and the part.
+/// Returns for each pair of cells the parts of the second that its pieces meet, each with the first and the last
+/// portal through which the piece is seen.
 fn candidates(
     pvs: &Pvs,
     volumes: &VisibleVolumes,
@@ -106,7 +109,7 @@ fn candidates(
         .collect()
 }
 
-/// The structural triangles that block sight.
+/// Returns the structural triangles that block sight.
 fn walls(world: &World) -> Vec<Triangle> {
     let blocks = |batch: &&Batch| {
         let material = batch.primitive.material;
@@ -122,7 +125,7 @@ fn walls(world: &World) -> Vec<Triangle> {
     triangles.collect()
 }
 
-/// A triangle of a batch, or those of a detail object.
+/// The triangle of a batch, or the triangles of a detail object.
 struct Shape {
     bounds: Aabb,
     triangles: Vec<Triangle>,
@@ -136,7 +139,7 @@ impl Shape {
         }
     }
 
-    /// Whether it touches what lies in front of all planes.
+    /// Returns `true` if it touches the space in front of all planes.
     fn meets(&self, planes: &[Plane]) -> bool {
         let middle = self.bounds.center();
         let half = self.bounds.size() * 0.5;
@@ -170,7 +173,7 @@ fn planes(piece: &[[f64; 4]]) -> Vec<Plane> {
     piece.iter().map(plane).collect()
 }
 
-/// By [`PartNumbers`], all parts.
+/// Returns all parts in the order of [`PartNumbers`].
 fn all_parts(world: &World) -> Vec<Shape> {
     let triangles = world.batches.iter().flat_map(|batch| {
         let positions = &batch.primitive.positions;
@@ -191,7 +194,7 @@ fn all_parts(world: &World) -> Vec<Shape> {
     triangles.chain(objects).map(Shape::new).collect()
 }
 
-/// By cell: what is seen from it without passing a portal, ascending.
+/// Returns for each cell the parts that are seen from it without passing a portal, ascending.
 fn by_cell(world: &World) -> Vec<Vec<u32>> {
     let numbers = PartNumbers::new(world);
     let mut by_cell = vec![Vec::new(); world.graph.cells.len()];

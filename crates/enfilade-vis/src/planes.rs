@@ -1,9 +1,9 @@
-//! Planes that separate two polygons, kept four at a time.
+//! Planes that separate two polygons, stored four at a time.
 //!
-//! A choice among lanes is a selection, not a jump that is mistaken for the other one half of the time, and most
-//! planes are only asked whether they cut a polygon at all.
+//! With four lanes a choice is a selection rather than a jump, which the processor would mispredict half of the time;
+//! and most planes are only tested for whether they cut a polygon at all.
 //!
-//! Everything here errs outwards: a plane that rounding has spoilt is not used.
+//! Everything here errs outwards: a plane spoilt by rounding is not used.
 
 use enfilade_geom::DVec3;
 use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
@@ -11,11 +11,11 @@ use fearless_simd::{Level, Simd, dispatch, f64x4, mask64x4, prelude::*};
 use crate::dirs::Dirs;
 use crate::tolerance::{HalfSpace, Tolerance};
 
-/// Planes side by side.
+/// Number of planes side by side.
 pub(crate) const LANES: usize = 4;
 
 /// Four planes, each with one polygon behind it and a later one in front of it. A lane without a plane has everything
-/// behind it and in front of it.
+/// both behind and in front of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Four {
     x: [f64; LANES],
@@ -23,16 +23,16 @@ pub(crate) struct Four {
     z: [f64; LANES],
     /// Greatest `normal · p` over the earlier polygon.
     behind: [f64; LANES],
-    /// Least `normal · p` over the later one; not less than `behind` but for rounding.
+    /// Least `normal · p` over the later polygon; at least `behind`, up to rounding.
     front: [f64; LANES],
 }
 
-/// Which side of planes counts.
+/// Side of a plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// Where a line that will cross both polygons comes from.
+    /// The side from which a line comes that will cross both polygons.
     Before,
-    /// Where a line that has crossed both polygons goes.
+    /// The side to which a line goes that has crossed both polygons.
     After,
 }
 
@@ -46,7 +46,7 @@ impl Four {
         }
     }
 
-    /// How far a point lies on a side, of each plane.
+    /// Returns the height of a point above each plane, on a side.
     #[inline(always)]
     fn height<S: Simd>(&self, simd: S, side: Side, p: DVec3) -> f64x4<S> {
         let height = self.normals(simd).dot(Lanes::splat(simd, p));
@@ -56,7 +56,7 @@ impl Four {
         }
     }
 
-    /// Least and greatest height of points on a side.
+    /// Returns the least and greatest height of points above each plane, on a side.
     #[inline(always)]
     fn extent<S: Simd>(&self, simd: S, side: Side, points: &[DVec3]) -> [f64x4<S>; 2] {
         let mut low = f64x4::splat(simd, f64::INFINITY);
@@ -69,7 +69,7 @@ impl Four {
         [low, high]
     }
 
-    /// Sine of the angle between each plane and that of a polygon.
+    /// Returns the sine of the angle between each plane and that of a polygon.
     #[inline(always)]
     fn sine<S: Simd>(&self, simd: S, turn: DVec3) -> f64x4<S> {
         let cosine = self.normals(simd).dot(Lanes::splat(simd, turn));
@@ -77,7 +77,7 @@ impl Four {
         (one - cosine * cosine).max(f64x4::splat(simd, 0.0)).sqrt()
     }
 
-    /// What lies on a side of one of the planes.
+    /// Returns the half-space on one side of a plane.
     #[inline]
     pub(crate) fn half_space(&self, side: Side, lane: usize) -> HalfSpace {
         let normal = DVec3::new(self.x[lane], self.y[lane], self.z[lane]);
@@ -94,23 +94,23 @@ impl Four {
     }
 }
 
-/// Shape of an opening: what [`separators`] needs beside the corners.
+/// Orientation of an opening, which [`separators`] needs besides its vertices.
 #[derive(Clone, Copy)]
 pub(crate) struct Facing {
-    /// Unit normal that the corners run counter-clockwise about.
+    /// Unit normal about which the vertices run counter-clockwise.
     pub(crate) turn: DVec3,
-    /// Unit normal the way it is crossed.
+    /// Unit normal in the direction in which it is crossed.
     pub(crate) normal: DVec3,
 }
 
-/// Planes through an edge of one polygon and a corner of the other, `a` behind and `b` in front.
+/// Appends the planes through an edge of one polygon and a vertex of the other that have `a` behind and `b` in front.
 ///
-/// Around each edge the polygon lies on a half-line of the perpendicular cross-section, and the first corner
-/// of the other met when turning from there gives the only such plane. Dirkse, section 7.4, and the Quake
-/// tools try all corners; time here is the product of the corner counts.
+/// In the cross-section perpendicular to an edge, its polygon is a half-line, and the first vertex of the other
+/// polygon that it meets when turned gives the only such plane. Dirkse, section 7.4, and the Quake tools try all
+/// vertices. Time: the product of the vertex counts.
 ///
-/// A plane that holds an edge of each comes twice. Giving it once would spare a little, but then a checker that
-/// cuts by both keeps polygons that differ by rounding, and finds planes that differ by more.
+/// A plane through an edge of each comes twice. Dropping one would save a little, but then a checker that cuts by
+/// both would keep polygons that differ by rounding, and find planes that differ by more.
 pub(crate) fn separators(
     a: (&[DVec3], Facing),
     b: (&[DVec3], Facing),
@@ -138,7 +138,7 @@ fn separators_by<S: Simd>(
     }
 }
 
-/// Heights of corners along a direction; those of the first few are at hand.
+/// Heights of vertices along a direction, precomputed for the first few.
 struct Heights {
     ahead: DVec3,
     first: [f64; 12],
@@ -163,7 +163,7 @@ impl Heights {
     }
 }
 
-/// A vector a lane.
+/// One vector per lane.
 #[derive(Clone, Copy)]
 struct Lanes<S: Simd> {
     x: f64x4<S>,
@@ -190,7 +190,7 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// No sum is fused with a product, so that all processors round alike.
+    /// Does not fuse multiplication and addition, so that all processors round alike.
     #[inline(always)]
     fn dot(self, v: Self) -> f64x4<S> {
         self.x * v.x + self.y * v.y + self.z * v.z
@@ -223,7 +223,7 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// This where `mask` is set, else `other`.
+    /// Returns `self` in the lanes where `mask` is set, else `other`.
     #[inline(always)]
     fn chosen(self, mask: mask64x4<S>, other: Self) -> Self {
         Self {
@@ -234,8 +234,8 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// The planes through edges `first..first + LANES` of `own` and a corner of `other`, of which `heights` are those
-/// ahead of `own`; `FIRST` where `own` is to be behind the plane.
+/// Appends the planes through edges `first..first + LANES` of `own` and a vertex of `other`. `heights` are those of
+/// `other` ahead of `own`; `FIRST` if `own` belongs behind the plane.
 #[inline(always)]
 fn through_edges<S: Simd, const FIRST: bool>(
     simd: S,
@@ -246,7 +246,7 @@ fn through_edges<S: Simd, const FIRST: bool>(
     out: &mut Vec<Four>,
 ) {
     let n = own.len();
-    // Lanes past the last edge do the last one again.
+    // Lanes past the last edge repeat it.
     let at = |l: usize| own[(first + l).min(n - 1)];
     let next = |l: usize| {
         if first + l + 1 < n {
@@ -259,7 +259,7 @@ fn through_edges<S: Simd, const FIRST: bool>(
     let edge = Lanes::new(simd, [next(0), next(1), next(2), next(3)]).minus(p);
     let inward = Lanes::splat(simd, facing.turn).cross(edge);
     let rounding = tolerance.rounding;
-    // A corner on the edge's line lies in every plane through it, and says nothing about which to take.
+    // A vertex on the edge's line lies in every plane through it, so it does not help to choose one.
     let near = f64x4::splat(simd, 1e2 * rounding);
     let near_squared = near * near;
     let zero = f64x4::splat(simd, 0.0);
@@ -269,8 +269,8 @@ fn through_edges<S: Simd, const FIRST: bool>(
     let (mut x, mut y) = (f64x4::splat(simd, f64::NEG_INFINITY), zero);
     let mut best = p;
     for (j, &corner) in other.iter().enumerate() {
-        // The inward axis is longer than a unit by the edge's length; angles are compared only
-        // among themselves, so that does not matter.
+        // The inward axis is longer than a unit by the edge's length. This does not matter, as angles are only
+        // compared with each other.
         let height = f64x4::splat(simd, heights.of(j, corner));
         let corner = Lanes::splat(simd, corner);
         let cx = inward.dot(corner) - across;
@@ -286,7 +286,7 @@ fn through_edges<S: Simd, const FIRST: bool>(
     }
     let normal = edge.cross(best.minus(p));
     let length = normal.dot(normal).sqrt();
-    // The way that `own` has the least of.
+    // Turn each normal away from `own`.
     let one = f64x4::splat(simd, 1.0);
     let turned = normal.dot(inward).simd_gt(zero).select(-one, one);
     let toward = normal.times(turned / length);
@@ -298,7 +298,7 @@ fn through_edges<S: Simd, const FIRST: bool>(
     for &q in other {
         lowest = lowest.min(toward.dot(Lanes::splat(simd, q)));
     }
-    // Shorter normals have no direction left.
+    // Shorter normals are all rounding.
     let has_direction = length.simd_gt(f64x4::splat(simd, rounding * rounding));
     let is_ahead = y.simd_gt(f64x4::splat(simd, rounding));
     let is_between = lowest.simd_ge(highest - f64x4::splat(simd, rounding));
@@ -324,13 +324,13 @@ fn through_edges<S: Simd, const FIRST: bool>(
     });
 }
 
-/// [`admits`] for one opening alone.
+/// Computes [`admits`] for a single opening.
 #[inline]
 pub(crate) fn is_admitted(planes: &[Four], dirs: &Dirs, dir: usize, tolerance: &Tolerance) -> bool {
     dispatch!(Level::new(), simd => admits(simd, planes, dirs, dir, tolerance))
 }
 
-/// Whether an opening reaches in front of every plane.
+/// Returns `true` if an opening reaches in front of every plane.
 #[inline(always)]
 pub(crate) fn admits<S: Simd>(
     simd: S,
@@ -342,7 +342,7 @@ pub(crate) fn admits<S: Simd>(
     let [x, y, z, radius] = dirs.balls[dir];
     let center = DVec3::new(x, y, z);
     let radius = f64x4::splat(simd, radius);
-    // Those whose planes cut the ball.
+    // Groups with a plane that cuts the ball.
     let mut unsure = 0u64;
     for (k, four) in planes.iter().enumerate() {
         let height = four.height(simd, Side::After, center);
@@ -354,7 +354,7 @@ pub(crate) fn admits<S: Simd>(
     unsure == 0 || admits_corners(simd, planes, unsure, dirs, dir, tolerance)
 }
 
-/// Closures would not be compiled for the processor that `simd` stands for; hence the loops.
+/// Uses loops, as closures would not be compiled for the processor that `simd` stands for.
 #[inline(always)]
 fn admits_corners<S: Simd>(
     simd: S,
@@ -374,7 +374,7 @@ fn admits_corners<S: Simd>(
         if high.simd_ge(wide).all_true() {
             continue;
         }
-        // A disc of the clearance's radius reaches less far past a plane that meets it at an angle.
+        // A disc with the clearance as its radius reaches less far past a plane that meets it at an angle.
         let sine = four.sine(simd, dirs.all[dir].turn);
         let clearance = f64x4::splat(simd, tolerance.clearance);
         let least = clearance * sine - f64x4::splat(simd, tolerance.outward);
@@ -385,7 +385,7 @@ fn admits_corners<S: Simd>(
     true
 }
 
-/// Whether a ball (middle, radius) lies behind a plane.
+/// Returns `true` if a ball (center, radius) lies behind a plane.
 #[inline]
 pub(crate) fn hide(planes: &[Four], ball: [f64; 4]) -> bool {
     dispatch!(Level::new(), simd => hide_by(simd, planes, ball))
@@ -403,7 +403,7 @@ fn hide_by<S: Simd>(simd: S, planes: &[Four], [x, y, z, radius]: [f64; 4]) -> bo
     false
 }
 
-/// Which of four planes cut something off a polygon, as bits; `ball` (middle, radius) is around it.
+/// Returns, as bits, which of four planes cut something off a polygon; `ball` (center, radius) encloses it.
 #[inline]
 pub(crate) fn cuts(
     four: &Four,
@@ -433,8 +433,7 @@ fn cuts_by<S: Simd>(
     low.simd_lt(least).to_bitmask()
 }
 
-/// The planes that are there, less those that are the same but for rounding (which hold an edge of each opening),
-/// side by side without gaps.
+/// Packs the planes without empty lanes, dropping duplicates up to rounding (they hold an edge of each opening).
 pub(crate) fn pack(planes: &mut Vec<Four>, tolerance: &Tolerance) {
     let mut kept: Vec<(HalfSpace, f64)> = Vec::with_capacity(planes.len() * LANES);
     for four in &*planes {

@@ -1,9 +1,9 @@
-//! Convex pieces of space: the part of a box in front of planes.
+//! Convex pieces of space: parts of a box in front of planes.
 
 use enfilade_geom::{Aabb, DVec3, Plane, poly};
 
-/// The faces of the part of a box that lies in front of all planes, each at least one corner; none where it is empty. Corners
-/// within `eps` of a plane count as on it. Time: the square of the planes.
+/// Returns the faces of the part of a box in front of all planes, each with at least one vertex; none if it is empty.
+/// Vertices within `eps` of a plane count as on it. Time: the square of the number of planes.
 pub(crate) fn faces_in_box(planes: &[Plane], bounds: &Aabb, eps: f64) -> Vec<Vec<DVec3>> {
     let mut faces = Vec::new();
     for face in bounds.faces() {
@@ -21,7 +21,7 @@ pub(crate) fn faces_in_box(planes: &[Plane], bounds: &Aabb, eps: f64) -> Vec<Vec
         };
         let mut points: Vec<DVec3> = section.iter().copied().collect();
         for (k, other) in planes.iter().enumerate() {
-            // The same plane twice makes one face.
+            // A repeated plane makes only one face.
             let is_twin =
                 other.normal.dot(plane.normal) > 1.0 - 1e-15 && (other.d - plane.d).abs() < eps;
             if k < i && is_twin {
@@ -37,7 +37,7 @@ pub(crate) fn faces_in_box(planes: &[Plane], bounds: &Aabb, eps: f64) -> Vec<Vec
     faces
 }
 
-/// Leaves the part of a convex polygon in front of a plane, and what is nearer than `eps` behind it; it may be a segment or a point.
+/// Clips a convex polygon to the front of a plane, or to within `eps` behind it; a segment or a point may be left.
 pub(crate) fn clip(points: &mut Vec<DVec3>, plane: &Plane, eps: f64) {
     let heights: Vec<f64> = points
         .iter()

@@ -1,11 +1,10 @@
-//! The search once more, with its result in hand, written down so that others can check it.
+//! The search repeated with its result known, recorded so that others can check it.
 //!
-//! `docs/evidence.md` describes the bytes. The claims that openings are out of each other's sight support
-//! each other: a chain is left as soon as a later part of it is claimed to be impossible. That is no circle,
-//! because a part is shorter than the whole; a shortest line against any claim would have to pass a chain that
-//! was closed by planes.
+//! `docs/evidence.md` describes the bytes. The claims that openings are hidden from each other support each other: a
+//! chain is left as soon as a later part of it is claimed to be impossible. That is not circular, because a part is
+//! shorter than the whole: a shortest line against any claim would have to pass a chain that planes close.
 //!
-//! What was settled by sides of planes or follows from its neighbors needs no trace.
+//! Openings hidden by sides of planes, or as a consequence of their neighbors, need no trace.
 
 use rayon::prelude::*;
 
@@ -17,17 +16,17 @@ use crate::stabbing::Answer;
 
 /// Symbols of the trace.
 pub(crate) mod symbol {
-    /// Nothing that is to be shown hidden can lie behind this exit.
+    /// Nothing claimed to be hidden can lie behind this exit.
     pub(crate) const SKIP: u8 = 0;
     /// Planes leave nothing of the chain through this exit.
     pub(crate) const CUT: u8 = 1;
-    /// The chain goes on through this exit.
+    /// The chain continues through this exit.
     pub(crate) const ENTER: u8 = 2;
     /// Planes leave nothing once the source is split.
     pub(crate) const SPLIT: u8 = 3;
     /// First symbol of a step: its exits follow.
     pub(crate) const EXITS: u8 = 4;
-    /// First symbol of a step: planes leave nothing to be shown hidden.
+    /// First symbol of a step: planes leave nothing that is claimed to be hidden.
     pub(crate) const DONE: u8 = 5;
     /// In a split: this piece is closed.
     pub(crate) const CLOSED: u8 = 6;
@@ -37,8 +36,8 @@ pub(crate) mod symbol {
     pub(crate) const UNSTABBED: u8 = 8;
 }
 
-/// For each opening, those that its trace shows to be hidden: what the search settled from it, less what
-/// follows from neighbors.
+/// Returns for each opening those that its trace must show to be hidden: all that the search settled from it, less
+/// those that follow from neighbors.
 pub(crate) fn claims(shared: &Shared<'_>, settled: &BitTable) -> BitTable {
     let (dirs, might) = (shared.dirs, shared.might);
     let mut claims = settled.clone();
@@ -62,9 +61,9 @@ pub(crate) fn claims(shared: &Shared<'_>, settled: &BitTable) -> BitTable {
     claims
 }
 
-/// The traces of all openings that have claims, by direction in the graph's numbers.
+/// Returns the traces of all openings that have claims, ordered by direction in the graph's numbers.
 ///
-/// `None` where a claim could not be shown again, which is a bug.
+/// `None` if a claim could not be proved again, which is a bug.
 pub(crate) fn traces(shared: &Shared<'_>, claims: &BitTable) -> Option<Vec<u8>> {
     let dirs = shared.dirs;
     let mut order: Vec<usize> = (0..dirs.len())
@@ -144,7 +143,8 @@ impl Flow {
                 Some((source, target)) => {
                     self.chain.push(target);
                     let done = if is_wanted {
-                        // In the order of the search, so that what closed a chain there does here.
+                        // Same order as in the search, so that the test that closed a chain there also closes it
+                        // here.
                         let few = shared.max_pieces.min(FEW_PIECES);
                         self.write_split(shared, source, few, trace)
                             .or_else(|| self.write_weights(shared, trace))
@@ -163,7 +163,7 @@ impl Flow {
         Some(())
     }
 
-    /// Writes that planes leave nothing once the source is in so many pieces; nothing where they do.
+    /// Records that planes leave nothing once the source is split; `None`, with `trace` unchanged, if they do.
     fn write_split(
         &mut self,
         shared: &Shared<'_>,
@@ -229,7 +229,7 @@ impl Flow {
         Some(())
     }
 
-    /// Drops what is wanted and lies behind a plane, or can only be reached through what does.
+    /// Drops wanted openings behind a plane, and those reachable only through such openings.
     fn flood_wanted(&mut self, shared: &Shared<'_>, first_plane: usize) -> bool {
         let dirs = shared.dirs;
         let (first, pass) = (self.chain[0].dir as usize, self.chain[1].dir);

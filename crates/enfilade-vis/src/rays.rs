@@ -1,35 +1,35 @@
-//! Sight lines followed from cell to cell: what one crosses, it proves visible.
+//! Sight lines followed from cell to cell. A line proves visible everything that it crosses.
 
 use enfilade_geom::DVec3;
 
 use crate::dirs::Dirs;
 use crate::rng::Rng;
 
-/// Tells whether something solid lies between two points.
+/// Returns `true` if something solid lies between two points.
 pub(crate) type Blocker<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
 
-/// A line that proves pairs of cells to see each other.
+/// A line that proves that pairs of cells see each other.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Line {
     /// A point in the opening that the walk started from.
     pub(crate) origin: DVec3,
-    /// Any length.
+    /// Direction; any length.
     pub(crate) direction: DVec3,
     /// The directions crossed, in order.
     pub(crate) chain: Vec<u32>,
 }
 
-/// Sine of the least angle at which a line proves to cross an opening: where one that runs along its plane meets it
-/// is a matter of rounding.
+/// Sine of the least angle at which a crossing counts. Where a line along the plane of an opening meets it is a
+/// matter of rounding.
 pub(crate) const MIN_SINE: f64 = 1e-9;
 
 /// Longest chain followed.
 const MAX_STEPS: usize = 4096;
 
-/// Follows the line from a point of the opening `first` through it and on; appends the directions crossed,
-/// without `first`.
+/// Follows the line from a point of the opening `first` through it and on; appends the directions crossed, without
+/// `first`.
 ///
-/// Counts only crossings that lie `margin` inside an opening, so what it says is proved; it may stop early.
+/// Counts only crossings that lie at least `margin` inside an opening, so that each is proved. May stop early.
 pub(crate) fn walk(
     dirs: &Dirs,
     first: usize,
@@ -77,7 +77,7 @@ pub(crate) fn walk(
 }
 
 impl Dirs {
-    /// Whether a point of an opening's plane lies at least `margin` inside one of its pieces.
+    /// Returns `true` if a point of an opening's plane lies at least `margin` inside one of its pieces.
     #[inline]
     pub(crate) fn is_inside(&self, dir: usize, p: DVec3, margin: f64) -> bool {
         let pieces = &self.all[dir].pieces;
@@ -90,7 +90,7 @@ impl Dirs {
             })
     }
 
-    /// Whether a line crosses all openings of its chain in order, each this far inside.
+    /// Returns `true` if a line crosses all openings of its chain in order, each at least `margin` inside.
     pub(crate) fn is_crossed(&self, line: &Line, margin: f64) -> bool {
         let mut before = f64::NEG_INFINITY;
         let least = MIN_SINE * line.direction.length();
@@ -104,7 +104,7 @@ impl Dirs {
         })
     }
 
-    /// A random point of an opening, uniform over a random triangle of its fan.
+    /// Returns a random point of an opening, uniform over a random triangle of its fan.
     pub(crate) fn random_point(&self, dir: usize, rng: &mut Rng) -> DVec3 {
         let pieces = &self.all[dir].pieces;
         let n_pieces = (pieces.end - pieces.start) as usize;

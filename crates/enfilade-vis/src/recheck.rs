@@ -1,9 +1,9 @@
-//! A saved search, proved again before it goes on.
+//! Proof of a saved search before it resumes.
 //!
-//! A checkpoint comes from a file that anybody may have written, and a bit that wrongly says "hidden" would be believed ever
-//! after. So nothing of it is: every line must pass its openings, and what it says is hidden is traced as for evidence
-//! ([`crate::prove`]), where one false claim cannot be closed. What errs towards "visible" may stand. Time: that of
-//! writing evidence, a part of what the search took.
+//! A checkpoint comes from a file that anybody may have written, and a bit that wrongly marks something as hidden
+//! would never be questioned again. So nothing is trusted: every line must pass its openings, and everything marked
+//! as hidden is traced as for evidence ([`crate::prove`]), which fails for a false claim. Errors towards "visible"
+//! may stand. Time: that of writing evidence, a part of that of the search.
 
 use crate::bits;
 use crate::config::VisError;
@@ -12,9 +12,9 @@ use crate::flow::Shared;
 use crate::prove;
 use crate::search::{Rest, Search};
 
-/// Refuses a restored search that claims anything which cannot be shown.
+/// Refuses a restored search that makes a claim without proof.
 ///
-/// `base` is what sides of planes and distances leave, as of a search that has not begun.
+/// `base` is the table of what might be seen by sides of planes and distances, as before any search.
 pub(crate) fn check(
     search: &Search<'_>,
     rest: &Rest,
@@ -26,18 +26,18 @@ pub(crate) fn check(
         return refuse("its tables and counts do not fit the graph");
     }
     if !search.lines.iter().all(|line| search.is_proof(line)) {
-        return refuse("a line of it does not pass its openings");
+        return refuse("one of its lines does not pass its openings");
     }
     if !seen_is_shown(search) {
-        return refuse("no line of it shows what it says is visible");
+        return refuse("it marks cells as visible without a line that proves it");
     }
     if !hidden_is_shown(search, base, max_pieces) {
-        return refuse("it says that something is hidden which is not");
+        return refuse("it marks as hidden something that is not");
     }
     Ok(())
 }
 
-/// Whether nothing lies beyond the ends of rows, no opening is left twice, and counts are such as work can make.
+/// Returns `true` if no bit lies beyond the ends of rows, no opening is left twice, and all counts are possible.
 fn is_sound(search: &Search<'_>, rest: &Rest) -> bool {
     let (n_dirs, n_cells) = (search.dirs.len(), search.dirs.n_cells);
     let widths = [n_dirs, n_dirs, n_cells, n_cells];
@@ -57,7 +57,7 @@ fn is_sound(search: &Search<'_>, rest: &Rest) -> bool {
         && order.all(|&(n, d)| n <= n_dirs && !std::mem::replace(&mut is_left[d], true))
 }
 
-/// Pairs of cells that count as proved are on a line; those given up on count as visible, both ways.
+/// Returns `true` if each pair of cells marked as proved is on a line, and those given up on are visible both ways.
 fn seen_is_shown(search: &Search<'_>) -> bool {
     let (dirs, n) = (search.dirs, search.dirs.n_cells);
     let mut shown = bits::BitTable::new(n, n);
@@ -86,7 +86,7 @@ fn seen_is_shown(search: &Search<'_>) -> bool {
     })
 }
 
-/// What is hidden beyond the sides of planes was settled from one end or the other, and can be settled again.
+/// Returns `true` if all pairs hidden beyond the sides of planes were settled from one end, and can be settled again.
 fn hidden_is_shown(search: &Search<'_>, base: &bits::BitTable, max_pieces: u32) -> bool {
     let (dirs, might) = (search.dirs, &search.might);
     for s in 0..dirs.len() {

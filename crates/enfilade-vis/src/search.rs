@@ -1,8 +1,8 @@
-//! Rounds of searches over all openings, the same on any number of threads.
+//! Rounds of searches over all openings, with the same result for any number of threads.
 //!
-//! Openings that might see least come first, as in the Quake tools, because what they settle narrows the
-//! others. Those of one round see what earlier rounds settled and nothing of each other, so the order in
-//! which threads finish does not matter.
+//! Openings that might see least come first, as in the Quake tools, because their results narrow the others. Searches
+//! of one round use the results of earlier rounds and not each other's, so the order in which threads finish does not
+//! matter.
 
 use enfilade_geom::DVec3;
 use rayon::prelude::*;
@@ -14,27 +14,27 @@ use crate::rays::{self, Blocker, Line};
 use crate::rng::Rng;
 use crate::tolerance::Tolerance;
 
-/// Openings a round. More lose knowledge of each other, fewer leave threads waiting at its end.
+/// Openings per round. With more, fewer results are shared; with fewer, threads wait at the end of each.
 const ROUND: usize = 64;
 
-/// Share of the far plane that lines keep to; a checker's sums may differ in the last digits.
+/// Share of the far plane that lines keep to; a checker may compute other last digits.
 const FAR_KEPT: f64 = 1.0 - 1e-9;
 
-/// What is left to search.
+/// Work left in a search.
 pub(crate) struct Rest {
-    /// Openings, and before each how many it might see.
+    /// Openings left, each after the number of those it might see.
     pub(crate) order: Vec<(usize, usize)>,
-    /// Work done and work in all.
+    /// Work done and total work.
     pub(crate) done: u64,
     pub(crate) total: u64,
 }
 
-/// That no line leads through one opening and a later one.
+/// Proof that no line leads through one opening and a later one.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Closed {
     pub(crate) from: u32,
     pub(crate) to: u32,
-    /// Trees of beams, one for each two pieces of the openings that a line passes both of.
+    /// Trees of beams, one for each two pieces of the openings that a line may join.
     pub(crate) tree: Vec<u8>,
 }
 
@@ -43,9 +43,9 @@ pub(crate) struct Search<'a> {
     pub(crate) might: BitTable,
     /// Pairs of cells proved visible.
     pub(crate) seen: BitTable,
-    /// Pairs of cells given up on, in `seen` as well.
+    /// Pairs of cells given up on, a subset of `seen`.
     pub(crate) undecided: BitTable,
-    /// By opening, what was settled as hidden from it beyond the sides of planes.
+    /// For each opening, those hidden from it beyond the sides of planes.
     pub(crate) settled: BitTable,
     pub(crate) lines: Vec<Line>,
     /// Pairs of openings that walls hide from each other.
@@ -54,7 +54,7 @@ pub(crate) struct Search<'a> {
     pub(crate) blocker: Option<Blocker<'a>>,
     far: Option<f64>,
     pub(crate) effort: Effort,
-    /// How many of `lines` have been grown.
+    /// Number of `lines` already grown.
     pub(crate) n_grown: usize,
 }
 
@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Random lines from every opening, some aimed at what is not yet seen.
+    /// Casts random lines from every opening, some aimed at openings not seen yet.
     pub(crate) fn cast(&mut self, n_rays: usize) {
         let openings: Vec<usize> = (0..self.dirs.len())
             .filter(|&d| self.dirs.all[d].id.is_multiple_of(2))
@@ -120,7 +120,7 @@ impl<'a> Search<'a> {
             let side = i % 2;
             let d = both[side];
             let (origin, direction) = if i == 0 {
-                // Straight through: neighbors see each other, whatever else is in sight.
+                // Straight through first: neighbors always see each other.
                 let piece = dirs.pieces[dirs.all[d].pieces.start as usize].clone();
                 let corners = &dirs.points[piece.start as usize..piece.end as usize];
                 let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
@@ -169,7 +169,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Marks what lines prove, and keeps those that prove something new.
+    /// Marks the pairs of cells that lines prove, and keeps the lines that prove something new.
     pub(crate) fn keep(&mut self, lines: Vec<Line>) {
         let pieces: Vec<Vec<Line>> = lines
             .into_par_iter()
@@ -181,7 +181,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The parts of a line that a checker, on other sums, takes for proofs.
+    /// Returns the parts of a line that a checker, with other rounding, also accepts as proofs.
     fn sure_pieces(&self, line: Line) -> Vec<Line> {
         let mut out = Vec::new();
         // Lines that graze an opening may have slipped through.
@@ -192,8 +192,7 @@ impl<'a> Search<'a> {
             self.part(line, &mut out);
             return out;
         }
-        // What is solid and what is far, judged as a checker does: between crossings as computed from the
-        // line's origin.
+        // Solid parts and distances are judged as a checker does: between crossings computed from the line's origin.
         let dirs = self.dirs;
         let ts: Vec<f64> = line
             .chain
@@ -226,15 +225,15 @@ impl<'a> Search<'a> {
         out
     }
 
-    /// Parts a line where openings on it were shown to be hidden from each other: one that passes an edge nearer than the
-    /// clearance may cross what no line with clearance does.
+    /// Splits a line between openings that are known to be hidden from each other: a line that passes an edge nearer
+    /// than the clearance may cross openings that no line with clearance does.
     fn part(&self, mut line: Line, out: &mut Vec<Line>) {
         loop {
             let chain = &line.chain;
             let might = |i: usize, j: usize| self.might.get(chain[i] as usize, chain[j] as usize);
             let end = (1..chain.len()).find(|&j| (0..j).any(|i| !might(i, j)));
             let Some(end) = end else { break };
-            // The rest begins behind the last opening that does not go with it.
+            // The rest begins behind the last opening that is hidden from this one.
             let first = (0..end)
                 .rev()
                 .find(|&i| !might(i, end))
@@ -270,7 +269,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// All openings, those that might see least first.
+    /// Returns all openings, those that might see least first.
     pub(crate) fn all_openings(&self) -> Rest {
         let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
             .map(|d| (bits::count(self.might.row(d)), d))
@@ -284,10 +283,10 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Searches from the openings that are left. `on_round` hears of each round before it starts and says
-    /// whether to go on; work is counted in what openings might see at the start.
+    /// Searches from the openings that are left. Calls `on_round` before each round and stops when it returns
+    /// `false`; work is counted in openings that might be seen at the start.
     ///
-    /// Returns whether all was searched.
+    /// Returns `true` if the search is complete.
     pub(crate) fn run(
         &mut self,
         max_pieces: u32,
@@ -311,14 +310,14 @@ impl<'a> Search<'a> {
                 blocker: self.blocker,
                 max_pieces,
             };
-            // The longest first, so that no thread begins one when the others have ended.
+            // The longest first, so that no thread starts one when the others have ended.
             let found: Vec<Found> = round
                 .par_iter()
                 .rev()
                 .with_max_len(1)
                 .map_init(Flow::default, |flow, &(_, d)| flow.search(&shared, d))
                 .collect();
-            // All that is hidden before any line: none is kept that says otherwise.
+            // Merge everything hidden before any line, so that no line is kept that contradicts it.
             for found in &found {
                 self.merge(found, &mut next);
             }
@@ -328,12 +327,12 @@ impl<'a> Search<'a> {
         true
     }
 
-    /// All that a search finds out beside lines.
+    /// Returns all results of a search other than lines.
     pub(crate) fn tables(&self) -> [&BitTable; 4] {
         [&self.might, &self.settled, &self.seen, &self.undecided]
     }
 
-    /// Takes up where another search left off.
+    /// Restores the state of another search.
     pub(crate) fn restore(&mut self, tables: [BitTable; 4], lines: Vec<Line>, steps: u64) {
         [self.might, self.settled, self.seen, self.undecided] = tables;
         self.n_grown = lines.len();
@@ -341,8 +340,8 @@ impl<'a> Search<'a> {
         self.effort.steps = steps;
     }
 
-    /// Whether a line shows that each cell on its way sees the others: finite, of openings that follow each other, and neither
-    /// solid nor too long in between.
+    /// Returns `true` if a line proves that all cells on its way see each other: finite, through openings that follow
+    /// each other, free of walls and not too long.
     pub(crate) fn is_proof(&self, line: &Line) -> bool {
         let all = &self.dirs.all;
         let is_chain = !line.chain.is_empty()
@@ -354,7 +353,8 @@ impl<'a> Search<'a> {
             && self.is_free(line)
     }
 
-    /// Whether nothing solid is between the first and the last opening of a line, and they are not too far apart.
+    /// Returns `true` if nothing solid lies between the first and the last opening of a line, and they are near
+    /// enough.
     fn is_free(&self, line: &Line) -> bool {
         let cross = |d: &u32| (self.dirs).crossing(*d as usize, line.origin, line.direction);
         let ts: Vec<f64> = line.chain.iter().map(cross).collect();
@@ -383,7 +383,7 @@ impl<'a> Search<'a> {
         self.effort.add(&found.effort);
     }
 
-    /// Pairs of cells that may see each other.
+    /// Returns the pairs of cells that may see each other.
     pub(crate) fn visible(&self) -> BitTable {
         let n = self.dirs.n_cells;
         let mut visible = BitTable::new(n, n);

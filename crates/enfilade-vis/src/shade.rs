@@ -1,13 +1,13 @@
-//! Occlusion by walls of what lies behind a portal.
+//! Occlusion, by walls, of the space behind a portal.
 //!
-//! Behind a portal the visible volume is all that is in front of it, which in a street is the whole facade that the
-//! window is in. Here the lines from the portal to a triangle are held against the walls, as `occlude` does between
-//! two portals: by sheets, and by all walls in one plane (`cover`). Of an object they are held against each face of
-//! its box by which they may come in, and if that is not enough, against its triangles. Lines that a wall's plane
-//! tells apart are cut there rather than in halves.
+//! The visible volume behind a portal is everything in front of it; in a street, that is the window's whole facade.
+//! Here the lines from the portal to a triangle are tested against the walls, as `occlude` does between two portals:
+//! by sheets, and by all walls in one plane (`cover`). For an object, the lines to the faces of its box by which they
+//! may enter are tested first, and if that is not enough, those to its triangles. Where a wall's plane divides lines,
+//! they are split there rather than halved.
 //!
-//! Most of what is seen is found by a few random lines. Errs to visible: what [`MAX_BEAMS`] pieces do not settle
-//! counts as seen.
+//! A few random lines find most of what is visible. Errs to visible: lines not settled within [`MAX_BEAMS`] pieces
+//! count as free.
 
 use enfilade_geom::{Aabb, DVec3, Ray, Triangle};
 
@@ -17,14 +17,14 @@ use crate::occlude::{APART, spread};
 use crate::rng::Rng;
 use crate::sheets::{Beam, Hull, Part, Sheets, cut, halves, inner_point, size};
 
-/// Pieces that the lines to one face of a box, or to one triangle, may be cut into.
+/// Most pieces that the lines to one face of a box, or to one triangle, are cut into.
 const MAX_BEAMS: usize = 24;
-/// Lines tried before.
+/// Random lines tried first.
 const LINES: usize = 16;
-/// Objects of more triangles are told by their boxes alone.
+/// Objects with more triangles are tested by their boxes alone.
 const MAX_TRIANGLES: usize = 64;
 
-/// Which way the faces of a box look, in the order of [`Aabb::faces`].
+/// Outward normals of the faces of a box, in the order of [`Aabb::faces`].
 const OUTWARD: [DVec3; 6] = [
     DVec3::NEG_X,
     DVec3::X,
@@ -38,16 +38,16 @@ const OUTWARD: [DVec3; 6] = [
 pub(crate) struct Shade<'a> {
     pub(crate) sheets: &'a Sheets<'a>,
     pub(crate) dirs: &'a Dirs,
-    /// How far inside an opening's edges lines pass it. [Units: wu]
+    /// Distance that lines keep inside an opening's edges. [Units: wu]
     pub(crate) inset: f64,
     /// Rounding of `normal · point`. [Units: wu]
     pub(crate) rounding: f64,
-    /// The world's tolerance: how far planes and vertices may be moved. [Units: wu]
+    /// The world's tolerance: the distance by which planes and vertices may be moved. [Units: wu]
     pub(crate) slack: f64,
 }
 
 impl Shade<'_> {
-    /// Returns whether no line through an opening reaches a triangle, or the triangles of an object, behind it.
+    /// Returns `true` if no line through an opening reaches a triangle, or the triangles of an object, behind it.
     pub(crate) fn hides(&self, dir: usize, triangles: &[Triangle], bounds: &Aabb) -> bool {
         let opening = &self.dirs.all[dir];
         let height = (opening.low + opening.high) * 0.5;
@@ -63,7 +63,7 @@ impl Shade<'_> {
             strip: self.inset,
             ..self.near()
         };
-        // What lies in the opening's plane is seen along it at most.
+        // Parts in the opening's plane are seen at most edge-on.
         let behind = |t: &Triangle| cut(t, opening.normal, height + self.inset);
         let to: Vec<_> = triangles
             .iter()
@@ -75,22 +75,22 @@ impl Shade<'_> {
                 .iter()
                 .flat_map(|part| to.iter().map(move |to| [part, to]))
         };
-        // What is seen is mostly found by a line.
+        // A line quickly finds most of what is visible.
         !both().any(|ends| self.has_line(ends, LINES.div_ceil(to.len()), true))
             && both().all(|ends| self.closes(ends.map(Clone::clone), near, true))
     }
 
-    /// Returns whether no line through an opening reaches a box behind it.
+    /// Returns `true` if no line through an opening reaches a box behind it.
     fn hides_box(&self, dir: usize, bounds: &Aabb) -> bool {
         let opening = &self.dirs.all[dir];
         let height = (opening.low + opening.high) * 0.5;
         let parts = self.dirs.open_parts(dir, self.inset);
         let parts = parts.iter().filter(|part| part.len() > 2);
-        // Lines that begin in the box come in by no face.
+        // Lines that begin inside the box enter through none of its faces.
         if Aabb::of_points(parts.clone().flatten()).overlaps(bounds) {
             return false;
         }
-        // What of an object lies this far before a wall may as well be in it.
+        // A part of an object this little in front of a wall may as well lie in the wall.
         let near = Near {
             strip: self.slack,
             ..self.near()
@@ -99,7 +99,7 @@ impl Shade<'_> {
         let center = bounds.center();
         for part in parts {
             for (face, outward) in faces.iter().zip(OUTWARD) {
-                // The axis along which the face lies apart from the middle.
+                // `outward` is the axis along which the face is offset from the center.
                 debug_assert!((face[0] - center).dot(outward) >= 0.0);
                 let from = cut(part, outward, outward.dot(face[0]));
                 let to = cut(face, opening.normal, height);
@@ -124,7 +124,7 @@ impl Shade<'_> {
         }
     }
 
-    /// Returns whether one of so many lines from a polygon to another is free; the second may be in a wall itself.
+    /// Returns `true` if one of `n` random lines from a polygon to another is free; the second may be part of a wall.
     fn has_line(&self, ends: [&Vec<DVec3>; 2], n: usize, may_be_wall: bool) -> bool {
         let mut rng = Rng::new(0);
         (0..n).any(|_| {
@@ -134,7 +134,7 @@ impl Shade<'_> {
         })
     }
 
-    /// Returns whether walls close all lines from one polygon to the other, which may be in a wall itself.
+    /// Returns `true` if walls close all lines from one polygon to the other, which may be part of a wall.
     fn closes(&self, ends: [Vec<DVec3>; 2], near: Near, may_be_wall: bool) -> bool {
         let mut beams = vec![ends];
         let mut n_done = 0;
@@ -193,7 +193,7 @@ impl Shade<'_> {
         beams.push(ends);
     }
 
-    /// Returns the effect on a beam of the walls that one of its lines meets.
+    /// Returns the effect on a beam of the walls that its line `line` hits.
     fn close(
         &self,
         ends: &[Vec<DVec3>; 2],
@@ -224,7 +224,7 @@ impl Shade<'_> {
     }
 }
 
-/// A random point of a convex polygon, not evenly spread.
+/// Returns a random point of a convex polygon, not evenly distributed.
 fn point_in(points: &[DVec3], rng: &mut Rng) -> DVec3 {
     let k = 1 + rng.below(points.len() - 2);
     let [mut u, mut v] = [rng.unit(), rng.unit()];
@@ -242,7 +242,7 @@ mod tests {
     use super::*;
     use crate::hourglass::Hourglasses;
 
-    /// A square opening between two cells, one unit wide around the z axis; lines pass it upwards.
+    /// A square opening between two cells, one unit wide around the z axis, crossed upwards.
     const OPENING: [[f64; 3]; 4] = [
         [-0.5, -0.5, 0.0],
         [0.5, -0.5, 0.0],
@@ -274,7 +274,7 @@ mod tests {
         shade.hides(glasses.place(0), target, &bounds)
     }
 
-    /// Three walls side by side in one plane, which share no edge.
+    /// Three walls side by side in one plane, without shared edges.
     fn row(z: f64) -> Vec<Triangle> {
         let walls = [
             rectangle([-9.0, -9.0], [-0.1, 9.0], z),
@@ -289,7 +289,7 @@ mod tests {
         let target = rectangle([-1.0, -1.0], [1.0, 1.0], 4.0);
         let walls = row(1.0);
         assert!(hides(&walls, &target[..1]) && hides(&walls, &target));
-        // Without the one in the middle there is a way through, and in front of them nothing is hidden.
+        // Without the middle wall there is a way through, and nothing in front of the walls is hidden.
         let gap = [&walls[..2], &walls[4..]].concat();
         assert!(!hides(&gap, &target[..1]) && !hides(&gap, &target));
         let before = rectangle([-1.0, -1.0], [1.0, 1.0], 0.9);
@@ -305,9 +305,9 @@ mod tests {
         let walls = row(1.0);
         assert!(!hides(&walls, &[upright(0.5, 2.0)]));
         assert!(!hides(&walls, &[upright(0.999, 2.0)]));
-        // It begins in the wall, as a wall does that two rooms share.
+        // It begins in the wall, like a wall that two rooms share.
         assert!(hides(&walls, &[upright(1.0, 2.0)]));
-        // What is in the wall itself is seen.
+        // A triangle in the wall itself is visible.
         assert!(!hides(&walls, &walls[..1]));
     }
 

@@ -1,12 +1,12 @@
-//! Sheets of triangles, and the beams they close; `occlude` says why.
+//! Sheets of triangles, and the beams that they close; `occlude` explains the method.
 //!
-//! Errs to visible: what comes too near to a border to say for sure closes nothing.
+//! Errs to visible: anything too near to a border to be certain closes nothing.
 
 use std::collections::HashMap;
 
 use enfilade_geom::{Bvh, DVec3, Triangle};
 
-/// Triangles of a sheet.
+/// Most triangles of a sheet.
 const MAX_SHEET: usize = 96;
 
 /// Symbols of a tree of beams.
@@ -15,7 +15,7 @@ mod symbol {
     pub(crate) const FIRST: u8 = 0;
     /// The piece of the second opening is halved.
     pub(crate) const SECOND: u8 = 1;
-    /// A sheet is in the way: number of triangles, and which.
+    /// A sheet is in the way: number of triangles, and their indices.
     pub(crate) const SHEET: u8 = 2;
 }
 
@@ -23,24 +23,24 @@ mod symbol {
 pub(crate) struct Sheets<'a> {
     pub(crate) triangles: &'a [Triangle],
     pub(crate) bvh: &'a Bvh,
-    /// By triangle.
+    /// For each triangle, its edges.
     edges: Vec<[u32; 3]>,
-    /// By edge, its ends and the triangles that have it.
+    /// For each edge, its ends and the triangles around it.
     ends: Vec<[DVec3; 2]>,
     around: Vec<Vec<u32>>,
 }
 
-/// Lines from a polygon to another.
+/// The lines from one polygon to another.
 pub(crate) struct Beam {
     pub(crate) ends: [Vec<DVec3>; 2],
-    /// Where it was written down: a leaf's sheet, or the beams that follow.
+    /// Node of the tree: a leaf's sheet, or the indices of two halves.
     pub(crate) what: Part,
 }
 
 pub(crate) enum Part {
     Open,
     Sheet(Vec<u32>),
-    /// Which end was halved, and the two halves.
+    /// The end that was halved, and the two halves.
     Halves(usize, [Option<usize>; 2]),
 }
 
@@ -52,7 +52,7 @@ impl<'a> Sheets<'a> {
         let mut edges = Vec::with_capacity(triangles.len());
         for (i, triangle) in triangles.iter().enumerate() {
             let ids = triangle.map(|p| {
-                // Zero has two signs.
+                // Adding zero turns -0 into +0.
                 let key = (p + DVec3::ZERO).to_array().map(f64::to_bits);
                 let next = corners.len() as u32;
                 *corners.entry(key).or_insert(next)
@@ -77,7 +77,7 @@ impl<'a> Sheets<'a> {
         }
     }
 
-    /// A sheet that crosses the beam, grown from a triangle over every edge that touches the beam.
+    /// Returns a sheet that crosses the beam, grown from a triangle over every edge that touches the beam.
     pub(crate) fn grown(
         &self,
         seed: u32,
@@ -127,7 +127,7 @@ impl<'a> Sheets<'a> {
         is_free.then_some(sheet)
     }
 
-    /// How straight a sheet goes on over an edge: cosine of the turn.
+    /// Returns how straight a sheet continues over an edge: the cosine of the turn.
     fn flatness(&self, edge: u32, from: u32, to: u32) -> f64 {
         let [a, b] = self.ends[edge as usize];
         let along = (b - a).normalize_or_zero();
@@ -142,7 +142,7 @@ impl<'a> Sheets<'a> {
     }
 }
 
-/// Half-spaces around a beam, each touching it.
+/// Half-spaces that enclose a beam, each touching it.
 pub(crate) struct Hull {
     sides: Vec<(DVec3, f64)>,
     apart: f64,
@@ -179,7 +179,7 @@ impl Hull {
         hull
     }
 
-    /// Whatever the normal, the half-space holds the beam: nothing rests on how well it was computed.
+    /// Adds the half-space with this normal that holds the beam. It is valid for any normal, however inaccurate.
     fn add(&mut self, normal: DVec3, p: &[DVec3], q: &[DVec3]) {
         if normal != DVec3::ZERO {
             let heights = p.iter().chain(q).map(|x| normal.dot(*x));
@@ -188,7 +188,7 @@ impl Hull {
         }
     }
 
-    /// Whether a segment does not touch the beam.
+    /// Returns `true` if a segment does not touch the beam.
     fn is_apart(&self, [a, b]: [DVec3; 2]) -> bool {
         let (mut first, mut last) = (0.0_f64, 1.0_f64);
         for &(normal, least) in &self.sides {
@@ -205,7 +205,7 @@ impl Hull {
                 last = last.min(h / (h - g));
             }
         }
-        // Shares of the segment have no unit; a millionth of it is more than they can be wrong.
+        // Positions along the segment have no unit; their error is less than a millionth.
         first > last + 1e-6
     }
 }
@@ -216,7 +216,7 @@ fn area_normal(points: &[DVec3]) -> DVec3 {
     sum.normalize_or_zero()
 }
 
-/// Whether a segment crosses a triangle; `None` where it comes too near to its plane's or its edges' border to say.
+/// Returns `true` if a segment crosses a triangle; `None` if it comes too near to its plane or an edge to be certain.
 fn crosses(triangle: &Triangle, [p, q]: [DVec3; 2], apart: f64) -> Option<bool> {
     let [a, b, c] = *triangle;
     let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -224,7 +224,7 @@ fn crosses(triangle: &Triangle, [p, q]: [DVec3; 2], apart: f64) -> Option<bool> 
     if h.min(g) > apart || h.max(g) < -apart {
         return Some(false);
     }
-    // A line that runs along the plane crosses it at no sure place.
+    // A line along the plane crosses it at no certain place.
     if (h - g).abs() <= 1e-4 * (q - p).length() {
         return None;
     }
@@ -234,7 +234,7 @@ fn crosses(triangle: &Triangle, [p, q]: [DVec3; 2], apart: f64) -> Option<bool> 
     for (from, to) in [(a, b), (b, c), (c, a)] {
         let inward = normal.cross(to - from).normalize_or_zero();
         let height = inward.dot(at - from);
-        // One edge that it is clearly outside of is enough.
+        // To be clearly outside of one edge is enough.
         if height < -near {
             return Some(false);
         }
@@ -244,7 +244,7 @@ fn crosses(triangle: &Triangle, [p, q]: [DVec3; 2], apart: f64) -> Option<bool> 
     (is_inside && is_through).then_some(true)
 }
 
-/// Whether a plane passes between a triangle and a convex polygon.
+/// Returns `true` if a plane separates a triangle and a convex polygon.
 fn are_apart(triangle: &Triangle, polygon: &[DVec3], apart: f64) -> bool {
     let extent = |points: &[DVec3], axis: DVec3| {
         let heights = points.iter().map(|p| axis.dot(*p));
@@ -268,7 +268,7 @@ fn are_apart(triangle: &Triangle, polygon: &[DVec3], apart: f64) -> bool {
         })
 }
 
-/// The part of a convex polygon where `normal · p >= least`.
+/// Returns the part of a convex polygon where `normal · p >= least`.
 pub(crate) fn cut(points: &[DVec3], normal: DVec3, least: f64) -> Vec<DVec3> {
     let n = points.len();
     let mut out = Vec::with_capacity(n + 1);
@@ -279,7 +279,7 @@ pub(crate) fn cut(points: &[DVec3], normal: DVec3, least: f64) -> Vec<DVec3> {
             out.push(p);
         }
         if (h > 0.0 && g < 0.0) || (h < 0.0 && g > 0.0) {
-            // From the inner end, so that both directions of an edge give the same point.
+            // Computed from the inner end, so that both directions of an edge give the same point.
             out.push(if h > 0.0 {
                 p + (q - p) * (h / (h - g))
             } else {
@@ -290,14 +290,14 @@ pub(crate) fn cut(points: &[DVec3], normal: DVec3, least: f64) -> Vec<DVec3> {
     if out.len() < 3 { Vec::new() } else { out }
 }
 
-/// A point inside, off the lines of symmetry along which walls are cut into triangles.
+/// Returns a point inside, off the lines of symmetry along which walls are cut into triangles.
 pub(crate) fn inner_point(points: &[DVec3]) -> DVec3 {
     let weight = |i: usize| 1.0 + 0.13 * (i % 5) as f64;
     let sum: DVec3 = points.iter().enumerate().map(|(i, &p)| p * weight(i)).sum();
     sum / (0..points.len()).map(weight).sum::<f64>()
 }
 
-/// Across the longest side, the upper half first.
+/// Returns the halves of a polygon across its longest axis, the upper half first.
 pub(crate) fn halves(points: &[DVec3]) -> [Vec<DVec3>; 2] {
     let low = points.iter().copied().fold(DVec3::MAX, DVec3::min);
     let high = points.iter().copied().fold(DVec3::MIN, DVec3::max);
@@ -318,7 +318,7 @@ pub(crate) fn size(points: &[DVec3]) -> f64 {
     points.iter().map(|p| p.distance(o)).fold(0.0, f64::max)
 }
 
-/// Adds the tree of a beam and of those that follow from it; `docs/evidence.md` describes it.
+/// Appends the tree of a beam and its descendants; `docs/evidence.md` describes the format.
 pub(crate) fn write_tree(beams: &[Beam], at: usize, out: &mut Vec<u8>) {
     match &beams[at].what {
         Part::Sheet(sheet) => {

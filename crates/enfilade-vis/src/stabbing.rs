@@ -1,21 +1,22 @@
-//! Whether any line at all passes a chain of openings: in Plücker coordinates, by a tiny linear programme.
+//! Test whether any line at all passes a chain of openings: a tiny linear program in Plücker coordinates.
 //!
-//! A line through `x` along `d` is the six numbers `(d, m)` with `m = x × d`. That it passes the edge from `p` to
-//! `q` of an opening on the inner side is `d · (p × q) + m · (q - p) > 0`, and that it crosses the opening the right
-//! way is `n · d > 0`: half-spaces through the origin of six dimensions, a row each. After Teller 1992 and
-//! Gjørup 1999, section 2.2.3.
+//! A line through `x` along `d` is the six numbers `(d, m)` with `m = x × d`. It passes the edge from `p` to `q` of
+//! an opening on the inner side if `d · (p × q) + m · (q - p) > 0`, and it crosses the opening in the right direction
+//! if `n · d > 0`: half-spaces through the origin of six dimensions, one row each. After Teller 1992 and Gjørup 1999,
+//! section 2.2.3.
 //!
 //! The point nearest to the origin of the hull of all rows (Wolfe, *Finding the nearest point in a polytope*, 1976)
-//! answers: if it is the origin itself, the rows' weights show that no six numbers satisfy all (Farkas), and
-//! so no line; else it is the six numbers that satisfy all by the widest margin, and lines are looked for near
-//! them. Six numbers need not be a line, as `d · m = 0` is asked of those: some chains stay open.
+//! gives the answer. If it is the origin itself, the rows' weights prove that no six numbers satisfy all rows
+//! (Farkas), so no line does. Otherwise it is the six numbers that satisfy all by the widest margin, and lines are
+//! tried near them. Six numbers are a line only if `d · m = 0`, so some chains stay open.
 //!
-//! Time: a step of the search takes the product of rows and six; there are some ten for each row that counts.
+//! Time: six times the number of rows for each step, and about ten steps for each row that matters.
 
 use enfilade_geom::DVec3;
 
-/// A sum of weighted unit rows this short counts as zero; lines whose distance inside an opening, over the chain's
-/// size, times the sine of the angle at which they cross it is less may be lost. A checker asks for ten times as much.
+/// A sum of weighted unit rows this short counts as zero. A line may be lost if its distance inside an opening,
+/// relative to the chain's size, times the sine of the angle at which it crosses, is less. A checker requires ten
+/// times as much.
 const ZERO: f64 = 1e-14;
 
 /// Steps of the search; a chain of 50 edges takes a few dozen.
@@ -24,28 +25,28 @@ const MAX_STEPS: usize = 500;
 /// An opening of the chain.
 pub(crate) struct Gate<'a> {
     pub(crate) winding: &'a [DVec3],
-    /// Unit normal that the corners run counter-clockwise about.
+    /// Unit normal about which the vertices run counter-clockwise.
     pub(crate) turn: DVec3,
-    /// Unit normal the way it is crossed.
+    /// Unit normal in the direction in which it is crossed.
     pub(crate) normal: DVec3,
 }
 
-/// What the rows say.
+/// Result of the linear program.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Answer {
-    /// Weights of rows whose sum is zero.
+    /// No line: weights of rows whose sum is zero.
     Closed(Vec<(u16, f64)>),
-    /// A point and a direction, the best guess for a line.
+    /// The best guess for a line: a point and a direction.
     Guess(DVec3, DVec3),
-    /// Rounding is in the way.
+    /// Rounding prevents an answer.
     Unknown,
 }
 
 type Row = [f64; 6];
 
-/// Asks whether a line passes all gates inside their edges.
+/// Tests whether a line passes all gates inside their edges.
 pub(crate) fn stabbed(gates: &[Gate<'_>]) -> Answer {
-    // An opening without area hides nothing: its edges run there and back, and would show that no line passes it.
+    // An opening without area hides nothing: its edges run back and forth, and would prove that no line passes it.
     if gates.iter().any(|gate| gate.normal == DVec3::ZERO) {
         return Answer::Unknown;
     }
@@ -70,7 +71,7 @@ pub(crate) fn stabbed(gates: &[Gate<'_>]) -> Answer {
     Answer::Guess(center + through * size, direction)
 }
 
-/// The middle of all corners, and their greatest distance from it along an axis.
+/// Returns the mean of all vertices, and their greatest distance from it along an axis.
 fn frame(gates: &[Gate<'_>]) -> (DVec3, f64) {
     let corners = || gates.iter().flat_map(|g| g.winding);
     let center = corners().sum::<DVec3>() / corners().count().max(1) as f64;
@@ -78,8 +79,8 @@ fn frame(gates: &[Gate<'_>]) -> (DVec3, f64) {
     (center, reach.fold(f64::MIN_POSITIVE, f64::max))
 }
 
-/// Of each gate in turn: a unit row for each edge, in order, then one for the way it is crossed. Rows of edges without
-/// length are zero.
+/// Returns the rows of each gate in turn: a unit row for each edge, in order, then one for the crossing direction.
+/// The rows of edges without length are zero.
 fn rows(gates: &[Gate<'_>], center: DVec3, size: f64) -> Vec<Row> {
     let mut rows = Vec::new();
     for gate in gates {
@@ -121,8 +122,8 @@ fn sum(rows: &[Row], weights: &[(usize, f64)]) -> Row {
     out
 }
 
-/// The point of the hull of the rows that is nearest to the origin, and the rows that it is a mean of. Rows that are
-/// zero say nothing and are passed over.
+/// Returns the point of the hull of the rows nearest to the origin, and the weighted rows that give it. Ignores zero
+/// rows.
 fn nearest(rows: &[Row]) -> Option<(Row, Vec<(usize, f64)>)> {
     let first = rows.iter().position(|r| length(r) > 0.0)?;
     let mut weights = vec![(first, 1.0)];
@@ -138,7 +139,7 @@ fn nearest(rows: &[Row]) -> Option<(Row, Vec<(usize, f64)>)> {
             .filter(|(_, r)| length(r) > 0.0)
             .map(|(i, r)| (i, dot(&x, r)))
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        // Rounding of the products; the margin itself may be smaller than that is.
+        // Allows for the rounding of products, which may exceed the margin itself.
         if least >= x2 - 1e-15 * x2.sqrt() || weights.iter().any(|&(i, _)| i == next) {
             return Some((x, weights));
         }
@@ -154,7 +155,7 @@ fn nearest(rows: &[Row]) -> Option<(Row, Vec<(usize, f64)>)> {
                 }
                 break;
             }
-            // As far towards it as no weight falls below zero; what reaches zero is dropped.
+            // Moves towards it as far as all weights stay positive; weights that reach zero are dropped.
             let mut step = 1.0_f64;
             for (&(_, w), &goal) in weights.iter().zip(&wanted) {
                 if goal <= 0.0 {
@@ -178,8 +179,8 @@ fn nearest(rows: &[Row]) -> Option<(Row, Vec<(usize, f64)>)> {
     None
 }
 
-/// Weights, of sum 1 and any sign, of the point nearest to the origin of the flat through the rows. By orthogonal
-/// steps from the first row, as products of rows would lose half of the digits.
+/// Returns the weights, of sum 1 and any sign, of the point nearest to the origin in the affine hull of the rows.
+/// Orthogonalizes from the first row, as products of rows would lose half of the digits.
 fn affine(rows: &[Row], weights: &[(usize, f64)]) -> Option<Vec<f64>> {
     let base = rows[weights[0].0];
     let n = weights.len() - 1;
@@ -192,7 +193,7 @@ fn affine(rows: &[Row], weights: &[(usize, f64)]) -> Option<Vec<f64>> {
             v[k] -= base[k];
         }
         let before = length(&v);
-        // Twice is enough.
+        // Two passes are enough.
         for _ in 0..2 {
             for (i, axis) in axes.iter().enumerate() {
                 let c = dot(axis, &v);
@@ -234,7 +235,7 @@ mod tests {
     use super::*;
     use crate::rng::Rng;
 
-    /// A convex polygon around a point of its plane, and unit normals: of its corners' order, and as crossed.
+    /// A convex polygon around a point of its plane, and unit normals: for its vertex order, and as crossed.
     struct Made(Vec<DVec3>, DVec3, DVec3);
 
     fn gate(made: &Made) -> Gate<'_> {
@@ -249,11 +250,11 @@ mod tests {
         stabbed(&made.iter().map(gate).collect::<Vec<_>>())
     }
 
-    /// A polygon of 3 to 6 corners, `inside` by a tenth at least, crossed along `ahead`.
+    /// A polygon of 3 to 6 vertices with the point `inside` it by at least a tenth, crossed along `ahead`.
     fn around(rng: &mut Rng, inside: DVec3, ahead: DVec3) -> Made {
         let mut unit = || 2.0 * rng.unit() - 1.0;
         let mut normal = DVec3::new(unit(), unit(), unit()).normalize();
-        // At 6 degrees to its plane at least.
+        // At least 6 degrees off its plane.
         if normal.dot(ahead).abs() < 0.1 {
             normal = ahead;
         }
@@ -305,7 +306,7 @@ mod tests {
                 Answer::Unknown => {}
             }
         }
-        // Six numbers that are far from any line are the rest: one guess is all that is asked.
+        // Otherwise the six numbers are far from any line; a single guess is enough here.
         assert!(n_found * 100 > n_chains * 85, "{n_found} of {n_chains}");
     }
 
@@ -317,13 +318,13 @@ mod tests {
 
     #[test]
     fn what_only_lines_along_edges_or_planes_would_pass_is_closed() {
-        // There and back through one plane.
+        // Back and forth through one plane.
         let back = [
             square(0.0, 0.0, 0.0, DVec3::Z),
             square(4.0, 0.0, 0.0, -DVec3::Z),
         ];
         assert!(matches!(ask(&back), Answer::Closed(_)));
-        // Three in a row of which the outer ones touch the middle one's edge from either side.
+        // Three in a row; the outer ones touch the middle one's edge from opposite sides.
         let edge = [
             square(1.0, 0.0, 0.0, DVec3::Z),
             square(0.0, 0.0, 1.0, DVec3::Z),
@@ -334,7 +335,7 @@ mod tests {
         };
         let total: f64 = weights.iter().map(|&(_, w)| w).sum();
         assert!((total - 1.0).abs() < 1e-12 && weights.iter().all(|&(_, w)| w > 0.0));
-        // Moved by a thousandth there is a line.
+        // Moved by a thousandth, a line passes.
         let open = [
             square(0.999, 0.0, 0.0, DVec3::Z),
             square(0.0, 0.0, 1.0, DVec3::Z),

@@ -1,13 +1,13 @@
-//! How far numbers are trusted, and the half-spaces that are held against it.
+//! Numeric tolerances, and half-spaces that use them.
 
 use enfilade_geom::DVec3;
 
-/// How far numbers are trusted. [Units: wu]
+/// Numeric tolerances. [Units: wu]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tolerance {
-    /// A clip keeps this much more.
+    /// Extra distance that a clip keeps.
     pub(crate) outward: f64,
-    /// Rounding of `normal · point`.
+    /// Rounding error of `normal · point`.
     pub(crate) rounding: f64,
     /// A sight line that stays this far inside every opening's edges is never lost.
     pub(crate) clearance: f64,
@@ -31,7 +31,7 @@ pub(crate) struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// Whether a ball (middle, radius) lies in it.
+    /// Returns `true` if a ball (center, radius) lies in it.
     #[inline]
     pub(crate) fn holds(&self, [x, y, z, radius]: [f64; 4]) -> bool {
         self.normal.dot(DVec3::new(x, y, z)) - self.offset >= radius

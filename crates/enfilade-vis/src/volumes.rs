@@ -1,12 +1,14 @@
-//! The potentially visible volume: what of each cell the portals leave to be seen from each other cell.
+//! The potentially visible volume: the part of each cell that may be seen, through portals, from each other cell.
 //!
-//! After Dirkse 2002, section 7.4: every sequence of portals from a cell to another bounds what is seen behind it, by planes that separate its first
-//! portal from its last ([`Hourglass`]). We walk all sequences that the search left, and keep the union of what they bound, piece by piece.
+//! After Dirkse 2002, section 7.4: every sequence of portals from one cell to another bounds the space seen behind it
+//! by planes that separate its first portal from its last ([`Hourglass`]). We walk all sequences that the search
+//! left, and keep the union of these spaces as a list of pieces.
 //!
-//! A sequence never comes back into the cell that it began in: what is seen on its way on is seen from where it came back, by a shorter one.
+//! A sequence never returns to the cell that it began in: from there, a shorter one sees as much.
 //!
-//! Errs to visible. Where a walk takes more than [`MAX_STEPS`], or a pair gets more than [`VisibleVolumes::MAX_PIECES`] pieces, those of one
-//! first portal and one last become the piece of these two, whatever lies between; and where that is still too much, the cell counts as seen whole.
+//! Errs to visible. If a walk takes more than [`MAX_STEPS`], or a pair gets more than [`VisibleVolumes::MAX_PIECES`]
+//! pieces, those with the same first and last portal become the piece of these two, regardless of the portals
+//! between; if that is still too much, the whole cell counts as seen.
 
 use std::collections::BTreeMap;
 
@@ -20,20 +22,20 @@ use crate::hourglass::{Hourglass, Hourglasses};
 use crate::narrow::narrow_might;
 use crate::polytope::faces_in_box;
 
-/// Portals pushed on the way from one portal of a cell.
+/// Most portals pushed in the walk from one portal of a cell.
 const MAX_STEPS: usize = 20_000;
 
 /// Longest sequence followed. Bounds the stack.
 const MAX_SEQUENCE: usize = 256;
 
-/// Corners this near to a plane count as on it. [Units: wu] Far below what any reader allows for.
+/// Vertices this near to a plane count as on it; far below the tolerance of any reader. [Units: wu]
 const EPS: f64 = 1e-9;
 
-/// Stands for the portals of a piece that is not seen through one alone.
+/// Marks the portals of a piece that is not seen through a single one.
 pub(crate) const ANY_PORTAL: u32 = u32::MAX;
 
-/// The volumes of each pair, and by piece the first portal and the last through which it is seen: directions of the graph, or
-/// [`ANY_PORTAL`].
+/// Returns the volumes of each pair of cells, and for each piece its first and its last portal: directions of the
+/// graph, or [`ANY_PORTAL`].
 pub(crate) fn volumes_of(
     world: &World,
     pvs: &Pvs,
@@ -63,8 +65,8 @@ pub(crate) fn volumes_of(
     (volumes, ends)
 }
 
-/// The faces of a piece of a cell's visible volume, to be drawn: convex polygons around the part of the cell's box that the piece holds.
-/// [Units: wu]
+/// Returns the faces of a piece of a cell's visible volume, for drawing: convex polygons around the part of the
+/// cell's box inside the piece. [Units: wu]
 #[must_use]
 pub fn piece_faces(piece: &[[f64; 4]], bounds: &Aabb) -> Vec<Vec<DVec3>> {
     let plane = |&[x, y, z, d]: &[f64; 4]| Plane {
@@ -75,13 +77,13 @@ pub fn piece_faces(piece: &[[f64; 4]], bounds: &Aabb) -> Vec<Vec<DVec3>> {
     faces_in_box(&planes, bounds, EPS)
 }
 
-/// A convex piece, and what it was made by.
+/// A convex piece and its origin.
 struct Piece {
     /// First portal and last, as directions of the graph.
     ends: [u32; 2],
-    /// Moved outwards by the world's tolerance, so that who asks needs none.
+    /// Moved outwards by the world's tolerance, so that queries need none.
     planes: Vec<Plane>,
-    /// Its corners in the cell's box.
+    /// Its vertices in the cell's box.
     corners: Vec<DVec3>,
 }
 
@@ -90,15 +92,16 @@ struct Walk<'a> {
     pvs: &'a Pvs,
     glasses: &'a Hourglasses,
     might: &'a BitTable,
-    /// How far what is seen of a cell may lie beyond its box and behind planes: the world's tolerance. [Units: wu]
+    /// Distance by which visible parts may lie outside their cell's box or behind planes: the world's tolerance.
+    /// [Units: wu]
     slack: f64,
 }
 
-/// The pieces of the cells that one cell sees.
+/// For each cell seen from a cell, its pieces.
 type Pieces = BTreeMap<u32, Vec<Piece>>;
 
 impl Walk<'_> {
-    /// The pieces of each cell that `cell` sees, in the order of ids.
+    /// Returns the pieces of each cell that `cell` sees, in the order of ids.
     fn pieces_seen_from(&self, cell: u32) -> Vec<Vec<Piece>> {
         let dirs = self.dirs();
         let mut found = Pieces::new();
@@ -120,7 +123,7 @@ impl Walk<'_> {
         .collect()
     }
 
-    /// The piece that is a whole cell.
+    /// Returns the piece that is a whole cell.
     fn whole(&self, cell: u32) -> Piece {
         Piece {
             ends: [ANY_PORTAL; 2],
@@ -133,7 +136,7 @@ impl Walk<'_> {
         self.glasses.dirs()
     }
 
-    /// The cell that a direction leads into, as the graph numbers it.
+    /// Returns the cell that a direction leads into, in the graph's numbers.
     fn cell_after(&self, dir: usize) -> u32 {
         let dirs = self.dirs();
         dirs.cells[dirs.all[dir].to as usize]
@@ -166,7 +169,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Takes what is seen behind a sequence and behind all that go on from it; false where that takes too long.
+    /// Adds the space seen behind a sequence and all its extensions; returns `false` if that takes too long.
     fn follow(&self, glass: &Hourglass, state: &mut State<'_>) -> bool {
         let dirs = self.dirs();
         let depth = state.chain.len() - 1;
@@ -175,7 +178,7 @@ impl Walk<'_> {
         if let Some(piece) = self.piece(glass, to) {
             state.out.push((to, piece));
         } else {
-            // What is behind the next portals is behind this one.
+            // Nothing is seen behind the next portals either.
             return true;
         }
         if depth + 1 >= MAX_SEQUENCE {
@@ -212,7 +215,7 @@ impl Walk<'_> {
         true
     }
 
-    /// What is seen through a portal and any later one, whatever lies between.
+    /// Returns the pieces seen through a portal and any later one, regardless of those between.
     fn between_all(&self, exit: usize) -> Vec<(u32, Piece)> {
         let dirs = self.dirs();
         let source = dirs.cells[dirs.all[exit].from as usize];
@@ -234,7 +237,7 @@ impl Walk<'_> {
         out
     }
 
-    /// What of a cell's box a sequence leaves; `None` where that is nothing.
+    /// Returns the part of a cell's box that a sequence leaves; `None` if it is empty.
     fn piece(&self, glass: &Hourglass, to: u32) -> Option<Piece> {
         let bounds = self.bounds(to);
         let wide: Vec<Plane> = glass
@@ -249,7 +252,7 @@ impl Walk<'_> {
             .into_iter()
             .flatten()
             .collect();
-        // A plane that cuts nothing off is not kept.
+        // Keep only planes that cut something off.
         let cuts = |p: &&Plane| bounds.corners().iter().any(|&c| p.signed_distance(c) < 0.0);
         let most = VisibleVolumes::MAX_PLANES;
         let ends = [
@@ -263,14 +266,14 @@ impl Walk<'_> {
         })
     }
 
-    /// The box of a cell, and of all that is seen of it.
+    /// Returns the box of a cell and of everything seen of it.
     fn bounds(&self, cell: u32) -> Aabb {
         let corners = self.world.graph.cells[cell as usize].aabb;
         let [low, high] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
         Aabb::new(low, high).expanded(self.slack)
     }
 
-    /// Adds a piece unless another holds it, and drops those that it holds.
+    /// Adds a piece unless another holds it; drops those that it holds.
     fn add(&self, found: &mut Pieces, to: u32, piece: Piece) {
         let pieces = found.entry(to).or_default();
         if pieces.iter().any(|p| p.holds(&piece)) {
@@ -283,7 +286,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Makes one piece of those of one first portal and one last; the whole cell where that is not enough.
+    /// Merges pieces with the same first and last portal; if that is not enough, keeps the whole cell.
     fn merge(&self, pieces: &mut Vec<Piece>, to: u32) {
         let mut ends: Vec<[u32; 2]> = pieces.iter().map(|p| p.ends).collect();
         ends.sort_unstable();
@@ -307,7 +310,7 @@ impl Walk<'_> {
                 kept.push(piece);
             }
         }
-        // Half of what is allowed, so that merging is rare.
+        // Half of the limit, so that merging is rare.
         if kept.is_empty() || kept.len() > VisibleVolumes::MAX_PIECES / 2 {
             kept = vec![self.whole(to)];
         }
@@ -315,18 +318,18 @@ impl Walk<'_> {
     }
 }
 
-/// A walk's way, and what it found.
+/// State of a walk, and its results.
 struct State<'o> {
     source: u32,
     chain: Vec<usize>,
-    /// By depth: what all portals of the sequence might see.
+    /// For each depth, the directions that all portals of the sequence might see.
     reach: Vec<Vec<u64>>,
     n_left: usize,
     out: &'o mut Vec<(u32, Piece)>,
 }
 
 impl Piece {
-    /// Whether another piece of the same cell, seen through the same portals, lies in it.
+    /// Returns `true` if another piece of the same cell, seen through the same portals, lies inside it.
     fn holds(&self, other: &Self) -> bool {
         if self.ends[1] != ANY_PORTAL && self.ends != other.ends {
             return false;

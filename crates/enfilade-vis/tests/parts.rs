@@ -1,4 +1,4 @@
-//! What rays from a cell hit is among its parts and in its volumes, on worlds that are exact by construction.
+//! Everything that rays from a cell hit is among its parts and in its volumes, in worlds exact by construction.
 
 use enfilade_cpg::{CellId, PartNumbers, Pvs, SightGraph, World};
 use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Ray, Triangle};
@@ -10,7 +10,7 @@ fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// All triangles with their parts' numbers.
+/// All triangles, each with the number of its part.
 fn triangles(world: &World) -> Vec<(Triangle, u32)> {
     let numbers = PartNumbers::new(world);
     let mut out = Vec::new();
@@ -32,7 +32,7 @@ fn triangles(world: &World) -> Vec<(Triangle, u32)> {
     out
 }
 
-/// The world with what is seen from each cell: cells, parts, volumes.
+/// The world with the results for each cell: cells, parts, volumes.
 fn with_sight(mut world: World) -> World {
     let walls: Vec<Triangle> = triangles(&World {
         details: Vec::new(),
@@ -62,7 +62,7 @@ fn pair(pvs: &Pvs, from: CellId, to: CellId) -> Option<usize> {
     pvs.pairs().position(|p| p == (from, to))
 }
 
-/// Whether a point is in a piece of what `from` sees of `to`.
+/// Returns `true` if a point lies in a piece of the volume of a pair of cells.
 fn is_in_volume(pvs: &Pvs, pair: usize, p: DVec3) -> bool {
     let is_in = |piece: &[[f64; 4]]| {
         let height = |q: &[f64; 4]| DVec3::new(q[0], q[1], q[2]).dot(p) + q[3];
@@ -71,7 +71,7 @@ fn is_in_volume(pvs: &Pvs, pair: usize, p: DVec3) -> bool {
     pvs.volumes.as_ref().unwrap().pieces_of(pair).any(is_in)
 }
 
-/// Casts rays from random points of all cells; how many hit something.
+/// Casts rays from random points of all cells; returns how many hit something.
 fn cast(world: &World, rng: &mut Rng, n: usize) -> usize {
     let pvs = world.pvs.as_ref().unwrap();
     let parts = pvs.parts.as_ref().unwrap();
@@ -119,7 +119,7 @@ fn cast(world: &World, rng: &mut Rng, n: usize) -> usize {
     n_hits
 }
 
-/// Pairs of cells, and of these: parts in all, and parts that count as seen.
+/// Counts, over all pairs of cells, the parts of the second, and those of them that count as seen.
 fn counts(world: &World) -> [usize; 2] {
     let pvs = world.pvs.as_ref().unwrap();
     let parts = pvs.parts.as_ref().unwrap();
@@ -223,13 +223,13 @@ proptest! {
                 let beyond = q + (q - p) * 3.0;
                 prop_assert!(both.reaches(beyond, 1e-6));
                 prop_assert!(both.planes().len() > 1);
-                // A point beside the waist, far behind the last portal's edge, is not reached.
+                // A point beside the waist, far behind the last portal's edge, is out of reach.
                 let side = both.last()[0] + (both.last()[0] - both.last()[both.last().len() / 2]) * 1e3;
                 n_stopped += usize::from(!both.reaches(side + normal(second) * 1e-3, 1e-6));
             }
         }
         prop_assert!(n_passed == 0 || n_stopped > 0);
-        // What does not follow.
+        // Portals that do not follow each other.
         let one = glasses.of_portal(0).unwrap();
         prop_assert!(glasses.push(&one, 1).is_none());
         prop_assert!(glasses.push(&one, 2 * n as u32).is_none());

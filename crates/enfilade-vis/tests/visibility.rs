@@ -1,4 +1,4 @@
-//! Visibility before run-time, on random grids of rooms, against lines followed by other means.
+//! Precomputed visibility of random grids of rooms, compared with lines followed by other means.
 
 mod common;
 
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 /// Rooms of one unit on a grid of `n` by `n`, with a window in most walls between neighbors.
 struct Grid {
     n: usize,
-    /// By room and axis (x, z): low and high corner of the window to the next room, across and up.
+    /// For each room and axis (x, z): the least and greatest coordinates of the window to the next room, across and up.
     windows: Vec<[Option<[f64; 4]>; 2]>,
 }
 
@@ -58,14 +58,14 @@ impl Grid {
                 });
             }
         }
-        // Normals lead from the first cell to the second.
+        // Normals point from the first cell to the second.
         SightGraph {
             n_cells: (self.n * self.n) as u32,
             portals,
         }
     }
 
-    /// Whether the segment passes only windows, by stepping over the grid's planes.
+    /// Returns `true` if the segment passes only through windows; steps over the grid's planes.
     fn is_open(&self, p: DVec3, q: DVec3) -> bool {
         [(0, 2), (2, 0)]
             .into_iter()
@@ -105,7 +105,7 @@ fn see(graph: &SightGraph, config: &VisConfig) -> VisOutput {
     see_all(graph, config, &mut context).unwrap()
 }
 
-/// Whether one answer has nothing that another has not.
+/// Returns `true` if one answer is a subset of another.
 fn is_subset(one: &VisOutput, other: &VisOutput) -> bool {
     let mut cells = (0..one.cells.n_cells() as u32).map(CellId);
     cells.all(|a| one.cells.visible_from(a).all(|b| other.cells.sees(a, b)))
@@ -173,7 +173,7 @@ fn windows_in_line_are_seen_through_and_windows_out_of_line_are_not() {
             ..VisConfig::default()
         },
     );
-    // Neighbors share an opening, so nothing is too far for them.
+    // Neighbors share an opening, so they are never too far apart.
     assert!(sees(&near, 0, 1) && near.cells.n_pairs() <= vis.cells.n_pairs());
 }
 
@@ -201,7 +201,7 @@ fn threads_and_an_early_stop_change_what_they_should() {
     verify_evidence(&graph, &stopped.evidence.unwrap(), None).unwrap();
 }
 
-/// Searches until `rounds` have passed; returns what was found and what was saved then.
+/// Searches for `rounds`; returns the result and the last saved state.
 fn see_in_parts(
     graph: &SightGraph,
     config: &VisConfig,
@@ -234,7 +234,7 @@ fn a_search_in_parts_finds_what_one_in_one_go_finds() {
     let whole = see(&graph, &config);
     let (part, mut saved) = see_in_parts(&graph, &config, None, 1);
     assert!(!part.unwrap().is_complete);
-    // A round at a time, to the end.
+    // One round at a time, to the end.
     let done = (0..100).find_map(|_| {
         let (part, next) = see_in_parts(&graph, &config, Some(saved.clone()), 1);
         saved = next;
@@ -269,7 +269,7 @@ fn checkpoints_that_do_not_fit_are_refused() {
     }
 }
 
-/// A checkpoint with one bit of its body changed, and its sum made to fit.
+/// Changes a checkpoint's body, and corrects its checksum.
 fn tampered(saved: &[u8], change: impl FnOnce(&mut [u8])) -> Vec<u8> {
     use std::io::{Read, Write};
     let mut body = Vec::new();
@@ -304,7 +304,7 @@ fn a_checkpoint_that_lies_never_hides_what_is_seen() {
             Err(error) => panic!("bit {bit}: {error}"),
             Ok(vis) => {
                 n_harmless += 1;
-                // Work counted wrongly, or an opening not searched: never less than can be seen.
+                // The work count is wrong, or an opening was not searched: that never hides what is visible.
                 verify_evidence(&graph, &vis.evidence.unwrap(), None).unwrap();
                 let mut cells = (0..whole.cells.n_cells() as u32).map(CellId);
                 let is_seen = cells.all(|from| {
@@ -408,7 +408,7 @@ fn a_thousand_tampered_files_are_rejected() {
         assert!(verify_evidence(&graph, &bad, None).is_err(), "byte {at}");
     }
 
-    // Lies that are packed properly.
+    // Tampered bodies, packed correctly.
     let mut body = Vec::new();
     flate2::read::ZlibDecoder::new(&bytes[24..])
         .read_to_end(&mut body)
@@ -422,12 +422,12 @@ fn a_thousand_tampered_files_are_rejected() {
         let mut bad = body.clone();
         match i % 5 {
             0 => {
-                // A line is forgotten: what only it proves is no longer proved.
+                // Drop a line: pairs that only it proves are no longer proved.
                 let count = u64::from_le_bytes(bad[lines..lines + 8].try_into().unwrap());
                 bad[lines..lines + 8].copy_from_slice(&(count - 1).to_le_bytes());
             }
             1 => {
-                // Something seen is called hidden, both ways.
+                // Mark something visible as hidden, both ways.
                 let (s, t) = loop {
                     let (s, t) = (rng.below(n), rng.below(n));
                     if bad[tables + s * row + t / 8] >> (t % 8) & 1 != 0 {
@@ -439,13 +439,13 @@ fn a_thousand_tampered_files_are_rejected() {
                 }
             }
             2 => {
-                // Other totals.
+                // Change the totals.
                 let at = 24 + rng.below(16);
                 bad[at] ^= 1 << rng.below(8);
             }
             3 => bad.truncate(body.len() - 1 - rng.below(n_trace)),
             _ => {
-                // A symbol that no trace has.
+                // A symbol that no trace contains.
                 let at = body.len() - 1 - rng.below(n_trace);
                 bad[at] = 9 + rng.below(240) as u8;
             }
@@ -453,8 +453,8 @@ fn a_thousand_tampered_files_are_rejected() {
         let packed = pack(&bad);
         assert!(i > 0 || verify_evidence(&graph, &pack(&body), None).is_ok());
         let verdict = verify_evidence(&graph, &packed, None);
-        // One opening of several between two cells may be called hidden without being seen to be wrong
-        // by a line; then it still lacks a reason.
+        // If only one of several openings between two cells is marked as hidden, no line contradicts it; but it still
+        // lacks a proof.
         assert!(verdict.is_err(), "lie {i} was believed");
     }
     let mut other = graph.clone();
@@ -462,7 +462,7 @@ fn a_thousand_tampered_files_are_rejected() {
     assert!(verify_evidence(&other, &bytes, None).is_err());
 }
 
-/// Two openings of one cell in one slanting plane, but for the rounding of their corners, crossed there and back.
+/// Two openings of one cell in one slanting plane, up to the rounding of their vertices, crossed back and forth.
 fn there_and_back() -> SightGraph {
     let there = [
         [-48.60913705583784, 1344.7715736040611, 120.0],
@@ -506,7 +506,7 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
     flate2::read::ZlibDecoder::new(&bytes[24..])
         .read_to_end(&mut body)
         .unwrap();
-    // A step, an exit skipped or not, then how many rows, and which with what weight.
+    // A step, an exit skipped or not, then the number of rows, and the index and weight of each.
     let trace = &body[body.len() - report.n_trace as usize..];
     let first = trace.iter().position(|&b| b == 8).expect("weights");
     let n = usize::from(trace[first + 1]);
@@ -514,7 +514,8 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
     let start = body.len() - trace.len() + first + 2;
     for i in 0..n {
         let row = start + 10 * i;
-        // Another row, one that is not there, and another weight: a little more, none, less than none, no number.
+        // Another row, a row that does not exist, and other weights: slightly more, none, less than none, not a
+        // number.
         for (at, bytes) in [
             (row, vec![body[row] ^ 1]),
             (row, vec![0xff, 0xff]),
@@ -531,7 +532,7 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
             );
         }
     }
-    // All weights zero balance as well.
+    // Weights that are all zero also balance.
     let mut bad = body.clone();
     for i in 0..n {
         bad[start + 10 * i + 2..start + 10 * i + 10].fill(0);
@@ -541,7 +542,7 @@ fn what_only_lines_in_a_plane_would_pass_is_hidden_and_weights_show_it() {
 
 #[test]
 fn cells_without_portals_cost_nothing() {
-    // A million cells, of which a few in the middle have portals: tables of all pairs would be 137 GB.
+    // A million cells, of which a few in the middle have portals: tables of all pairs would take 137 GB.
     let few = Grid::new(3, 2).graph();
     let first = 500_000;
     let mut many = SightGraph {

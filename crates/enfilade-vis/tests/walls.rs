@@ -1,4 +1,4 @@
-//! What walls hide inside cells, against lines followed by other means.
+//! Occlusion by walls inside cells, compared with lines followed by other means.
 
 mod common;
 
@@ -12,14 +12,14 @@ use enfilade_verify::{EvidenceError, EvidenceReport, verify_evidence};
 use enfilade_vis::{VisConfig, VisContext, VisOutput, see_all};
 use proptest::prelude::*;
 
-/// Rooms of one unit in a row along x, a window from each to the next, and screens that stand in them.
+/// Rooms of one unit in a row along x, with a window from each to the next, and screens standing in them.
 struct Row {
-    /// Low and high corner of each window: z, y.
+    /// Least and greatest z, then y, of each window.
     windows: Vec<[f64; 4]>,
     screens: Vec<Screen>,
 }
 
-/// A rectangle that stands upright: its two ends on the floor plan (x, z), and its least and greatest height.
+/// An upright rectangle: its two ends on the floor plan (x, z), and its least and greatest height.
 struct Screen {
     ends: [[f64; 2]; 2],
     heights: [f64; 2],
@@ -71,7 +71,7 @@ impl Row {
         }
     }
 
-    /// The walls around the windows, and the screens.
+    /// Returns the walls around the windows, and the screens.
     fn triangles(&self) -> Vec<Triangle> {
         let mut out = Vec::new();
         let mut quad = |[a, b, c, d]: [DVec3; 4]| out.extend([[a, b, c], [a, c, d]]);
@@ -92,7 +92,7 @@ impl Row {
         out
     }
 
-    /// Whether a segment between two rooms passes windows only and no screen, by plain geometry.
+    /// Returns `true` if a segment between two rooms passes only through windows and no screen, by plain geometry.
     fn is_free(&self, p: DVec3, q: DVec3) -> bool {
         let passes = self.windows.iter().enumerate().all(|(i, &[a, b, c, d])| {
             let x = i as f64 + 1.0;
@@ -231,7 +231,7 @@ fn triangles_that_are_none_hide_nothing() {
     let vis = see(&graph, &walls);
     assert_eq!(vis.cells, before.cells);
     check(&graph, &vis, &walls).unwrap();
-    // Nothing but such triangles is nothing.
+    // Degenerate triangles alone hide nothing.
     let vis = see(&graph, &walls[walls.len() - 3..]);
     assert!(sees(&vis, 0, 2));
     check(&graph, &vis, &walls[walls.len() - 3..]).unwrap();
@@ -257,7 +257,7 @@ fn evidence_by_walls_that_are_not_there_is_rejected() {
     let vis = see(&graph, &walls);
     let bytes = vis.evidence.clone().unwrap();
     assert!(verify_evidence(&graph, &bytes, None).is_err());
-    // Each of the screen's corners moved so that a way opens, one triangle gone, and a rent between the two.
+    // Move each of the screen's vertices to open a way, remove one triangle, and tear the two apart.
     let first = walls.len() - 2;
     let refused = |changed: &[Triangle], what: &str| {
         assert!(check(&graph, &vis, changed).is_err(), "{what} was not seen");
@@ -299,7 +299,7 @@ fn evidence_by_walls_that_are_not_there_is_rejected() {
             let mut bad = body.clone();
             bad[byte] ^= 1 << bit;
             let verdict = verify_evidence(&graph, &pack(&bad), Some(&walls));
-            // The same pair named from its other side is the same claim, of the mirrored pieces.
+            // The same pair named from its other side is the same claim, with mirrored pieces.
             let is_mirrored = byte < tree - 4 && bad[at + 8..tree - 4] != body[at + 8..tree - 4];
             assert!(verdict.is_err() || is_mirrored, "byte {byte}, bit {bit}");
         }

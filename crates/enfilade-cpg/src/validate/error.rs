@@ -1,9 +1,9 @@
-//! What can be broken, and the list of what is.
+//! Problems of a graph or a world, and a list to collect them.
 
 use crate::Locator;
 use enfilade_geom::shown;
 
-/// Most problems that one call reports; a world with more is broken in the same way many times.
+/// Most problems that one call reports; a world with more usually repeats the same one.
 pub const MAX_REPORTED: usize = 64;
 
 /// An invariant that a graph or a world breaks. Ids are positions in the lists of the graph.
@@ -45,28 +45,28 @@ pub enum GraphError {
     CellPortals {
         /// The cell.
         cell: u32,
-        /// What it lists, from the first difference on; at most eight.
+        /// Its list, from the first difference on; at most eight entries.
         listed: Vec<u32>,
-        /// What it should list there.
+        /// The correct list, from the same place on.
         actual: Vec<u32>,
     },
     /// The leak path has a single point, or one that is not finite.
-    #[error("the leak path must be of two finite points or more, or empty")]
+    #[error("the leak path must be empty or have at least two points, all finite")]
     LeakPath,
-    /// What says where something comes from does not hold together.
+    /// A source or a reference to one is invalid.
     #[error("{}: {}", shown(owner), shown(problem))]
     Source {
-        /// Whose source it is.
+        /// The owner of the source.
         owner: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// What fills an opening is not there or moves by no number.
+    /// A fitting does not exist or has an invalid motion.
     #[error("{}: {}", shown(owner), shown(problem))]
     Fitting {
         /// The portal or detail.
         owner: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
     /// A row of the potentially visible set does not fit the graph.
@@ -74,25 +74,25 @@ pub enum GraphError {
     Pvs {
         /// The cell.
         cell: u32,
-        /// What is wrong with its row.
+        /// The problem of its row.
         problem: &'static str,
     },
-    /// What may be seen of one cell from another does not fit the world.
-    #[error("potentially visible set, what cell {} sees of cell {}: {problem}; compute it again", .cells[0], .cells[1])]
+    /// The visible parts or volumes of a pair of cells do not fit the world.
+    #[error("potentially visible set, from cell {} into cell {}: {problem}; compute it again", .cells[0], .cells[1])]
     PvsPair {
-        /// The cells; past the last one where no pair is to blame.
+        /// The cells; past the last one if the problem is not that of a pair.
         cells: [u32; 2],
-        /// What is wrong.
+        /// The problem.
         problem: &'static str,
     },
     /// A portal joins a cell to itself or to a cell that does not exist.
-    #[error("portal {portal} joins cells {cells:?}; they must differ and lie below {n_cells}")]
+    #[error("portal {portal} joins cells {cells:?}; they must be different cells below {n_cells}")]
     PortalCells {
         /// The portal.
         portal: u32,
-        /// The cells that it names.
+        /// The cells that it refers to.
         cells: [u32; 2],
-        /// How many cells there are.
+        /// Number of cells.
         n_cells: usize,
     },
     /// A portal's normal is not of unit length.
@@ -103,34 +103,34 @@ pub enum GraphError {
         /// Its normal.
         normal: [f32; 3],
     },
-    /// A corner of a portal is not finite.
-    #[error("portal {portal}: corner {at:?} is not finite")]
+    /// A vertex of a portal is not finite.
+    #[error("portal {portal}: vertex {at:?} is not finite")]
     PortalCorner {
         /// The portal.
         portal: u32,
-        /// The corner.
+        /// The vertex.
         at: [f32; 3],
     },
-    /// An outline or a piece has fewer than three corners.
-    #[error("portal {portal}, {}: {n_corners} corners are no polygon", polygon_name(*.piece))]
+    /// An outline or a piece has fewer than three vertices.
+    #[error("portal {portal}, {}: a polygon needs at least 3 vertices, not {n_corners}", polygon_name(*.piece))]
     TooFewCorners {
         /// The portal.
         portal: u32,
         /// The piece, or `None` for the outline.
         piece: Option<u32>,
-        /// How many corners it has.
+        /// Its number of vertices.
         n_corners: usize,
     },
-    /// A corner is off the portal's plane.
-    #[error("portal {portal}, {}: corner {at:?} is {distance} off the portal's plane", polygon_name(*.piece))]
+    /// A vertex is off the portal's plane.
+    #[error("portal {portal}, {}: vertex {at:?} is {distance} off the portal's plane", polygon_name(*.piece))]
     NotPlanar {
         /// The portal.
         portal: u32,
         /// The piece, or `None` for the outline.
         piece: Option<u32>,
-        /// The corner. [Units: wu]
+        /// The vertex. [Units: wu]
         at: [f32; 3],
-        /// Its distance. [Units: wu]
+        /// Its distance from the plane. [Units: wu]
         distance: f64,
     },
     /// An outline or a piece is not convex.
@@ -140,12 +140,12 @@ pub enum GraphError {
         portal: u32,
         /// The piece, or `None` for the outline.
         piece: Option<u32>,
-        /// Its first corner. [Units: wu]
+        /// Its first vertex. [Units: wu]
         near: [f32; 3],
     },
     /// An outline or a piece runs clockwise, or an outline has no area.
     #[error(
-        "portal {portal}, {} near {near:?}: corners must run counter-clockwise seen from the second cell",
+        "portal {portal}, {} near {near:?}: vertices must run counter-clockwise seen from the second cell",
         polygon_name(*.piece)
     )]
     WrongWay {
@@ -153,33 +153,33 @@ pub enum GraphError {
         portal: u32,
         /// The piece, or `None` for the outline.
         piece: Option<u32>,
-        /// Its first corner. [Units: wu]
+        /// Its first vertex. [Units: wu]
         near: [f32; 3],
     },
     /// A piece reaches out of the outline.
-    #[error("portal {portal}: its pieces reach out of the outline, farthest at {at:?}")]
+    #[error("portal {portal}: its pieces extend beyond the outline, farthest at {at:?}")]
     PieceOutside {
         /// The portal.
         portal: u32,
-        /// The piece's corner farthest from the outline's middle. [Units: wu]
+        /// The piece's vertex farthest from the outline's center. [Units: wu]
         at: [f32; 3],
     },
-    /// A portal without pieces, or whose area is not the sum of its pieces.
-    #[error("portal {portal}: area {stored} is stored, its pieces sum up to {measured}")]
+    /// A portal has no pieces, or its area is not the sum of theirs.
+    #[error("portal {portal}: the stored area is {stored}, but its pieces add up to {measured}")]
     PortalArea {
         /// The portal.
         portal: u32,
-        /// Stored. [Units: wu²]
+        /// Stored area. [Units: wu²]
         stored: f32,
-        /// Summed over the pieces. [Units: wu²]
+        /// Sum over the pieces. [Units: wu²]
         measured: f64,
     },
     /// The locator's box is not finite and ordered (nor the empty box).
     #[error("the locator's box {min:?} to {max:?} is neither finite and ordered nor empty")]
     LocatorBounds {
-        /// Least corner.
+        /// Its minimum.
         min: [f64; 3],
-        /// Greatest corner.
+        /// Its maximum.
         max: [f64; 3],
     },
     /// A plane of the locator is not finite or has no direction.
@@ -190,14 +190,14 @@ pub enum GraphError {
         /// `[nx, ny, nz, d]`.
         value: [f64; 4],
     },
-    /// A node of the locator names a plane that does not exist.
-    #[error("node {node} of the locator names plane {plane} of {n_planes}")]
+    /// A node of the locator refers to a plane that does not exist.
+    #[error("node {node} of the locator refers to plane {plane}, but there are {n_planes}")]
     LocatorNode {
         /// The node.
         node: u32,
-        /// The plane that it names.
+        /// The plane that it refers to.
         plane: u32,
-        /// How many there are.
+        /// Number of planes.
         n_planes: usize,
     },
     /// A child in the locator is neither a later node nor a leaf with an existing cell.
@@ -205,16 +205,16 @@ pub enum GraphError {
     LocatorChild {
         /// The node, or `None` for the root.
         node: Option<u32>,
-        /// Where it leads.
+        /// The child value.
         child: i32,
     },
     /// Two children in the locator, or the root and a child, are the same node: it is not a tree.
-    #[error("node {node} of the locator is a child twice; a tree reaches each node once")]
+    #[error("node {node} of the locator is reached twice; in a tree each node has one parent")]
     LocatorShared {
         /// The node.
         node: u32,
     },
-    /// A walk down the locator takes too long.
+    /// A node of the locator is too deep.
     #[error(
         "node {node} of the locator is deeper than {} nodes; balance the tree",
         Locator::MAX_DEPTH
@@ -224,31 +224,31 @@ pub enum GraphError {
         node: u32,
     },
     /// The cell beyond the locator's box does not exist.
-    #[error("the locator's outside is cell {cell} of {n_cells}")]
+    #[error("the locator's outside is cell {cell}, but there are {n_cells} cells")]
     LocatorOutside {
-        /// The cell that it names.
+        /// The cell that it refers to.
         cell: u32,
-        /// How many there are.
+        /// Number of cells.
         n_cells: usize,
     },
-    /// What lies beyond the locator's box is not the outdoors, or the outdoors does not lie there.
-    #[error("the locator's outside is {}, the outdoors {}; they must be the same", cell_name(*.outside), cell_name(*.outdoors))]
+    /// The cell beyond the locator's box and the outdoors differ.
+    #[error("the locator's outside is {}, but the outdoors is {}; they must be the same", cell_name(*.outside), cell_name(*.outdoors))]
     OutsideOutdoors {
         /// The cell beyond the locator's box.
         outside: Option<u32>,
         /// The cell that is marked as the outdoors.
         outdoors: Option<u32>,
     },
-    /// A box lies, or reaches, where nothing of the world can be.
-    #[error("{}: the box {min:?} to {max:?} reaches out of {of}", shown(owner))]
+    /// A box extends beyond the region that should hold it.
+    #[error("{}: the box {min:?} to {max:?} extends beyond {of}", shown(owner))]
     FarBox {
-        /// Whose box it is, e.g. `cell 3`, `the locator`.
+        /// Owner of the box, e.g. `cell 3`, `the locator`.
         owner: String,
-        /// What it should lie in or around.
+        /// The region that should hold it.
         of: &'static str,
-        /// Least corner. [Units: wu]
+        /// Its minimum. [Units: wu]
         min: [f64; 3],
-        /// Greatest corner. [Units: wu]
+        /// Its maximum. [Units: wu]
         max: [f64; 3],
     },
     /// A count in the statistics is not finite.
@@ -261,41 +261,41 @@ pub enum GraphError {
     },
     /// A list of cells is not ascending, repeats one, or names a cell that does not exist.
     #[error(
-        "{}: cells must ascend, none twice, all below {n_cells}; {cell} does not fit",
+        "{}: cells must be ascending, without duplicates and below {n_cells}; {cell} is not",
         shown(owner)
     )]
     CellList {
-        /// Whose list it is, e.g. `batch 3` or `detail 7 (chair)`.
+        /// Owner of the list, e.g. `batch 3` or `detail 7 (chair)`.
         owner: String,
-        /// The first cell that does not fit.
+        /// The first invalid cell.
         cell: u32,
-        /// How many cells there are.
+        /// Number of cells.
         n_cells: usize,
     },
     /// A list of triangles is broken.
     #[error("{}: {}", shown(owner), shown(problem))]
     Primitive {
-        /// Whose triangles they are, e.g. `batch 3` or `detail mesh 2, primitive 0`.
+        /// Owner of the triangles, e.g. `batch 3` or `detail mesh 2, primitive 0`.
         owner: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// A detail object names a mesh that does not exist or has a transform that is none.
+    /// A detail object refers to a mesh that does not exist or has an invalid transform.
     #[error("detail {detail} ({}): {}", shown(name), shown(problem))]
     Detail {
         /// The detail object.
         detail: u32,
         /// Its name.
         name: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// A material, texture or sampler is broken.
     #[error("{}: {}", shown(owner), shown(problem))]
     Look {
-        /// What it is, e.g. `material 3`.
+        /// Its name, e.g. `material 3`.
         owner: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

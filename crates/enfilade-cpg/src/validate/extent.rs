@@ -1,21 +1,21 @@
-//! Are boxes where the geometry is? Who reads a world sizes pictures and grids by them.
+//! Checks that boxes lie around the geometry: readers size pictures and grids by them.
 
 use enfilade_geom::{Aabb, DVec3};
 
 use super::error::{Findings, GraphError};
 use crate::{CellPortalGraph, World};
 
-/// What a box may stick out by: corners are rounded to `f32`, outwards by some builders, and cells that end at
-/// the locator's border end within its planes' rounding. [Units: wu] Relative to the largest coordinate below.
+/// Most that a box may stick out, and its share of the largest coordinate: vertices are rounded to `f32`, outwards by
+/// some builders, and cells that end at the locator's border end within its planes' rounding. [Units: wu]
 const SLACK: f64 = 1e-3;
 const RELATIVE_SLACK: f64 = 1e-5;
 
-/// How far the space around a model may reach beyond it: so many times its largest side, and so many meters more.
+/// Most that the space around a model may extend beyond it: this many times its largest side, plus this many meters.
 /// Builders leave meters; a thousand times as much is an error or an attack.
 const AROUND: f64 = 10.0;
 const AROUND_AT_LEAST: f64 = 100.0;
 
-/// A room lies in the locator's box: beyond it, all is outside.
+/// Checks that rooms lie in the locator's box: everything beyond it is outside.
 pub(super) fn check_cells_in_locator(graph: &CellPortalGraph, found: &mut Findings) {
     let bounds = graph.locator.bounds;
     if bounds.is_empty() {
@@ -35,7 +35,7 @@ pub(super) fn check_cells_in_locator(graph: &CellPortalGraph, found: &mut Findin
     }
 }
 
-/// The locator's box and the outdoors' lie around the model. A world without triangles says nothing.
+/// Checks that the boxes of the locator and the outdoors lie near the model. Passes worlds without triangles.
 pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
     let graph = &world.graph;
     let model = geometry(world);
@@ -59,7 +59,7 @@ pub(super) fn check_boxes_around_geometry(world: &World, found: &mut Findings) {
     }
 }
 
-/// The box around structure and portals.
+/// Returns the box around structure and portals.
 pub(super) fn geometry(world: &World) -> Aabb {
     let corners = world.batches.iter().flat_map(|b| &b.primitive.positions);
     let portals = world.graph.portals.iter().flat_map(|p| &p.outline);

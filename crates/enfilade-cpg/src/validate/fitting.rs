@@ -1,4 +1,4 @@
-//! Is what fills openings there, and can it move as it says?
+//! Checks that fittings exist and have valid motions.
 
 use std::collections::HashMap;
 
@@ -8,11 +8,11 @@ use super::extent::geometry;
 use crate::fitting::vector;
 use crate::{Fitting, FittingPart, Motion, MotionKind, World};
 
-/// How far from the model a hinge may be, and by how much more than the model's size a leaf may slide. A leaf is not larger, and
-/// stands in an opening of the model. [Units: wu]
+/// Farthest that a hinge may be from the model, and most by which a leaf may slide beyond the model's size. A leaf is
+/// not larger than the model, and stands in one of its openings. [Units: wu]
 const BESIDE: f64 = 10.0;
 
-/// Checks the fittings of all portals, and what details say they were taken out of.
+/// Checks the fittings of all portals, and the objects that details were separated from.
 pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
     let n = world.details.len();
     let model = geometry(world).expanded(BESIDE);
@@ -22,19 +22,22 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
         for f in &portal.fittings {
             let mut report = |problem: String| broken(format!("portal {i}"), problem);
             if f.detail as usize >= n {
-                report(format!("is filled by detail {} of {n}", f.detail));
+                report(format!(
+                    "refers to detail {} as a fitting, but there are {n}",
+                    f.detail
+                ));
             } else if before.is_some_and(|b| b >= f.detail) {
-                report("its fittings do not ascend by detail".into());
+                report("its fittings must be ascending by detail, without duplicates".into());
             }
             before = Some(f.detail);
             if let Some(problem) = problem(f, &model) {
-                report(format!("detail {} in it: {problem}", f.detail));
+                report(format!("fitting, detail {}: {problem}", f.detail));
             }
             let (first, other) = *known.entry(f.detail).or_insert((i, f));
             if other.motion != f.motion {
                 let d = f.detail;
                 report(format!(
-                    "detail {d} moves otherwise in it than in portal {first}; it moves in one way, or not at all"
+                    "detail {d} has another motion in portal {first}; an object has one motion or none"
                 ));
             }
         }
@@ -47,24 +50,26 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
         if let Some(whole) = detail.part_of.filter(|&w| !is_whole(w)) {
             broken(
                 format!("detail {i} ({})", detail.name),
-                format!("is part of detail {whole}, which is none, itself, or a part of another"),
+                format!(
+                    "is part of detail {whole}, which does not exist, is itself, or is part of another"
+                ),
             );
         }
     }
 }
 
-/// Returns what is wrong with a fitting by itself.
+/// Returns a problem of a single fitting, if any.
 fn problem(f: &Fitting, model: &Aabb) -> Option<&'static str> {
     let motion = match (f.part, &f.motion) {
         (FittingPart::Leaf, Some(motion)) => motion,
-        (FittingPart::Leaf, None) => return Some("a leaf that does not move"),
+        (FittingPart::Leaf, None) => return Some("a leaf needs a motion"),
         (_, None) => return None,
-        (_, Some(_)) => return Some("moves, though it is no leaf"),
+        (_, Some(_)) => return Some("only leaves have a motion"),
     };
     motion.problem().or_else(|| far_problem(motion, model))
 }
 
-/// Returns how a motion leads out of the world.
+/// Returns a problem if a motion leads out of the world.
 fn far_problem(motion: &Motion, model: &Aabb) -> Option<&'static str> {
     match motion.kind {
         MotionKind::Turn { through, .. } => {

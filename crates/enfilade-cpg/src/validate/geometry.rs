@@ -1,4 +1,4 @@
-//! Do batches, meshes and objects name what exists, with numbers that are finite?
+//! Checks that batches, meshes and objects have valid references and finite numbers.
 
 use enfilade_geom::scene::{Mesh, Primitive};
 
@@ -67,15 +67,17 @@ pub(super) fn check_primitive(
     }
     if !p.indices.len().is_multiple_of(3) {
         problem(format!(
-            "{} indices are no whole number of triangles",
+            "{} indices are not a multiple of 3",
             p.indices.len()
         ));
     }
     if let Some(index) = p.indices.iter().find(|&&i| i as usize >= n) {
-        problem(format!("index {index} into {n} positions"));
+        problem(format!("index {index}, but there are {n} positions"));
     }
     if let Some(material) = p.material.filter(|&m| m as usize >= n_materials) {
-        problem(format!("material {material} of {n_materials}"));
+        problem(format!(
+            "refers to material {material}, but there are {n_materials}"
+        ));
     }
 }
 
@@ -97,7 +99,10 @@ pub(super) fn check_detail(
         });
     };
     if detail.mesh as usize >= n_meshes {
-        problem(format!("mesh {} of {n_meshes}", detail.mesh));
+        problem(format!(
+            "refers to mesh {}, but there are {n_meshes}",
+            detail.mesh
+        ));
     }
     let t = &detail.transform;
     if !t.iter().all(|v| v.is_finite()) {

@@ -1,4 +1,4 @@
-//! Is the locator a tree, not too deep, whose walks end in cells that exist?
+//! Checks that the locator is a tree of limited depth whose leaves hold existing cells.
 
 use super::error::{Findings, GraphError};
 use crate::{CellId, Locator};
@@ -59,12 +59,13 @@ pub(super) fn check_locator(locator: &Locator, n_cells: usize, found: &mut Findi
     check_tree(locator, found);
 }
 
-/// Each node has one parent at most, and the way to it is not too long.
+/// Checks that each node has at most one parent and is not too deep.
 ///
-/// Readers that take the tree apart reach each node once; with shared nodes, a few kilobytes would have more leaves than anyone can
-/// count.
+/// Readers that take the tree apart reach each node once; with shared nodes, a few kilobytes could have an
+/// astronomical number of leaves.
 fn check_tree(locator: &Locator, found: &mut Findings) {
-    // Number of nodes that lead to each, itself among them; 0 as long as none does. A parent comes before its children.
+    // Number of nodes on the path to each, including itself; 0 until a parent is found. A parent comes before its
+    // children.
     let mut depth = vec![0_u32; locator.nodes.len()];
     let mut is_deep = false;
     let mut lead_to = |depth: &mut [u32], child: i32, above: u32| {

@@ -1,13 +1,13 @@
-//! Whether what the input said of itself holds together: names, lights, cameras, marked places.
+//! Checks the input's information about itself: names, lights, cameras, marked places.
 
 use enfilade_geom::scene::FixtureKind;
 
 use crate::World;
 
-/// Sources above one another, at most: importers read no more than 1,024 nodes so, and paths of names are as long.
+/// Most levels of sources: importers read at most 1,024 nested nodes, and paths of names are as long.
 const MAX_DEPTH: u32 = 4096;
 
-/// Checks the tree of sources and all that refers to it.
+/// Checks the tree of sources and all references to it.
 pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
     let n = world.sources.len();
     let mut depths: Vec<u32> = Vec::with_capacity(n);
@@ -15,7 +15,7 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
         if let Some(parent) = node.parent.filter(|&p| p as usize >= i) {
             broken(
                 format!("source {i} ({})", node.name),
-                format!("its parent {parent} does not come before it"),
+                format!("its parent {parent} must come before it"),
             );
         }
         let above = node.parent.and_then(|p| depths.get(p as usize));
@@ -23,7 +23,7 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
         if depth == MAX_DEPTH {
             broken(
                 format!("source {i} ({})", node.name),
-                format!("more than {MAX_DEPTH} sources are above one another"),
+                format!("the tree of sources is deeper than {MAX_DEPTH}"),
             );
         }
         depths.push(depth);
@@ -40,7 +40,7 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
             broken(format!("batch {i}"), problem);
         }
         if batch.is_seal && !batch.sources.is_empty() {
-            let problem = "has sources, but is of seals, which no input has";
+            let problem = "has sources, but consists of seals, which the input does not have";
             broken(format!("batch {i}"), problem.into());
         }
     }
@@ -48,7 +48,7 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
         if let Some(source) = detail.source.filter(|&s| s as usize >= n) {
             broken(
                 format!("detail {i} ({})", detail.name),
-                format!("source {source} of {n}"),
+                format!("refers to source {source}, but there are {n}"),
             );
         }
     }
@@ -68,7 +68,10 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
             is_object
         };
         if !fits {
-            broken(owner(), "is no JSON object, or a marker that is one".into());
+            broken(
+                owner(),
+                "a light or camera must be a JSON object, and a marker must be empty".into(),
+            );
         }
         for text in [&fixture.gltf, &fixture.extras] {
             if let Err(why) = check_json(text) {
@@ -78,10 +81,10 @@ pub(crate) fn check(world: &World, broken: &mut dyn FnMut(String, String)) {
     }
 }
 
-/// Brackets around a value in the file, at most: a reader must not find more than it takes.
+/// Levels of brackets around a value in the file: a reader must not meet more than it accepts.
 const NESTING: usize = 8;
 
-/// Whether the text is a JSON value, or empty, that fits into the JSON of a file.
+/// Checks that a text is empty, or a JSON value that fits into the JSON of a file.
 fn check_json(text: &str) -> Result<(), String> {
     if text.is_empty() {
         return Ok(());

@@ -1,32 +1,31 @@
-//! Is a portal a flat, convex opening between two cells, and are its pieces what it says?
+//! Checks that a portal is a flat, convex opening between two cells, and that its pieces fit.
 
 use enfilade_geom::{DVec3, Plane, Winding};
 
 use super::error::{Findings, GraphError};
 use crate::Portal;
 
-/// How far a stored corner may be from where it was computed. [Units: wu]
+/// Returns the largest distance of a stored vertex from its computed position. [Units: wu]
 ///
-/// Corners and normal are computed in `f64` and rounded once to `f32`, which moves each coordinate
-/// by at most 2⁻²⁴ of its size: √3·2⁻²⁴·|corner| for a corner, and the normal's own rounding tilts
-/// the plane by as much across the polygon. Rounding outlines *outwards* takes the neighbouring
-/// `f32` instead of the nearest, twice as far. Four times their sum leaves room for the corners
-/// that a check compares with each other, and is still a tenth of a millimeter at 100 m.
+/// Vertices and normal are computed in `f64` and rounded once to `f32`, which moves each coordinate by at most 2⁻²⁴
+/// of its size: √3·2⁻²⁴·|vertex| for a vertex, and the normal's own rounding tilts the plane by as much across the
+/// polygon. Rounding outlines *outwards* takes the neighboring `f32` instead of the nearest, twice as far. Four times
+/// their sum allows for comparing rounded vertices with each other, and is still a tenth of a millimeter at 100 m.
 fn corner_slack<'a>(corners: impl IntoIterator<Item = &'a [f32; 3]>) -> f64 {
     let largest = corners
         .into_iter()
         .flatten()
         .fold(0.0_f32, |m, c| m.max(c.abs()));
     4.0 * 2.0 * (3.0_f64.sqrt() * 2.0_f64.powi(-24)) * 2.0 * f64::from(largest)
-        // Coordinates near zero: what is below a nanometer does not matter to anyone.
+        // For coordinates near zero: a nanometer is negligible.
         + 1e-9
 }
 
-/// Relative error of an area that was summed in `f64` and stored as `f32`, doubled.
+/// Twice the relative error of an area that is summed in `f64` and stored as `f32`.
 const AREA_ROUNDING: f64 = 2.4e-7;
 
-/// How far the length of a normal rounded to `f32` may be from 1: √3 · 2⁻²⁴, times ten for
-/// normals that were normalized in `f32` arithmetic.
+/// Largest difference from 1 of the length of a normal rounded to `f32`: √3 · 2⁻²⁴, times ten for normals that were
+/// normalized in `f32` arithmetic.
 const UNIT_SLACK: f64 = 1e-6;
 
 pub(super) fn check_portal(portal: u32, p: &Portal, n_cells: usize, found: &mut Findings) {
@@ -87,13 +86,11 @@ pub(super) fn check_portal(portal: u32, p: &Portal, n_cells: usize, found: &mut 
 
 /// Checks the polygons of one portal.
 ///
-/// Whether a polygon is convex, and whether polygons lie inside another, is asked of convex hulls:
-/// a closed curve is convex if and only if it is as long as its hull's and encloses as much, and a
-/// set lies in a convex polygon if and only if it adds nothing to its hull. That takes
-/// O(n log n) for n corners, does not depend on how short an edge is (a corner test across a
-/// hair-short edge amplifies rounding without bound), and the allowance is exact: the hull of
-/// points moved by at most ε has at most ε·perimeter + πε² more area and is at most 2πε longer
-/// (Steiner's formula).
+/// Tests convexity, and containment of polygons, by convex hulls: a closed curve is convex if and only if it is as
+/// long as its hull's and encloses as much, and a set lies in a convex polygon if and only if it adds nothing to its
+/// hull. That takes O(n log n) for n vertices and does not depend on how short an edge is (a vertex test across a
+/// hair-short edge amplifies rounding without bound). The allowance is exact: the hull of points moved by at most ε
+/// has at most ε·perimeter + πε² more area and is at most 2πε longer (Steiner's formula).
 struct PolygonCheck {
     portal: u32,
     plane: Plane,
@@ -132,7 +129,7 @@ impl PolygonCheck {
         let points = dvecs(corners);
         let length = perimeter(&points);
         let area = Winding::new(points.clone()).area_normal().dot(plane.normal) * 0.5;
-        // A piece may be a sliver that rounding has flattened or turned; an outline may not.
+        // A piece may be a sliver that rounding has flattened or flipped; an outline may not.
         let least = if piece.is_some() {
             -slack * length
         } else {
@@ -149,8 +146,8 @@ impl PolygonCheck {
         let hull = Winding::hull_in_plane(&plane, &points);
         let hull_length = perimeter(&hull.points);
         let dent = hull.area() - area;
-        // Each corner moved by the slack makes two edges longer by it; a curve that runs around
-        // twice is twice as long, however many corners it has.
+        // Each vertex moved by the slack lengthens two edges by it. A curve that runs around twice is twice as long,
+        // regardless of its number of vertices.
         let longer = (4.0 * points.len() as f64 * slack).min(0.25 * hull_length.max(slack));
         if dent > slack * (length + 4.0 * slack) || length > hull_length + longer {
             found.push(GraphError::NotConvex {
@@ -193,7 +190,7 @@ impl PolygonCheck {
     }
 }
 
-/// Whether `value` is above `limit`, or no number at all.
+/// Returns `true` if `value` is above `limit` or not a number.
 fn exceeds(value: f64, limit: f64) -> bool {
     value.is_nan() || value > limit
 }

@@ -1,9 +1,9 @@
-//! Boxes around placed objects: what a file says, and whether it is so.
+//! Boxes around placed objects, and the check of those in a file.
 
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
-/// The box around a mesh in its own space; empty without vertices.
+/// Returns the box around a mesh in its own space; empty without vertices.
 pub(super) fn of_mesh<'a>(primitives: impl IntoIterator<Item = &'a Primitive>) -> Aabb {
     let positions = primitives.into_iter().flat_map(|p| &p.positions);
     positions
@@ -11,7 +11,7 @@ pub(super) fn of_mesh<'a>(primitives: impl IntoIterator<Item = &'a Primitive>) -
         .fold(Aabb::EMPTY, Aabb::including)
 }
 
-/// The box in world space around the placed box of a mesh: constant time, however large the mesh is.
+/// Returns the box in world space around the placed box of a mesh. Constant time for meshes of any size.
 pub(super) fn placed(local: &Aabb, transform: &[f32; 16]) -> Option<[[f64; 3]; 2]> {
     if local.is_empty() {
         return None;
@@ -28,14 +28,14 @@ pub(super) fn placed(local: &Aabb, transform: &[f32; 16]) -> Option<[[f64; 3]; 2
         by.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
     };
     let b = (0..8).map(corner).fold(Aabb::EMPTY, Aabb::including);
-    // Infinity has no place in JSON.
+    // JSON cannot hold infinity.
     let limit = f64::from(f32::MAX);
     let rounded = |p: DVec3| p.to_array().map(|v| v.clamp(-limit, limit) as f32 as f64);
     Some([rounded(b.min), rounded(b.max)])
 }
 
-/// Whether the box that a file says is the placed one, up to what a program that takes transforms apart and puts them
-/// together in `f32` may round: a hundred times its epsilon, of the largest number that takes part.
+/// Returns `true` if the box in a file is the placed one, up to the rounding of a program that decomposes and
+/// recomposes transforms in `f32`: a hundred times its epsilon, relative to the largest number involved.
 pub(super) fn agree(said: &[[f64; 3]; 2], local: &Aabb, transform: &[f32; 16]) -> bool {
     let Some(found) = placed(local, transform) else {
         return false;

@@ -1,4 +1,4 @@
-//! The binary chunk: what goes where, and writing it there.
+//! The binary chunk: its layout, and writing it.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use super::json::{self, FLOAT, LINE_STRIP, TRIANGLES, U16, U32, VERTICES};
 use super::visible::words;
 use crate::World;
 
-/// A stretch of the buffer that holds one kind of vertex data or indices for all primitives.
+/// A part of the buffer that holds one kind of vertex data or indices for all primitives.
 #[derive(Clone, Copy, PartialEq)]
 enum Section {
     Positions,
@@ -65,23 +65,23 @@ impl Section {
     }
 }
 
-/// A primitive and which of its attributes are fit to be written.
+/// A primitive, and flags for the attributes that can be written.
 struct Prepared<'a> {
     primitive: Cow<'a, Primitive>,
     has_normals: bool,
     has_tangents: bool,
-    /// Texture coordinate sets that the material reads and the primitive lacks; written as zeros.
+    /// Number of texture coordinate sets that the material reads and the primitive lacks; written as zeros.
     n_missing_uvs: usize,
     indices: Section,
 }
 
-/// Where everything goes in the buffer.
+/// Layout of the buffer.
 #[derive(Default)]
 pub(super) struct Layout<'a> {
-    /// Texture coordinate sets that each material reads.
+    /// For each material, the number of texture coordinate sets that it reads.
     n_uvs: Vec<usize>,
     prepared: Vec<Prepared<'a>>,
-    /// With the section's position in [`Section::ALL`] in place of the buffer view.
+    /// Their `buffer_view` is the section's position in [`Section::ALL`] until sections are closed.
     pub(super) accessors: Vec<json::Accessor>,
     section_len: [u64; Section::ALL.len()],
     pub(super) views: Vec<json::BufferView>,
@@ -92,7 +92,7 @@ pub(super) struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    /// An empty layout for primitives whose materials read `n_uvs` texture coordinate sets each.
+    /// Makes an empty layout for primitives whose materials read `n_uvs` texture coordinate sets each.
     pub(super) fn new(n_uvs: Vec<usize>) -> Self {
         Self {
             n_uvs,
@@ -122,7 +122,7 @@ impl<'a> Layout<'a> {
         self.n_dropped_normals += u32::from(!has_normals && !p.normals.is_empty());
         self.n_dropped_tangents += u32::from(!has_tangents && !p.tangents.is_empty());
         let n = p.positions.len();
-        // 65,535 restarts a strip, so that it can be no index.
+        // 65,535 restarts a strip, so it cannot be an index.
         let indices = if n <= 65_535 {
             Section::Indices16
         } else {
@@ -166,7 +166,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// A polyline of two points or more.
+    /// Adds a polyline of at least two points.
     pub(super) fn push_line(&mut self, name: &str, points: &[[f32; 3]]) -> json::Mesh {
         let position = self.accessor(Section::Positions, points.len());
         let (min, max) = extent(points);
@@ -208,7 +208,7 @@ impl<'a> Layout<'a> {
         self.accessors.len() as u32 - 1
     }
 
-    /// Gives every section in use its buffer view, once all primitives are known.
+    /// Gives every section in use its buffer view, once all primitives are added.
     pub(super) fn close_sections(&mut self) {
         let mut view_of = [None; Section::ALL.len()];
         for section in Section::ALL {
@@ -229,7 +229,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Reserves `byte_length` bytes; `None` for none, because glTF knows no empty buffer view.
+    /// Reserves `byte_length` bytes; `None` for zero, as glTF does not allow an empty buffer view.
     pub(super) fn view(&mut self, byte_length: u64) -> Option<u32> {
         if byte_length == 0 {
             return None;
@@ -307,10 +307,10 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Buffer views start at multiples of this, which suits `f64` planes as well as vertices.
+/// Alignment of buffer views; fits `f64` planes as well as vertices.
 const ALIGNMENT: u64 = 8;
 
-/// The buffer while it is written.
+/// The buffer being written.
 struct Bulk<'o> {
     start: usize,
     out: &'o mut Vec<u8>,
@@ -345,7 +345,7 @@ impl Bulk<'_> {
                 let n_zeros = prepared.n_missing_uvs * p.positions.len() * 8;
                 self.out.resize(self.out.len() + n_zeros, 0);
             }
-            // Compared, so that NaN becomes 0 and no minus zero is left to chance.
+            // Comparisons turn NaN into 0, and never leave a negative zero.
             Section::Colors => {
                 self.mapped(&p.colors, |v| if v > 0.0 { v.min(1.0) } else { 0.0 });
             }
@@ -378,7 +378,7 @@ pub(super) fn image_bytes(image: &Image) -> Cow<'_, [u8]> {
     }
 }
 
-/// The picture's MIME type: by its first bytes where they tell, else as the input said.
+/// Returns the image's MIME type: by its first bytes if they are known, otherwise as in the input.
 pub(super) fn mime(image: &Image) -> &str {
     let bytes = image_bytes(image);
     if bytes.starts_with(&WHITE_PIXEL[..8]) {
@@ -394,7 +394,7 @@ pub(super) fn mime(image: &Image) -> &str {
     }
 }
 
-/// Whether a stored direction counts as of unit length; the Khronos validator allows 0.00674.
+/// Returns `true` if a stored direction counts as of unit length; the Khronos validator allows 0.00674.
 fn is_unit(v: [f32; 3]) -> bool {
     (DVec3::from(v.map(f64::from)).length() - 1.0).abs() <= 0.006
 }
@@ -403,7 +403,7 @@ fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for p in positions {
         for k in 0..3 {
-            // Compared, because `f32::min` may pick either of plus and minus zero.
+            // Compared explicitly, as `f32::min` may return either of plus and minus zero.
             if p[k] < min[k] {
                 min[k] = p[k];
             }
@@ -419,7 +419,7 @@ fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
 mod tests {
     use super::*;
 
-    /// CRC-32 as PNG defines it, bit by bit.
+    /// Computes CRC-32 bit by bit, as PNG defines it.
     fn crc(bytes: &[u8]) -> u32 {
         !bytes.iter().fold(!0_u32, |crc, &byte| {
             (0..8).fold(crc ^ u32::from(byte), |c, _| {

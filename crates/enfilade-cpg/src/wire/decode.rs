@@ -1,8 +1,8 @@
-//! GLB → world, from bytes that nobody vouches for.
+//! GLB → world, from untrusted bytes.
 //!
-//! Every count is checked against the bytes that are there before anything is allocated for it,
-//! and a file cannot have the same bytes decoded again and again ([`Reader::spend`]): memory and
-//! time stay within a small factor of the file's size. What comes out passed [`World::validate`].
+//! Every count is checked against the available bytes before anything is allocated for it, and a file cannot have the
+//! same bytes decoded again and again ([`Reader::spend`]), so memory and time stay within a small factor of the
+//! file's size. The result satisfies [`World::validate`].
 
 use std::collections::BTreeMap;
 
@@ -26,13 +26,12 @@ use crate::{
 
 /// Decodes a world from one GLB.
 ///
-/// Safe on hostile bytes: no panic, no allocation from an unchecked count, nesting of the JSON
-/// limited to 128. The world returned passes [`World::validate`]. Takes time and memory linear in
-/// the bytes.
+/// Safe on hostile bytes: no panic, no allocation from an unchecked count, nesting of the JSON limited to 128. The
+/// world returned satisfies [`World::validate`]. Takes time and memory linear in the bytes.
 ///
 /// # Errors
 ///
-/// Says what is wrong and what to do: no GLB, a GLB that was not baked, another version, damage.
+/// The problem and its remedy: not a GLB, a GLB that was not baked, another version, damage.
 pub fn decode_glb(bytes: &[u8]) -> Result<World, WireError> {
     let (text, bin) = chunks(bytes)?;
     check_version(text)?;
@@ -61,13 +60,13 @@ fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), WireError> {
     let word = |at: usize| {
         let word = bytes.get(at..at + 4).and_then(|w| w.try_into().ok());
         word.map(u32::from_le_bytes)
-            .ok_or(damaged(bytes.len(), "it ends within a header"))
+            .ok_or(damaged(bytes.len(), "it ends in the middle of a header"))
     };
     if word(4)? != GLB_VERSION {
         return Err(WireError::NotGlb("its container is not version 2"));
     }
     if word(8)? as usize != bytes.len() {
-        return Err(damaged(8, "the length in its header is not the file's"));
+        return Err(damaged(8, "the length in its header is wrong"));
     }
     let chunk = |at: usize, kind: [u8; 4]| {
         let len = word(at)? as usize;
@@ -87,12 +86,12 @@ fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), WireError> {
     }
     let (bin, end) = chunk(end, CHUNK_BIN)?;
     if end != bytes.len() {
-        return Err(damaged(end, "something follows the binary chunk"));
+        return Err(damaged(end, "there is data after the binary chunk"));
     }
     Ok((text, bin))
 }
 
-/// Looks for our extension and its version before anything else is asked of the file.
+/// Checks for our extension and its version before reading anything else.
 fn check_version(text: &str) -> Result<(), WireError> {
     #[derive(Deserialize)]
     struct Probe<'a> {
@@ -119,7 +118,7 @@ fn check_version(text: &str) -> Result<(), WireError> {
 struct Reader<'a> {
     root: &'a json::Root,
     bin: &'a [u8],
-    /// Bytes that may still be decoded.
+    /// Number of bytes that may still be decoded.
     budget: u64,
 }
 
@@ -131,7 +130,7 @@ impl<'a> Reader<'a> {
         {
             return Err(broken(
                 "buffer 0",
-                "lies in another file; a world is one GLB",
+                "is in another file; a world is a single GLB",
             ));
         }
         let runs = self.optional_view(graph.source_runs, "sourceRuns")?;
@@ -216,7 +215,7 @@ impl<'a> Reader<'a> {
             .and_then(|m| m.primitives.first())
             .filter(|p| p.mode == Some(LINE_STRIP) && p.indices.is_none())
             .and_then(|p| p.attributes.get("POSITION"));
-        let line = line.ok_or_else(|| broken("the leak path", "its node is no polyline"))?;
+        let line = line.ok_or_else(|| broken("the leak path", "its node is not a polyline"))?;
         self.rows(*line)
     }
 
@@ -239,10 +238,10 @@ impl<'a> Reader<'a> {
         let cells = graph.cells.iter().enumerate().map(|(i, c)| {
             let at = || format!("cell {i}");
             let Some(node) = nodes.get(c.node as usize) else {
-                return Err(broken(at(), format!("node {} of {}", c.node, nodes.len())));
+                return Err(broken(at(), format!("no node {}", c.node)));
             };
             if node.name != c.name {
-                let names = format!("is called {:?}, its node {:?}", c.name, node.name);
+                let names = format!("is named {:?}, but its node {:?}", c.name, node.name);
                 return Err(broken(at(), names));
             }
             Ok(Cell {
@@ -277,11 +276,11 @@ impl<'a> Reader<'a> {
 
     fn portals(&mut self) -> Result<Vec<Portal>, WireError> {
         let graph = &self.root.extensions.graph;
-        let bytes = self.optional_view(graph.portal_corners, "the portals' corners")?;
+        let bytes = self.optional_view(graph.portal_corners, "the portals' vertices")?;
         let (mut corners, rest) = bytes.as_chunks::<12>();
         if !rest.is_empty() {
             return Err(broken(
-                "the portals' corners",
+                "the portals' vertices",
                 "their buffer view is cut off",
             ));
         }
@@ -292,7 +291,7 @@ impl<'a> Reader<'a> {
                 let (polygon, rest) = corners.split_at_checked(n as usize).ok_or_else(|| {
                     broken(
                         format!("portal {i}"),
-                        "has more corners than the file holds",
+                        "has more vertices than the file holds",
                     )
                 })?;
                 corners = rest;
@@ -320,7 +319,7 @@ impl<'a> Reader<'a> {
         }
         if !corners.is_empty() {
             return Err(broken(
-                "the portals' corners",
+                "the portals' vertices",
                 "there are more than the portals use",
             ));
         }
@@ -354,7 +353,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Takes its runs of sources from the front of `runs`.
+    /// Reads a batch; takes its runs of sources from the front of `runs`.
     fn batch(
         &mut self,
         i: usize,
@@ -385,7 +384,7 @@ impl<'a> Reader<'a> {
             _ => {
                 return Err(broken(
                     format!("batch {i}"),
-                    "has a mesh or a primitive, not both",
+                    "must have both a mesh and a primitive, or neither",
                 ));
             }
         };
@@ -407,7 +406,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// `boxes` are those of the meshes.
+    /// Reads a detail object; `boxes` are those of the meshes.
     fn detail(
         &self,
         i: usize,
@@ -419,7 +418,7 @@ impl<'a> Reader<'a> {
         let node = node.ok_or_else(|| broken(at(), format!("no node {}", detail.node)))?;
         let meshes = &self.root.extensions.graph.detail_meshes;
         if meshes.get(detail.mesh as usize) != Some(&node.mesh) {
-            return Err(broken(at(), "its mesh is not its node's"));
+            return Err(broken(at(), "its mesh differs from its node's"));
         }
         let transform = super::transform::of_node(node).map_err(|why| broken(at(), why))?;
         if let Some(said) = &detail.aabb
@@ -427,7 +426,7 @@ impl<'a> Reader<'a> {
         {
             return Err(broken(
                 at(),
-                "does not fill its box: one of the two was changed",
+                "does not fit its box; one of the two was changed",
             ));
         }
         Ok(DetailObject {
@@ -490,7 +489,7 @@ impl<'a> Reader<'a> {
             let want = R::KIND;
             return Err(broken(
                 format!("accessor {accessor}"),
-                format!("is no {want} of floats"),
+                format!("is not a {want} of floats"),
             ));
         }
         Ok(bytes.chunks(stride).map(|row| R::of_bytes(row)).collect())
@@ -516,8 +515,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Bytes, stride, component type and kind of an accessor whose rows take `size` bytes, by
-    /// component type. The bytes end with the last row, so that chunks of `stride` are its rows.
+    /// Returns bytes, stride, component type and kind of an accessor whose rows take `size` bytes, by component type.
+    /// The bytes end with the last row, so their chunks of `stride` bytes are the rows.
     fn accessor(
         &mut self,
         accessor: u32,
@@ -537,9 +536,9 @@ impl<'a> Reader<'a> {
         let stride = match root.buffer_views[view as usize].byte_stride {
             None => size,
             Some(stride) if stride >= size as u64 && stride <= 252 => stride as usize,
-            Some(stride) => return Err(broken(at(), format!("its stride is {stride}"))),
+            Some(stride) => return Err(broken(at(), format!("invalid stride {stride}"))),
         };
-        let beyond = || broken(at(), "reaches beyond its buffer view");
+        let beyond = || broken(at(), "extends beyond its buffer view");
         let start = usize::try_from(a.byte_offset).map_err(|_| beyond())?;
         let bytes = bytes.get(start..).ok_or_else(beyond)?;
         let end = match a.count.checked_sub(1) {
@@ -552,7 +551,7 @@ impl<'a> Reader<'a> {
             .and_then(|end| usize::try_from(end).ok())
             .ok_or_else(beyond)?;
         let bytes = bytes.get(..end).ok_or_else(beyond)?;
-        // What decoding allocates: rows of their own size, indices as four bytes.
+        // Memory that decoding allocates: rows of their own size, indices as four bytes.
         self.spend(a.count * size.max(4) as u64)?;
         Ok((bytes, stride, a.component_type, &a.kind))
     }
@@ -568,11 +567,11 @@ impl<'a> Reader<'a> {
             .buffer_views
             .get(view as usize)
             .ok_or_else(missing)?;
-        let beyond = || broken(of(), format!("buffer view {view} reaches beyond the file"));
+        let beyond = || broken(of(), format!("buffer view {view} extends beyond the file"));
         if v.buffer != 0 {
             return Err(broken(
                 of(),
-                "its buffer lies in another file; a world is one GLB",
+                "its buffer is in another file; a world is a single GLB",
             ));
         }
         let start = usize::try_from(v.byte_offset).map_err(|_| beyond())?;
@@ -583,8 +582,8 @@ impl<'a> Reader<'a> {
             .ok_or_else(beyond)
     }
 
-    /// Counts what is decoded. Our files use every byte once (indices may grow from one byte to
-    /// four); a file that has megabytes decoded a thousand times is an attack.
+    /// Counts decoded bytes. Our files use every byte once (indices may grow from one byte to four); a file that has
+    /// megabytes decoded a thousand times is an attack.
     fn spend(&mut self, bytes: u64) -> Result<(), WireError> {
         let left = self.budget.checked_sub(bytes);
         self.budget =

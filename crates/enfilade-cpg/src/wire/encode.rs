@@ -1,7 +1,7 @@
 //! World → GLB.
 //!
-//! Two passes: the first lays out the buffer and writes the JSON, the second streams the bulk data
-//! behind it, so that the peak is the file itself and no copy of the geometry.
+//! Two passes: the first lays out the buffer and writes the JSON, the second streams the bulk data behind it. So peak
+//! memory is the file itself, without a copy of the geometry.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,8 +23,8 @@ use crate::{CellId, World};
 
 /// Encodes a world as one GLB.
 ///
-/// Equal worlds give equal bytes. What glTF forbids is mended as the [module](super) says.
-/// Takes time and memory linear in the world; nothing is allocated twice.
+/// Equal worlds give equal bytes. Changes values that glTF forbids as the [module](super) describes. Takes time and
+/// memory linear in the world; nothing is allocated twice.
 ///
 /// # Errors
 ///
@@ -157,7 +157,8 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
     }
 }
 
-/// What is seen from each cell, in the order in which [`visible::words`](super::visible::words) and its planes are written.
+/// Lays out the potentially visible set, in the order in which [`visible::words`](super::visible::words) and its
+/// planes are written.
 fn lay_out_pvs(layout: &mut Layout<'_>, world: &World) -> Option<json::PvsJson> {
     world.pvs.as_ref().map(|pvs| json::PvsJson {
         rows: layout.view(pvs.ends.len() as u64 * 4),
@@ -174,7 +175,7 @@ fn lay_out_pvs(layout: &mut Layout<'_>, world: &World) -> Option<json::PvsJson> 
     })
 }
 
-/// One mesh for every set of cells; returns the batches in the world's order.
+/// Makes one mesh for every set of cells; returns the batches in the world's order.
 fn lay_out_batches<'a>(
     layout: &mut Layout<'a>,
     world: &'a World,
@@ -306,17 +307,17 @@ fn lay_out_details<'a>(
     (details, detail_meshes)
 }
 
-/// The input's nodes above those of details, so that viewers show them in groups. They move nothing.
+/// The input's nodes above those of details, so that viewers show details in groups. Their transforms are identities.
 #[derive(Default)]
 struct NameTree {
-    /// Node by source.
+    /// For each source, its node.
     nodes: BTreeMap<u32, u32>,
-    /// Nodes without one above.
+    /// Nodes without a parent.
     top: Vec<u32>,
 }
 
 impl NameTree {
-    /// Puts `node`, which comes from `source`, below the nodes of all sources above that.
+    /// Adds `node`, which comes from `source`, below the nodes of that source's ancestors.
     fn add(&mut self, world: &World, nodes: &mut Vec<json::Node>, node: u32, source: Option<u32>) {
         let mut below = node;
         let mut above = source.and_then(|s| world.sources[s as usize].parent);
@@ -340,14 +341,14 @@ impl NameTree {
     }
 }
 
-/// Where lights, cameras and marked places went.
+/// Nodes and definitions of lights, cameras and marked places.
 struct Placed {
     nodes: Vec<u32>,
     lights: Option<json::Lights>,
     cameras: Vec<Box<RawValue>>,
 }
 
-/// A node a light, camera or marked place; equal lights and cameras are written once.
+/// Makes a node for each light, camera or marked place; writes equal lights and cameras once.
 fn lay_out_fixtures(world: &World, nodes: &mut Vec<json::Node>, top: &mut Vec<u32>) -> Placed {
     let mut number_of: BTreeMap<(FixtureKind, &str), u32> = BTreeMap::new();
     let (mut lights, mut cameras, mut placed) = (Vec::new(), Vec::new(), Vec::new());
@@ -385,7 +386,7 @@ fn lay_out_fixtures(world: &World, nodes: &mut Vec<json::Node>, top: &mut Vec<u3
     }
 }
 
-/// The extension of lights, and those that lights and cameras use.
+/// Adds the extension for lights, and the extensions that lights and cameras use.
 fn add_fixture_extensions(used: &mut BTreeSet<String>, world: &World) {
     for fixture in &world.fixtures {
         if fixture.kind == FixtureKind::Light {
@@ -461,7 +462,7 @@ fn lay_out_images(layout: &mut Layout, world: &World) -> Vec<json::Image> {
     let image = |image: &Image| json::Image {
         name: image.name.clone(),
         mime_type: mime(image).to_owned(),
-        // An image without bytes is written as a white pixel, so that there always is a view.
+        // An image without bytes is written as a white pixel, so that a view always exists.
         buffer_view: layout
             .view(image_bytes(image).len() as u64)
             .unwrap_or_default(),
@@ -557,7 +558,7 @@ fn optional_raw(text: &str) -> Option<Box<RawValue>> {
     (!text.is_empty()).then(|| raw(text.to_owned()))
 }
 
-/// Embeds JSON text as it is. The world was validated, so that it parses.
+/// Embeds JSON text as it is. The world is valid, so the text parses.
 fn raw(text: String) -> Box<RawValue> {
     RawValue::from_string(text).unwrap_or_else(|_| RawValue::NULL.to_owned())
 }

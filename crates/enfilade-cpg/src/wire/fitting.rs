@@ -1,4 +1,4 @@
-//! What fills openings, as the file has it.
+//! Fittings in the form of the file.
 
 use super::json::{FittingJson, PartJson, SlideJson, TurnJson};
 use super::{WireError, broken};
@@ -43,7 +43,7 @@ pub(super) fn read(portal: usize, fitting: &FittingJson) -> Result<Fitting, Wire
     let motion = match (&fitting.turn, &fitting.slide) {
         (Some(_), Some(_)) => {
             let what = format!("portal {portal}");
-            return Err(broken(what, "a leaf both turns and slides; it does one"));
+            return Err(broken(what, "a leaf cannot both turn and slide"));
         }
         (Some(t), None) => Some(Motion {
             kind: MotionKind::Turn {

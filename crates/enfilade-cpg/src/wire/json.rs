@@ -1,7 +1,7 @@
-//! The JSON of a world, as written and as read.
+//! The JSON of a world, for writing and reading.
 //!
-//! Only what a world needs of glTF is here; other properties are ignored when read. Numbers that
-//! are `f32` in the graph are written as the `f64` of the same value, so that nothing rounds twice.
+//! Contains only the parts of glTF that a world needs; reading ignores other properties. Numbers that are `f32` in
+//! the graph are written as the `f64` of the same value, so that nothing rounds twice.
 
 use std::collections::BTreeMap;
 
@@ -70,7 +70,7 @@ pub(super) struct Node {
     pub(super) mesh: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) matrix: Option<[f64; 16]>,
-    /// Instead of a matrix, as other programs write; we only read these.
+    /// Other programs write these instead of a matrix; we only read them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) translation: Option<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -81,7 +81,7 @@ pub(super) struct Node {
     pub(super) camera: Option<u32>,
     #[serde(default, skip_serializing_if = "NodeExtensions::is_empty")]
     pub(super) extensions: NodeExtensions,
-    /// Of details, they are written for other programs; ours are in the table of sources.
+    /// For details, written only for other programs; we read them from the table of sources.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) extras: Option<Box<RawValue>>,
 }
@@ -211,12 +211,12 @@ pub(super) struct Graph {
     pub(super) version: u64,
     pub(super) cells: Vec<CellJson>,
     pub(super) portals: Vec<PortalJson>,
-    /// Buffer view of all portals' corners.
+    /// Buffer view of all portals' vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) portal_corners: Option<u32>,
     pub(super) batches: Vec<BatchJson>,
     pub(super) details: Vec<Detail>,
-    /// glTF mesh by detail mesh; null for a mesh without triangles.
+    /// For each detail mesh, its glTF mesh; null for a mesh without triangles.
     pub(super) detail_meshes: Vec<Option<u32>>,
     pub(super) locator: LocatorJson,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -256,9 +256,9 @@ pub(super) struct PortalJson {
     pub(super) kind: Kind,
     pub(super) normal: [f64; 3],
     pub(super) area: f64,
-    /// Corners of the outline.
+    /// Number of vertices of the outline.
     pub(super) outline: u32,
-    /// Corners of each piece.
+    /// Number of vertices of each piece.
     pub(super) pieces: Vec<u32>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) fittings: Vec<FittingJson>,
@@ -335,7 +335,7 @@ pub(super) struct BatchJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) primitive: Option<u32>,
     pub(super) cells: Vec<u32>,
-    /// Runs of sources.
+    /// Number of runs of sources.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub(super) sources: u32,
     #[serde(default, skip_serializing_if = "is_false")]
@@ -361,17 +361,17 @@ pub(super) struct Detail {
     pub(super) cells: Vec<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) source: Option<u32>,
-    /// The detail that it was taken out of.
+    /// The detail from which it was separated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) part_of: Option<u32>,
-    /// Absent for a mesh without vertices, and in files of before.
+    /// Absent for a mesh without vertices, and in older files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) aabb: Option<[[f64; 3]; 2]>,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct LocatorJson {
-    /// Absent for the locator that covers nothing.
+    /// Absent for an empty locator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) bounds: Option<[[f64; 3]; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -388,39 +388,39 @@ pub(super) struct LocatorJson {
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct PvsJson {
-    /// Buffer view: by cell, where its runs end. Absent where there is no cell.
+    /// Buffer view: for each cell, the end of its runs. Absent without cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) rows: Option<u32>,
     /// Buffer view of runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) runs: Option<u32>,
-    /// What is seen by pair of cells. Absent where it was not asked for.
+    /// Parts visible by pair of cells. Absent if not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) parts: Option<PartsJson>,
-    /// By pair of cells. Absent where they were not asked for.
+    /// Volumes visible by pair of cells. Absent if not requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) volumes: Option<VolumesJson>,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct PartsJson {
-    /// Buffer view: by pair, where its runs end. Absent where there is no cell.
+    /// Buffer view: for each pair, the end of its runs. Absent without cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) rows: Option<u32>,
-    /// Buffer view of runs. Absent where there is none.
+    /// Buffer view of runs. Absent if there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) runs: Option<u32>,
 }
 
 #[derive(Serialize, Deserialize)]
 pub(super) struct VolumesJson {
-    /// Buffer view: by pair, where its pieces end. Absent where there is no cell.
+    /// Buffer view: for each pair, the end of its pieces. Absent without cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) rows: Option<u32>,
-    /// Buffer view: by piece, where its planes end. Absent where there is none.
+    /// Buffer view: for each piece, the end of its planes. Absent if there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) pieces: Option<u32>,
-    /// Buffer view of planes. Absent where there is none.
+    /// Buffer view of planes. Absent if there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) planes: Option<u32>,
 }
@@ -459,7 +459,7 @@ pub(super) const VERTICES: u32 = 34962;
 /// `ELEMENT_ARRAY_BUFFER`.
 pub(super) const TRIANGLES: u32 = 34963;
 
-/// Extension that carries a texture's picture, by MIME type; core glTF knows PNG and JPEG only.
+/// Extension for a texture's image, by MIME type; core glTF allows only PNG and JPEG.
 pub(super) const TEXTURE_EXTENSIONS: [(&str, &str); 4] = [
     ("image/webp", "EXT_texture_webp"),
     ("image/avif", "EXT_texture_avif"),

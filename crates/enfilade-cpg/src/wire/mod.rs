@@ -1,33 +1,33 @@
 //! The world file: graph and geometry ⇄ bytes.
 //!
-//! A world is one GLB that every glTF viewer opens. What is ours sits in the root extension
-//! [`EXTENSION`], which is in `extensionsUsed` and never in `extensionsRequired`; its bulk data
-//! (portal corners, locator) sits in buffer views. `docs/format.md` describes every field.
+//! A world is one GLB that every glTF viewer opens. Our data is in the root extension [`EXTENSION`], which is in
+//! `extensionsUsed` and never in `extensionsRequired`; its bulk data (portal vertices, locator) is in buffer views.
+//! `docs/format.md` describes every field.
 //!
 //! ```text
-//! world ─┬─ cell-0, cell-1, …   one node a cell: what is seen from that cell only
-//!        ├─ shared ── shared-0, …   one node a set of cells: what is seen from several
-//!        ├─ unseen                  what no cell sees, such as the inside of walls
+//! world ─┬─ cell-0, cell-1, …   one node per cell: triangles that only this cell sees
+//!        ├─ shared ── shared-0, …   one node per set of cells: triangles that several see
+//!        ├─ unseen                  triangles that no cell sees, such as the inside of walls
 //!        ├─ details ── …            placed detail objects; instances share their mesh
 //!        ├─ fixtures ── …           the input's lights, cameras and marked places
-//!        └─ enfilade leak path      a polyline for people, only where it was asked for
+//!        └─ enfilade leak path      a polyline for people, only if requested
 //! ```
 //!
 //! Every triangle is drawn exactly once. Equal worlds give equal bytes, and
 //! `encode(decode(bytes)) == bytes` for bytes that [`encode_glb`] made.
 //!
-//! # What is not kept
+//! # Changed on writing
 //!
-//! glTF's rules are stricter than inputs are. What breaks them is mended in a way that shows, and
-//! counted in the statistics where the picture changes:
-//! - normals of a primitive where any is not of unit length (and its tangents with them): dropped,
-//!   counted as `dropped_normals`; tangents alone likewise, `dropped_tangents`. Viewers then shade
-//!   flat. They are not renormalized, because a zero normal has no direction to restore.
+//! glTF's rules are stricter than inputs. Values that break them are changed visibly, and counted in the statistics
+//! where the picture changes:
+//! - normals of a primitive, if any is not of unit length (and its tangents with them): dropped, counted as
+//!   `dropped_normals`; tangents alone likewise, `dropped_tangents`. Viewers then shade flat. Normals are not
+//!   renormalized, because a zero normal has no direction to restore.
 //! - texture coordinates that are not finite become 0; vertex colors are clamped to 0 … 1.
 //! - texture coordinate sets that a material reads and a primitive lacks are written as zeros.
 //! - primitives without triangles are left out.
-//! - a detail object whose transform shears or flattens, which glTF nodes cannot express, gets a
-//!   transformed copy of its mesh, counted as `flattened_details`.
+//! - a detail object whose transform shears or flattens, which glTF nodes cannot express, gets a transformed copy of
+//!   its mesh, counted as `flattened_details`.
 //! - an image without bytes (its file was missing) becomes one white pixel.
 
 mod boxes;
@@ -53,7 +53,7 @@ pub const EXTENSION: &str = "ENFILADE_cell_portal_graph";
 /// Name of the node that draws [`World::leak_path`](crate::World::leak_path).
 pub const LEAK_PATH: &str = "enfilade leak path";
 
-/// Name of the glTF extension that lights are in.
+/// Name of the glTF extension for lights.
 const LIGHTS: &str = "KHR_lights_punctual";
 
 /// Version of the extension that this program writes and reads.
@@ -64,22 +64,22 @@ const GLB_VERSION: u32 = 2;
 const CHUNK_JSON: [u8; 4] = *b"JSON";
 const CHUNK_BIN: [u8; 4] = *b"BIN\0";
 
-/// Why bytes are no world, or a world could not become bytes.
+/// The reasons why bytes are not a world, or a world cannot become bytes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WireError {
-    /// The bytes are no GLB at all.
-    #[error("this is no GLB file ({0}); a world is made with `enfilade bake IN -o OUT.glb`")]
+    /// The bytes are not a GLB.
+    #[error("this is not a GLB file ({0}); make a world with `enfilade bake IN -o OUT.glb`")]
     NotGlb(&'static str),
-    /// The bytes end early, go on too long, or chunks do not fit into each other.
+    /// The bytes end early or too late, or chunks do not fit together.
     #[error("the file is cut off or damaged: {problem} (byte {at})")]
     Damaged {
-        /// Offset into the file.
+        /// Offset in the file.
         at: usize,
-        /// What does not fit.
+        /// The problem.
         problem: &'static str,
     },
-    /// The JSON part cannot be parsed, or a field of ours is missing or of the wrong type.
+    /// The JSON chunk cannot be parsed, or one of our fields is missing or has the wrong type.
     #[error("the file's JSON is damaged: {}", shown(.0))]
     Json(String),
     /// A GLB without our extension.
@@ -90,19 +90,19 @@ pub enum WireError {
     NotAWorld,
     /// A world of another version.
     #[error(
-        "this world is of version {found}, this program reads version {VERSION}; \
+        "this world has version {found}, but this program reads version {VERSION}; \
          bake the scene again, or use the program that wrote it"
     )]
     Version {
         /// Version of the file.
         found: u64,
     },
-    /// A reference or a size within the file does not fit.
+    /// A reference or a size in the file is wrong.
     #[error("the file is damaged: {}: {}", shown(at), shown(problem))]
     Structure {
-        /// Where, e.g. `accessor 12` or `portal 3`.
+        /// The place, e.g. `accessor 12` or `portal 3`.
         at: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// The world breaks invariants.
@@ -110,10 +110,10 @@ pub enum WireError {
     Invalid(Vec<GraphError>),
     /// More than the 4 GiB that a GLB can hold.
     #[error(
-        "the world takes {bytes} bytes, a GLB holds at most 4 GiB; bake it in parts or with smaller pictures"
+        "the world needs {bytes} bytes, but a GLB holds at most 4 GiB; bake it in parts or with smaller images"
     )]
     TooLarge {
-        /// What it would take.
+        /// Size of the file. [Units: bytes]
         bytes: u64,
     },
 }

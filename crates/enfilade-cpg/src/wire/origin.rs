@@ -1,4 +1,4 @@
-//! What the input said of itself, as read from a file: names, lights, cameras, terms of use.
+//! Reads the input's information about itself from a file: names, lights, cameras, terms of use.
 
 use enfilade_geom::DMat4;
 use enfilade_geom::scene::{About, Fixture, FixtureKind, SourceNode};
@@ -15,10 +15,10 @@ pub(super) fn source(source: &json::SourceJson) -> SourceNode {
     }
 }
 
-/// The light, camera or marked place of a node.
+/// Reads the light, camera or marked place of a node.
 pub(super) fn fixture(root: &json::Root, node: u32) -> Result<Fixture, WireError> {
     let at = || format!("fixtures, node {node}");
-    let missing = || broken(at(), "is no light, camera or marked place of the file");
+    let missing = || broken(at(), "is not a light, camera or marked place in the file");
     let node = root.nodes.get(node as usize).ok_or_else(missing)?;
     let light = node.extensions.light.as_ref().map(|l| l.light as usize);
     let text =

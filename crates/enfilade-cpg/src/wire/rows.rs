@@ -1,4 +1,4 @@
-//! Rows of numbers as they lie in a buffer: little-endian, tightly packed.
+//! Rows of numbers as stored in a buffer: little-endian, tightly packed.
 
 /// A row of an accessor.
 pub(super) trait Row: Sized {
@@ -20,7 +20,7 @@ macro_rules! float_rows {
 }
 float_rows!(2 "VEC2", 3 "VEC3", 4 "VEC4");
 
-/// Four bytes from `at` on. Callers hand in slices of checked length.
+/// Returns four bytes from `at` on. Callers pass slices of checked length.
 pub(super) fn four(bytes: &[u8], at: usize) -> [u8; 4] {
     std::array::from_fn(|i| bytes[at + i])
 }
@@ -29,7 +29,7 @@ pub(super) fn eight(bytes: &[u8], at: usize) -> [u8; 8] {
     std::array::from_fn(|i| bytes[at + i])
 }
 
-/// All bytes as pairs of `u32`; `None` where they end amid one.
+/// Returns all bytes as pairs of `u32`; `None` if they end within one.
 pub(super) fn pairs(bytes: &[u8]) -> Option<Vec<[u32; 2]>> {
     let (pairs, rest) = bytes.as_chunks::<8>();
     let pair = |p: &[u8; 8]| [0, 4].map(|at| u32::from_le_bytes(four(p, at)));

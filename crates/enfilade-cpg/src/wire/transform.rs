@@ -5,26 +5,26 @@ use enfilade_geom::{DMat3, DMat4, DQuat, DVec3};
 
 use super::json::Node;
 
-/// Stays where it is.
+/// The identity.
 pub(super) const IDENTITY: [f32; 16] = [
     1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
 ];
 
-/// The transform of a node: its matrix, or its translation, rotation (x, y, z, w) and scale.
+/// Returns the transform of a node: its matrix, or its translation, rotation (x, y, z, w) and scale.
 ///
 /// # Errors
 ///
-/// A node that has both, which glTF forbids, and a rotation that is no unit quaternion.
+/// A node with both, which glTF forbids, or a rotation that is not a unit quaternion.
 pub(super) fn of_node(node: &Node) -> Result<[f32; 16], &'static str> {
     let has_parts = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
     if !has_parts {
         return Ok(node.matrix.map_or(IDENTITY, |m| m.map(|v| v as f32)));
     }
     if node.matrix.is_some() {
-        return Err("has a matrix and a translation, rotation or scale");
+        return Err("has both a matrix and a translation, rotation or scale");
     }
     let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
-    // Quaternions rounded to a few digits are common; what is farther off turns nothing.
+    // Quaternions rounded to a few digits are common; larger errors are not rotations.
     if (rotation.length() - 1.0).abs() > 1e-2 || !rotation.is_finite() {
         return Err("its rotation is not of unit length");
     }
@@ -36,15 +36,15 @@ pub(super) fn of_node(node: &Node) -> Result<[f32; 16], &'static str> {
     Ok(whole.to_cols_array().map(|v| v as f32))
 }
 
-/// Whether a transform is translation, rotation and scale, as glTF demands of a node's matrix.
+/// Returns `true` if a transform consists of translation, rotation and scale, as glTF requires of a node's matrix.
 ///
-/// The limit is a fifth of what the Khronos validator allows (columns' sums of absolute values
-/// within 5·10⁻⁵, whatever the scale), so that its decomposition in `f32` has room to round.
+/// The limit is a fifth of the Khronos validator's (columns' sums of absolute values within 5·10⁻⁵, at any scale),
+/// which leaves room for rounding in its decomposition in `f32`.
 pub(super) fn is_trs(transform: &[f32; 16]) -> bool {
     let m = linear(transform);
     let columns = [m.x_axis, m.y_axis, m.z_axis];
     let lengths = columns.map(DVec3::length);
-    // A validator that works in f32 sees a smaller determinant as none.
+    // To a validator that works in f32, smaller determinants are zero.
     if m.determinant().abs() < 1e-30 || lengths.iter().any(|&l| l < 1e-9) {
         return transform == &IDENTITY;
     }
@@ -59,11 +59,11 @@ fn linear(t: &[f32; 16]) -> DMat3 {
     DMat3::from_mat4(DMat4::from_cols_array(&t.map(f64::from)))
 }
 
-/// The primitive with `transform` applied to its vertices.
+/// Returns the primitive with `transform` applied to its vertices.
 pub(super) fn transformed(p: &Primitive, transform: &[f32; 16]) -> Primitive {
     let whole = DMat4::from_cols_array(&transform.map(f64::from));
     let linear = linear(transform);
-    // The adjugate's transpose carries normals through singular matrices, too, and keeps the side.
+    // The adjugate's transpose also transforms normals by singular matrices, and keeps the side.
     let normal_matrix = DMat3::from_cols(
         linear.y_axis.cross(linear.z_axis),
         linear.z_axis.cross(linear.x_axis),
@@ -89,7 +89,7 @@ pub(super) fn transformed(p: &Primitive, transform: &[f32; 16]) -> Primitive {
         *tangent = [t.x, t.y, t.z, w * mirror as f32];
     }
     if mirror < 0.0 {
-        // Front faces stay front faces.
+        // Keep front faces in front.
         for triangle in moved.indices.chunks_exact_mut(3) {
             triangle.swap(1, 2);
         }

@@ -1,12 +1,12 @@
-//! What may be seen from each cell, as it lies in the buffer.
+//! The potentially visible set as stored in the buffer.
 
 use super::WireError;
 use super::json::PvsJson;
 use super::rows::{eight, pairs};
 use crate::{Pvs, VisibleParts, VisibleVolumes};
 
-/// Reads the rows; `view` gives a buffer view's bytes, none where it is absent, and counts what they cost. What they say is not
-/// checked.
+/// Reads the rows without checking them. `view` returns a buffer view's bytes, empty if absent, and counts their
+/// cost.
 pub(super) fn read_pvs<'a>(
     json: &PvsJson,
     mut view: impl FnMut(Option<u32>) -> Result<&'a [u8], WireError>,
@@ -47,7 +47,7 @@ fn planes(bytes: &[u8]) -> Option<Vec<[f64; 4]>> {
     rest.is_empty().then(|| planes.iter().map(plane).collect())
 }
 
-/// The words of each buffer view that holds counts, in the order in which they lie; then come the planes.
+/// Returns the words of each buffer view of counts, in the order in which they are stored; the planes follow.
 pub(super) fn words(pvs: &Pvs) -> impl Iterator<Item = &[u32]> {
     let parts = pvs.parts.iter();
     let parts = parts.flat_map(|p| [&p.ends[..], p.runs.as_flattened()]);

@@ -11,7 +11,7 @@ use enfilade_geom::scene::{
 };
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
-/// Four corners as two triangles, with normals and texture coordinates.
+/// Makes two triangles of four vertices, with normals and texture coordinates.
 pub(crate) fn quad(corners: [[f32; 3]; 4], normal: [f32; 3]) -> Primitive {
     Primitive {
         positions: corners.to_vec(),
@@ -24,7 +24,7 @@ pub(crate) fn quad(corners: [[f32; 3]; 4], normal: [f32; 3]) -> Primitive {
     }
 }
 
-/// Floor of the rectangle `x0..x1` × `0..5`.
+/// Makes the floor of the rectangle `x0..x1` × `0..5`.
 pub(crate) fn floor(x0: f32, x1: f32) -> Primitive {
     quad(
         [
@@ -50,7 +50,7 @@ pub(crate) fn cell(name: &str, aabb: [[f32; 3]; 2], portals: &[u32]) -> Cell {
     }
 }
 
-/// A rectangle in the plane at `x`, facing +x, from `z0` to `z1` and from the floor to `height`.
+/// Makes a rectangle in the plane at `x`, facing +x, from `z0` to `z1` and from the floor to `height`.
 pub(crate) fn doorway(x: f32, z0: f32, z1: f32, height: f32, cells: [u32; 2]) -> Portal {
     let outline = vec![[x, 0.0, z0], [x, height, z0], [x, height, z1], [x, 0.0, z1]];
     Portal {
@@ -64,7 +64,7 @@ pub(crate) fn doorway(x: f32, z0: f32, z1: f32, height: f32, cells: [u32; 2]) ->
     }
 }
 
-/// Two rooms of 4 × 3 × 5 m side by side along x, a doorway between them, a window to outdoors.
+/// Makes two rooms of 4 × 3 × 5 m side by side along x, with a doorway between them and a window to outdoors.
 pub(crate) fn two_rooms() -> World {
     let mut window = doorway(8.0, 1.0, 3.0, 2.0, [1, 2]);
     window.kind = PortalKind::Window;
@@ -275,7 +275,7 @@ pub(crate) fn two_rooms() -> World {
     }
 }
 
-/// The two rooms with what is seen from each: all but the second room from the outdoors.
+/// Makes the two rooms with a potentially visible set: all pairs, except from the outdoors into the second room.
 pub(crate) fn two_rooms_with_pvs() -> World {
     let mut world = two_rooms();
     let n = world.graph.cells.len();
@@ -285,7 +285,7 @@ pub(crate) fn two_rooms_with_pvs() -> World {
     world
 }
 
-/// The same with what is seen by pair of cells.
+/// Makes the same world with the parts visible by pair of cells.
 #[allow(dead_code)] // Not all tests that share this file use it.
 pub(crate) fn two_rooms_with_parts() -> World {
     let mut world = two_rooms_with_pvs();
@@ -300,7 +300,7 @@ pub(crate) fn two_rooms_with_parts() -> World {
     world
 }
 
-/// The two rooms with everything in them that inputs hold and glTF forbids.
+/// Makes the two rooms with everything that inputs contain and glTF forbids.
 pub(crate) fn nasty_rooms() -> World {
     let mut world = two_rooms();
     let p = &mut world.batches[0].primitive;
@@ -309,9 +309,9 @@ pub(crate) fn nasty_rooms() -> World {
     p.colors = vec![[2.0, -1.0, f32::NAN, 0.5]; 4];
     let tilted = &mut world.detail_meshes[0].primitives[0];
     tilted.tangents[3] = [1.0, 0.0, 0.0, 0.5];
-    // Material 0 reads a texture coordinate set that this one lacks.
+    // Material 0 reads a texture coordinate set that this primitive lacks.
     world.batches[1].primitive.uvs.clear();
-    // Every index is the largest that 16 bits may hold, or one less.
+    // Every index is the largest of 16 bits, or one less.
     let many = &mut world.batches[2].primitive;
     many.positions = (0..65_535)
         .map(|i| [i as f32 * 1e-4, -0.0, (i % 7) as f32])
@@ -320,7 +320,7 @@ pub(crate) fn nasty_rooms() -> World {
     many.uvs.clear();
     many.indices = vec![65_534, 65_533, 0];
     many.material = None;
-    // One more, and the largest index would restart the triangles if it were of 16 bits.
+    // With one more vertex, the largest 16-bit index would restart the triangles.
     let mut more = many.clone();
     more.positions.push([7.0, 0.0, 1.0]);
     more.normals.push([0.0, 1.0, 0.0]);

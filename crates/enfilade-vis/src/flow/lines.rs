@@ -1,4 +1,4 @@
-//! Lines that pass a chain of openings: guessed, mended, and followed beyond its end.
+//! Lines that pass a chain of openings: guessed, corrected, and followed beyond its end.
 
 use enfilade_geom::DVec3;
 
@@ -9,11 +9,11 @@ use crate::rays::{self, Line, MIN_SINE};
 use crate::stabbing::{self, Answer, Gate};
 use crate::tolerance::HalfSpace;
 
-/// How often the ends of a line that was guessed are moved.
+/// Most corrections of the ends of a guessed line.
 const MAX_TURNS: usize = 8;
 
 impl Flow {
-    /// Whether any line passes the chain, whatever planes leave of it.
+    /// Decides whether any line passes the chain, independently of planes.
     pub(super) fn stab_at_all(&mut self, shared: &Shared<'_>, source: Poly) -> Stab {
         let (origin, direction) = match self.stabbed(shared) {
             Answer::Closed(_) => return Stab::None,
@@ -24,7 +24,7 @@ impl Flow {
         let target = self.chain[self.chain.len() - 1];
         let at = |dir: u32| origin + direction * dirs.crossing(dir as usize, origin, direction);
         let (mut from, mut to) = (at(source.dir), at(target.dir));
-        // Each end by turns moves to the middle of what is seen from the other.
+        // Move each end in turn to the middle of the part seen from the other.
         for _ in 0..MAX_TURNS {
             if self.passes(shared, from, to) {
                 return Stab::Line(from, to);
@@ -51,7 +51,7 @@ impl Flow {
         stabbing::stabbed(&self.chain.iter().map(gate).collect::<Vec<_>>())
     }
 
-    /// Follows a line from the source; everything it crosses is seen.
+    /// Follows a line from the source and marks everything it crosses as seen.
     pub(super) fn shoot(&mut self, shared: &Shared<'_>, from: DVec3, to: DVec3) {
         let dirs = shared.dirs;
         let source = self.found.source;
@@ -82,7 +82,7 @@ impl Flow {
         }
     }
 
-    /// Whether a line passes all openings of the chain.
+    /// Tries a few lines through the openings of the chain.
     pub(super) fn stab(&mut self, shared: &Shared<'_>, source: Poly, target: Poly) -> Stab {
         self.found.effort.stabs += 1;
         let (from, to) = (self.arena.mean(source), self.arena.mean(target));
@@ -102,13 +102,13 @@ impl Flow {
         Stab::Unknown
     }
 
-    /// Whether the line crosses all openings of the chain.
+    /// Returns `true` if the line crosses all openings of the chain.
     fn passes(&self, shared: &Shared<'_>, from: DVec3, to: DVec3) -> bool {
         let dirs = shared.dirs;
         let margin = shared.tolerance.rounding * 16.0;
         let direction = to - from;
         let least = MIN_SINE * direction.length();
-        // The ends too: a clip keeps a hair more than the opening.
+        // Test the ends too: a clip keeps slightly more than the opening.
         self.chain.iter().all(|poly| {
             let dir = &dirs.all[poly.dir as usize];
             let speed = dir.normal.dot(direction);
@@ -117,7 +117,7 @@ impl Flow {
         })
     }
 
-    /// The lines from a point at one end through the chain meet its other end in a polygon: the middle of that.
+    /// Returns the middle of the polygon in which lines from a point at one end of the chain meet its other end.
     fn middle_seen(&mut self, shared: &Shared<'_>, eye: DVec3, end: Poly) -> Option<DVec3> {
         let mark = self.arena.mark();
         let seen = self.seen_from(shared, eye, end);
@@ -126,7 +126,7 @@ impl Flow {
         middle
     }
 
-    /// What of an end of the chain is seen from a point at its other end.
+    /// Returns the part of one end of the chain that is seen from a point at the other.
     fn seen_from(&mut self, shared: &Shared<'_>, eye: DVec3, mut end: Poly) -> Option<Poly> {
         let dirs = shared.dirs;
         for k in 1..self.chain.len() - 1 {
@@ -143,7 +143,7 @@ impl Flow {
     }
 }
 
-/// The half-space of lines from `eye` that pass edge `i` of an opening on its inner side.
+/// Returns the half-space of lines from `eye` that pass edge `i` of an opening on its inner side.
 fn edge_plane(dirs: &Dirs, dir: usize, i: usize, eye: DVec3) -> Option<HalfSpace> {
     let winding = dirs.winding(dir);
     let p = winding[i];

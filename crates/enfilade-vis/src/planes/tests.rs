@@ -1,10 +1,10 @@
-//! Planes against lines and points at random.
+//! Tests of planes with random lines and points.
 
 use super::*;
 use crate::clip::Arena;
 use crate::rng::Rng;
 
-/// A convex polygon with 3 to 8 corners around a point, facing up the z axis more or less, and its normal.
+/// A convex polygon with 3 to 8 vertices around a point, facing roughly up the z axis, and its normal.
 fn polygon(rng: &mut Rng, center: DVec3) -> (Vec<DVec3>, DVec3) {
     let mut unit = || 2.0 * rng.unit() - 1.0;
     let turn = DVec3::new(unit() * 0.5, unit() * 0.5, 1.0).normalize();
@@ -47,7 +47,7 @@ fn between(seed: u64) -> Vec<Four> {
     planes
 }
 
-/// The planes that are there.
+/// The lanes that hold a plane.
 fn lanes(planes: &[Four]) -> impl Iterator<Item = (&Four, usize)> {
     planes
         .iter()
@@ -63,7 +63,7 @@ fn planes_have_the_first_polygon_behind_and_the_second_in_front() {
         for (four, lane) in lanes(&between(seed)) {
             let [before, after] =
                 [Side::Before, Side::After].map(|side| four.half_space(side, lane));
-            // Sums of three products are taken in another order here.
+            // Sums of three products have another order here.
             let least = |h: HalfSpace, points: &[DVec3]| {
                 let heights = points.iter().map(|&p| h.normal.dot(p) - h.offset);
                 heights.fold(f64::INFINITY, f64::min)
@@ -74,7 +74,7 @@ fn planes_have_the_first_polygon_behind_and_the_second_in_front() {
             n_planes += 1;
         }
     }
-    // Two polygons in general position have at least two planes from each, mostly one for each edge.
+    // Two polygons in general position have at least two planes through edges of each, mostly one per edge.
     assert!(n_planes > 500 * 4, "{n_planes}");
 }
 

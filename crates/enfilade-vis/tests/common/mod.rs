@@ -1,8 +1,8 @@
-//! Evidence files made by hand.
+//! Handmade evidence files.
 
 use std::io::Write;
 
-/// A body of evidence as a file, with length and check sum as they should be.
+/// Packs a body of evidence into a file with correct length and checksum.
 pub(crate) fn pack(body: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
     encoder.write_all(body).unwrap();
