@@ -15,7 +15,6 @@ const STILL: &[&str] = &[
     "crates/enfilade-cpg/",
     "crates/enfilade-geom/src/allowance.rs",
     "crates/enfilade-import/",
-    "crates/enfilade-render/",
     "crates/enfilade-report/",
     "crates/enfilade-testkit/examples/generate.rs",
     "crates/enfilade-testkit/src/disturb.rs",
