@@ -20,7 +20,6 @@ const STILL: &[&str] = &[
     "crates/enfilade-testkit/src/disturb.rs",
     "crates/enfilade-testkit/src/shuffle",
     "crates/enfilade-testkit/tests/shuffle.rs",
-    "crates/enfilade-verify/",
     "crates/enfilade-vis/",
     "crates/enfilade-world/src/floors.rs",
     "crates/enfilade-world/tests/paths.rs",
