@@ -15,16 +15,9 @@ const STILL: &[&str] = &[
     "crates/enfilade-geom/src/allowance.rs",
     "crates/enfilade-import/",
     "crates/enfilade-report/",
-    "crates/enfilade-testkit/examples/generate.rs",
-    "crates/enfilade-testkit/src/disturb.rs",
-    "crates/enfilade-testkit/src/shuffle",
-    "crates/enfilade-testkit/tests/shuffle.rs",
     "crates/enfilade-vis/",
-    "crates/enfilade-world/src/floors.rs",
-    "crates/enfilade-world/tests/paths.rs",
     "crates/enfilade/src/file.rs",
     "crates/enfilade/src/whole.rs",
-    "fuzz/",
     "xtask/",
 ];
 
@@ -145,7 +138,8 @@ mod tests {
     #[test]
     fn crates_not_rewritten_yet_are_skipped() {
         let source = |file: &str| (file.to_owned(), "// What\n".to_owned());
-        let sources = BTreeMap::from([source("crates/new/src/a.rs"), source("fuzz/a.rs")]);
+        let files = ["crates/new/src/a.rs"];
+        let sources = files.iter().chain(STILL).copied().map(source).collect();
         assert_eq!(
             problems(&sources),
             ["crates/new/src/a.rs:1: begins with What; begin with a noun or a verb"]
