@@ -18,7 +18,6 @@ const STILL: &[&str] = &[
     "crates/enfilade-vis/",
     "crates/enfilade/src/file.rs",
     "crates/enfilade/src/whole.rs",
-    "xtask/",
 ];
 
 /// First words that leave a reader waiting for the noun.
