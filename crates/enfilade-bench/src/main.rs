@@ -121,7 +121,7 @@ enum What {
         #[arg(long, default_value_t = 500)]
         views: usize,
     },
-    /// Tightness: size of the answer relative to what rays hit, from ordinary eyes indoors.
+    /// Tightness: size of the answer relative to the objects that rays hit, from ordinary eyes indoors.
     Tight {
         /// Worlds.
         scenes: Vec<PathBuf>,

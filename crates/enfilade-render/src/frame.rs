@@ -4,7 +4,7 @@ use crate::camera::Projection;
 use crate::list::DrawList;
 use crate::marks::Mark;
 
-/// How surfaces are painted.
+/// The coloring of surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Paint {
     /// Textured and lit.
@@ -20,7 +20,7 @@ pub enum Paint {
 /// The style of a frame, apart from its contents.
 #[derive(Clone, Copy, Debug)]
 pub struct Style {
-    /// How surfaces are painted.
+    /// The coloring of surfaces.
     pub paint: Paint,
     /// True if ambient occlusion darkens the places where surfaces meet; costs about as much as everything else.
     pub dark_corners: bool,

@@ -1,6 +1,6 @@
 //! Pictures by OpenGL equal those by Vulkan, also with only the features of WebGL 2.
 //!
-//! On machines without one of the two drivers, the tests say so and pass.
+//! On machines without one of the two drivers, the tests print that and pass.
 
 use enfilade_cpg::{DetailObject, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive};

@@ -195,7 +195,7 @@ fn what_is_seen_of_a_floor_looks_as_it_does_and_what_is_not_is_dark_or_red() {
     );
 }
 
-/// How bright a picture is on average, 0 to 255.
+/// Returns the mean brightness of a picture, 0 to 255.
 fn brightness(picture: &Picture) -> f64 {
     let sum: u64 = picture.rgba.chunks_exact(4).map(|p| u64::from(p[1])).sum();
     sum as f64 / f64::from(picture.width * picture.height)

@@ -22,8 +22,8 @@
 //! # Limits
 //!
 //! A world stores vertices as `f32`, and a builder may snap planes together by [`tolerance`] (`eps`). So two readers
-//! of one file may place the same wall or opening up to `eps` apart, and each of two surfaces. An event within `2
-//! eps` of a surface is not a statement about the world:
+//! of one file may place the same wall or opening up to `eps` apart, and each of two surfaces. An event within
+//! `2 eps` of a surface is not a statement about the world:
 //!
 //! - end points closer than `2 eps` to a structural triangle or a portal are drawn again;
 //! - a segment that meets no triangle but passes a triangle, or the rim of a portal's piece, closer than that is
@@ -35,7 +35,6 @@
 //!
 //! Everything else is judged. Sampling finds faults, but does not prove their absence; so the report always contains
 //! how much was judged.
-//! therefore always says how much was judged.
 
 mod carried;
 mod claims;

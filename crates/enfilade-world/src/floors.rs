@@ -214,7 +214,7 @@ impl Floors {
         self.floors.len()
     }
 
-    /// Returns the walker for whom they are.
+    /// Returns the walker of these floors.
     #[must_use]
     pub fn walker(&self) -> &Agent {
         &self.walker

@@ -388,7 +388,7 @@ fn stairs_are_walked_and_ledges_are_not() {
     assert_eq!(walk(&stairs(0.5), 5.0).unwrap_err(), NoPath::NoWay);
 }
 
-/// W10: what is too low or too narrow is not passed, what stands free is walked around.
+/// W10: a walker passes no opening that is too low or too narrow, and walks around free-standing obstacles.
 #[test]
 fn a_walker_needs_its_room() {
     let straight = walk(&[], 0.0).unwrap();

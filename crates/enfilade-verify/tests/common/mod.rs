@@ -21,8 +21,8 @@ pub(crate) const DOOR_X: f64 = 4.125;
 
 pub(crate) type Quad = [[f64; 3]; 4];
 
-/// Builds a chain of box tests: the first box that contains a point gives its cell. Box `k` has planes `6 k` to `6 k
-/// + 5`; a point may fail at each of them, and its next test is then in a tree of its own.
+/// Builds a chain of box tests: the first box that contains a point gives its cell. Box `k` has planes `6 k` to
+/// `6 k + 5`; a point may fail at each of them, and its next test is then in a tree of its own.
 pub(crate) fn locator_of_boxes(
     boxes: &[([f64; 3], [f64; 3], Option<CellId>)],
     bounds: Aabb,
