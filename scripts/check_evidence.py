@@ -219,11 +219,11 @@ class Checker:
         for _ in range(data.take("<Q")[0]):
             x = data.take("<6d")
             chain = data.take(f"<{data.take('<I')[0]}I")
-            require(all(d < n for d in chain), "a line names no opening")
+            require(all(d < n for d in chain), "a line contains an opening that is not in the graph")
             self.lines.append((x[:3], x[3:], chain))
         for _ in range(data.take("<Q")[0]):
             s, t, size = data.take("<III")
-            require(s < n and t < n, "a tree names no opening")
+            require(s < n and t < n, "a tree contains an opening that is not in the graph")
             self.trees.append((s, t, data.bytes(size)))
         self.trace = data.data[data.at:]
 
@@ -689,11 +689,11 @@ class Trees:
         elif symbol == 2:
             ids = self.data.take(f"<{self.data.take('<B')[0]}I")
             if not self.k.walls or any(i >= len(self.k.walls) for i in ids):
-                self.fail("it names no triangle")
+                self.fail("it contains a triangle that is not in the world")
             if first and second:
                 self.sheet([self.k.walls[i] for i in ids], first, second)
         else:
-            self.fail("it has no such symbol")
+            self.fail("it has an unknown symbol")
 
     @staticmethod
     def halves(polygon):
@@ -712,7 +712,7 @@ class Trees:
         sides = self.hull(first, second)
         for count, u, v in rim.values():
             if count % 2 and not self.is_off(u, v, sides):
-                self.fail("a way leads around the triangles")
+                self.fail("a line may pass around the triangles")
         p, q = self.inner(first), self.inner(second)
         odd = False
         for t in sheet:
@@ -720,7 +720,7 @@ class Trees:
                 self.fail("a triangle touches an opening")
             odd ^= self.crosses(t, p, q)
         if not odd:
-            self.fail("a line passes the triangles")
+            self.fail("a line passes through the triangles unblocked")
 
     @staticmethod
     def inner(polygon):

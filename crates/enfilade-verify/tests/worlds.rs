@@ -311,9 +311,9 @@ fn broken_outlines_are_named() {
     assert!(broken(&|p| p.outline[1][0] += 0.01).contains("leaves the portal's plane"));
     assert!(broken(&|p| p.outline[2] = [0.0, 1.2, 1.7]).contains("not convex"));
     assert!(broken(&|p| p.pieces[0][2][1] += 0.1).contains("reaches out of the outline"));
-    assert!(broken(&|p| p.area = 0.9).contains("area 0.9"));
+    assert!(broken(&|p| p.area = 0.9).contains("area is 0.9"));
     assert!(broken(&|p| p.pieces[0].reverse()).contains("clockwise"));
-    assert!(broken(&|p| p.outline.truncate(2)).contains("2 corners"));
+    assert!(broken(&|p| p.outline.truncate(2)).contains("2 vertices"));
     assert!(broken(&|p| p.cells = [A, enfilade_cpg::CellId(9)]).contains("no ray was shot"));
 }
 
