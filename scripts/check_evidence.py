@@ -208,7 +208,7 @@ class Checker:
         require(data.take("<Q")[0] == expected, "it is about another graph")
         self.c, self.far = data.take("<dd")
         require(0.0 <= self.c <= 1e-6 * self.scale, "its clearance is too wide")
-        require(self.far >= 0.0, "its far plane is no distance")
+        require(self.far >= 0.0, "its far plane is not a distance")
         self.said = data.take("<QQ")
         n = len(self.all)
         self.might, self.claims = (
@@ -219,11 +219,11 @@ class Checker:
         for _ in range(data.take("<Q")[0]):
             x = data.take("<6d")
             chain = data.take(f"<{data.take('<I')[0]}I")
-            require(all(d < n for d in chain), "a line names no opening")
+            require(all(d < n for d in chain), "a line contains an opening that is not in the graph")
             self.lines.append((x[:3], x[3:], chain))
         for _ in range(data.take("<Q")[0]):
             s, t, size = data.take("<III")
-            require(s < n and t < n, "a tree names no opening")
+            require(s < n and t < n, "a tree contains an opening that is not in the graph")
             self.trees.append((s, t, data.bytes(size)))
         self.trace = data.data[data.at:]
 
@@ -246,7 +246,7 @@ class Checker:
             visible[opening.start] |= 1 << opening.end
             for t in bits(self.might[s]):
                 visible[opening.start] |= 1 << self.all[t].end
-        require(all(p & ~v == 0 for p, v in zip(proved, visible)), "a line proves what is called hidden")
+        require(all(p & ~v == 0 for p, v in zip(proved, visible)), "a line shows a cell that is claimed hidden")
         n_visible, n_proved = (sum(row.bit_count() for row in table) for table in (visible, proved))
         require(self.said == (n_visible, n_proved), "its totals are not those of its tables")
         return {
@@ -290,7 +290,7 @@ class Checker:
                         may(s, e ^ 1) and may(e ^ 1, t) for e in self.out[target.start] if e != t
                     )
                 )
-                require(reasons, f"{s}, {t}: no reason is given why they are hidden")
+                require(reasons, f"{s}, {t}: no reason shows that they are hidden")
 
     def are_apart(self, s, t):
         a, b = self.all[s], self.all[t]
@@ -482,10 +482,10 @@ class Walk:
         symbol = self.symbol()
         if symbol == 5:
             if not closed and reach & self.claims:
-                self.fail("it stops while something is left to show")
+                self.fail("it stops before it shows everything")
             return
         if symbol != 4:
-            self.fail("no step begins with this symbol")
+            self.fail("a step begins with an unknown symbol")
         for q in k.out[k.all[last].end]:
             symbol = self.symbol()
             behind = reach & k.might[q]
@@ -505,14 +505,14 @@ class Walk:
                     self.fail("planes do not close this chain")
             elif symbol == 2:
                 if claimed and target:
-                    self.fail("it sees what it is to show hidden")
+                    self.fail("it sees an opening that it claims hidden")
                 self.step(grown, left, behind, [*dirs, q])
             elif symbol == 3:
                 self.split(grown, left)
             elif symbol == 8:
                 self.unstabbed([*dirs, q])
             else:
-                self.fail("no exit has this symbol")
+                self.fail("an exit has an unknown symbol")
 
     def narrow(self, source, passed, q, planes, depth):
         k = self.k
@@ -559,7 +559,7 @@ class Walk:
             for half in halves:
                 self.split(chain, half)
         else:
-            self.fail("no split has this symbol")
+            self.fail("a split has an unknown symbol")
 
     def closes(self, chain, source, tries):
         tight = self.tighten(chain, source)
@@ -689,11 +689,11 @@ class Trees:
         elif symbol == 2:
             ids = self.data.take(f"<{self.data.take('<B')[0]}I")
             if not self.k.walls or any(i >= len(self.k.walls) for i in ids):
-                self.fail("it names no triangle")
+                self.fail("it contains a triangle that is not in the world")
             if first and second:
                 self.sheet([self.k.walls[i] for i in ids], first, second)
         else:
-            self.fail("it has no such symbol")
+            self.fail("it has an unknown symbol")
 
     @staticmethod
     def halves(polygon):
@@ -712,7 +712,7 @@ class Trees:
         sides = self.hull(first, second)
         for count, u, v in rim.values():
             if count % 2 and not self.is_off(u, v, sides):
-                self.fail("a way leads around the triangles")
+                self.fail("a line may pass around the triangles")
         p, q = self.inner(first), self.inner(second)
         odd = False
         for t in sheet:
@@ -720,7 +720,7 @@ class Trees:
                 self.fail("a triangle touches an opening")
             odd ^= self.crosses(t, p, q)
         if not odd:
-            self.fail("a line passes the triangles")
+            self.fail("a line passes through the triangles unblocked")
 
     @staticmethod
     def inner(polygon):

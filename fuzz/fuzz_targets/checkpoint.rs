@@ -1,4 +1,4 @@
 #![no_main]
-//! Hostile bytes for the search that goes on from a checkpoint.
+//! Hostile bytes for a search resumed from a checkpoint.
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| enfilade_fuzz::sight::checkpoint(data));

@@ -17,10 +17,10 @@ const METHODS: [Method; 4] = [
     Method::Delaunay,
 ];
 
-/// Triangles at most.
+/// Most triangles.
 const MOST: usize = 40;
 
-/// A byte that chooses, then corners: a bake is refused, or its world is valid, comes back from its bytes, and keeps what it promises.
+/// A byte of choices, then vertices: a bake fails, or its world is valid, survives encoding, and keeps its promises.
 pub fn bake(data: &[u8]) {
     let mut numbers = Numbers(data);
     let kind = numbers.byte();
@@ -58,7 +58,7 @@ pub fn bake(data: &[u8]) {
     assert!(structural_triangles(&world).len() <= 100_000);
 }
 
-/// Triangles on a grid of an eighth of a meter, where much lies in one plane, or anywhere.
+/// Returns triangles on a grid of an eighth of a meter, where many are coplanar, or anywhere.
 fn scene(numbers: &mut Numbers<'_>, is_any: bool) -> Scene {
     let mut positions = Vec::new();
     while !numbers.0.is_empty() && positions.len() < 3 * MOST {
@@ -67,7 +67,7 @@ fn scene(numbers: &mut Numbers<'_>, is_any: bool) -> Scene {
         } else {
             numbers.take().map(|b: u8| f32::from(b as i8) / 8.0)
         };
-        // The importer lets no other through.
+        // The importer rejects other values.
         positions.push(corner.map(|x| {
             if x.is_finite() {
                 x.clamp(-1000.0, 1000.0)
@@ -100,7 +100,7 @@ fn scene(numbers: &mut Numbers<'_>, is_any: bool) -> Scene {
     }
 }
 
-/// Two rooms with a doorway, on the grid: 38 triangles, for each method.
+/// Returns two rooms with a doorway, on the grid: 38 triangles, for each method.
 #[must_use]
 pub fn seeds() -> Vec<Vec<u8>> {
     let boxes: [[[i8; 3]; 2]; 4] = [

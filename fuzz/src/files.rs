@@ -1,18 +1,18 @@
-//! Names of files in a scene: none outside its folder is read.
+//! File names in a scene: no file outside its folder is read.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use enfilade_import::{ImportOptions, Limits, import};
 
-/// A folder of this process.
+/// Returns a folder of this process.
 pub(crate) fn folder() -> PathBuf {
     let folder = std::env::temp_dir().join(format!("enfilade-fuzz-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for files");
     folder
 }
 
-/// A coordinate that only the file outside has.
+/// A coordinate that only the file outside contains.
 const SECRET: f32 = 54.25;
 
 /// The folder of the scene, beside which there is a file that it must not read.
@@ -37,7 +37,7 @@ static SCENE: LazyLock<PathBuf> = LazyLock::new(|| {
     scene
 });
 
-/// A glTF scene whose buffer and picture, and an OBJ scene whose library, have any name.
+/// A glTF scene with any names of its buffer and image, and an OBJ scene with any name of its library.
 pub fn files(data: &[u8]) {
     let Ok(name) = std::str::from_utf8(data) else {
         return;
@@ -46,7 +46,7 @@ pub fn files(data: &[u8]) {
         .chars()
         .map(|c| format!("\\u{:04x}", c as u32))
         .collect();
-    // What lies beyond four digits has another form there.
+    // Characters beyond four digits have another form in JSON.
     if name.chars().all(|c| (c as u32) < 0xd800) {
         let gltf = format!(
             r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"buffers":[{{"byteLength":36,"uri":"{quoted}"}}],
@@ -93,7 +93,7 @@ fn check(file: &str, text: &str) {
     }
 }
 
-/// A name of no file.
+/// Returns `true` for a name that belongs to no file.
 fn is_made_up(path: &Path) -> bool {
     !path.exists()
 }

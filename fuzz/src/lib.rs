@@ -1,4 +1,4 @@
-//! What the targets do with their bytes. Each function panics where a promise is broken, and nowhere else.
+//! The bodies of the fuzz targets. Each function panics where a promise is broken, and nowhere else.
 
 pub mod bake;
 pub mod files;
@@ -7,7 +7,7 @@ pub mod settings;
 pub mod sight;
 pub mod world;
 
-// The command's settings are built once more (`settings`), and ask for these by the name of its library.
+// The command's settings (`settings`) are compiled again here, and refer to these modules by the name of its library.
 extern crate self as enfilade_cli;
 #[doc(hidden)]
 #[path = "../../crates/enfilade-cli/src/input.rs"]
@@ -16,7 +16,7 @@ pub mod input;
 #[path = "../../crates/enfilade-cli/src/values.rs"]
 pub mod values;
 
-/// Takes numbers off the front of some bytes; zeros when they are used up.
+/// Takes numbers off the front of some bytes; zeros at their end.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {
@@ -33,7 +33,7 @@ impl Numbers<'_> {
         self.take::<1>()[0]
     }
 
-    /// Any `f32`, or of two bytes a plain one in ±128, which hits things more often.
+    /// Returns any `f32`, or a plain one in ±128 from two bytes, which hits things more often.
     fn float(&mut self, is_any: bool) -> f32 {
         if is_any {
             f32::from_le_bytes(self.take())

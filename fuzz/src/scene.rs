@@ -1,4 +1,4 @@
-//! Readers of scenes.
+//! Importers of scenes.
 
 use enfilade_geom::scene::Role;
 use enfilade_import::{
@@ -7,7 +7,7 @@ use enfilade_import::{
     write_pvs_text,
 };
 
-/// glTF, text or binary.
+/// glTF, JSON or binary.
 pub fn gltf(data: &[u8]) {
     check(decode_gltf(data, &options()));
 }
@@ -32,7 +32,7 @@ pub fn stl(data: &[u8]) {
     check(decode_stl(data, &options()));
 }
 
-/// Portal files and text PVS: what is read is written and read alike.
+/// Portal files and text PVS: a decoded file is encoded and decoded alike.
 pub fn prt(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;
@@ -46,7 +46,7 @@ pub fn prt(data: &[u8]) {
     }
 }
 
-/// Small limits, but scenes of any size: most inputs would end at the size check otherwise.
+/// Small limits, but scenes of any extent: most inputs would end at that check otherwise.
 fn options() -> ImportOptions {
     ImportOptions {
         limits: Limits {
@@ -59,7 +59,7 @@ fn options() -> ImportOptions {
     }
 }
 
-/// What is read keeps the scene's promises, can be looked at, written, and read again.
+/// An imported scene keeps the scene's promises, and can be inspected, exported and imported again.
 fn check(result: Result<Imported, ImportError>) {
     let imported = match result {
         Ok(imported) => imported,
@@ -87,7 +87,7 @@ fn check(result: Result<Imported, ImportError>) {
     let report = cleaning_report(scene, Some(&imported.report), &cleaning).expect("good options");
     assert!(!report.to_string().is_empty());
     let mut options = options();
-    // What is written is longer than what was read, and less of it is shared.
+    // The export is longer than the input, since less of it is shared.
     options.limits = Limits {
         max_extent: f64::INFINITY,
         min_extent: 0.0,

@@ -1,4 +1,4 @@
-//! Settings and choices, read by the command's own code.
+//! Settings and choices, parsed by the command's own code.
 
 use std::cell::LazyCell;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use enfilade::geom::scene::Scene;
 
-// The command is no library: its modules are built once more.
+// The command is not a library: its modules are compiled again.
 #[allow(dead_code)]
 #[path = "../../crates/enfilade-cli/src/bake/settings.rs"]
 mod command;
@@ -25,7 +25,7 @@ thread_local! {
     static FILE: LazyCell<PathBuf> = LazyCell::new(|| crate::files::folder().join("settings.toml"));
 }
 
-/// The settings file: understood, or refused with the name of the file.
+/// The settings file: accepted, or rejected with the name of the file.
 pub fn settings(data: &[u8]) {
     with_file(data, |path| {
         let line = Line::try_parse_from([Path::new("bake"), Path::new("--config"), path]);
@@ -37,7 +37,7 @@ pub fn settings(data: &[u8]) {
     });
 }
 
-/// The file of choices: what is read is written and read alike.
+/// The file of choices: decoded and encoded alike.
 pub fn choices(data: &[u8]) {
     let read = |path: &Path| {
         let line = Line::try_parse_from([Path::new("bake"), Path::new("--choices"), path]);

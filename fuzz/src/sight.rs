@@ -14,13 +14,13 @@ use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
 
-/// Evidence and checkpoints begin alike: a mark, a number, the sum of what follows, which is compressed.
+/// Evidence and checkpoints have the same head: magic, a number, and the check sum of the compressed rest.
 const HEAD: usize = 24;
 
-/// A graph, what is known about it, and good files about it.
+/// A graph, the known visibility in it, and valid files about it.
 struct Known {
     graph: SightGraph,
-    /// Visible by lines that stay clear of all edges: whoever calls one of these pairs hidden is wrong.
+    /// Pairs visible by lines that stay clear of all edges: calling one of these hidden is wrong.
     proved: Pvs,
     evidence: Vec<u8>,
     checkpoint: Vec<u8>,
@@ -65,7 +65,7 @@ static KNOWN: LazyLock<Known> = LazyLock::new(|| {
     Known {
         graph,
         proved,
-        evidence: evidence.expect("it was asked for"),
+        evidence: evidence.expect("requested"),
         checkpoint,
     }
 });
@@ -101,7 +101,7 @@ fn search(graph: &SightGraph, config: &VisConfig, resume: Option<Vec<u8>>) -> Op
     }
 }
 
-/// The body of a good file, as a seed.
+/// Returns the body of a valid file, as a seed.
 fn body(file: &[u8]) -> Vec<u8> {
     let mut body = Vec::new();
     ZlibDecoder::new(&file[HEAD..])
@@ -110,7 +110,7 @@ fn body(file: &[u8]) -> Vec<u8> {
     body
 }
 
-/// A file with this body, in which length and sum are right.
+/// Returns a file with this body and a valid length and sum.
 fn packed(head: &[u8], body: &[u8], has_length: bool) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
     encoder.write_all(body).expect("memory takes all");
@@ -126,13 +126,13 @@ fn packed(head: &[u8], body: &[u8], has_length: bool) -> Vec<u8> {
     [&head[..8], second, &sum, &packed].concat()
 }
 
-/// Good bodies of evidence and of a checkpoint.
+/// Returns valid bodies of evidence and of a checkpoint.
 #[must_use]
 pub fn seeds() -> [Vec<u8>; 2] {
     [body(&KNOWN.evidence), body(&KNOWN.checkpoint)]
 }
 
-/// Evidence that is accepted calls nothing hidden that is visible.
+/// Accepted evidence calls no visible cell hidden.
 pub fn evidence(data: &[u8]) {
     let known = &*KNOWN;
     for bytes in [data, &packed(&known.evidence, data, true)] {
@@ -143,7 +143,7 @@ pub fn evidence(data: &[u8]) {
             for b in known.proved.visible_from(CellId(a)) {
                 assert!(
                     visible.contains(b),
-                    "cell {a} sees cell {}, which is called hidden",
+                    "cell {a} sees cell {}, which is claimed hidden",
                     b.0
                 );
             }
@@ -151,7 +151,7 @@ pub fn evidence(data: &[u8]) {
     }
 }
 
-/// A search that goes on from anything finds what is visible.
+/// A search resumed from any checkpoint finds all visible cells.
 pub fn checkpoint(data: &[u8]) {
     let known = &*KNOWN;
     for bytes in [data, &packed(&known.checkpoint, data, false)] {
@@ -162,7 +162,7 @@ pub fn checkpoint(data: &[u8]) {
     }
 }
 
-/// Portal files after they are read: both searches agree, and the evidence is accepted.
+/// Portal files after decoding: both searches agree, and the evidence is accepted.
 pub fn pvs(data: &[u8]) {
     let Some(file) = std::str::from_utf8(data)
         .ok()
@@ -197,12 +197,12 @@ pub fn pvs(data: &[u8]) {
         for b in exact.cells.visible_from(CellId(a)) {
             assert!(
                 exact.cells.sees(b, CellId(a)),
-                "{a} sees {}, and not the other way",
+                "{a} sees {}, but not the reverse",
                 b.0
             );
         }
     }
-    let report = verify_evidence(&graph, &exact.evidence.expect("it was asked for"), None);
+    let report = verify_evidence(&graph, &exact.evidence.expect("requested"), None);
     let report = report.expect("evidence of the search's own");
     assert_eq!(report.n_visible, exact.cells.n_pairs() as u64);
 }
@@ -212,7 +212,7 @@ fn check_holds(all: &Pvs, some: &Pvs) {
         for b in some.visible_from(a) {
             assert!(
                 all.sees(a, b),
-                "cell {} sees cell {}, which was called hidden",
+                "cell {} sees cell {}, which was claimed hidden",
                 a.0,
                 b.0
             );

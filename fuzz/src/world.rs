@@ -1,4 +1,4 @@
-//! Worlds: reading, drawing plans, asking.
+//! Worlds: decoding, reports, queries.
 
 use std::sync::LazyLock;
 
@@ -12,8 +12,8 @@ use enfilade_testkit::{GridParams, room_grid};
 
 use crate::Numbers;
 
-/// The decoder: what it accepts is valid and can be written. Also with the lengths mended, so that
-/// mutations get past them and into what they describe.
+/// The decoder: every world that it accepts is valid and can be encoded. Also with corrected lengths, so that mutations
+/// get past the lengths to the contents.
 pub fn world(data: &[u8]) {
     check(data);
     check(&with_lengths_mended(data));
@@ -27,7 +27,7 @@ fn check(bytes: &[u8]) {
     assert!(encode_glb(&back).expect("and written again") == written);
 }
 
-/// Plan and page: any valid world has them.
+/// Plan and report page, which every valid world has.
 pub fn report(data: &[u8]) {
     let Ok(world) = decode_glb(&with_lengths_mended(data)) else {
         return;
@@ -41,14 +41,14 @@ pub fn report(data: &[u8]) {
     };
     let page = report_html(&world, &parts);
     assert!(page.ends_with("</html>\n"));
-    // Its own script, and none of the world's.
+    // The page has its own script and none from the world.
     assert!(page.matches("<script").count() == 1 && !page.contains("<&>"));
 }
 
 /// A world that keeps its promises.
 static PLAIN: LazyLock<World> = LazyLock::new(|| room_grid(&GridParams::offices(6, 3)));
 
-/// What programs ask each frame: a few questions, then the world, or a plain one where that cannot be read.
+/// Per-frame queries: the input holds a few queries, then a world; a plain world if that cannot be decoded.
 pub fn run_time(data: &[u8]) {
     const QUESTIONS: usize = 96;
     let (questions, rest) = data.split_at(data.len().min(QUESTIONS));
@@ -106,20 +106,20 @@ pub fn run_time(data: &[u8]) {
     assert_eq!(picked.is_ok(), is_finite);
     if let Ok(Some(hit)) = picked {
         assert!((0.0..=1.0).contains(&hit.t), "{hit:?}");
-        // Details stop no sight.
+        // Details do not block sight.
         let is_detail = matches!(hit.target, Target::Detail { .. });
         assert!(is_detail || !lines.is_clear(&state, a, b), "{hit:?}");
     }
     let [whole, by_cells] = [lines.first_hit(a, b), lines.first_hit_by_cells(a, b)]
         .map(|hit| hit.map(|h| h.t.to_bits()));
-    // Where a world lies about what is in which cell, following the cells finds other walls.
+    // If the decoded world is inconsistent about its cells, following the cells finds other walls.
     assert!(
         decoded.is_some() || whole == by_cells,
         "{whole:?} {by_cells:?}"
     );
 }
 
-/// A seed: four rooms, a leaf in each doorway, half of them of glass.
+/// Returns a seed: four rooms with a leaf in each doorway, half of them of glass.
 #[must_use]
 pub fn with_doors() -> Vec<u8> {
     let grid = GridParams {
@@ -160,7 +160,7 @@ fn look(sight: &Sight, state: &SightState, world: &World, view: Option<View>, ki
                 .all(|&i| (i as usize) < draw.batch(world).primitive.positions.len())
         );
     }
-    // The eye's own room is always seen, unless it is locked.
+    // The eye's own room is always visible, unless it is locked.
     if let Some(cell) = sight.locate(view.eye()) {
         assert!(
             cells.contains(&cell) || state.is_locked(cell),
@@ -169,7 +169,7 @@ fn look(sight: &Sight, state: &SightState, world: &World, view: Option<View>, ki
     }
 }
 
-/// Sets the lengths in the header and before both chunks to what the bytes hold.
+/// Sets the lengths in the header and before both chunks to those of the bytes.
 fn with_lengths_mended(data: &[u8]) -> Vec<u8> {
     let mut out = data.to_vec();
     if out.len() < 20 {

@@ -1,4 +1,4 @@
-//! What the tests need of the system: says what is missing, and installs what it can by apt-get.
+//! System packages that tests need: reports missing ones, and installs those that apt-get provides.
 
 use std::process::Command;
 
@@ -6,7 +6,7 @@ use anyhow::bail;
 
 use crate::run_to_end;
 
-/// Something of the system, and the packages that bring it.
+/// A system requirement, and the packages that provide it.
 pub(crate) struct Need {
     what: &'static str,
     why: &'static str,
@@ -14,8 +14,8 @@ pub(crate) struct Need {
     is_there: fn() -> bool,
 }
 
-/// What draws the pictures of the tests, and the display that windows open on: nothing but Linux has
-/// these; elsewhere the window's test is not built.
+/// Software that draws the pictures of the tests, and the display on which windows open. Only Linux has these;
+/// elsewhere the window's test is not built.
 pub(crate) const NEEDS: [Need; 4] = [
     Need {
         what: "a C++ compiler",
@@ -43,7 +43,7 @@ pub(crate) const NEEDS: [Need; 4] = [
     },
 ];
 
-/// What tests use if it is there, and pass without: not every system has a package of it.
+/// Software that tests use if present, and pass without: not every system has a package of it.
 pub(crate) const WANTS: [Need; 1] = [Need {
     what: "Chromium",
     why: "opens the page that `report` writes, and points at it",
@@ -51,10 +51,10 @@ pub(crate) const WANTS: [Need; 1] = [Need {
     is_there: || has_tool("chromium") || has_tool("chromium-browser"),
 }];
 
-/// Installs what is missing of `wants`, or says that it is not there.
+/// Installs the missing ones of `wants`, or reports that they are missing.
 pub(crate) fn try_install(wants: &[Need], apt: impl FnMut(&[&str]) -> anyhow::Result<()>) {
     if let Err(why) = install(wants, apt) {
-        println!("{why:#}\nits test says so and passes");
+        println!("{why:#}\nits test skips itself");
     }
 }
 
@@ -75,7 +75,7 @@ fn has_tool(name: &str) -> bool {
     std::env::split_paths(&path).any(|dir| dir.join(name).is_file())
 }
 
-/// Installs what is missing of `needs`; says so, or says what to type.
+/// Installs the missing ones of `needs` and reports them, or the command to install them.
 ///
 /// `apt` runs apt-get with its arguments.
 pub(crate) fn install(
@@ -100,7 +100,7 @@ pub(crate) fn install(
         .map(|n| n.what)
         .collect();
     match done {
-        // An update may fail for one of many sources and the packages come all the same.
+        // An update may fail for one of many sources, and the install still succeed.
         _ if left.is_empty() => Ok(()),
         Ok(()) => bail!(
             "still missing after apt-get installed {}: {}",
@@ -108,14 +108,14 @@ pub(crate) fn install(
             left.join(", ")
         ),
         Err(why) => bail!(
-            "missing: {}; `apt-get install {}` or alike ({why:#})",
+            "missing: {}; `apt-get install {}` or equivalent ({why:#})",
             left.join(", "),
             packages.join(" ")
         ),
     }
 }
 
-/// Runs apt-get, which asks nothing.
+/// Runs apt-get without prompts.
 pub(crate) fn apt_get(args: &[&str]) -> anyhow::Result<()> {
     let mut command = Command::new("apt-get");
     run_to_end(command.args(args).env("DEBIAN_FRONTEND", "noninteractive"))
@@ -169,7 +169,7 @@ mod tests {
             "{why}"
         );
         assert!(why.contains("apt-get install thing libthing"), "{why}");
-        // apt says it is done, and the thing is not there.
+        // apt reports success, but the tool is still missing.
         assert!(install(&[need(|| false)], |_| Ok(())).is_err());
     }
 

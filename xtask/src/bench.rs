@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: how time and memory of a bake grow with the building, the voxel kernels beside other
+//! `cargo xtask bench`: growth of time and memory of a bake with the building, the voxel kernels beside other
 //! implementations, and the tables of `enfilade-bench`.
 
 use std::fmt::Write as _;
@@ -14,8 +14,8 @@ use crate::{RELEASE, output_of, root, run_to_end, target_dir, write_between_mark
 /// Rooms of the towers, a factor of 4 apart.
 const SIZES: [usize; 4] = [16, 64, 256, 1024];
 
-/// Prints the table of growth, and puts it into `docs/benchmarks/growth.md` if `is_written`. With
-/// `peers`, the folder of the scripts that make the kernels' inputs, the kernels' table too.
+/// Prints the table of growth, and writes it to `docs/benchmarks/growth.md` if `is_written`. With `peers`, the folder
+/// of the scripts that generate the kernels' inputs, also prints the kernels' table.
 pub(crate) fn run(peers: Option<&Path>, is_written: bool) -> anyhow::Result<()> {
     if let Some(peers) = peers {
         kernels(peers)?;
@@ -23,7 +23,7 @@ pub(crate) fn run(peers: Option<&Path>, is_written: bool) -> anyhow::Result<()> 
     growth(is_written)
 }
 
-/// Runs the table that `args` begin with; its exit code is ours.
+/// Runs the table named by the first of `args`; returns its exit code.
 pub(crate) fn measure(args: &[String]) -> ExitCode {
     let run = || {
         run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-bench"]))?;
@@ -119,11 +119,11 @@ fn growth(is_written: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A tower's bake.
+/// The bake of a tower.
 struct Tower {
-    /// By the generator's truth; it makes whole storeys.
+    /// From the generator's truth; it makes whole storeys.
     n_rooms: usize,
-    /// Found indoors.
+    /// Cells indoors.
     n_cells: usize,
     triangles: f64,
     voxels: f64,
@@ -172,7 +172,7 @@ fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     })
 }
 
-/// The lines `NAME  1.23 s` that `bake -v` prints among others; names are words, and the estimate at the beginning is a sentence.
+/// Returns the lines `NAME  1.23 s` of `bake -v`. Names are words; the estimate at the beginning is a sentence.
 fn stage_times(said: &str) -> Vec<(String, String)> {
     said.lines()
         .filter_map(|line| {
@@ -184,7 +184,7 @@ fn stage_times(said: &str) -> Vec<(String, String)> {
         .collect()
 }
 
-/// What a command took.
+/// Resources used by a command.
 struct Used {
     /// Standard error.
     said: String,
@@ -192,7 +192,7 @@ struct Used {
     wall: f64,
     /// User time of all threads. [Units: s]
     user: f64,
-    /// Most resident memory. [Units: bytes]
+    /// Largest resident memory. [Units: bytes]
     peak: f64,
 }
 

@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that must hold before a change lands.
+//! `cargo xtask test`: all checks that must pass before a change lands.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,13 +11,13 @@ use crate::{
     scenes, score, target_dir, tidy,
 };
 
-/// Segments and rays tested on each scene; the whole 10⁷ are run by hand.
+/// Segments and rays tested on each scene; the full 10⁷ are run by hand.
 const RAYS: &str = "200000";
 
 /// Views of each scene in which the run-time's answer, details included, is compared with what rays hit.
 const SIGHT_VIEWS: &str = "200";
 
-/// Runs all steps, stops at the first that fails, and prints `N passed, N failed` last.
+/// Runs all steps, stops at the first failure, and prints `N passed, N failed` last.
 pub(crate) fn run() -> anyhow::Result<()> {
     let start = Instant::now();
     let mut steps = Steps { passed: 0 };
@@ -45,7 +45,7 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     })?;
     steps.step("tests", || {
         let mut tests = GATE.cargo("test", &["--workspace"]);
-        // The window's test skips itself where it has no display, but not here.
+        // The window's test skips itself without a display, but not here.
         run_to_end(
             tests
                 .env("NODE_PATH", node_path())
@@ -62,7 +62,7 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
         run_to_end(&mut GATE.cargo("build", &["--workspace"]))
     })?;
     steps.step("fuzz", || {
-        // A workspace of its own, which nothing above builds.
+        // A separate workspace, which no step above builds.
         let mut check = cargo(&[
             "check",
             "--manifest-path",
@@ -109,13 +109,13 @@ fn tools_dir() -> PathBuf {
     target_dir().join("tools")
 }
 
-/// The folder of packages for node that tests need.
+/// Returns the folder of node packages that tests need.
 pub(crate) fn node_path() -> PathBuf {
     tools_dir().join("node_modules")
 }
 
-/// Says what is missing, a line each, and installs what it can: the Khronos glTF validator, a package
-/// for node, which goes below the target folder, and what `apt` knows.
+/// Reports missing tools, a line each, and installs those it can: the Khronos glTF validator, a node package, below the
+/// target folder, and the packages of `apt`.
 fn tools() -> anyhow::Result<()> {
     let has = |name: &str| {
         Command::new(name)
@@ -131,7 +131,7 @@ fn tools() -> anyhow::Result<()> {
     let missing: Vec<String> = needed
         .iter()
         .filter(|n| !has(n.0))
-        .map(|(name, why, how)| format!("missing: {name}, which {why}; `{how}` or alike"))
+        .map(|(name, why, how)| format!("missing: {name}, which {why}; `{how}` or equivalent"))
         .collect();
     if !missing.is_empty() {
         bail!("{}", missing.join("\n"));
@@ -173,8 +173,8 @@ fn validate(world: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Tests the promises of a world. With the folder of its scene, the triangles of the scene's own files decide what
-/// blocks, not those that the world says it holds.
+/// Tests the promises of a world. With the folder of its scene, the triangles of the scene's files block, not those
+/// that the world contains.
 fn verify(world: &Path, scene: Option<&Path>) -> anyhow::Result<()> {
     let mut command = Command::new(GATE.binary("enfilade"));
     command.arg("verify").arg(world).args(["--rays", RAYS]);
@@ -186,7 +186,7 @@ fn verify(world: &Path, scene: Option<&Path>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Packs every crate that is to be published, as if those that it uses were published already; builds none of them.
+/// Packs every crate that will be published, as if its dependencies were published already; builds none of them.
 fn package() -> anyhow::Result<()> {
     let args = [
         "package",
@@ -202,7 +202,7 @@ fn package() -> anyhow::Result<()> {
 
 fn demo() -> anyhow::Result<()> {
     let dir = target_dir().join("demo");
-    // Files of an earlier version are in the way.
+    // Files of an earlier version would be in the way.
     let _ = std::fs::remove_dir_all(&dir);
     let mut demo = Command::new(GATE.binary("enfilade"));
     print!("{}", output_of(demo.arg("demo").arg("-o").arg(&dir), None)?);
@@ -216,7 +216,7 @@ fn name_of(scene: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Where the world of the scene `name` is baked to.
+/// Returns the path of the world baked from the scene `name`.
 fn world_of(name: &str) -> PathBuf {
     target_dir().join("scenes").join(name).with_extension("glb")
 }
@@ -233,7 +233,7 @@ fn check_scene(scene: &Path, name: &str) -> anyhow::Result<()> {
     check_order(scene, name, &world)
 }
 
-/// Bakes the scene once more, with its triangles, vertices, nodes and all other lists shuffled: not a byte may differ.
+/// Bakes the scene again with its triangles, vertices, nodes and all other lists shuffled: the bytes must not differ.
 fn check_order(scene: &Path, name: &str, world: &Path) -> anyhow::Result<()> {
     let folder = target_dir().join("scenes").join(format!("{name}-shuffled"));
     let mut generate = Command::new(GATE.binary("examples/generate"));
@@ -254,7 +254,7 @@ fn check_order(scene: &Path, name: &str, world: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Scores the worlds that were just baked; fails where a figure lies below its floor.
+/// Scores the freshly baked worlds; fails if a figure lies below its floor.
 fn check_scores(scenes: &[PathBuf]) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for scene in scenes.iter().filter(|s| s.join("truth.json").is_file()) {

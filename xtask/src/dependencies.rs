@@ -1,8 +1,7 @@
-//! What our dependencies may be, by `deny.toml`: their licenses, where they come from, and which are there in several
-//! versions.
+//! Checks of dependencies against `deny.toml`: licenses, sources, and duplicate versions.
 //!
-//! `cargo deny` reads the same file and knows more (the texts of licenses, advisories), but takes minutes to build. So the
-//! gate runs it where it is installed, and this, which needs nothing but cargo, everywhere.
+//! `cargo deny` reads the same file and checks more (license texts, advisories), but takes minutes to build. So the
+//! gate runs it only where it is installed, and these checks, which need only cargo, everywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +10,7 @@ use serde_json::Value;
 
 use crate::{cargo, output_of, root, run_to_end};
 
-/// Where all that is not ours must come from.
+/// The only allowed source of other people's packages.
 const REGISTRY: &str = "registry+https://github.com/rust-lang/crates.io-index";
 
 /// Fails with a line for each problem.
@@ -33,7 +32,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// As [`run`], and `cargo deny` where it is installed; without the advisories, which need the network.
+/// Same as [`run`], plus `cargo deny` if it is installed; without advisories, which need the network.
 pub(crate) fn run_with_tool() -> anyhow::Result<()> {
     run()?;
     let version = cargo(&["deny", "--version"]).output();
@@ -51,7 +50,7 @@ struct Package {
     name: String,
     version: String,
     license: String,
-    /// `None` for ours.
+    /// `None` for our own packages.
     source: Option<String>,
 }
 
@@ -67,10 +66,10 @@ fn packages(metadata: &Value) -> Vec<Package> {
     .collect()
 }
 
-/// What `deny.toml` says.
+/// The rules of `deny.toml`.
 struct Rules {
     licenses: BTreeSet<String>,
-    /// Names and beginnings of versions that may stand beside another.
+    /// Names and beginnings of versions that may exist beside another.
     skipped: Vec<(String, String)>,
 }
 
@@ -129,7 +128,7 @@ impl Rules {
             let left = found.iter().filter(|v| !is_skipped(v)).count();
             if left > 1 {
                 problems.push(format!(
-                    "{name} is there as {}: update, or skip one with a reason in deny.toml",
+                    "{name} has several versions, {}: update, or skip one with a reason in deny.toml",
                     found.join(" and ")
                 ));
             }
@@ -144,13 +143,13 @@ impl Rules {
     }
 }
 
-/// Whether `version` is one of those that `beginning` stands for: `0.38` for `0.38.44`.
+/// Returns `true` if `version` begins with the parts of `beginning`: `0.38` for `0.38.44`.
 fn begins(version: &str, beginning: &str) -> bool {
     let rest = version.strip_prefix(beginning);
     rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
-/// Whether an SPDX expression can be met by these licenses. A slash is an old way to write OR.
+/// Returns `true` if these licenses can satisfy an SPDX expression. A slash is an old form of OR.
 fn is_allowed(expression: &str, licenses: &BTreeSet<String>) -> bool {
     let spaced = expression
         .replace('(', " ( ")
@@ -161,7 +160,7 @@ fn is_allowed(expression: &str, licenses: &BTreeSet<String>) -> bool {
     is_met == Some(true) && words.is_empty()
 }
 
-/// Terms joined by OR, the last of `words` first; `None` where they are no expression.
+/// Evaluates terms joined by OR, the last of `words` first; `None` if they are not an expression.
 fn any(words: &mut Vec<&str>, licenses: &BTreeSet<String>) -> Option<bool> {
     let mut is_met = all(words, licenses)?;
     while words.last() == Some(&"OR") {
@@ -171,7 +170,7 @@ fn any(words: &mut Vec<&str>, licenses: &BTreeSet<String>) -> Option<bool> {
     Some(is_met)
 }
 
-/// Terms joined by AND.
+/// Evaluates terms joined by AND.
 fn all(words: &mut Vec<&str>, licenses: &BTreeSet<String>) -> Option<bool> {
     let mut is_met = term(words, licenses)?;
     while words.last() == Some(&"AND") {
@@ -250,7 +249,7 @@ mod tests {
             ["deny.toml: old:0.3 need not be skipped"]
         );
         let three = [&two[..], &[package("old", "1.0.0", "MIT")]];
-        assert!(rules.problems(&three.concat())[0].starts_with("old is there as"));
+        assert!(rules.problems(&three.concat())[0].starts_with("old has several versions"));
         assert!(Rules::parse(&RULES.replace(", reason = \"someone\"", "")).is_err());
     }
 

@@ -1,8 +1,8 @@
-//! Which features of `docs/features.md` a test names.
+//! Coverage of `docs/features.md` by tests.
 //!
-//! A test that holds a feature's promise says so in a comment, `Covers R3.` or `Covers Q1, Q4 and Q5.`, and so does a
-//! file of tests for all that is in it. A test that names a feature which is not listed is an error; features that
-//! no test names are printed.
+//! A test of a feature's promise names it in a comment, `Covers R3.` or `Covers Q1, Q4 and Q5.`; a file of tests may
+//! do so for all its tests. A test that names an unlisted feature is an error; features that no test names are
+//! printed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -11,7 +11,7 @@ use anyhow::{Context, bail};
 
 use crate::{output_of, root};
 
-/// Prints how many features are covered and which are not.
+/// Prints the number of covered features, and the uncovered ones.
 pub(crate) fn run() -> anyhow::Result<()> {
     let page = root().join("docs/features.md");
     let page = std::fs::read_to_string(&page).with_context(|| page.display().to_string())?;
@@ -58,7 +58,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The ids in the first column of the page's tables.
+/// Returns the ids in the first column of the page's tables.
 fn listed(page: &str) -> BTreeSet<String> {
     page.lines()
         .filter_map(|l| l.strip_prefix("| "))
@@ -68,7 +68,7 @@ fn listed(page: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// A capital and a number.
+/// Returns `true` for a capital letter followed by a number.
 fn is_id(word: &str) -> bool {
     let mut chars = word.chars();
     chars.next().is_some_and(|c| c.is_ascii_uppercase())
@@ -76,7 +76,7 @@ fn is_id(word: &str) -> bool {
         && chars.all(|c| c.is_ascii_digit())
 }
 
-/// The ids after each `Covers` in comments.
+/// Returns the ids after each `Covers` in comments.
 fn named(text: &str) -> BTreeSet<String> {
     let mut ids = BTreeSet::new();
     for comment in text.lines().filter_map(|l| l.split_once("//")).map(|l| l.1) {

@@ -1,14 +1,13 @@
-//! The least score that each real scene must keep.
+//! The minimum scores of the real scenes.
 //!
-//! A floor lies 0.01 below the figure in `docs/benchmarks/rooms.md`: rounding passes, one room or door less does
-//! not. Where figures get better, write them (`cargo xtask score --write`) and raise the floors here; a test
-//! compares the two.
+//! A floor lies 0.01 below the figure in `docs/benchmarks/rooms.md`: rounding passes, one room or door less does not.
+//! When figures improve, write them (`cargo xtask score --write`) and raise the floors here; a test compares the two.
 
 use anyhow::bail;
 
 use crate::score::{COLUMNS, Row};
 
-/// The least shares of rooms, doors and windows: the first three of [`COLUMNS`].
+/// The minimum shares of rooms, doors and windows: the first three of [`COLUMNS`].
 struct Floor {
     scene: &'static str,
     shares: [f64; 3],
@@ -41,7 +40,7 @@ const FLOORS: [Floor; 6] = [
     },
 ];
 
-/// Fails with a line for each figure below its floor. Scenes without a floor pass, and are named.
+/// Fails with a line for each figure below its floor. Scenes without a floor pass, but are listed.
 pub(crate) fn check(rows: &[Row]) -> anyhow::Result<()> {
     let mut low = Vec::new();
     for row in rows {
@@ -57,7 +56,7 @@ pub(crate) fn check(rows: &[Row]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The figures that lie below their floors, or are not there.
+/// Returns the figures that are below their floors or missing.
 fn below(floor: &Floor, shares: [Option<f64>; 3]) -> Vec<String> {
     (0..3)
         .filter(|&k| !shares[k].is_some_and(|share| share >= floor.shares[k]))

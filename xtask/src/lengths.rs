@@ -1,18 +1,18 @@
-//! Files and functions that are too long to be read at once.
+//! Limits on the length of files and functions.
 //!
-//! Tests do not count as functions, and their files may be longer: a list of cases is read one by one.
+//! Test functions are exempt, and files of tests may be longer: a list of cases is read one by one.
 
 use std::collections::BTreeMap;
 
-/// Lines a source file may have.
+/// Most lines of a source file.
 const MAX_FILE: usize = 600;
-/// Lines a file of tests may have.
+/// Most lines of a file of tests.
 const MAX_TEST_FILE: usize = 800;
-/// Lines a function may have, from `fn` to its closing brace.
+/// Most lines of a function, from `fn` to its closing brace.
 const MAX_FUNCTION: usize = 100;
 
-/// A line for each file and function among `sources` (path in the repository, text) that is too long. Time grows
-/// with the length of all files.
+/// Returns a line for each file and function in `sources` (path in the repository, text) that is too long. O(length
+/// of all files).
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
     let line = |((file, function), n): ((&str, &str), usize)| {
         let (place, limit) = match function {
@@ -24,7 +24,7 @@ pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
     too_long(sources).into_iter().map(line).collect()
 }
 
-/// Lines by file and function; the function is empty where the file itself is too long.
+/// Lines by file and function; the function is empty if the file itself is too long.
 type Lengths<'a> = BTreeMap<(&'a str, &'a str), usize>;
 
 fn too_long(sources: &BTreeMap<String, String>) -> Lengths<'_> {
@@ -37,7 +37,7 @@ fn too_long(sources: &BTreeMap<String, String>) -> Lengths<'_> {
         if is_test(file) {
             continue;
         }
-        // Unit tests stand at the foot of the file.
+        // Unit tests stand at the end of the file.
         let end = text.find("\n#[cfg(test)]\nmod tests {");
         for (name, n) in functions(&text[..end.unwrap_or(text.len())]) {
             if n > MAX_FUNCTION {
@@ -61,7 +61,7 @@ fn is_test(file: &str) -> bool {
     file.contains("/tests/") || file.ends_with("tests.rs")
 }
 
-/// Names of the functions with bodies, and their lines from `fn` to the closing brace.
+/// Returns the names of functions with bodies, and their lines from `fn` to the closing brace.
 fn functions(text: &str) -> Vec<(&str, usize)> {
     let code = without_literals(text);
     let mut out = Vec::new();
@@ -71,7 +71,7 @@ fn functions(text: &str) -> Vec<(&str, usize)> {
         }
         let name = &text[at + 3..];
         let name = &name[..name.find(|c| !is_word(c)).unwrap_or(name.len())];
-        // A pointer's type or a macro's variable has no name here, a trait's declaration no body.
+        // The type of a function pointer and a macro's variable have no name here, a trait's declaration no body.
         let n = body_end(&code[at..]).map(|end| code[at..at + end].matches('\n').count() + 1);
         if let Some(n) = n.filter(|_| !name.is_empty()) {
             out.push((name, n));
@@ -84,9 +84,9 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// Where the body of the function ends that `code` begins with; `None` where a semicolon comes first.
+/// Returns the end of the body of the function at the start of `code`; `None` if a semicolon comes first.
 fn body_end(code: &str) -> Option<usize> {
-    // Braces in brackets of the signature, as in `[u8; { N }]`, do not begin the body.
+    // Braces within brackets of the signature, as in `[u8; { N }]`, do not start the body.
     let mut depth = 0_usize;
     let mut is_body = false;
     for (i, c) in code.char_indices() {
@@ -104,7 +104,7 @@ fn body_end(code: &str) -> Option<usize> {
     None
 }
 
-/// The text with comments, strings and characters blanked, byte for byte; line breaks stay.
+/// Returns the text with comments, strings and characters blanked, byte for byte; line breaks stay.
 fn without_literals(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -123,7 +123,7 @@ fn without_literals(text: &str) -> String {
     out
 }
 
-/// Bytes of the comment, string or character that `rest` begins with; `None` where it begins with none.
+/// Returns the length of the comment, string or character at the start of `rest`, in bytes; `None` if there is none.
 fn literal(rest: &str, is_in_word: bool) -> Option<usize> {
     let to = |end: Option<usize>| Some(end.unwrap_or(rest.len()));
     if rest.starts_with("//") {
@@ -136,7 +136,7 @@ fn literal(rest: &str, is_in_word: bool) -> Option<usize> {
         return to(quoted(rest, '"'));
     }
     if let Some(inner) = rest.strip_prefix('\'') {
-        // A character has one, or an escape; a lifetime has no second quote there.
+        // A character literal holds one character or an escape; a lifetime has no second quote there.
         let mut inner = inner.chars();
         let first = inner.next()?;
         let is_char = first == '\\' || inner.next() == Some('\'');
@@ -157,7 +157,7 @@ fn literal(rest: &str, is_in_word: bool) -> Option<usize> {
     to(end.map(|end| rest.len() - inner.len() + end))
 }
 
-/// Where a comment that may hold others ends.
+/// Returns the end of a comment that may contain others.
 fn block_comment(rest: &str) -> Option<usize> {
     let (mut depth, mut at) = (0_usize, 0);
     loop {
@@ -172,7 +172,7 @@ fn block_comment(rest: &str) -> Option<usize> {
     }
 }
 
-/// Where a literal ends that begins and ends with `quote`, and may hold escaped ones.
+/// Returns the end of a literal that begins and ends with `quote`, and may contain escaped quotes.
 fn quoted(rest: &str, quote: char) -> Option<usize> {
     let mut is_escaped = false;
     for (i, c) in rest.char_indices().skip(1) {

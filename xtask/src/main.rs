@@ -1,7 +1,6 @@
 //! The project's chores: `cargo xtask test | tidy | score | bench`.
 //!
-//! `test` is what decides whether a change may land; `score` and `bench` print the tables of
-//! `docs/benchmarks/`.
+//! `test` decides whether a change may land; `score` and `bench` print the tables of `docs/benchmarks/`.
 
 mod apt;
 mod bench;
@@ -33,22 +32,22 @@ usage: cargo xtask test
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
-  tidy    of these, what needs no build: who may use whom, lengths, links, licenses and versions of
-          dependencies, features that tests name
-  score   rooms and doors found, against the rooms that architects modeled
+  tidy    the checks of these that need no build: dependencies between crates, lengths, wording, links,
+          licenses and versions of dependencies, features that tests name
+  score   rooms and doors found, compared with those that architects modeled
   bench   growth of time and memory with the size of an office tower; with --peers, the voxel
           kernels beside other implementations too (scripts/bench_kernels.py);
-          messy: what becomes of rooms and doors when models are spoilt, a row a figure; --rows
+          messy: robustness of rooms and doors against disturbed models, a row per figure; --rows
           (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
-          choose by how names begin;
-          trust: hostile and huge input, a row a figure; --rows (bound, case, commands, estimate, gate, habits, large,
-          mutated, nasty, order, tampered, tight) chooses; --count and --from choose the damaged files of `mutated` and
+          select by beginnings of names;
+          trust: hostile and huge input, a row per figure; --rows (bound, case, commands, estimate, gate, habits, large,
+          mutated, nasty, order, tampered, tight) selects; --count and --from select the damaged files of `mutated` and
           the shuffles of `order`, --scenes its scenes;
           any other NAME (bring, bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
           docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
 
---write puts the table into docs/benchmarks/. Real scenes (folders with a scene.glb) are looked for
-in $ENFILADE_SCENES, then in ../shared/scenes.";
+--write writes the table to docs/benchmarks/. Real scenes (folders with a scene.glb) are searched in
+$ENFILADE_SCENES, then in ../shared/scenes.";
 
 fn main() -> ExitCode {
     let Some(task) = Task::parse(std::env::args().skip(1)) else {
@@ -77,7 +76,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What is asked for.
+/// A parsed task.
 enum Task {
     Test,
     Tidy,
@@ -96,7 +95,7 @@ enum Task {
 }
 
 impl Task {
-    /// `None` for arguments that mean nothing.
+    /// Returns `None` for invalid arguments.
     fn parse(mut args: impl Iterator<Item = String>) -> Option<Self> {
         let name = args.next()?;
         let (mut is_written, mut dirs, mut peers) = (false, Vec::new(), None);
@@ -108,7 +107,7 @@ impl Task {
             let is_name = arg != "messy" && !arg.starts_with('-');
             let asks_help = ["--help", "-h"].contains(&arg.as_str());
             if name == "bench" && messy.is_none() && (is_name || asks_help) {
-                // Nothing of growth and kernels goes before the name.
+                // Options of growth and kernels must not precede the name.
                 let is_first = !is_written && peers.is_none();
                 return is_first.then(|| Self::Measure([arg].into_iter().chain(args).collect()));
             }
@@ -163,31 +162,31 @@ impl Task {
     }
 }
 
-/// The workspace's root: the checkout that `cargo xtask` was called in, even where the binary was built in another
-/// that shares its target folder.
+/// Returns the workspace's root: that of the checkout in which `cargo xtask` was called, even if the binary was built
+/// in another one that shares its target folder.
 fn root() -> PathBuf {
     let here = std::env::var_os("CARGO_MANIFEST_DIR")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
     here.parent().unwrap_or(&here).to_path_buf()
 }
 
-/// Where builds go. A relative `CARGO_TARGET_DIR` is meant from the root, where cargo is run.
+/// Returns the folder of builds. A relative `CARGO_TARGET_DIR` starts at the root, where cargo runs.
 fn target_dir() -> PathBuf {
     root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// A profile of `Cargo.toml` that commands are built with.
+/// A profile of `Cargo.toml` with which commands are built.
 #[derive(Clone, Copy)]
 struct Profile(&'static str);
 
-/// What users get, and what is measured.
+/// For users, and for measurements.
 const RELEASE: Profile = Profile("release");
-/// A release that ends where a `debug_assert!` is wrong or an integer overflows: what the gate runs. All of the
-/// gate uses this one, so that nothing is built twice.
+/// A release that aborts where a `debug_assert!` fails or an integer overflows: for the gate, all of which uses it,
+/// so that nothing is built twice.
 const GATE: Profile = Profile("gate");
 
 impl Profile {
-    /// The binary `name`.
+    /// Returns the path of the binary `name`.
     fn binary(self, name: &str) -> PathBuf {
         target_dir()
             .join(self.0)
@@ -195,12 +194,12 @@ impl Profile {
             .with_extension(std::env::consts::EXE_EXTENSION)
     }
 
-    /// `cargo COMMAND --profile SELF ARGS`, in the root.
+    /// Returns `cargo COMMAND --profile SELF ARGS`, in the root.
     fn cargo(self, command: &str, args: &[&str]) -> Command {
         cargo(&[&[command, "--profile", self.0], args].concat())
     }
 
-    /// The bake of a scene folder with default settings.
+    /// Returns the bake of a scene folder with default settings.
     fn bake_command(self, scene: &Path, world: &Path) -> Command {
         let mut command = Command::new(self.binary("enfilade"));
         command.arg("bake");
@@ -210,7 +209,7 @@ impl Profile {
     }
 }
 
-/// Adds the files of a scene folder to a command, the structure after the option `name` if there is one.
+/// Adds the files of a scene folder to a command, the structure after the option `name` if given.
 fn add_scene_files(command: &mut Command, scene: &Path, name: Option<&str>) {
     command.args(name).arg(scene.join("scene.glb"));
     let detail = scene.join("detail.glb");
@@ -219,19 +218,19 @@ fn add_scene_files(command: &mut Command, scene: &Path, name: Option<&str>) {
     }
 }
 
-/// The folder of real scenes, where there is one.
+/// Returns the folder of real scenes, if there is one.
 fn scenes_dir() -> Option<PathBuf> {
     let dir = std::env::var_os("ENFILADE_SCENES")
         .map_or_else(|| root().join("../shared/scenes"), PathBuf::from);
     dir.is_dir().then_some(dir)
 }
 
-/// The real scenes, by name.
+/// Returns the real scenes, by name.
 fn scenes() -> Vec<PathBuf> {
     scenes_dir().map_or_else(Vec::new, |dir| scenes_in(&dir))
 }
 
-/// The folders with a `scene.glb` in `dir`, by name.
+/// Returns the folders with a `scene.glb` in `dir`, by name.
 fn scenes_in(dir: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(dir) else {
         return Vec::new();
@@ -245,14 +244,14 @@ fn scenes_in(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// A cargo command in the root.
+/// Returns a cargo command in the root.
 fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root()).args(args);
     command
 }
 
-/// Runs to the end; an error names the command.
+/// Runs a command to its end; an error contains the command.
 fn run_to_end(command: &mut Command) -> anyhow::Result<()> {
     let status = command
         .status()
@@ -263,7 +262,7 @@ fn run_to_end(command: &mut Command) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Puts `text` between the two marks of a page of `docs/benchmarks/`; what people wrote around it stays.
+/// Writes `text` between the two marks of a page of `docs/benchmarks/`; text around it stays.
 fn write_between_marks(page: &str, text: &str) -> anyhow::Result<()> {
     const BEGIN: &str = "<!-- written by `cargo xtask";
     const END: &str = "<!-- end -->";
@@ -279,7 +278,7 @@ fn write_between_marks(page: &str, text: &str) -> anyhow::Result<()> {
     std::fs::write(&path, new).with_context(|| path.display().to_string())
 }
 
-/// Standard output of a command that must succeed; what it says goes into the error.
+/// Returns the standard output of a command that must succeed; an error contains its standard error.
 fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<String> {
     use std::io::Write as _;
     use std::process::Stdio;
@@ -295,12 +294,12 @@ fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<Strin
         .with_context(|| format!("cannot start {command:?}"))?;
     if let (Some(text), Some(mut stdin)) = (input, child.stdin.take()) {
         let text = text.to_owned();
-        // In a thread of its own: the child may fill its output before it has read all.
+        // In its own thread: the child may fill its output before it has read all input.
         std::thread::spawn(move || stdin.write_all(text.as_bytes()));
     }
     let done = child.wait_with_output()?;
     if !done.status.success() {
-        // The reports of `verify` and of the validator stand on standard output.
+        // `verify` and the validator print their reports to standard output.
         bail!(
             "{command:?}: {}\n{}{}",
             done.status,

@@ -1,15 +1,15 @@
 //! Files of a crate that import each other: neither can be read, moved or tested without the other.
 //!
-//! Looks at paths that begin with `crate`, `super`, `self` or a child module, in `use` and elsewhere. What a
-//! file only hands on (`pub use`) is looked up where it comes from, and is no import. Tests do not count.
+//! Considers paths that begin with `crate`, `super`, `self` or a child module, in `use` and elsewhere. A re-export
+//! (`pub use`) is followed to its source, and is not an import. Tests are exempt.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How often a name that is handed on is followed.
+/// Most re-exports followed for a name.
 const MAX_HOPS: usize = 8;
 
-/// A line for each pair among `sources` (path in the repository, text) that imports each other. Time grows with the
-/// length of all files.
+/// Returns a line for each pair in `sources` (path in the repository, text) that imports each other. O(length of all
+/// files).
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
     let found = pairs(sources).into_iter();
     found
@@ -17,16 +17,16 @@ pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
         .collect()
 }
 
-/// A source file by what its paths mean.
+/// A source file and its paths.
 struct File {
     /// Modules from the crate's root down.
     module: Vec<String>,
     imports: Vec<Vec<String>>,
-    /// Names handed on, and from where.
+    /// Re-exported names, and their sources.
     exports: BTreeMap<String, Vec<String>>,
 }
 
-/// By module, its file.
+/// The file of each module.
 type Modules<'a> = BTreeMap<&'a [String], &'a str>;
 
 fn pairs(sources: &BTreeMap<String, String>) -> BTreeSet<(String, String)> {
@@ -38,7 +38,7 @@ fn pairs(sources: &BTreeMap<String, String>) -> BTreeSet<(String, String)> {
     }
     let mut out = BTreeSet::new();
     for files in crates.values() {
-        // Of a library and a program in one folder the root is the program's: it comes last.
+        // If a folder holds a library and a program, the root is the program's: it comes last.
         let modules: Modules<'_> = files.iter().map(|(p, f)| (&f.module[..], *p)).collect();
         let mut edges = BTreeSet::new();
         for (&path, file) in files {
@@ -55,7 +55,7 @@ fn pairs(sources: &BTreeMap<String, String>) -> BTreeSet<(String, String)> {
     out
 }
 
-/// The crate's name and what is in the file; `None` for tests and what is no source of a crate.
+/// Returns the crate's name and the file's contents; `None` for tests and files that are not sources of a crate.
 fn read<'a>(path: &'a str, text: &str) -> Option<(&'a str, File)> {
     let (name, rest) = path
         .strip_prefix("crates/")
@@ -102,7 +102,7 @@ fn read<'a>(path: &'a str, text: &str) -> Option<(&'a str, File)> {
     ))
 }
 
-/// What follows `use` on a line that begins one, and whether it hands on.
+/// Returns the rest of a line that begins with `use`, and true for a re-export.
 fn used(line: &str) -> Option<(bool, &str)> {
     let line = line.trim_start();
     if let Some(tree) = line.strip_prefix("use ") {
@@ -116,7 +116,7 @@ fn used(line: &str) -> Option<(bool, &str)> {
     Some((true, rest.trim_start().strip_prefix("use ")?))
 }
 
-/// Adds the paths of a tree as in `a::{b, c::{self, d as e}}`, each with the name that it gets.
+/// Adds the paths of a tree as in `a::{b, c::{self, d as e}}`, each with its new name.
 fn expand(tree: &str, before: &[String], out: &mut Vec<(Vec<String>, String)>) {
     let mut path = before.to_vec();
     let (head, list) = match tree.find('{') {
@@ -156,7 +156,7 @@ fn expand(tree: &str, before: &[String], out: &mut Vec<(Vec<String>, String)>) {
     }
 }
 
-/// Paths in code that begin with `crate` or `super`.
+/// Returns the paths in code that begin with `crate` or `super`.
 fn inline(line: &str) -> Vec<Vec<String>> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let starts = ["crate::", "super::"]
@@ -173,7 +173,7 @@ fn inline(line: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// The file that a path in `module` leads to; `None` for other crates.
+/// Returns the file to which a path in `module` leads; `None` for other crates.
 fn target<'a>(
     files: &BTreeMap<&'a str, File>,
     modules: &Modules<'a>,

@@ -1,9 +1,9 @@
-//! Types of one name in a crate: who reads one takes it for the other.
+//! Distinct names of types in a crate: equal names are easily confused.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A line for each name that two files of a crate give to a type, outside tests. `sources` are texts by their path in
-/// the repository. Time grows with the length of all files.
+/// Returns a line for each name that two files of a crate give to a type, outside tests. `sources` are texts by their
+/// path in the repository. O(length of all files).
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
     let mut files_of: BTreeMap<(&str, &str), BTreeSet<&str>> = BTreeMap::new();
     for (file, text) in sources {
@@ -34,7 +34,7 @@ pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
         .collect()
 }
 
-/// The name of the type that a line declares outside of any function or trait.
+/// Returns the name of the type that a line declares outside of functions and traits.
 fn type_of(line: &str) -> Option<&str> {
     let rest = match line.strip_prefix("pub") {
         Some(rest) if rest.starts_with('(') => rest.split_once(") ")?.1,

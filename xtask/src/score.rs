@@ -1,7 +1,7 @@
-//! `cargo xtask score`: rooms, doors and windows found, against what the architects modeled.
+//! `cargo xtask score`: rooms, doors and windows found, compared with those that architects modeled.
 //!
-//! A scene folder with a `truth.json` is baked with default settings and asked through `inspect
-//! --json` and `locate`, as a user would. What is counted stands in `docs/benchmarks/rooms.md`.
+//! A scene folder with a `truth.json` is baked with default settings and queried through `inspect --json` and
+//! `locate`, as a user would. `docs/benchmarks/rooms.md` defines the figures.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -45,7 +45,7 @@ pub(crate) fn vec3(v: &Value) -> Option<V3> {
     ])
 }
 
-/// Centroid and area of a convex polygon.
+/// Returns centroid and area of a convex polygon.
 pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
     let (mut center, mut area) = ([0.0; 3], 0.0);
     for i in 1..points.len().saturating_sub(1) {
@@ -63,11 +63,11 @@ pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
     }
 }
 
-/// One row of the table; `None` where a scene has nothing of the kind.
+/// One row of the table; `None` if a scene has nothing of the kind.
 pub(crate) struct Row {
     pub(crate) name: String,
     n_rooms: usize,
-    /// By [`COLUMNS`].
+    /// In the order of [`COLUMNS`].
     pub(crate) figures: [Option<f64>; 6],
     seconds: f64,
     failed: Vec<String>,
@@ -75,8 +75,8 @@ pub(crate) struct Row {
 
 pub(crate) const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
 
-/// Scores `dirs`, or all the real scenes where that is empty; prints the table, and puts it into
-/// `docs/benchmarks/rooms.md` if `is_written`.
+/// Scores `dirs`, or all real scenes if that is empty; prints the table, and writes it to `docs/benchmarks/rooms.md` if
+/// `is_written`.
 pub(crate) fn run(
     profile: Profile,
     dirs: &[PathBuf],
@@ -98,15 +98,15 @@ pub(crate) fn run(
         .collect::<anyhow::Result<Vec<_>>>()?;
     print(&rows);
     if is_written {
-        // Without seconds: they say more about the machine than about us.
+        // Without seconds: they depend more on the machine than on the program.
         write_between_marks("rooms.md", &table(&rows, false))?;
     }
     Ok(rows)
 }
 
-/// Prints the table, and what was missed in each scene.
+/// Prints the table, and the misses in each scene.
 pub(crate) fn print(rows: &[Row]) {
-    // Worlds that something else baked have no time of a bake.
+    // Worlds baked elsewhere have no time of a bake.
     println!(
         "{}",
         table(rows, rows.iter().all(|r| r.seconds.is_finite()))
@@ -118,7 +118,7 @@ pub(crate) fn print(rows: &[Row]) {
     }
 }
 
-/// Markdown; the last row is the average over the scenes that have a figure.
+/// Returns the table in Markdown; the last row is the average over the scenes that have a figure.
 fn table(rows: &[Row], with_seconds: bool) -> String {
     let show = |f: Option<f64>| f.map_or_else(|| "–".to_owned(), |f| format!("{f:.2}"));
     let seconds = |text: String| {
@@ -161,7 +161,7 @@ fn table(rows: &[Row], with_seconds: bool) -> String {
     out
 }
 
-/// The cell of each point, `-` for none.
+/// Returns the cell of each point, `-` for none.
 pub(crate) fn locate(profile: Profile, world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
     let text: String = points
         .iter()
@@ -188,7 +188,7 @@ fn text(v: &Value) -> String {
     v.as_str().map_or_else(|| v.to_string(), str::to_owned)
 }
 
-/// Rooms joined by boundaries without a wall are one group: telling them apart is optional.
+/// Returns groups of rooms joined by boundaries without a wall: separating those is optional.
 fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
     let mut group: BTreeMap<String, String> = rooms
         .iter()
@@ -216,14 +216,14 @@ fn score_scene(profile: Profile, dir: &Path) -> anyhow::Result<Row> {
     Ok(Row { seconds, ..row })
 }
 
-/// What `inspect --json` says.
+/// Returns the output of `inspect --json`.
 pub(crate) fn inspect(profile: Profile, world: &Path) -> anyhow::Result<Value> {
     let mut command = Command::new(profile.binary("enfilade"));
     command.arg("inspect").arg(world).arg("--json");
     Ok(serde_json::from_str(&output_of(&mut command, None)?)?)
 }
 
-/// Scores a world, with what `inspect` says of it, against the truth in its scene's folder.
+/// Scores a world, given its output of `inspect`, against the truth in its scene's folder.
 pub(crate) fn score_world(
     profile: Profile,
     dir: &Path,
@@ -272,19 +272,19 @@ pub(crate) fn score_world(
     })
 }
 
-/// The elements of an array; none of anything else.
+/// Returns the elements of an array; none of anything else.
 fn list(v: &Value) -> &[Value] {
     v.as_array().map_or(&[], Vec::as_slice)
 }
 
-/// Points in rooms: one entry a point in each list.
+/// Points in rooms; each list has one entry per point.
 struct Samples {
     rooms: Vec<String>,
     /// The group of the room.
     groups: Vec<String>,
-    /// The cell found; a point that is nowhere shares its cell with no other.
+    /// The cell found; a point outside of all cells gets a cell of its own.
     cells: Vec<String>,
-    /// Cells that hold points.
+    /// Number of cells that contain points.
     n_cells: usize,
 }
 
@@ -316,7 +316,7 @@ impl Samples {
         })
     }
 
-    /// Rooms of which nearly all points are in one cell that holds hardly any of other groups.
+    /// Counts rooms with nearly all points in one cell that has hardly any points of other groups.
     fn n_whole_and_alone(&self, rooms: &[Value], failed: &mut Vec<String>) -> usize {
         let mut per_room = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
         let mut per_cell = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
@@ -375,7 +375,7 @@ fn portals_of(graph: &Value) -> Vec<Portal> {
     list(&graph["portals"]).iter().filter_map(portal).collect()
 }
 
-/// Where an opening of the truth is.
+/// The place of an opening of the truth.
 struct Place {
     center: V3,
     normal: V3,
@@ -395,13 +395,13 @@ impl Place {
         })
     }
 
-    /// Points on either side of it.
+    /// Returns points on either side of it.
     fn probes(&self) -> [V3; 2] {
         let far = 0.35 + self.thickness / 2.0;
         [far, -far].map(|t| along(self.center, self.normal, t))
     }
 
-    /// Whether a portal lies in it, and so is none too many.
+    /// Returns `true` if a portal lies in it, and so is not superfluous.
     fn holds(&self, portal: &Portal) -> bool {
         let off = sub(portal.center, self.center);
         let depth = dot(off, self.normal).abs();
@@ -426,7 +426,7 @@ impl FoundOpenings {
     }
 }
 
-/// Looks for a portal of each usable opening's place, size and cells.
+/// Finds a portal at each usable opening's place, of its size and cells.
 fn find_openings(
     openings: &[Value],
     portals: &[Portal],
@@ -463,8 +463,8 @@ fn find_openings(
     Ok(found)
 }
 
-/// Matthews correlation over pairs of points: same room? same cell? Pairs of two rooms in one group
-/// do not count.
+/// Returns the Matthews correlation of "same room" and "same cell" over pairs of points. Pairs from two rooms in one
+/// group do not count.
 fn pair_mcc(rooms: &[String], groups: &[String], cells: &[String]) -> Option<f64> {
     fn pairs<K: Ord>(keys: impl Iterator<Item = K>) -> f64 {
         let mut count: BTreeMap<K, usize> = BTreeMap::new();

@@ -1,5 +1,5 @@
-//! What no lint checks: who may use whom, files that import each other, lengths of files and functions, types of one name, wording
-//! of comments, strings that must not be there, links.
+//! Checks beyond lints: dependencies between crates, files that import each other, lengths of files and functions,
+//! names of types, wording of comments, forbidden strings, links.
 //!
 //! The table here is the "may not" column of ARCHITECTURE.md; change both together.
 
@@ -12,19 +12,19 @@ use serde_json::Value;
 
 use crate::{cargo, lengths, mutual, names, output_of, root, words};
 
-/// What one crate may use. Dependencies for its tests alone are free.
+/// Permitted dependencies of one crate. Dependencies of its tests are exempt.
 struct Fence {
     name: &'static str,
     /// Siblings it may depend on.
     siblings: &'static [&'static str],
     /// Crates of others that it must not depend on.
     not: &'static [&'static str],
-    /// Words that its sources must not hold, outside comments.
+    /// Words that its sources must not contain, outside comments.
     words: &'static [&'static str],
 }
 
 const PRINT: &[&str] = &["println!", "eprintln!", "print!(", "eprint!("];
-/// Ways around the writers of the command, which escape what is printed.
+/// Ways around the command's writers, which escape printed text.
 const RAW: &[&str] = &[
     "println!",
     "eprintln!",
@@ -33,7 +33,7 @@ const RAW: &[&str] = &[
     "stdout()",
     "stderr()",
 ];
-/// Readers of formats and front ends, which have their own crates.
+/// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
 const FENCES: [Fence; 17] = [
@@ -53,7 +53,7 @@ const FENCES: [Fence; 17] = [
         name: "enfilade-import",
         siblings: &["enfilade-geom"],
         not: &["rayon", "anyhow"],
-        // It waits for a converter, and so may sleep.
+        // Waits for a converter, and so may sleep.
         words: &["thread::spawn", "thread::scope", "thread::Builder"],
     },
     Fence {
@@ -139,7 +139,7 @@ const FENCES: [Fence; 17] = [
     },
     Fence {
         name: "enfilade-cli",
-        // The test kit makes the house of `demo`.
+        // The test kit generates the house of `demo`.
         siblings: &[
             "enfilade",
             "enfilade-render",
@@ -170,7 +170,7 @@ const FENCES: [Fence; 17] = [
     },
 ];
 
-/// What every program of the façade links; all else of ours is behind a feature.
+/// Linked by every program that uses the façade; all other crates are behind a feature.
 const FACADE_ALWAYS: [&str; 3] = ["enfilade-geom", "enfilade-cpg", "enfilade-runtime"];
 
 /// Finds all problems, and fails with one line for each.
@@ -192,7 +192,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     let mut n_files = 0;
     let mut sources = BTreeMap::new();
     for file in listed.lines() {
-        // What is no text (images, fuzz seeds), or is deleted but not yet committed.
+        // Skip files that are not text (images, fuzz seeds), or are deleted but not yet committed.
         let Ok(text) = std::fs::read_to_string(root().join(file)) else {
             continue;
         };
@@ -247,11 +247,10 @@ fn dependency_problems(metadata: &Value) -> Vec<String> {
     problems
 }
 
-/// What must stand in no file.
+/// Returns forbidden strings in a file.
 fn text_problems(file: &str, text: &str) -> Vec<String> {
     let mut problems = Vec::new();
-    // Put together here, so that this file does not find itself. The first are absolute paths of
-    // somebody's machine.
+    // Concatenated here, so that this file does not contain them. The first are absolute paths of some machine.
     let forbidden = [
         ["/work", "/"].concat(),
         ["/ho", "me/"].concat(),
@@ -272,7 +271,7 @@ fn text_problems(file: &str, text: &str) -> Vec<String> {
     problems
 }
 
-/// What the sources of a fenced crate must not use.
+/// Returns forbidden words in the sources of a fenced crate.
 fn fence_problems(file: &str, text: &str) -> Vec<String> {
     let Some((name, rest)) = file
         .strip_prefix("crates/")
@@ -286,14 +285,14 @@ fn fence_problems(file: &str, text: &str) -> Vec<String> {
     if !rest.starts_with("src/") || !file.ends_with(".rs") || file.ends_with("tests.rs") {
         return Vec::new();
     }
-    // Libraries are silent; the benchmarks print, and so does the command, by one file that knows how.
+    // Libraries print nothing; the benchmarks print, and so does the command, through one file that escapes its text.
     let print = match name {
         "enfilade-bench" => &[],
         "enfilade-cli" if rest == "src/screen.rs" => &[],
         "enfilade-cli" => RAW,
         _ => PRINT,
     };
-    // Unit tests stand at the foot of the file.
+    // Unit tests stand at the end of the file.
     let end = text.find("\n#[cfg(test)]\nmod tests {");
     let mut problems = Vec::new();
     for (i, line) in text[..end.unwrap_or(text.len())].lines().enumerate() {
@@ -307,7 +306,7 @@ fn fence_problems(file: &str, text: &str) -> Vec<String> {
     problems
 }
 
-/// Links from one page to a file of ours that is not there.
+/// Returns links from a page to missing files of the repository.
 fn link_problems(file: &str, text: &str, exists: &dyn Fn(&Path) -> bool) -> Vec<String> {
     let folder = Path::new(file).parent().unwrap_or(Path::new(""));
     text.match_indices("](")

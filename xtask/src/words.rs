@@ -2,24 +2,8 @@
 //!
 //! A comment line begins with a noun phrase or a verb, says "is not" rather than "is no", and calls the points of a
 //! polygon vertices (`docs/glossary.md`).
-//! Files below [`STILL`] are exempt until they are rewritten; a file leaves the list with the commit that rewrites it.
 
 use std::collections::BTreeMap;
-
-/// Folders and files not rewritten yet. Remove entries; add none.
-const STILL: &[&str] = &[
-    "crates/enfilade-bench/",
-    "crates/enfilade-render/",
-    "crates/enfilade-testkit/examples/generate.rs",
-    "crates/enfilade-testkit/src/disturb.rs",
-    "crates/enfilade-testkit/src/shuffle",
-    "crates/enfilade-testkit/tests/shuffle.rs",
-    "crates/enfilade-verify/",
-    "crates/enfilade-world/src/floors.rs",
-    "crates/enfilade-world/tests/paths.rs",
-    "fuzz/",
-    "xtask/",
-];
 
 /// First words that leave a reader waiting for the noun.
 const OPENINGS: [&str; 5] = ["What", "Whether", "Of", "By", "Who"];
@@ -28,7 +12,6 @@ const OPENINGS: [&str; 5] = ["What", "Whether", "Of", "By", "Who"];
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
     sources
         .iter()
-        .filter(|(file, _)| !STILL.iter().any(|folder| file.starts_with(folder)))
         .flat_map(|(file, text)| {
             faults(text).map(move |(line, fault)| format!("{file}:{line}: {fault}"))
         })
@@ -132,16 +115,6 @@ mod tests {
         assert_eq!(
             found("/// ```\n/// // What corner?\n/// ```\n/// corner\nlet corners = 1;\n"),
             [4]
-        );
-    }
-
-    #[test]
-    fn crates_not_rewritten_yet_are_skipped() {
-        let source = |file: &str| (file.to_owned(), "// What\n".to_owned());
-        let sources = BTreeMap::from([source("crates/new/src/a.rs"), source("fuzz/a.rs")]);
-        assert_eq!(
-            problems(&sources),
-            ["crates/new/src/a.rs:1: begins with What; begin with a noun or a verb"]
         );
     }
 }

@@ -24,7 +24,8 @@ const HEURISTICS: [(&str, Heuristic); 4] = [
     ("max-ortho", Heuristic::MaxOrtho),
 ];
 
-/// One line a scene and heuristic; with a threshold in polygons each is baked to the end, cells merged up to it.
+/// Prints one line per scene and heuristic; with a threshold in polygons, bakes each to the end and merges cells up
+/// to it.
 pub(crate) fn bench_bsp(
     table: &mut Table,
     paths: &[PathBuf],
@@ -57,7 +58,7 @@ pub(crate) fn bench_bsp(
     Ok(())
 }
 
-/// Adds the lines of a scene; its polygons and the seconds of the last one's tree and grouping.
+/// Adds the lines of a scene; returns its polygons and the seconds of the last tree and grouping.
 fn measure(
     table: &mut Table,
     name: &str,
@@ -89,8 +90,7 @@ fn measure(
         let c = bsp.counts();
         size = (c.n_polygons as f64, grouped - start);
         let last = if let Some(min_polygons) = min_polygons {
-            // As in the paper, whose polygons are those of the tree: a polygon costs as many triangles as they have on
-            // average, and objects cost nothing.
+            // The paper counts polygons of the tree: take each as the average number of triangles, and objects as none.
             let min_cost = min_polygons * c.n_triangles as f64 / c.n_polygons.max(1) as f64;
             let mut config = BakeConfig::of(Method::Bsp);
             config.bsp.heuristic = heuristic;
@@ -130,7 +130,7 @@ fn measure(
         ));
         if let Some(leak) = bsp.leak() {
             table.push(format!(
-                "{name} leaks, by a path of {} points",
+                "{name} leaks along a path of {} points",
                 leak.points.len()
             ));
         }
@@ -138,7 +138,7 @@ fn measure(
     Ok(size)
 }
 
-/// Expected triangles a view before and after, by both metrics, at the same share of portals.
+/// Prints expected triangles per view before and after, by both metrics, at the same share of portals.
 pub(crate) fn bench_simplify(table: &mut Table, worlds: &[PathBuf]) -> anyhow::Result<()> {
     const VIEWS: usize = 1000;
     table.push(

@@ -1,4 +1,4 @@
-//! `bench builders`: the same scenes through each builder, compared.
+//! `bench builders`: a comparison of the builders on the same scenes.
 
 use std::path::PathBuf;
 
@@ -13,10 +13,10 @@ use enfilade_verify::{VerifyOptions, verify_world};
 use crate::measure::{cpu_seconds, files_of, name};
 use crate::table::Table;
 
-/// Points that say how far two graphs agree.
+/// Points for the agreement of two graphs.
 const POINTS: usize = 20_000;
 
-/// One line a scene and builder, the watershed first.
+/// Prints one line per scene and builder, the watershed first.
 pub(crate) fn bench_builders(
     table: &mut Table,
     paths: &[PathBuf],
@@ -78,8 +78,8 @@ fn compare(table: &mut Table, name: &str, scene: &Scene, rays: u64) -> anyhow::R
     Ok(())
 }
 
-/// Over pairs of random points that both graphs hold and that do not both lie outdoors: correlation of
-/// "in one cell" between the graphs (Matthews), from 1 for the same rooms to 0 for unrelated ones.
+/// Returns the Matthews correlation of "in one cell" between two graphs, over pairs of random points that lie in both
+/// and are not both outdoors: 1 for the same rooms, 0 for unrelated ones.
 fn agreement(a: &CellPortalGraph, b: &CellPortalGraph) -> f64 {
     let boxes = a.cells.iter().filter(|c| !c.outdoor).map(|c| c.aabb);
     let bounds = boxes.fold(Aabb::EMPTY, |all, [low, high]| {
@@ -104,7 +104,7 @@ fn agreement(a: &CellPortalGraph, b: &CellPortalGraph) -> f64 {
     correlation(&counts)
 }
 
-/// The Matthews correlation of "same row" and "same column" over all pairs of what was counted.
+/// Returns the Matthews correlation of "same row" and "same column" over all pairs of counted points.
 fn correlation(counts: &[Vec<f64>]) -> f64 {
     let pairs = |n: f64| n * (n - 1.0) / 2.0;
     let both: f64 = counts.iter().flatten().map(|&n| pairs(n)).sum();
@@ -116,7 +116,7 @@ fn correlation(counts: &[Vec<f64>]) -> f64 {
     let neither = all - rows - columns + both;
     let product = rows * columns * (all - rows) * (all - columns);
     if product <= 0.0 {
-        // One of them knows one cell only: they agree if the other does, too.
+        // One of them has only one cell: they agree if the other does, too.
         return f64::from(u8::from(rows == columns));
     }
     (both * neither - (rows - both) * (columns - both)) / product.sqrt()

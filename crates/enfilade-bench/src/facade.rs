@@ -1,4 +1,4 @@
-//! `bench facade`: a view of towers with many windows, portals in groups and one by one.
+//! `bench facade`: views of towers with many windows, with portals in groups and one by one.
 
 use std::time::Instant;
 
@@ -8,10 +8,10 @@ use enfilade_testkit::{Rng, window_tower};
 use crate::measure::quantile;
 use crate::table::Table;
 
-/// Where the eye is, for a tower of this many squares a side and storeys.
+/// Draws eye and view direction, for a tower of this many squares a side and storeys.
 type Place = fn(&mut Rng, f64, f64) -> ([f64; 3], [f64; 3]);
 
-/// Sides of squares of the generated tower. [Units: wu]
+/// Side of a square of the generated tower. [Units: wu]
 const SQUARE: f64 = 3.0;
 
 const PLACES: [(&str, Place); 5] = [
@@ -52,7 +52,7 @@ const PLACES: [(&str, Place); 5] = [
     }),
 ];
 
-/// One line a tower and place.
+/// Prints one line per tower and place.
 pub(crate) fn bench_facade(
     table: &mut Table,
     windows: &[usize],

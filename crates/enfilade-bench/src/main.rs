@@ -1,5 +1,5 @@
-//! The experiments behind `docs/benchmarks/`, run by `cargo xtask bench NAME`, printed as Markdown tables or as
-//! lines of JSON.
+//! The experiments behind `docs/benchmarks/`: run by `cargo xtask bench NAME`, printed as Markdown tables or as lines
+//! of JSON.
 
 mod bring;
 mod bsp;
@@ -29,7 +29,7 @@ use table::Table;
 use tampered::bench_tampered;
 use walkthrough::Walkthrough;
 
-/// Measures, and prints the tables of the documentation.
+/// Measure, and print the tables of the documentation.
 #[derive(Parser)]
 #[command(name = "cargo xtask bench", version)]
 struct Cli {
@@ -42,30 +42,31 @@ struct Cli {
 
 #[derive(clap::Subcommand)]
 enum What {
-    /// What worlds bring to those who use them, a row a figure with the value that it must reach.
+    /// Value of worlds to programs and modelers: a row per figure, with the value that it must reach.
     Bring {
-        /// Only rows whose names begin so.
+        /// Only rows whose names begin with one of these.
         #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
         rows: Vec<String>,
-        /// Only scenes whose names begin so. Scenes are folders of $ENFILADE_SCENES, or of ../shared/scenes.
+        /// Only scenes whose names begin with one of these. Scenes are folders of $ENFILADE_SCENES, or of
+        /// ../shared/scenes.
         #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
         scenes: Vec<String>,
     },
-    /// Things, paths, sound, contacts and moving rooms, a row a figure with the value that it must reach.
+    /// Things, paths, sound, contacts and moving rooms: a row per figure, with the value that it must reach.
     Living {
-        /// Only rows whose names begin so.
+        /// Only rows whose names begin with one of these.
         #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
         rows: Vec<String>,
-        /// Only scenes whose names begin so.
+        /// Only scenes whose names begin with one of these.
         #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
         scenes: Vec<String>,
     },
-    /// Falsified worlds, those of a generated house among them: at how many of three places each kind is found by default. Lines
-    /// of JSON, which `bench trust` reads.
+    /// Tampered worlds, those of a generated house included: at how many of three places the defaults find each kind.
+    /// Prints lines of JSON, the input of `bench trust`.
     Tampered {
-        /// Folders with `scene.glb` and perhaps `detail.glb`.
+        /// Folders with `scene.glb` and optionally `detail.glb`
         scenes: Vec<PathBuf>,
-        /// Only kinds whose names begin so.
+        /// Only kinds whose names begin with one of these.
         #[arg(long, value_delimiter = ',', value_name = "KIND,...")]
         kinds: Vec<String>,
     },
@@ -76,7 +77,7 @@ enum What {
         /// All heuristics, not only the default.
         #[arg(long)]
         heuristics: bool,
-        /// Bake to the end, cells merged up to the threshold.
+        /// Bake to the end, with cells merged up to the threshold.
         #[arg(long)]
         bake: bool,
         /// Merging threshold in polygons of the tree, as in the paper; objects do not count.
@@ -86,12 +87,12 @@ enum What {
         #[arg(long, value_delimiter = ',')]
         clinic: Vec<usize>,
     },
-    /// The same scenes through each builder: cells, portals, how far they agree, promises.
+    /// All builders on the same scenes: cells, portals, agreement, promises.
     Builders {
-        /// Scene files, or folders with `scene.glb` and perhaps `detail.glb`.
+        /// Scene files, or folders with `scene.glb` and optionally `detail.glb`
         #[arg(required = true)]
         scenes: Vec<PathBuf>,
-        /// Rays that try the promises of each world.
+        /// Rays that test the promises of each world.
         #[arg(long, default_value_t = 100_000)]
         rays: u64,
     },
@@ -100,34 +101,34 @@ enum What {
         /// Worlds.
         worlds: Vec<PathBuf>,
     },
-    /// Time of a view: in worlds, in portal files, in offices of so many rooms, in a courtyard.
+    /// Time of a view: in worlds, in portal files, in generated offices, in a courtyard.
     See {
         /// Worlds (`.glb`) and Quake portal files (`.prt`).
         scenes: Vec<PathBuf>,
-        /// Rooms of generated offices, e.g. 100,1000,10000.
+        /// Numbers of rooms of generated offices, e.g. 100,1000,10000.
         #[arg(long, value_delimiter = ',')]
         rooms: Vec<usize>,
-        /// Views of each.
+        /// Views per scene.
         #[arg(long, default_value_t = 2000)]
         views: usize,
     },
-    /// Time of a view of towers with so many windows, portals in groups and one by one.
+    /// Time of a view of towers with many windows, with portals in groups and one by one.
     Facade {
-        /// Windows of each tower.
+        /// Numbers of windows of the towers.
         #[arg(long, value_delimiter = ',', default_values_t = [64, 1024, 10_000])]
         windows: Vec<usize>,
-        /// Views from each place.
+        /// Views per place.
         #[arg(long, default_value_t = 500)]
         views: usize,
     },
-    /// How much is answered beyond what rays hit, from ordinary eyes indoors.
+    /// Tightness: size of the answer relative to the objects that rays hit, from ordinary eyes indoors.
     Tight {
         /// Worlds.
         scenes: Vec<PathBuf>,
-        /// Views of each.
+        /// Views per world.
         #[arg(long, default_value_t = 300)]
         views: u64,
-        /// Rays in each view.
+        /// Rays per view.
         #[arg(long, default_value_t = 20_000)]
         rays: u64,
     },
@@ -138,23 +139,23 @@ enum What {
         /// Views on the path.
         #[arg(long, default_value_t = 290)]
         views: usize,
-        /// Height of the view, in degrees; it is 4:3.
+        /// Vertical angle of view, in degrees; the picture is 4:3.
         #[arg(long, default_value_t = 60.0)]
         fov: f32,
-        /// Triangles culled together.
+        /// Triangles per chunk.
         #[arg(long, default_value_t = SightOptions::default().chunk_triangles)]
         chunk: usize,
     },
-    /// A walk through rooms, drawn whole, with frustum culling and by portals.
+    /// A walk through rooms: drawn whole, with frustum culling, and by portals.
     Walkthrough(Walkthrough),
-    /// Lines of sight by cells against the tree of the whole world.
+    /// Lines of sight by cells, compared with one tree of the whole world.
     Los {
         /// Worlds.
         scenes: Vec<PathBuf>,
-        /// Rooms of generated offices.
+        /// Numbers of rooms of generated offices.
         #[arg(long, value_delimiter = ',')]
         rooms: Vec<usize>,
-        /// Pairs of points in each.
+        /// Pairs of points per scene.
         #[arg(long, default_value_t = 1_000_000)]
         pairs: usize,
     },

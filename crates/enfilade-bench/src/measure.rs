@@ -1,9 +1,9 @@
-//! What all tables share: names, files of a scene, processor time, quantiles.
+//! Helpers of all tables: names, files of a scene, processor time, quantiles.
 
 use std::path::{Path, PathBuf};
 
-/// Processor seconds that this process has used so far, all threads together; 0 where the system does
-/// not say.
+/// Returns the processor seconds that this process has used so far, all threads together; 0 if the system does not
+/// provide them.
 pub(crate) fn cpu_seconds() -> f64 {
     let of_task = |entry: std::io::Result<std::fs::DirEntry>| {
         let text = std::fs::read_to_string(entry.ok()?.path().join("schedstat")).ok()?;
@@ -13,14 +13,14 @@ pub(crate) fn cpu_seconds() -> f64 {
     tasks.filter_map(of_task).sum::<f64>() * 1e-9
 }
 
-/// A file's name without its folder and ending.
+/// Returns a file's name without folder and extension.
 pub(crate) fn name(path: &Path) -> String {
     path.file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default()
 }
 
-/// A scene file, or a folder with `scene.glb` and, if there is one, `detail.glb`.
+/// Returns the structure and detail files of a scene: a file, or a folder with `scene.glb` and optionally `detail.glb`.
 pub(crate) fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     if !path.is_dir() {
         return (vec![path.to_owned()], Vec::new());
@@ -34,7 +34,7 @@ pub(crate) fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     (vec![path.join("scene.glb")], detail)
 }
 
-/// The value that so large a share of `values` does not exceed; sorts them. Not a number where there are none.
+/// Returns the value that this share of `values` does not exceed; sorts them. Not a number if there are none.
 pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);

@@ -1,7 +1,7 @@
-//! Figures with bars, a row each: what an issue promises, measured.
+//! Figures with bars, one per row: the targets of issues, measured.
 //!
-//! As JSON a row is a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if the scene is not there, and
-//! `note` says more. Rows share the scenes' bakes.
+//! In JSON a row is a line `{"row", "scene", "value", "bar", "ok", "note"}`, where `value` and `ok` are null if the
+//! scene is missing. Rows share the scenes' bakes.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -14,30 +14,30 @@ use serde_json::json;
 
 use crate::measure::files_of;
 
-/// A figure of some scenes.
+/// A figure and its scenes.
 pub(crate) struct Row {
     pub(crate) name: &'static str,
     pub(crate) scenes: &'static [&'static str],
     pub(crate) measure: Measure,
 }
 
-/// How a figure is measured.
+/// The input of a measurement.
 pub(crate) enum Measure {
-    /// On the bake of a scene of the shared ones.
+    /// The bake of a shared scene.
     Baked(fn(&World) -> anyhow::Result<Figure>),
-    /// On what the row makes by itself; it is told the name of the scene.
+    /// A scene that the row generates by name.
     Made(fn(&str) -> anyhow::Result<Figure>),
 }
 
-/// What was measured, and what it must be.
+/// A measured value and its bar.
 pub(crate) struct Figure {
     pub(crate) value: f64,
-    /// The greatest value that is good.
+    /// The largest value that passes.
     pub(crate) most: f64,
     pub(crate) note: String,
 }
 
-/// Prints the rows; an error where one does not reach its bar.
+/// Prints the rows; an error if one does not reach its bar.
 pub(crate) fn bench_rows(
     all: &[Row],
     is_json: bool,
@@ -68,7 +68,7 @@ pub(crate) fn bench_rows(
         }
     }
     if n_missed > 0 {
-        bail!("{n_missed} rows do not reach their bars");
+        bail!("{n_missed} rows miss their bars");
     }
     Ok(())
 }
@@ -77,7 +77,7 @@ fn print(is_json: bool, row: &str, scene: &str, figure: Option<&Figure>) -> io::
     let mut out = io::stdout().lock();
     let bar = figure.map(|f| format!("<= {}", f.most));
     let ok = figure.map(|f| f.value <= f.most);
-    let note = figure.map_or("the scene is not there", |f| &f.note);
+    let note = figure.map_or("the scene is missing", |f| &f.note);
     if is_json {
         let value = figure.map(|f| f.value);
         let line =
@@ -94,7 +94,7 @@ fn print(is_json: bool, row: &str, scene: &str, figure: Option<&Figure>) -> io::
     }
 }
 
-/// The world of a scene; `None` where the scene is not there.
+/// Returns the world of a scene; `None` if the scene is missing.
 fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
     let dir = std::env::var_os("ENFILADE_SCENES")
         .map_or_else(|| PathBuf::from("../shared/scenes"), PathBuf::from);

@@ -75,7 +75,7 @@ pub(crate) fn bench_see(
                 ];
                 (seconds, n)
             };
-            // Once for the buffers to grow.
+            // Once to grow the buffers.
             for (view, cell) in &drawn {
                 ask(view, *cell);
             }
@@ -83,7 +83,7 @@ pub(crate) fn bench_see(
             for (view, cell) in &drawn {
                 let (first, n) = ask(view, *cell);
                 cold.push(first);
-                // As when the same place is looked at frame after frame.
+                // The fastest of five, as when the same place is viewed frame after frame.
                 let least = (0..5).fold(f64::INFINITY, |t, _| t.min(ask(view, *cell).0));
                 warm.push(least);
                 for k in 0..4 {

@@ -1,4 +1,4 @@
-//! What views are asked of: worlds, portal files and generated offices.
+//! Subjects of view queries: worlds, portal files and generated offices.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use enfilade_testkit::{GridParams, Rng, room_grid};
 
 use crate::measure::name;
 
-/// A scene, and cells to start from where it has no locator.
+/// A scene, with eyes in known cells if it has no locator.
 pub(crate) struct Subject {
     pub(crate) name: String,
     pub(crate) world: World,
@@ -26,10 +26,10 @@ pub(crate) enum Eyes {
     Known(Vec<[f32; 3]>),
 }
 
-/// Meters in a Quake unit, nearly.
+/// Approximate length of a Quake unit. [Units: wu]
 const QUAKE_UNIT: f64 = 1.0 / 32.0;
 
-/// The leaves of a Quake portal file as a world without triangles.
+/// Loads the leaves of a Quake portal file as a world without triangles.
 fn read_portal_file(path: &Path) -> anyhow::Result<Subject> {
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -73,7 +73,7 @@ fn read_portal_file(path: &Path) -> anyhow::Result<Subject> {
     for (i, cell) in cells.iter_mut().enumerate() {
         cell.name = format!("cell-{i}");
     }
-    // A leaf is convex: the mean of points on its portals lies in it.
+    // A leaf is convex, so the mean of points on its portals lies in it.
     let eyes = sums
         .iter()
         .map(|(sum, n)| (*sum / f64::max(*n, 1.0)).as_vec3().to_array())
@@ -115,7 +115,7 @@ pub(crate) fn subjects(scenes: &[PathBuf], rooms: &[usize]) -> anyhow::Result<Ve
     Ok(out)
 }
 
-/// A view with the cell of its eye, upright, 60 degrees high, 16:9.
+/// Draws a view with the cell of its eye: upright, 60 degrees high, 16:9.
 pub(crate) fn draw_view(
     rng: &mut Rng,
     subject: &Subject,

@@ -1,21 +1,21 @@
-//! Tables that are printed row by row: a row may take minutes.
+//! Tables printed row by row, since a row may take minutes.
 
 use std::io::{self, Write};
 
 use serde_json::{Map, Value};
 
-/// Takes the lines of Markdown tables and of what stands between them, and prints each at once: as it is, or as JSON.
+/// Receives the lines of Markdown tables and the text between them, and prints each at once: as it is, or as JSON.
 #[derive(Default)]
 pub(crate) struct Table {
-    /// By column, its name; empty between tables.
+    /// Names of the columns; empty between tables.
     columns: Vec<String>,
     is_json: bool,
-    /// What went wrong first.
+    /// The first error.
     problem: Option<io::Error>,
 }
 
 impl Table {
-    /// Prints Markdown, or a JSON object for each row and for each line outside tables (`note`).
+    /// Returns a table that prints Markdown, or a JSON object for each row and for each line outside tables (`note`).
     pub(crate) fn new(is_json: bool) -> Self {
         Self {
             is_json,
@@ -40,12 +40,12 @@ impl Table {
 
     /// # Errors
     ///
-    /// What could not be printed.
+    /// The first failure to print.
     pub(crate) fn finish(self) -> anyhow::Result<()> {
         self.problem.map_or(Ok(()), |problem| Err(problem.into()))
     }
 
-    /// A row as an object by the names of the columns, numbers as numbers; nothing for what is only form.
+    /// Returns a row as an object with the column names as keys, numbers as numbers; nothing for lines of pure form.
     fn as_json(&mut self, line: &str) -> Option<String> {
         let Some(row) = line.strip_prefix("| ").and_then(|l| l.strip_suffix(" |")) else {
             self.columns.clear();
@@ -69,7 +69,7 @@ impl Table {
     }
 }
 
-/// Names of columns; what comes again is told by the column before it.
+/// Returns distinct names of columns; a repeated name is qualified by the column before it.
 fn distinct(names: &[&str]) -> Vec<String> {
     let name = |i: usize| {
         if i > 0 && names[..i].contains(&names[i]) {

@@ -1,4 +1,5 @@
-//! Falsified worlds: each kind of tampering at three places of each scene, and whether `verify` finds it by default.
+//! Tampered worlds: each kind of tampering at three places of each scene, and the rate at which `verify` finds it by
+//! default.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -20,10 +21,10 @@ use serde_json::json;
 
 use crate::measure::files_of;
 
-/// Rays tried one after the other until something is found; the last is the default of `verify`.
+/// Numbers of rays tried one after the other until a problem is found; the last is the default of `verify`.
 const RAYS: [u64; 4] = [0, 20_000, 200_000, 1_000_000];
 
-/// Prints a line of JSON for each kind and scene: at how many places it was found, of how many. `kinds` are beginnings of names.
+/// Prints a line of JSON for each kind and scene: places found and places tried. `kinds` are beginnings of names.
 pub(crate) fn bench_tampered(scenes: &[PathBuf], kinds: &[String]) -> anyhow::Result<()> {
     bench_scene("house", &named(furnished_house().scene), kinds)?;
     for dir in scenes {
@@ -43,7 +44,7 @@ fn bench_scene(name: &str, scene: &Scene, kinds: &[String]) -> anyhow::Result<()
         |kind: &str| kinds.is_empty() || kinds.iter().any(|k| kind.starts_with(k.as_str()));
     anyhow::ensure!(
         !is_found(&world, scene, ShownBy::Source),
-        "{name}: found, though nobody changed it"
+        "{name}: a problem found in the unchanged world"
     );
     for tampering in tamperings().filter(|t| is_asked(t.name)) {
         let (mut n, mut n_found) = (0, 0);
@@ -66,7 +67,7 @@ fn bench_scene(name: &str, scene: &Scene, kinds: &[String]) -> anyhow::Result<()
     Ok(())
 }
 
-/// Returns true where a world is refused or found false: by itself, or also by its source.
+/// Returns `true` if decoding or verification rejects a world, by itself or also by its source.
 fn is_found(world: &World, scene: &Scene, by: ShownBy) -> bool {
     let Ok(Ok(read)) = encode_glb(world).map(|bytes| decode_glb(&bytes)) else {
         return true;
@@ -100,7 +101,7 @@ fn detail_problems(world: &World, scene: &Scene) -> Vec<String> {
     })
 }
 
-/// The generated house as an input has it: its objects with names of their own.
+/// Returns the generated house with object names of its own, as an input has them.
 fn named(mut scene: Scene) -> Scene {
     for (i, object) in (0..).zip(&mut scene.objects) {
         object.name = format!("{} {i}", object.name);
@@ -113,7 +114,7 @@ fn named(mut scene: Scene) -> Scene {
     scene
 }
 
-/// With what is seen from each cell, as volumes and parts.
+/// Adds visible volumes and parts for each cell.
 fn seen(mut world: World) -> anyhow::Result<World> {
     let walls: Vec<Triangle> = structural_triangles(&world).iter().map(|t| t.0).collect();
     let mut context = VisContext {

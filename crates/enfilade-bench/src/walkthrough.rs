@@ -1,4 +1,4 @@
-//! `bench walkthrough`: a walk, drawn whole, with frustum culling and by portals.
+//! `bench walkthrough`: a walk drawn whole, with frustum culling, and by portals.
 
 use std::collections::VecDeque;
 use std::f32::consts::TAU;
@@ -19,7 +19,7 @@ use enfilade_testkit::{TowerParams, clinic, office_tower};
 
 use crate::table::Table;
 
-/// What to walk through.
+/// Scenes and modes of the walk.
 #[derive(clap::Args)]
 pub(crate) struct Walkthrough {
     /// Worlds.
@@ -27,25 +27,24 @@ pub(crate) struct Walkthrough {
     /// Rooms of a generated, furnished office tower, baked on the spot.
     #[arg(long, value_name = "ROOMS")]
     tower: Option<usize>,
-    /// A generated clinic of about so many polygons, baked on the spot by its planes.
+    /// Approximate polygons of a generated clinic, baked on the spot by its planes.
     #[arg(long, value_name = "POLYGONS")]
     clinic: Option<usize>,
-    /// Place an object in each room, the same everywhere, of so many triangles that the world has as
-    /// many as this.
+    /// Place equal objects in all rooms, with so many triangles that the world has this total.
     #[arg(long, value_name = "TRIANGLES")]
     total: Option<u64>,
-    /// Another world of the same scene, such as one of `bake --method bsp` that was not simplified: the
-    /// same walk, by its portals. With one world only.
+    /// Another world of the same scene, such as one of `bake --method bsp` without simplification: same walk, its
+    /// portals. With one world only.
     #[arg(long, value_name = "GLB")]
     also: Option<PathBuf>,
-    /// With the adapter asked which portals are seen, too, instead of clipping.
+    /// Also by occlusion queries instead of clipping.
     #[arg(long)]
     queries: bool,
-    /// By portals once more, with those that cover fewer pixels not looked through.
+    /// Also by portals, without looking through those that cover fewer pixels than this.
     #[arg(long, value_name = "PIXELS")]
     stop: Option<f32>,
-    /// By frustum culling and by portals once more, with objects of fewer triangles where that moves their surface by
-    /// at most so many pixels.
+    /// Also by frustum culling and by portals, with coarser objects where their surface moves by at most this many
+    /// pixels.
     #[arg(long, value_name = "PIXELS")]
     lod: Option<f32>,
     /// Frames of the walk.
@@ -54,18 +53,18 @@ pub(crate) struct Walkthrough {
     /// Size of the frames.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     size: [u32; 2],
-    /// With shadows and dark corners.
+    /// With shadows and ambient occlusion.
     #[arg(long)]
     full: bool,
-    /// What draws: `best`, `gpu`, `software`, or part of a name.
+    /// Adapter: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
-    /// Frames left out of *everything*, but for one of so many; for adapters that are slow.
+    /// Draw only every Nth frame of *everything*, for slow adapters.
     #[arg(long, default_value_t = 1, value_name = "N")]
     sparse: usize,
 }
 
-/// Frames that may be under way at once, as in a program with a window.
+/// Most frames in flight, as in a program with a window.
 const IN_FLIGHT: usize = 2;
 
 pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()> {
@@ -87,7 +86,7 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
         worlds.push((format!("clinic of {polygons} polygons"), baked.world));
     }
     if worlds.is_empty() {
-        bail!("a world is needed, or --tower ROOMS, or --clinic POLYGONS");
+        bail!("give a world, --tower ROOMS or --clinic POLYGONS");
     }
     table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | ms of all threads | the same to frustum culling | triangles drawn | draws | ms to hand in |".into());
     table.push(
@@ -95,7 +94,7 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
             .into(),
     );
     if args.also.is_some() && worlds.len() != 1 {
-        bail!("--also compares with one world");
+        bail!("--also needs exactly one world");
     }
     let mut adapter = String::new();
     for (name, mut world) in worlds {
@@ -135,7 +134,7 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
             let run = walk(&mut studio, &world, &cameras, mode, args)?;
             rows.add(&mode.label(), &run, studio.world.n_triangles());
         }
-        // From all to least.
+        // From the most to the least drawn.
         rows.lines.swap(0, 1);
         if let Some(path) = &args.also {
             let mut other = read_world(path)?;
@@ -171,7 +170,7 @@ enum Mode {
     /// Portals of fewer pixels are not looked through.
     Stopped(f32),
     Queries,
-    /// Objects are off by at most so many pixels.
+    /// Objects are off by at most this many pixels.
     FrustumLevels(f32),
     PortalsLevels(f32),
 }
@@ -193,7 +192,7 @@ impl Mode {
 /// The lines of one world.
 struct Rows<'a> {
     name: &'a str,
-    /// Seconds a frame by frustum culling: as time passes, and of all threads.
+    /// Seconds per frame by frustum culling: elapsed, and of all threads.
     frustum: [f64; 2],
     lines: Vec<String>,
 }
@@ -225,9 +224,9 @@ impl Rows<'_> {
 #[derive(Default)]
 struct Run {
     seconds: Vec<f64>,
-    /// Of the thread that hands frames in.
+    /// Time of the thread that submits frames.
     processor: f64,
-    /// Of all threads, a frame; what other programs take does not count.
+    /// Time of all threads per frame, without other programs.
     threads: f64,
     triangles: f64,
     draws: f64,
@@ -274,7 +273,7 @@ fn walk(
     };
     let mut run = Run::default();
     let mut pending = VecDeque::new();
-    // Buffers grow and pipelines are built in frames that do not count.
+    // Warm-up frames grow buffers and build pipelines.
     let warm = cameras.iter().take(3).map(|c| (c, false));
     let mut last = Instant::now();
     let mut threads = f64::NAN;
@@ -316,7 +315,7 @@ fn walk(
         studio.give_list(list);
     }
     studio.gpu.wait()?;
-    // What is still under way when the last frame is handed in belongs to the frames as well.
+    // Work in flight after the last frame belongs to the frames as well.
     if let Some(seconds) = run.seconds.last_mut() {
         *seconds += last.elapsed().as_secs_f64();
     }
@@ -324,12 +323,12 @@ fn walk(
     Ok(run)
 }
 
-/// What all threads of this process have computed so far, on Linux; elsewhere not a number. [Units: s]
+/// Returns the processor time of all threads of this process on Linux; elsewhere not a number. [Units: s]
 fn thread_seconds() -> f64 {
     let Ok(text) = std::fs::read_to_string("/proc/self/stat") else {
         return f64::NAN;
     };
-    // After the name, which may hold anything: `utime` and `stime`, in hundredths.
+    // After the name, which may contain anything: `utime` and `stime`, in hundredths of a second.
     let after = text.rsplit(')').next().unwrap_or_default();
     let mut fields = after.split_whitespace().skip(11);
     let mut ticks = || fields.next()?.parse::<f64>().ok();
@@ -339,7 +338,7 @@ fn thread_seconds() -> f64 {
     }
 }
 
-/// One object for each room, all alike.
+/// Equal objects, one per room.
 struct Rings {
     places: Vec<[f32; 3]>,
     ring: Primitive,
@@ -349,7 +348,7 @@ struct Rings {
 const RADIUS: f32 = 0.42;
 
 impl Rings {
-    /// As many as rooms have place for, so that the world has about `total` triangles.
+    /// Makes as many as rooms have space for, so that the world has about `total` triangles.
     fn of(world: &World, total: u64) -> anyhow::Result<Self> {
         let sight = Sight::build(world)?;
         let mut places = Vec::new();
@@ -373,12 +372,12 @@ impl Rings {
         let missing = total.saturating_sub(sight.n_triangles());
         if places.is_empty() || missing == 0 {
             bail!(
-                "it has {} triangles already, or no rooms",
+                "it already has {} triangles, or no rooms",
                 sight.n_triangles()
             );
         }
         let each = missing.div_ceil(places.len() as u64);
-        // A ring, wound about itself: 4 by 1 quads.
+        // A ring wound as a tube, of quads 4 by 1.
         let around = ((each as f64 / 8.0).sqrt().ceil() as u32).max(2) * 2;
         let along = u32::try_from(each.div_ceil(u64::from(around) * 2))?.max(3);
         Ok(Self {
@@ -387,7 +386,7 @@ impl Rings {
         })
     }
 
-    /// Puts them into a world, the one they were made for or another of the same scene.
+    /// Places them in a world: the one they were made for, or another of the same scene.
     fn place(&self, world: &mut World) {
         let mesh = world.detail_meshes.len() as u32;
         world.detail_meshes.push(Mesh {
@@ -432,7 +431,7 @@ impl Rings {
     }
 }
 
-/// A ring of 40 cm radius with a wave on it.
+/// Returns a ring of 40 cm radius with a wavy surface.
 fn ring(along: u32, around: u32) -> Primitive {
     let mut out = Primitive::default();
     for i in 0..along {

@@ -1,4 +1,4 @@
-//! Runs benchmarks on worlds made in code, and on files that are none.
+//! Runs benchmarks on worlds made in code, and on invalid files.
 
 use std::fs;
 use std::path::PathBuf;
@@ -20,14 +20,14 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-/// Writes a world to a file of this test alone.
+/// Writes a world to a file used by this test only.
 fn file(name: &str, world: &World) -> String {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::write(&path, encode_glb(world).unwrap()).unwrap();
     path.to_str().unwrap().to_owned()
 }
 
-/// Two rooms in a row along x with a doorway between them.
+/// Returns two rooms in a row along x with a doorway between them.
 fn two_rooms() -> World {
     room_grid(&GridParams {
         size: [2, 1, 1],

@@ -1,39 +1,37 @@
-//! Cameras: where a picture is taken from, and what takes points to the screen.
+//! Cameras and the projections that map world points to the screen.
 //!
-//! Depth runs from 1 at the near plane to 0 at infinity, in 32-bit floats: so that two surfaces a
-//! millimeter apart stay apart across a large building, and nothing is cut off far away. Points are
-//! made relative to the camera before anything is multiplied, so that large coordinates cost no
-//! precision.
+//! Depth runs from 1 at the near plane to 0 at infinity, in 32-bit floats, so that surfaces a millimeter apart stay
+//! apart across a large building and nothing is clipped far away. The camera's position is subtracted from points
+//! before any multiplication, so that large coordinates cost no precision.
 
 use enfilade_runtime::{View, ViewError};
 use glam::{Mat4, Vec3, Vec4};
 
-/// Where the eye is, which way it looks, how wide. Upright: +Y is up in the picture.
+/// A perspective camera without roll: +Y is up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it is. [Units: wu]
+    /// Position. [Units: wu]
     pub eye: [f32; 3],
-    /// Where it looks; any length.
+    /// View direction, of any length.
     pub toward: [f32; 3],
-    /// Angle from the lower to the upper edge of the picture. [Units: rad] [Limit: above 0, below pi]
+    /// Vertical angle of view. [Units: rad] [Limit: above 0, below pi]
     pub fov_y: f32,
 }
 
 impl Camera {
-    /// What is nearer than this is not drawn. [Units: wu]
+    /// Distance of the near plane. [Units: wu]
     ///
-    /// Depths are floats that are finest at zero, which is infinitely far away: so that this can be as
-    /// little as the smallest gap between an eye and a wall that matters.
+    /// Depths are floats, finest near zero, which is infinitely far away. So this can be as small as the smallest
+    /// distance between an eye and a wall that matters.
     pub const NEAR: f32 = 1e-4;
 
-    /// How far away a depth of an [`IdPicture`](crate::IdPicture) is along the view direction.
-    /// [Units: wu]
+    /// Returns the distance along the view direction of a depth in an [`IdPicture`](crate::IdPicture). [Units: wu]
     #[must_use]
     pub fn distance_of(depth: f32) -> f32 {
         Self::NEAR / depth
     }
 
-    /// A camera at `eye` that looks at the point `at`, 60 degrees high.
+    /// Returns a camera at `eye` that looks at the point `at`, with a vertical angle of view of 60 degrees.
     #[must_use]
     pub fn looking_at(eye: [f32; 3], at: [f32; 3]) -> Self {
         Self {
@@ -43,16 +41,16 @@ impl Camera {
         }
     }
 
-    /// The view that the run-time is asked about, of a picture `aspect` times as wide as high.
+    /// Returns the run-time's view for a picture `aspect` times as wide as high.
     ///
     /// # Errors
     ///
-    /// A camera without a direction, with numbers that are not finite, or with no angle.
+    /// A camera without a direction, with numbers that are not finite, or with an angle out of range.
     pub fn view(&self, aspect: f32) -> Result<View, ViewError> {
         View::perspective(self.eye, self.toward, [0.0, 1.0, 0.0], self.fov_y, aspect)
     }
 
-    /// What takes points to the screen.
+    /// Returns the projection to the screen.
     ///
     /// # Errors
     ///
@@ -75,11 +73,11 @@ impl Camera {
         })
     }
 
-    /// Right, up and forward, of unit length and at right angles.
+    /// Returns right, up and forward: orthogonal unit vectors.
     #[must_use]
     pub fn axes(&self) -> [Vec3; 3] {
         let forward = Vec3::from(self.toward).normalize_or(Vec3::NEG_Z);
-        // As `View::perspective` does it, so that pictures and answers mean the same view.
+        // Same as `View::perspective`, so that pictures and queries mean the same view.
         let right = forward.cross(Vec3::Y);
         let right = if right.length() > 1e-6 {
             right.normalize()
@@ -89,7 +87,7 @@ impl Camera {
         [right, right.cross(forward), forward]
     }
 
-    /// The four directions to the corners of the picture, counter-clockwise from the lower left.
+    /// Returns the four edges of the view pyramid, counter-clockwise from the lower left of the picture.
     #[must_use]
     pub fn corners(&self, aspect: f32) -> [Vec3; 4] {
         let [right, up, forward] = self.axes();
@@ -99,20 +97,20 @@ impl Camera {
     }
 }
 
-/// What takes points to the screen.
+/// A map from world points to the screen.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection {
     /// From points relative to `origin` to clip space.
     pub(crate) clip_from_relative: Mat4,
     pub(crate) origin: Vec3,
-    /// Where lines of sight come from; of a parallel projection, far away.
+    /// Origin of the lines of sight; far away for a parallel projection.
     pub(crate) eye: Vec3,
     pub(crate) is_parallel: bool,
 }
 
 impl Projection {
-    /// Parallel lines along `toward`, onto a picture that is `height` meters high in the middle at
-    /// `center`; what is up to `depth` meters before and behind that is in it.
+    /// Returns a parallel projection along `toward` onto a picture `height` meters high with `center` in its middle. It
+    /// contains points up to `depth` meters before and behind that center.
     #[must_use]
     pub fn parallel(
         center: [f32; 3],
@@ -131,7 +129,7 @@ impl Projection {
         let rows = [
             (right / (half * aspect)).extend(0.0),
             (up / half).extend(0.0),
-            // 1 at the near end, 0 at the far one.
+            // 1 at the near end, 0 at the far end.
             (forward * (-0.5 / depth)).extend(0.5),
             Vec4::W,
         ];
@@ -144,7 +142,7 @@ impl Projection {
         }
     }
 
-    /// Where on the picture a point lies, 0 to 1 from the upper left; `None` behind the eye.
+    /// Returns the position of a point in the picture, 0 to 1 from the upper left; `None` behind the eye.
     #[must_use]
     pub fn place(&self, p: [f32; 3]) -> Option<[f32; 2]> {
         let q = self.clip_from_relative * (Vec3::from(p) - self.origin).extend(1.0);

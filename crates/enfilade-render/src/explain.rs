@@ -1,7 +1,7 @@
-//! Why points of a world are seen or are not, as a shader reads it.
+//! A table for shaders that explains why points of a world are visible or not.
 //!
-//! By point, not by what is drawn: the narrowed views of each cell, as planes, tell it for every point of a floor that many
-//! cells share.
+//! It holds the narrowed views of each cell as planes, so that the answer depends on the point, not on the triangle: a
+//! floor that many cells share is explained point by point.
 
 use enfilade_runtime::{Seen, Sight, SightState, View, Viewer};
 use glam::{DVec3, Vec3};
@@ -9,14 +9,15 @@ use glam::{DVec3, Vec3};
 use crate::gpu::{Gpu, RenderError};
 use crate::light::table;
 
-/// The answer for one view: a header with the frustum's planes, then by cell where its visits stand, with occlusion and
-/// without; visits, which say where their planes stand; planes, relative to the field's origin.
+/// The answer for one view. Order of the texels: a header with the frustum's planes; by cell, the position of its
+/// visits, with occlusion and without; visits, each with the position of its planes; planes, relative to the field's
+/// origin.
 pub(crate) struct Explanation {
     texels: Vec<[u32; 4]>,
 }
 
 impl Explanation {
-    /// Asks what a view sees.
+    /// Queries one view and builds its table.
     pub(crate) fn new(
         viewer: &mut Viewer,
         sight: &Sight,
@@ -28,7 +29,7 @@ impl Explanation {
         let mut out = Self {
             texels: vec![[0; 4]; 1 + n_cells],
         };
-        // The whole view has the planes of who looks through walls.
+        // A query through walls is not narrowed, so its planes are those of the whole view.
         let seen = viewer.see_through_walls(sight, view);
         let whole: Vec<[f32; 4]> = (seen.visits().first())
             .map(|v| seen.planes(v).to_vec())
@@ -44,7 +45,7 @@ impl Explanation {
         out
     }
 
-    /// Adds planes; returns the texel that says where they stand.
+    /// Adds planes; returns a texel with their position and number.
     fn add_planes(&mut self, planes: &[[f32; 4]], origin: DVec3) -> [u32; 4] {
         let first = self.texels.len() as u32;
         for &[x, y, z, d] in planes {
@@ -58,7 +59,7 @@ impl Explanation {
     fn add_visits(&mut self, seen: &Seen<'_>, slot: usize, origin: DVec3, n_cells: usize) {
         let counts = seen.counts();
         if counts.is_eye_lost || counts.is_capped {
-            // All in view counts as seen: a visit without planes to every cell.
+            // Everything in view counts as seen: a visit without planes for every cell.
             let first = self.texels.len() as u32;
             self.texels.push([0; 4]);
             for cell in 1..=n_cells {

@@ -1,4 +1,4 @@
-//! The formats that everything is drawn in.
+//! Texture formats of the color, depth and id targets.
 
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;

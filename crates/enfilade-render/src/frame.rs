@@ -1,35 +1,34 @@
-//! What a frame shows and how it looks.
+//! The contents and style of a frame.
 
 use crate::camera::Projection;
 use crate::list::DrawList;
 use crate::marks::Mark;
 
-/// How surfaces are painted.
+/// The coloring of surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Paint {
-    /// As they look.
+    /// Textured and lit.
     #[default]
     Lit,
-    /// In the color of the cell before them: by point where light [was added](crate::Studio::add_light), else each
-    /// triangle in the color of one that sees it.
+    /// The color of the cell in front of the surface: point by point if light
+    /// [was added](crate::Studio::add_light), else per triangle, in the color of one cell that sees it.
     Cells,
-    /// By how many times each pixel is drawn.
+    /// The number of times that each pixel is drawn.
     Overdraw,
 }
 
-/// How a frame looks, apart from what is in it.
+/// The style of a frame, apart from its contents.
 #[derive(Clone, Copy, Debug)]
 pub struct Style {
-    /// How surfaces are painted.
+    /// The coloring of surfaces.
     pub paint: Paint,
-    /// Whether corners are darkened; costs about as much as all else.
+    /// True if ambient occlusion darkens the places where surfaces meet; costs about as much as everything else.
     pub dark_corners: bool,
-    /// Whether the sun casts shadows; their picture is made with the first frame of a world.
+    /// True if the sun casts shadows; the shadow map is drawn with the first frame of a world.
     pub shadows: bool,
-    /// Whether each place has the light that reaches it, where that [was computed](crate::Studio::add_light); else all have
-    /// the same.
+    /// True if each place gets the light that [was computed](crate::Studio::add_light) for it; else light is uniform.
     pub daylight: bool,
-    /// What is higher is not drawn: a ceiling taken off. [Units: wu]
+    /// Height above which nothing is drawn, to take ceilings off. [Units: wu]
     pub cut_above: f32,
 }
 
@@ -48,12 +47,12 @@ impl Default for Style {
 /// One frame.
 #[derive(Clone, Copy)]
 pub struct Frame<'a> {
-    /// What takes points to the screen.
+    /// The projection to the screen.
     pub projection: Projection,
-    /// What is drawn.
+    /// The draws.
     pub list: &'a DrawList,
-    /// How it looks.
+    /// The style.
     pub style: Style,
-    /// Lines and polygons over it.
+    /// Lines and polygons drawn over it.
     pub marks: &'a [Mark],
 }

@@ -1,4 +1,4 @@
-//! The adapter that draws: a graphics card, or software that stands in for one.
+//! The adapter: a graphics card, or a software renderer.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,63 +6,63 @@ use std::sync::{Arc, OnceLock};
 
 use crate::formats::{COLOR, DEPTH, ID};
 
-/// Why something cannot be drawn.
+/// An error of drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// No adapter at all.
+    /// There is no adapter.
     #[error(
-        "no graphics adapter was found: install a driver, or software that stands in for one \
+        "no graphics adapter found: install a driver or a software renderer \
          (Debian and Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1`)"
     )]
     NoAdapter,
-    /// Adapters, but none as asked for.
-    #[error("no adapter is {asked}; there are: {found}")]
+    /// No adapter matches the choice.
+    #[error("no adapter is {asked}; available: {found}")]
     NoSuchAdapter {
-        /// What was asked for.
+        /// The choice.
         asked: String,
-        /// Names of those there are.
+        /// Names of the available adapters.
         found: String,
     },
-    /// The adapter gives no device, or lacks what drawing needs.
+    /// The adapter provides no device, or lacks a required feature.
     #[error("{adapter} cannot be used: {why}; choose another with --adapter")]
     Device {
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
-        /// What it said.
+        /// The cause.
         why: String,
     },
-    /// A world, or a picture, that the adapter has no room for.
+    /// A world or picture beyond a limit of the adapter.
     #[error(
-        "{what} takes {needed}, and the adapter's limit is {limit}; choose another adapter, or less"
+        "{what}: {needed} needed, but the adapter's limit is {limit}; choose another adapter, or draw less"
     )]
     TooLarge {
-        /// What is too large.
+        /// The item that is too large.
         what: &'static str,
-        /// What it takes.
+        /// The size that it needs.
         needed: u64,
-        /// What there is.
+        /// The limit.
         limit: u64,
     },
-    /// A picture of more pixels than are drawn at once.
+    /// A picture with more pixels than one call draws.
     #[error(
-        "a picture of {}x{} pixels takes {}, and {} are drawn at once; of this shape, {}x{} are the most",
+        "a picture of {}x{} has {} pixels, more than the limit of {}; the largest of this shape is {}x{}",
         .size[0], .size[1], u64::from(.size[0]) * u64::from(.size[1]), MOST_PIXELS, .most[0], .most[1]
     )]
     TooManyPixels {
-        /// The size asked for.
+        /// The requested size.
         size: [u32; 2],
         /// The largest of this shape.
         most: [u32; 2],
     },
-    /// The device was lost, or ran out of memory, while it drew.
+    /// The device was lost or ran out of memory while drawing.
     #[error("the adapter failed while drawing: {0}")]
     Lost(String),
     /// A picture could not be encoded.
     #[error("the picture cannot be encoded: {0}")]
     Encode(String),
-    /// What should be a picture is none.
-    #[error("no PNG picture: {0}")]
+    /// Bytes that are not a PNG picture.
+    #[error("not a PNG picture: {0}")]
     Decode(String),
     /// A camera without a direction, or with numbers that are not finite.
     #[error(transparent)]
@@ -72,17 +72,17 @@ pub enum RenderError {
     World(#[from] enfilade_runtime::SightError),
 }
 
-/// Which adapter to draw with.
+/// Choice of adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// The fastest there is: a discrete card, an integrated one, software.
+    /// The fastest available: a discrete card, else an integrated one, else software.
     #[default]
     Best,
-    /// A graphics card, and nothing else.
+    /// A graphics card only.
     Gpu,
-    /// Software, and nothing else: the same pictures on every machine.
+    /// Software only: the same pictures on every machine.
     Software,
-    /// The first whose name holds this text, whatever its case.
+    /// The first whose name contains this text, ignoring case.
     Named(String),
 }
 
@@ -110,16 +110,16 @@ impl fmt::Display for AdapterChoice {
     }
 }
 
-/// Pixels of a picture, at most: 8192 x 8192. On the adapter and on their way to a file they take up to 30 bytes each.
+/// Largest picture: 8192 × 8192. On the adapter and on its way to a file, a pixel takes up to 30 bytes.
 pub(crate) const MOST_PIXELS: u64 = 1 << 26;
 
-/// A point in what was submitted.
+/// A point in the sequence of submitted work.
 #[derive(Clone, Debug)]
 pub struct Submitted(wgpu::SubmissionIndex);
 
-/// An adapter, opened.
+/// An open adapter.
 pub struct Gpu {
-    /// Its instance, which windows make surfaces with.
+    /// The wgpu instance; windows create surfaces from it.
     pub instance: wgpu::Instance,
     /// The adapter.
     pub adapter: wgpu::Adapter,
@@ -127,7 +127,7 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
-    /// The first error that no call returned: too little memory.
+    /// The first error that no call returned, such as lack of memory.
     failed: Arc<OnceLock<String>>,
 }
 
@@ -149,7 +149,7 @@ fn rank(info: &wgpu::AdapterInfo) -> u32 {
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
     };
-    // OpenGL is what is left where nothing else works.
+    // OpenGL is the last resort.
     kind * 2 + u32::from(info.backend == wgpu::Backend::Gl)
 }
 
@@ -165,7 +165,7 @@ fn fits(choice: &AdapterChoice, info: &wgpu::AdapterInfo) -> bool {
     }
 }
 
-/// What an adapter lacks that drawing needs.
+/// Returns a required feature that an adapter lacks.
 fn lacking(adapter: &wgpu::Adapter) -> Option<String> {
     let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
     let read = drawn | wgpu::TextureUsages::TEXTURE_BINDING;
@@ -181,17 +181,17 @@ fn lacking(adapter: &wgpu::Adapter) -> Option<String> {
 }
 
 impl Gpu {
-    /// Opens an adapter; no display is needed.
+    /// Opens an adapter; needs no display.
     ///
     /// # Errors
     ///
-    /// When there is none as asked for, or it gives no device.
+    /// No matching adapter, or one that provides no device.
     pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         Self::open_with(&instance, choice, None)
     }
 
-    /// The adapters of an instance, and how each is spoken to, e.g. `llvmpipe (vulkan)`.
+    /// Returns the adapters of an instance with their backends, e.g. `llvmpipe (vulkan)`.
     #[must_use]
     pub fn names(instance: &wgpu::Instance) -> Vec<String> {
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
@@ -222,7 +222,7 @@ impl Gpu {
             }
             match Self::of_adapter(instance.clone(), adapter) {
                 Ok(gpu) => return Ok(gpu),
-                // The next best may do.
+                // Try the next best.
                 Err(why) => failed = failed.or(Some(why)),
             }
         }
@@ -240,7 +240,7 @@ impl Gpu {
             why,
         };
         if let Some(what) = lacking(&adapter) {
-            return Err(broken(format!("it has no {what}, which drawing needs")));
+            return Err(broken(format!("it lacks {what}, which are required")));
         }
         let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::INDIRECT_FIRST_INSTANCE;
         let descriptor = wgpu::DeviceDescriptor {
@@ -253,7 +253,7 @@ impl Gpu {
             .map_err(|why| broken(why.to_string()))?;
         let failed = Arc::new(OnceLock::new());
         let first = Arc::clone(&failed);
-        // Without a handler wgpu panics.
+        // Without a handler, wgpu panics.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             let _ = first.set(error.to_string());
         }));
@@ -266,36 +266,36 @@ impl Gpu {
         })
     }
 
-    /// Whether vertex shaders read storage buffers: where they do not, as on WebGL 2, a world takes 36
-    /// bytes more for each triangle.
+    /// Returns `true` if vertex shaders can read storage buffers. Otherwise, as on WebGL 2, a world takes 36 more
+    /// bytes per triangle.
     pub(crate) fn fetches(&self) -> bool {
         let flags = self.adapter.get_downlevel_capabilities().flags;
         flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE)
             && self.device.limits().max_storage_buffers_per_shader_stage >= 2
     }
 
-    /// Whether shaders have to write depths themselves, as on OpenGL: see `depth_written.wgsl`.
+    /// Returns `true` if shaders must write depths themselves, as on OpenGL: see `depth_written.wgsl`.
     pub(crate) fn writes_depth(&self) -> bool {
         self.adapter.get_info().backend == wgpu::Backend::Gl
     }
 
-    /// The adapter's name, and how it is spoken to, e.g. `llvmpipe (vulkan)`.
+    /// Returns the adapter's name and backend, e.g. `llvmpipe (vulkan)`.
     #[must_use]
     pub fn name(&self) -> String {
         named(&self.adapter.get_info())
     }
 
-    /// Whether software stands in for a card: what it takes says little of cards.
+    /// Returns `true` for a software renderer, whose times say little about graphics cards.
     #[must_use]
     pub fn is_software(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Waits until all that was submitted is done.
+    /// Waits for all submitted work.
     ///
     /// # Errors
     ///
-    /// A device that was lost.
+    /// The device was lost.
     pub fn wait(&self) -> Result<(), RenderError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
@@ -311,17 +311,17 @@ impl Gpu {
         }
     }
 
-    /// A mark after all that was submitted, for [`Gpu::wait_for`].
+    /// Returns a mark after all work submitted so far, for [`Gpu::wait_for`].
     #[must_use]
     pub fn mark(&self) -> Submitted {
         Submitted(self.queue.submit([]))
     }
 
-    /// Waits until what was submitted before the mark is done.
+    /// Waits for all work submitted before the mark.
     ///
     /// # Errors
     ///
-    /// A device that was lost.
+    /// The device was lost.
     pub fn wait_for(&self, mark: Submitted) -> Result<(), RenderError> {
         let submission_index = Some(mark.0);
         let wait = wgpu::PollType::Wait {
@@ -346,7 +346,7 @@ impl Gpu {
         Self::check("a side of the picture", size[0].max(size[1]).into(), side)
     }
 
-    /// Checks a size against a limit before the device would refuse it in a less helpful way.
+    /// Checks a size against a limit, with a more helpful error than the device's.
     pub(crate) fn check(
         what: &'static str,
         needed: u64,

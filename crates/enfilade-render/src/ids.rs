@@ -1,7 +1,7 @@
-//! Pictures of numbers: which triangle each pixel shows, and how deep it is.
+//! Id pictures: the triangle visible at each pixel, and its depth.
 //!
-//! Drawn through the same lists as pictures are, scissors included, so that what is tried is what is
-//! drawn. Two layers: surfaces that hide what is behind them, and the nearest that is seen through.
+//! They are drawn through the same lists as color pictures, scissors included, so that a test of culling tests real
+//! frames. There are two layers: opaque surfaces, and the nearest transparent one.
 
 use enfilade_cpg::PortalId;
 
@@ -14,77 +14,77 @@ use crate::renderer::{Renderer, Stage};
 use crate::resources::{bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
 
-/// What one pixel shows.
+/// The object visible at one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Shown {
-    /// Nothing: the sky.
+    /// The sky.
     Sky,
-    /// A structural triangle, by its number among all.
+    /// A structural triangle.
     Structure {
-        /// The triangle; [`GpuWorld::chunk_of_triangle`] knows more.
+        /// Index of the triangle among all; see [`GpuWorld::chunk_of_triangle`].
         triangle: u32,
     },
     /// A triangle of a detail object.
     Detail {
         /// Index into `World::details`.
         detail: u32,
-        /// The triangle, by its number among all.
+        /// Index of the triangle among all.
         triangle: u32,
     },
-    /// What fills a portal that is shut.
+    /// The plug of a shut portal.
     Plug {
         /// The portal.
         portal: PortalId,
     },
 }
 
-/// A picture of numbers.
+/// A picture of ids.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdPicture {
     /// Pixels in a row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// By pixel: what it shows, and its depth (1 at the near plane, 0 at infinity).
+    /// For each pixel, the visible object and its depth (1 at the near plane, 0 at infinity).
     pub pixels: Vec<(Shown, f32)>,
 }
 
-/// Pixels in which two pictures of numbers differ.
+/// The pixels in which two id pictures differ.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Difference {
-    /// Pixels, all of them.
+    /// Number of all pixels.
     pub n_pixels: u64,
-    /// Pixels where something else is shown.
+    /// Pixels that show a different object.
     pub lost: Vec<LostPixel>,
 }
 
-/// A pixel that shows something else.
+/// A pixel that shows a different object than expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LostPixel {
     /// Column and row.
     pub at: [u32; 2],
-    /// What is to be shown, and its depth.
+    /// The expected object and its depth.
     pub expected: (Shown, f32),
-    /// What is shown instead.
+    /// The visible object and its depth.
     pub found: (Shown, f32),
 }
 
 impl IdPicture {
-    /// What is shown at a pixel, and at which depth.
+    /// Returns the object visible at a pixel, and its depth.
     ///
     /// # Panics
     ///
-    /// When there is no such pixel.
+    /// If the pixel lies outside the picture.
     #[must_use]
     pub fn at(&self, [x, y]: [u32; 2]) -> (Shown, f32) {
         self.pixels[y as usize * self.width as usize + x as usize]
     }
 
-    /// Compares what is expected (`self`) with what is found.
+    /// Returns the differences of `found` from this, the expected picture.
     ///
     /// # Panics
     ///
-    /// When sizes differ.
+    /// If sizes differ.
     #[must_use]
     pub fn difference(&self, found: &Self) -> Difference {
         assert_eq!(self.pixels.len(), found.pixels.len(), "sizes differ");
@@ -108,8 +108,8 @@ impl IdPicture {
 }
 
 impl Renderer {
-    /// Draws the two pictures of numbers of a list: what hides, and the nearest that does not. Of two triangles in
-    /// one place, the one listed first is shown.
+    /// Draws both id pictures of a list: opaque surfaces, and the nearest transparent one. Where two triangles
+    /// coincide, the one listed first wins.
     ///
     /// # Errors
     ///
@@ -148,7 +148,7 @@ impl Renderer {
         if let Some(targets) = &self.targets {
             for (i, runs) in [&list.opaque, &list.transparent].into_iter().enumerate() {
                 let view = layers[i].create_view(&wgpu::TextureViewDescriptor::default());
-                // What is seen through is drawn over the depth of what is not.
+                // Transparent surfaces are drawn over the depth of the opaque ones.
                 let depth = (i == 0).then_some(0.0);
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("ids"),

@@ -1,9 +1,9 @@
-//! Levels of detail: the same object with fewer triangles, and how far its surface is off then.
+//! Levels of detail: versions of an object with fewer triangles, each with its geometric error.
 //!
 //! Funkhouser & Séquin, "Adaptive display algorithm for interactive frame rates" (1993), keep models of objects at
-//! several levels and choose per object; Gjørup 1999, §2.3.2, has portals decide. Both are done: what portals leave
-//! is drawn, at the level that its distance allows. Edges are collapsed by quadrics (Garland & Heckbert 1997) by
-//! the library meshoptimizer; how far a level is off is measured here, on the surface that came out.
+//! several levels and choose per object; Gjørup 1999, §2.3.2, lets portals decide. Both are done here: what is visible
+//! through portals is drawn at the level that its distance allows. The library meshoptimizer collapses edges by
+//! quadrics (Garland & Heckbert 1997); the error of a level is measured here, on the resulting surface.
 
 use std::collections::HashMap;
 
@@ -11,29 +11,28 @@ use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Bvh, DVec3, Triangle};
 use meshopt::{SimplifyOptions, VertexDataAdapter};
 
-/// Meshes of fewer triangles have one level. [Units: triangles]
+/// Meshes with fewer triangles have one level. [Units: triangles]
 const WORTH: usize = 200;
-/// Triangles of a level ÷ those of the one before, as asked for.
+/// Requested ratio of the triangles of a level to those of the one before.
 const STEP: usize = 4;
-/// A level of more than this share of the triangles of the one before is none. Corners at seams and rims stay, and
-/// then there is no more to win.
+/// Largest ratio of triangles that makes a level worth keeping. Vertices at seams and rims stay, which ends the gain.
 const GAIN: f64 = 0.7;
-/// How far corners may move, as a share of the mesh's size, as asked for: what is drawn so coarsely has ten pixels.
+/// Largest requested move of a vertex, as a share of the mesh's size: an object drawn so coarsely covers ten pixels.
 const FARTHEST: f32 = 0.1;
-/// How much a turn of the normal counts as a move of the surface by its mesh's size: lights must not jump.
+/// Weight of a change of the normal relative to a move by the mesh's size: shading must not jump.
 const NORMAL_WEIGHT: f32 = 0.2;
 
 /// A mesh with fewer triangles.
 pub(crate) struct Coarser {
-    /// How far the surface is from where it should be, at most. [Units: wu of the mesh]
+    /// Largest distance between its surface and the original. [Units: wu of the mesh]
     pub(crate) error: f64,
-    /// By primitive: triples of indices into its positions.
+    /// For each primitive, triples of indices into its positions.
     pub(crate) indices: Vec<Vec<u32>>,
 }
 
-/// Ever coarser meshes of `primitives`, errors ascending; none of what is small already.
+/// Returns ever coarser versions of `primitives`, errors ascending; none if the mesh is small.
 ///
-/// `O(n log n)` in triangles. Not in need of sound input: what meshoptimizer cannot take is left as it is.
+/// O(n log n) in triangles. Input need not be sound: primitives that meshoptimizer rejects stay unchanged.
 pub(crate) fn coarser(primitives: &[&Primitive]) -> Vec<Coarser> {
     let n_of = |all: &[Vec<u32>]| all.iter().map(|i| i.len() / 3).sum::<usize>();
     let full: Vec<Vec<u32>> = primitives.iter().map(|p| p.indices.clone()).collect();
@@ -50,7 +49,7 @@ pub(crate) fn coarser(primitives: &[&Primitive]) -> Vec<Coarser> {
         let indices: Vec<Vec<u32>> = (primitives.iter().zip(before))
             .map(|(p, before)| {
                 let less = collapsed(p, p.indices.len() / 3 / share, primitives.len() > 1);
-                // Nothing vanishes, and no level has more than the one before.
+                // No primitive vanishes, and no level has more triangles than the one before.
                 if less.is_empty() || less.len() > before.len() {
                     before.clone()
                 } else {
@@ -72,7 +71,7 @@ pub(crate) fn coarser(primitives: &[&Primitive]) -> Vec<Coarser> {
     levels
 }
 
-/// A primitive with about `n` triangles. Rims stay where other primitives may begin there.
+/// Returns the indices of a primitive reduced to about `n` triangles. Rims where other primitives may begin stay.
 fn collapsed(p: &Primitive, n: usize, keeps_rims: bool) -> Vec<u32> {
     let bytes = bytemuck::cast_slice(&p.positions);
     let Ok(positions) = VertexDataAdapter::new(bytes, size_of::<[f32; 3]>(), 0) else {
@@ -109,11 +108,11 @@ fn collapsed(p: &Primitive, n: usize, keeps_rims: bool) -> Vec<u32> {
     }
 }
 
-/// The indices of a primitive, of corners that look the same all to the first: files repeat them, and between what is
-/// not joined meshoptimizer keeps a seam.
+/// Returns the indices of a primitive with identical vertices merged: files repeat vertices, and meshoptimizer treats
+/// unmerged ones as a seam.
 fn joined(p: &Primitive) -> Vec<u32> {
     let bits = |v: Option<&[f32]>| -> Vec<u32> {
-        // Adding zero makes -0 and 0 one key.
+        // Adding zero makes -0 and 0 the same key.
         v.unwrap_or_default()
             .iter()
             .map(|x| (x + 0.0).to_bits())
@@ -134,7 +133,7 @@ fn joined(p: &Primitive) -> Vec<u32> {
     p.indices.iter().map(|&i| firsts[i as usize]).collect()
 }
 
-/// How far corners and middles of the triangles of one surface are from the other, at most, either way.
+/// Returns the largest distance of vertices and centers of triangles of either surface from the other.
 fn distance(p: &Primitive, coarse: &[u32]) -> f64 {
     let triangles = |indices: &[u32]| -> Vec<Triangle> {
         let corner = |i: u32| DVec3::from_array(p.positions[i as usize].map(f64::from));
@@ -167,13 +166,13 @@ fn distance(p: &Primitive, coarse: &[u32]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A ball of `n` × `2 n` quadrangles, flat or smooth.
+    /// A ball of `n` × `2 n` quads, flat or smooth.
     fn ball(n: u32, is_smooth: bool) -> Primitive {
         let mut p = Primitive::default();
         for i in 0..=n {
             for j in 0..2 * n {
                 let [a, b] = [i, j].map(|k| f64::from(k) * std::f64::consts::PI / f64::from(n));
-                // The sine of half a turn is not zero, and the ball would have a hole.
+                // The sine of half a turn is not exactly zero, which would leave a hole.
                 let r = if i == n { 0.0 } else { a.sin() };
                 let at = [r * b.cos(), a.cos(), r * b.sin()].map(|x| x as f32);
                 p.positions.push(at);
@@ -206,15 +205,15 @@ mod tests {
                 assert!(indices.len() < n && !indices.is_empty());
                 assert!(level.error >= error);
                 (n, error) = (indices.len(), level.error);
-                // All corners are on the ball; in between, a surface is inside by the error at most, and by what the
-                // ball itself is off.
+                // All vertices are on the ball. Between them, the surface lies inside by at most the error plus
+                // the ball's own error.
                 for t in indices.chunks_exact(3) {
                     let corner = |i: u32| DVec3::from_array(p.positions[i as usize].map(f64::from));
                     let middle = t.iter().map(|&i| corner(i)).sum::<DVec3>() / 3.0;
                     assert!(middle.length() > 1.0 - error - 0.02, "{middle} {error}");
                 }
             }
-            // An octahedron's sides are 0.42 off: nothing here is that coarse.
+            // An octahedron's faces are 0.42 off; no level here is that coarse.
             assert!(levels[0].error < 0.05 && error < 0.42, "{error}");
         }
     }
@@ -232,7 +231,7 @@ mod tests {
             }
             assert!(coarser(&[&p]).is_empty(), "{broken}");
         }
-        // All in one point.
+        // All vertices coincide.
         let mut point = ball(24, false);
         point.positions.fill([1.0; 3]);
         assert!(coarser(&[&point]).iter().all(|l| l.error == 0.0));
@@ -240,7 +239,7 @@ mod tests {
 
     #[test]
     fn rims_stay_between_primitives() {
-        // A ball cut in two, with a row of corners that both have.
+        // A ball cut in two, with a row of shared vertices.
         let whole = ball(24, false);
         let half = |indices: &[u32]| Primitive {
             indices: indices.to_vec(),

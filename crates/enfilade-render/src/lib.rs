@@ -1,13 +1,12 @@
 //! Draws worlds of cells and portals with wgpu: to files without a display, or to a window's texture.
 //!
-//! A world is loaded once ([`GpuWorld`]); each frame, a [`Lister`] turns what the run-time sees into a
-//! short list of draws, and a [`Renderer`] draws it. Any adapter that wgpu supports will do, software
-//! included.
+//! Load a world once ([`GpuWorld`]). Each frame, a [`Lister`] turns the run-time's answer into a short list of draws,
+//! and a [`Renderer`] draws it. Any adapter that wgpu supports works, software included.
 //!
-//! # What is not promised
+//! # Limits
 //!
-//! Looks are meant to be clear, not physical: base color, emission, alpha, one sun with shadows, daylight that comes
-//! through portals ([`Studio::add_light`]), dark corners, and glass. Metal, roughness and normal maps are not drawn.
+//! Shading aims to be clear, not physical: base color, emission, alpha, one sun with shadows, daylight through portals
+//! ([`Studio::add_light`]), ambient occlusion, and glass. Metalness, roughness and normal maps are ignored.
 
 mod camera;
 mod explain;

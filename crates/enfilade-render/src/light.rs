@@ -1,7 +1,7 @@
-//! The light of a world by place: which cell a point is in, and what light the air there holds.
+//! Light of a world by place: the cell of a point, and the light in the air there.
 //!
-//! Both are functions of the point alone, so that what is culled has no say in how the rest looks, and a floor that reaches
-//! through five rooms is lit, and painted, by each of them up to its borders.
+//! Both depend on the point alone. So culling does not change the look of what remains, and a floor that reaches
+//! through five rooms is lit and painted by each of them up to its borders.
 
 mod balance;
 mod field;
@@ -20,31 +20,31 @@ use probes::Probes;
 
 pub(crate) use balance::sun_of;
 
-/// Texels in a row of a table: a shader knows it, too.
+/// Texels in a row of a table; `light.wgsl` uses the same number.
 const ROW: u32 = 1024;
-/// Mean brightness of a room in its pictures, as a share of the brightness outdoors.
+/// Mean brightness of a room in its pictures, relative to the outdoors.
 const MIDDLE: f32 = 0.7;
-/// The longest exposure, as a multiple of the shortest.
+/// The longest exposure, relative to the shortest.
 const LONGEST: f32 = 4.0;
 /// Texels of a cell in the table.
 const CELL_TEXELS: usize = 4;
 
-/// What a shader needs to know besides the textures. As in `common.wgsl`.
+/// Shader parameters besides the textures, laid out as in `common.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct LightGlobals {
-    /// From the camera's place to the field's: added to relative points; w: exposure.
+    /// Offset from the camera's position to the field's origin, added to relative points; w: exposure.
     pub(crate) shift: [f32; 4],
     low: [f32; 4],
     density: [f32; 4],
-    /// What stands for outside, where cells begin in the table, whether there is a field, number of cells.
+    /// Leaf of the outside, first cell of the table, 1 if there is a field, number of cells.
     info: [i32; 4],
 }
 
 /// The light of a world on the adapter.
 pub(crate) struct Light {
     field: Field,
-    /// By cell: how bright its air is; 0 outdoors.
+    /// For each cell, brightness of its air; 0 outdoors.
     brightness: Vec<f32>,
     globals: LightGlobals,
     pub(crate) table: wgpu::TextureView,
@@ -87,7 +87,7 @@ fn volume(
     Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
 }
 
-/// Words that a shader looks up by number, four to a texel.
+/// Uploads words that a shader looks up by index, four per texel.
 pub(crate) fn table(
     gpu: &Gpu,
     what: &'static str,
@@ -169,7 +169,7 @@ impl Light {
         })
     }
 
-    /// All places alike, until the light of a world is [computed](Light::of_world).
+    /// Uniform light, until the light of a world is [computed](Light::of_world).
     pub(crate) fn uniform(gpu: &Gpu) -> Result<Self, RenderError> {
         let field = Field::build(&enfilade_cpg::Locator::default(), 1);
         let probes = Probes {
@@ -181,14 +181,14 @@ impl Light {
         Self::new(gpu, field, (&[], 0, 0), probes, false)
     }
 
-    /// The light of a world, under a sun in direction `sun`.
+    /// Computes the light of a world under a sun in direction `sun`.
     pub(crate) fn of_world(
         gpu: &Gpu,
         world: &World,
         sight: &Sight,
         sun: Vec3,
     ) -> Result<Self, RenderError> {
-        // Larger boxes of texels save nothing.
+        // Larger textures save nothing.
         let side = gpu.device.limits().max_texture_dimension_3d.min(512);
         let field = Field::build(&world.graph.locator, side);
         let probes = Probes::build(world, sight, sun, side);
@@ -215,8 +215,8 @@ impl Light {
         Self::new(gpu, field, (&texels, first, n_cells), probes, true)
     }
 
-    /// The exposure for an eye at a place, as a multiple of that outdoors: longer in dim rooms, from which the outdoors then
-    /// looks overexposed.
+    /// Returns the exposure for an eye at a place, relative to the outdoors: longer in dim rooms, from which the
+    /// outdoors then looks overexposed.
     fn exposure(&self, eye: Vec3) -> f32 {
         let cell = self.field.locate(eye.to_array());
         let brightness = usize::try_from(cell)
@@ -228,7 +228,7 @@ impl Light {
         }
     }
 
-    /// What the shader needs to know, for a camera at `origin`; `is_eye` where an eye is there.
+    /// Returns the shader parameters for a camera at `origin`; `is_eye` if an eye is there.
     pub(crate) fn globals(&self, origin: Vec3, is_eye: bool) -> LightGlobals {
         let shift = (origin.as_dvec3() - self.field.origin).as_vec3();
         let exposure = if is_eye { self.exposure(origin) } else { 1.0 };
@@ -238,12 +238,12 @@ impl Light {
         }
     }
 
-    /// What points of the field are relative to. [Units: wu]
+    /// Returns the origin of the field's coordinates. [Units: wu]
     pub(crate) fn origin(&self) -> DVec3 {
         self.field.origin
     }
 
-    /// Whether it is that of a world.
+    /// Returns `true` if the light of a world was computed.
     pub(crate) fn is_known(&self) -> bool {
         self.globals.info[2] != 0
     }

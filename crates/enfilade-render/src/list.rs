@@ -1,8 +1,7 @@
-//! What one frame draws: ranges of triangles, each once, near to far.
+//! The draw list of a frame: ranges of triangles, each once, near to far.
 //!
-//! A frame must not cost the processor more than the adapter. Chunks of a batch that stand side by
-//! side become one draw; all visible objects of a mesh become one draw, however many rooms they are
-//! in; buffers are kept from frame to frame.
+//! A frame must not cost the processor more than the adapter. So adjacent chunks of a batch become one draw; all
+//! visible objects of a mesh become one draw, in however many rooms; and buffers are reused from frame to frame.
 
 use std::ops::Range;
 
@@ -12,24 +11,24 @@ use glam::Vec3;
 
 use crate::scene::{Finish, GpuWorld, Span};
 
-/// Why something is drawn though it is not seen, for pictures that explain.
+/// Why an object is drawn although it is not visible, for pictures that explain culling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Reason {
-    /// It is seen.
+    /// It is visible.
     Seen = 0,
-    /// It is out of the view frustum.
+    /// It is outside the view frustum.
     OutOfView = 1,
-    /// It is in the view frustum, and no chain of portals leads there.
+    /// It is in the view frustum, but no chain of portals leads there.
     BehindWalls = 2,
-    /// A large polygon of a cell that is seen hides it.
+    /// A large polygon of a visible cell hides it.
     Occluded = 3,
 }
 
-/// The number of an instance; what is above tells why it is drawn.
+/// Bits of an instance's index; the bits above hold its reason.
 pub(crate) const INSTANCE_MASK: u32 = 0x0fff_ffff;
 
-/// Pixels of a picture: `[x, y, width, height]`.
+/// A rectangle of pixels: `[x, y, width, height]`.
 pub(crate) type Scissor = [u32; 4];
 
 /// One draw.
@@ -39,9 +38,9 @@ pub(crate) struct Run {
     pub(crate) n: u32,
     pub(crate) texture: u32,
     pub(crate) finish: Finish,
-    /// Whether corners have normals.
+    /// True if its vertices have normals.
     pub(crate) is_smooth: bool,
-    /// Into [`DrawList::instances`].
+    /// Range of [`DrawList::instances`].
     pub(crate) instances: Range<u32>,
     /// `None` for the whole picture.
     pub(crate) scissor: Option<Scissor>,
@@ -61,68 +60,67 @@ impl Run {
     }
 }
 
-/// What far away rooms and objects are spared: all of it changes pictures, and is off unless asked for.
+/// Reductions for distant rooms and objects. All of them change pictures and are off by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sparing {
-    /// A portal that covers fewer pixels is not looked through: a polygon of its outline, in the mean
-    /// color of the cell behind, stands in for that. [Units: px²]
+    /// Portals that cover fewer pixels are not looked through: their outlines are filled with the mean color of
+    /// the cell behind. [Units: px²]
     pub stop_below: f32,
-    /// Whether nothing stands in for it.
+    /// True to leave those outlines empty.
     pub stop_at_nothing: bool,
-    /// Objects of cells that are seen through fewer pixels are not drawn; their walls are.
-    /// [Units: px²]
+    /// Objects in cells visible through fewer pixels are not drawn; the walls of these cells are. [Units: px²]
     pub objects_below: f32,
-    /// Objects are drawn with fewer triangles where that moves their surface by at most so many pixels; 0 for never.
-    /// Of worlds that were [loaded with levels](GpuWorld::load_with_levels), for frustum culling, too. [Units: px]
+    /// Objects use fewer triangles if their surface moves by at most this many pixels; 0 for never. Only for worlds
+    /// [loaded with levels](GpuWorld::load_with_levels); applies to frustum culling, too. [Units: px]
     pub lod: f32,
 }
 
-/// What an answer is drawn for.
+/// The picture for which an answer is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
-    /// What was asked about.
+    /// The view of the query.
     pub view: &'a View,
-    /// Which portals are shut.
+    /// The state of doors, such as shut portals.
     pub state: &'a SightState,
-    /// Of the picture. [Units: px]
+    /// Size of the picture. [Units: px]
     pub size: [u32; 2],
-    /// Whether batches are drawn only where their cells are seen.
+    /// True to draw each batch only in the rectangle where its cells are visible.
     pub has_scissors: bool,
 }
 
-/// What one frame draws, and in which order.
+/// The draws of one frame, in order.
 #[derive(Clone, Debug, Default)]
 pub struct DrawList {
     pub(crate) opaque: Vec<Run>,
     /// Far to near.
     pub(crate) transparent: Vec<Run>,
-    /// The number of each instance drawn, and why in its highest four bits. Structure is number 0.
+    /// Index of each drawn instance, with its reason in the highest four bits. Structure has index 0.
     pub(crate) instances: Vec<u32>,
-    /// What stands in for what is not drawn.
+    /// Polygons drawn in place of cells behind small portals.
     pub(crate) stand_ins: Vec<(PortalId, CellId)>,
     n_triangles: u64,
 }
 
 impl DrawList {
-    /// Triangles that it draws.
+    /// Returns the number of drawn triangles.
     #[must_use]
     pub fn n_triangles(&self) -> u64 {
         self.n_triangles
     }
 
-    /// Draws that it takes.
+    /// Returns the number of draws.
     #[must_use]
     pub fn n_draws(&self) -> usize {
         self.opaque.len() + self.transparent.len()
     }
 
-    /// Portals drawn as a polygon each instead of what is behind them.
+    /// Returns the portals drawn as a polygon each instead of the cells behind them.
     #[must_use]
     pub fn stand_ins(&self) -> &[(PortalId, CellId)] {
         &self.stand_ins
     }
 
-    /// Adds what another list draws, after what this one does.
+    /// Appends the draws of another list.
     pub fn append(&mut self, other: &Self) {
         let base = self.instances.len() as u32;
         self.instances.extend_from_slice(&other.instances);
@@ -136,13 +134,13 @@ impl DrawList {
         self.n_triangles += other.n_triangles;
     }
 
-    /// Puts draws in the order of the world, so that two lists draw what they share in the same order.
+    /// Sorts draws in the order of the world, so that two lists draw their common part in the same order.
     pub(crate) fn sort(&mut self) {
         self.opaque.sort_by_key(|r| r.first);
         self.transparent.sort_by_key(|r| r.first);
     }
 
-    /// Nothing yet, with structure to be drawn as its only instance.
+    /// Returns an empty list with structure as its only instance.
     pub(crate) fn of_structure() -> Self {
         Self {
             instances: vec![0],
@@ -159,25 +157,25 @@ impl DrawList {
     }
 }
 
-/// Makes lists, frame by frame; keeps its buffers.
+/// Builds draw lists frame by frame; reuses its buffers.
 #[derive(Default)]
 pub struct Lister {
     list: DrawList,
     stamp: u32,
-    /// By cell: the part of the screen that it is seen in, and when that was found out.
+    /// For each cell, number of the frame that last saw it, and the part of the screen where it is visible.
     rectangles: Vec<(u32, [f32; 4])>,
-    /// By batch: its place in the order of drawing.
+    /// For each batch, its place in drawing order.
     ranks: Vec<(u32, u32)>,
     chunks: Vec<(u32, u32)>,
     /// Mesh, level, object.
     details: Vec<(u32, u32, u32)>,
     plugs: Vec<PortalId>,
-    /// Those that are seen, ascending.
+    /// Visible cells, ascending.
     cells: Vec<CellId>,
     far: Vec<(f32, Run)>,
 }
 
-/// A range of draws that grows while what is added continues it.
+/// Adds a run; extends the last one if it continues it.
 fn push_run(runs: &mut Vec<Run>, run: Run) {
     if let Some(last) = runs.last_mut()
         && last.first + last.n == run.first
@@ -194,13 +192,13 @@ fn push_run(runs: &mut Vec<Run>, run: Run) {
 }
 
 impl Lister {
-    /// A lister; one serves any number of worlds, one after the other.
+    /// Returns a lister; it serves any number of worlds, one after the other.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The last list; its buffers are missed until it is given back.
+    /// Moves out the last list with its buffers; give them back with [`Lister::give`].
     pub(crate) fn take(&mut self) -> DrawList {
         std::mem::take(&mut self.list)
     }
@@ -209,7 +207,7 @@ impl Lister {
         self.list = list;
     }
 
-    /// All that there is, whatever the view; and what fills portals that `state` shuts.
+    /// Lists everything, whatever the view, with plugs of the portals that `state` shuts.
     pub fn everything(
         &mut self,
         world: &GpuWorld,
@@ -227,8 +225,8 @@ impl Lister {
         self.finish(world, sight, eye, None)
     }
 
-    /// What an answer of the run-time names. With scissors, each batch is drawn within the rectangle that its cells are
-    /// seen in; views that look all around take none.
+    /// Lists the answer of a query. With scissors, each batch is drawn within the rectangle where its cells are
+    /// visible; views all around take no scissors.
     pub fn seen(
         &mut self,
         world: &GpuWorld,
@@ -286,7 +284,7 @@ impl Lister {
         self.cells.clear();
         self.cells.extend_from_slice(seen.cells());
         self.cells.sort_unstable();
-        // What fills the portals that are shut of cells that are seen.
+        // Plugs of shut portals of visible cells.
         let shut = shot.state.shut_portals();
         self.plugs.extend(shut.filter(|p| {
             let mut ends = world.portal_cells[p.0 as usize].iter();
@@ -295,7 +293,7 @@ impl Lister {
         self.finish(world, sight, shot.view.eye(), size)
     }
 
-    /// Chunks and details of one's own choice, colored by why they are drawn, and what fills all portals that `state` shuts.
+    /// Lists chosen chunks and details, colored by reason, with plugs of all portals that `state` shuts.
     pub fn chosen(
         &mut self,
         world: &GpuWorld,
@@ -328,7 +326,7 @@ impl Lister {
         self.far.clear();
     }
 
-    /// The pixels that a batch is seen in; `None` where it is nowhere.
+    /// Returns the rectangle where a batch is visible; `None` if it is not.
     fn scissor(&self, cells: &[CellId], size: [u32; 2]) -> Option<Scissor> {
         let mut r = [f32::INFINITY, f32::INFINITY, -f32::INFINITY, -f32::INFINITY];
         for c in cells {
@@ -344,7 +342,7 @@ impl Lister {
             }
         }
         let [w, h] = size.map(|n| n as f32);
-        // A pixel of margin: the rectangle is rounded.
+        // One pixel of margin for rounding.
         let low = |x: f32, n: f32| ((x * 0.5 + 0.5) * n - 1.0).floor().clamp(0.0, n) as u32;
         let high = |x: f32, n: f32| ((x * 0.5 + 0.5) * n + 1.0).ceil().clamp(0.0, n) as u32;
         let (x0, x1) = (low(r[0], w), high(r[2], w));
@@ -361,7 +359,7 @@ impl Lister {
     ) -> &DrawList {
         let eye = Vec3::from(eye);
         let reason = self.list.instances[0];
-        // Within a batch in the order of the buffer, so that neighbors join.
+        // Within a batch, keep the order of the buffer, so that neighbors join.
         self.chunks.sort_unstable();
         let mut batch = (u32::MAX, None);
         for &(_, c) in &self.chunks {
@@ -411,7 +409,7 @@ impl Lister {
                 }
             }
         }
-        // Equal distances in the order of the world: the same picture every time.
+        // Equal distances in the order of the world, so that pictures are deterministic.
         self.far
             .sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.first.cmp(&b.1.first)));
         for (_, run) in self.far.drain(..) {

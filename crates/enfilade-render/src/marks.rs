@@ -1,43 +1,43 @@
-//! Lines and see-through polygons over a picture: portals, the regions they narrow the view to,
-//! the eye and its frustum.
+//! Lines and translucent polygons drawn over a picture: portals, the regions to which they narrow the view, the eye and
+//! its frustum.
 
 use glam::{Vec3, Vec4};
 
 use crate::camera::Projection;
 
-/// What is drawn.
+/// The shape of a mark.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// A closed line through points of the world. [Units: wu]
+    /// A closed line through world points. [Units: wu]
     Outline(Vec<[f32; 3]>),
-    /// A line from point to point of the world. [Units: wu]
+    /// A line between two world points. [Units: wu]
     Line([[f32; 3]; 2]),
-    /// A convex polygon of the world, filled. [Units: wu]
+    /// A filled convex polygon. [Units: wu]
     Area(Vec<[f32; 3]>),
-    /// The outline of a part of the screen: `[left, bottom, right, top]`, -1 to 1.
+    /// The outline of a rectangle of the screen: `[left, bottom, right, top]`, -1 to 1.
     Rectangle([f32; 4]),
 }
 
 /// A line or polygon over a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// What is drawn.
+    /// The shape.
     pub shape: Shape,
-    /// Linear, with opacity.
+    /// Linear color with opacity.
     pub color: [f32; 4],
-    /// Of lines. [Units: px]
+    /// Width of lines. [Units: px]
     pub width: f32,
-    /// Whether it shows through what is before it.
+    /// True if surfaces before it do not hide it.
     pub on_top: bool,
 }
 
-/// A corner as the shader reads it: clip space, color.
+/// A vertex in the shader's layout: clip space position, color.
 pub(crate) type MarkCorner = [[f32; 4]; 2];
 
-/// Marks count as this much nearer, so that they win over the surface that they lie on.
+/// Factor by which marks count as nearer, so that they win over the surface in which they lie.
 const NEARER: f32 = 1.002;
 
-/// Triangles of marks, three corners each: those that surfaces hide, and those that nothing hides.
+/// Returns the triangles of marks, three vertices each: those that surfaces hide, and those on top.
 pub(crate) fn corners(
     marks: &[Mark],
     projection: &Projection,
@@ -68,7 +68,7 @@ pub(crate) fn corners(
             Shape::Area(points) => {
                 for pair in points.windows(2).skip(1) {
                     let triangle = [points[0], pair[0], pair[1]].map(clip);
-                    // The adapter clips what is behind the eye.
+                    // The adapter clips parts behind the eye.
                     out.extend(triangle.map(|q| [nearer(q), mark.color]));
                 }
             }
@@ -81,7 +81,7 @@ fn nearer(q: Vec4) -> [f32; 4] {
     [q.x, q.y, (q.z * NEARER).min(q.w), q.w]
 }
 
-/// A line as two triangles that face the picture.
+/// Adds a line as two triangles that face the camera.
 fn add_line(out: &mut Vec<MarkCorner>, mark: &Mark, [a, b]: [Vec4; 2], size: [u32; 2]) {
     const LEAST: f32 = 1e-3;
     let cut = |p: Vec4, q: Vec4| {
@@ -103,7 +103,7 @@ fn add_line(out: &mut Vec<MarkCorner>, mark: &Mark, [a, b]: [Vec4; 2], size: [u3
     if length.is_nan() || length < 1e-6 {
         return;
     }
-    // A little longer than it is, so that corners close.
+    // Slightly longer than the line, so that joints of outlines close.
     let (ux, uy) = (
         dx / length * mark.width * 0.5,
         dy / length * mark.width * 0.5,

@@ -1,30 +1,30 @@
-//! What surfaces look like: the part of glTF's materials that is drawn.
+//! Looks of surfaces: the supported part of glTF materials.
 
 use enfilade_cpg::World;
 use enfilade_geom::scene::Material;
 use image::ImageDecoder as _;
 use serde_json::Value;
 
-/// A texture of more texels than this a side is scaled down: 8 bytes a texel add up.
+/// Larger textures are scaled down to this side, since a texel takes 8 bytes. [Units: texels]
 const MAX_SIDE: u32 = 2048;
 
-/// Largest picture: 8192 x 8192 pixels of four bytes. [Units: bytes, decoded]
+/// Largest texture image: 8192 × 8192 pixels of four bytes. [Units: bytes, decoded]
 const MAX_PICTURE: u64 = 1 << 28;
-/// Most bytes of all pictures of a world, and more for each byte of them in the file: ten times what JPEG packs.
+/// Most bytes of all images of a world, and more per byte of them in the file: ten times the compression of JPEG.
 const MAX_PICTURES: u64 = 1 << 29;
 const MAX_EXPANSION: u64 = 128;
 
-/// What is drawn of one material.
+/// The supported part of one material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Look {
     pub(crate) base_color: [f32; 4],
     pub(crate) emissive: [f32; 3],
-    /// Texels with less alpha are not drawn; 0 for all are.
+    /// Texels with less alpha are not drawn; 0 draws all.
     pub(crate) cutoff: f32,
     pub(crate) is_transparent: bool,
     /// Index into `World::textures`.
     pub(crate) texture: Option<u32>,
-    /// Which set of texture coordinates.
+    /// Index of the set of texture coordinates.
     pub(crate) uv_set: usize,
 }
 
@@ -41,13 +41,13 @@ impl Default for Look {
     }
 }
 
-/// Whether a material is a pane by its name, though it says nothing of what shows through: converters of building
-/// models name materials by the class of the object, and lose the rest.
+/// Returns `true` if a material's name means a pane, even if its data do not make it transparent: converters of
+/// building models name materials by the class of the object and lose the rest.
 fn is_pane(name: &str) -> bool {
     const PANES: [&str; 5] = ["ifcwindow", "window", "glass", "glazing", "pane"];
     let is_part = |c: char| !c.is_alphanumeric();
     let words = || name.split(is_part).filter(|w| !w.is_empty());
-    // Of one word, or one beside a number: "glass wool" is no glass.
+    // One word, or one beside a number: "glass wool" is not glass.
     let mut named = words().filter(|w| !w.chars().all(|c| c.is_ascii_digit()));
     let first = named
         .next()
@@ -75,7 +75,7 @@ impl Look {
         }
         let transmission = &value["extensions"]["KHR_materials_transmission"]["transmissionFactor"];
         if let Some(t) = transmission.as_f64() {
-            // Glass that says it transmits all is seen by what it reflects: a tenth.
+            // Fully transmitting glass is visible by its reflections: a tenth.
             look.base_color[3] = look.base_color[3].min(1.0 - 0.85 * t as f32);
         }
         let texture = &value["pbrMetallicRoughness"]["baseColorTexture"];
@@ -92,10 +92,10 @@ impl Look {
     }
 }
 
-/// The looks of a world's materials.
+/// Returns the looks of a world's materials.
 ///
-/// What is a pane by its name is seen through, unless structure is made of it, too: structure that hides was baked as such, and
-/// what is behind it is not drawn.
+/// Materials with a pane's name become transparent, unless structure uses them, too: the bake took that structure as
+/// opaque, and nothing behind it is drawn.
 pub(crate) fn looks_of(world: &World) -> Vec<Look> {
     let mut looks: Vec<Look> = world.materials.iter().map(Look::of).collect();
     let mut is_structural = vec![false; looks.len()];
@@ -111,28 +111,28 @@ pub(crate) fn looks_of(world: &World) -> Vec<Look> {
         let is_plain = look.cutoff <= 0.0 && look.texture.is_none();
         if !is_structural && is_plain && !look.is_transparent && is_pane(&material.name) {
             look.is_transparent = true;
-            // Its frame is drawn alike, and in depth there are several faces.
+            // The frame is drawn the same way, and a pane has several faces in depth.
             look.base_color[3] = look.base_color[3].min(0.12);
         }
     }
     looks
 }
 
-/// A picture decoded: RGBA, and smaller and smaller copies.
+/// A decoded image: RGBA, and its mipmaps.
 pub(crate) struct Decoded {
     pub(crate) levels: Vec<image::RgbaImage>,
 }
 
-/// Why a picture is drawn without.
+/// Why a texture is drawn without its image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoPicture {
     /// Missing or damaged.
     Broken,
-    /// A picture of a few bytes may claim to be of any size.
+    /// Beyond the limit: an image of a few bytes may declare any size.
     TooLarge,
 }
 
-/// Decodes pictures as long as they come to no more than they may.
+/// Decodes images as long as they stay within their common limit.
 pub(crate) struct Decoder<'w> {
     world: &'w World,
     /// [Units: bytes, decoded]
@@ -146,7 +146,7 @@ impl<'w> Decoder<'w> {
         Self { world, left }
     }
 
-    /// The picture of a texture. Its size is asked before it is decoded.
+    /// Decodes the image of a texture. Checks its size before decoding.
     pub(crate) fn decode(&mut self, texture: u32) -> Result<Decoded, NoPicture> {
         let texture = self.world.textures.get(texture as usize);
         let image = texture.and_then(|t| self.world.images.get(t.image? as usize));
@@ -156,12 +156,12 @@ impl<'w> Decoder<'w> {
             .with_guessed_format()
             .map_err(|_| NoPicture::Broken)?;
         let mut limits = image::Limits::default();
-        // The decoder holds far less beside the picture.
+        // The decoder needs far less beside the image itself.
         limits.max_alloc = Some(2 * MAX_PICTURE);
         reader.limits(limits);
         let decoder = reader.into_decoder().map_err(broken)?;
         let (w, h) = decoder.dimensions();
-        // As they will be, four bytes a pixel, or more.
+        // Size after conversion: four bytes per pixel, or more.
         let size = decoder.total_bytes().max(u64::from(w) * u64::from(h) * 4);
         if size > MAX_PICTURE.min(self.left) {
             return Err(NoPicture::TooLarge);
@@ -173,7 +173,7 @@ impl<'w> Decoder<'w> {
         }
         if w.max(h) > MAX_SIDE {
             let scale = |n: u32| (n * MAX_SIDE / w.max(h)).max(1);
-            // In whole numbers: floats take four times as much.
+            // In integers: floats take four times as much.
             picture = picture.thumbnail_exact(scale(w), scale(h));
         }
         let mut levels = vec![picture.into_rgba8()];
@@ -188,7 +188,7 @@ impl<'w> Decoder<'w> {
     }
 }
 
-/// Whether a texture repeats beyond 0 … 1 along u and v, or is clamped or mirrored.
+/// Returns the wrap modes of a texture along u and v: repeated, clamped or mirrored.
 pub(crate) fn wrapping(world: &World, texture: u32) -> [wgpu::AddressMode; 2] {
     let sampler = world
         .textures
@@ -281,7 +281,7 @@ mod tests {
         assert!(broken(&world, 1), "cut off");
     }
 
-    /// A world of one texture for each of some pictures, and their files.
+    /// Returns a world with one texture for each of the given image files.
     fn textured(pictures: Vec<Vec<u8>>) -> World {
         World {
             textures: (0..pictures.len() as u32)
@@ -319,7 +319,7 @@ mod tests {
 
     #[test]
     fn pictures_that_claim_to_be_huge_are_told_before_they_are_decoded() {
-        // The head says so: what comes after it is that of a picture of a pixel.
+        // The header declares a huge image; the data after it are those of one pixel.
         let mut claims = std::io::Cursor::new(Vec::new());
         image::GrayImage::new(1, 1)
             .write_to(&mut claims, image::ImageFormat::Jpeg)
@@ -330,11 +330,11 @@ mod tests {
         let world = textured(vec![claims]);
         let found = Decoder::new(&world).decode(0).map(|d| d.levels.len());
         assert_eq!(found, Err(NoPicture::TooLarge));
-        // Each may be as large as it is, all together may not.
+        // Each image is within its limit, all together are not.
         let sheet = png(4096, 4096);
         let world = textured(vec![sheet; 12]);
         let mut decoder = Decoder::new(&world);
-        // No picture has been decoded here.
+        // No image has been decoded so far.
         let all = decoder.left;
         assert!(
             all > 8 * 4 * 4096 * 4096 && all < 12 * 4 * 4096 * 4096,

@@ -1,10 +1,9 @@
-//! What a pixel shows by exact sight lines, to tell what culling lost from what an adapter rounds.
+//! Exact lines of sight per pixel, to separate losses by culling from rounding by the adapter.
 //!
-//! Adapters round corners to a grid of 1/256 pixel before they fill triangles. Where two triangles
-//! share an edge, or a hidden one ends at it, which of them a pixel on that edge shows is a rounding;
-//! and pictures with more triangles have more such edges. So each pixel that differs is asked of a ray
-//! in 64-bit arithmetic: it is lost unless the ray, moved by less than a 64th of a pixel, says that
-//! what was drawn is right.
+//! Adapters round vertices to a grid of 1/256 pixel before they fill triangles. Where two triangles share an edge, or a
+//! hidden one ends at it, rounding decides which of them a pixel on that edge shows; and pictures with more
+//! triangles have more such edges. So each differing pixel is tested by a ray in 64-bit arithmetic: it counts as lost
+//! unless the ray, moved by less than a 64th of a pixel, confirms the drawn surface.
 
 use enfilade_cpg::World;
 use enfilade_geom::scene::Primitive;
@@ -16,16 +15,16 @@ use crate::ids::{LostPixel, Shown};
 use crate::materials::{Look, looks_of};
 use crate::scene::plug;
 
-/// How far a sight line is moved, in pixels: a little over what adapters round by.
+/// Distance by which a line of sight is moved: slightly more than the rounding of adapters. [Units: px]
 const NUDGE: f64 = 1.0 / 64.0;
 
-/// Triangles, those that hide and those that do not, and what a picture calls each.
+/// Opaque and transparent triangles, each with its object in id pictures.
 struct Layers {
     bvhs: [Bvh; 2],
     keys: [Vec<Shown>; 2],
 }
 
-/// Layers under way.
+/// Layers in construction.
 struct LayersBuilder<'w> {
     looks: &'w [Look],
     triangles: [Vec<Triangle>; 2],
@@ -65,15 +64,15 @@ impl<'w> LayersBuilder<'w> {
     }
 }
 
-/// The triangles of a world.
+/// The triangles of a world, for exact lines of sight.
 ///
-/// Memory: some 200 bytes a triangle. A question takes microseconds.
+/// Memory: about 200 bytes per triangle. A query takes microseconds.
 pub struct Oracle<'w> {
     world: &'w World,
     looks: Vec<Look>,
-    /// By detail mesh: the number of its first triangle.
+    /// For each detail mesh, the index of its first triangle.
     first_of_mesh: Vec<u32>,
-    /// What stays, and what a state has moved or put in.
+    /// Fixed triangles, and those that a state has moved or added.
     layers: [Layers; 2],
     tolerance: f64,
 }
@@ -83,7 +82,7 @@ fn dvec(p: [f32; 3]) -> DVec3 {
 }
 
 impl<'w> Oracle<'w> {
-    /// Of a world as the model has it; `sight`, which was made of the same, numbers the triangles as pictures do.
+    /// Prepares a world as modeled; `sight`, built from the same world, numbers the triangles as pictures do.
     #[must_use]
     pub fn new(world: &'w World, sight: &Sight) -> Self {
         let looks = looks_of(world);
@@ -123,22 +122,22 @@ impl<'w> Oracle<'w> {
         }
     }
 
-    /// Moves leaves to where `state` has them, and fills the portals that it shuts. Linear in the triangles of these.
+    /// Moves leaves as `state` has them, and adds plugs to shut portals. Linear in their triangles.
     pub fn follow(&mut self, sight: &Sight, state: &SightState) {
         let (world, looks) = (self.world, &self.looks);
         self.layers[1] = moving(world, looks, &self.first_of_mesh, sight, state);
     }
 
-    /// Whether an eye is so near to a surface that the near plane cuts it.
+    /// Returns `true` if the eye is so close to a surface that the near plane cuts it.
     #[must_use]
     pub fn is_at_surface(&self, eye: [f32; 3]) -> bool {
         let near = f64::from(Camera::NEAR) * 8.0;
         (self.layers.iter().flat_map(|l| &l.bvhs)).any(|b| b.nearest(dvec(eye), near).is_some())
     }
 
-    /// Whether what is drawn at a pixel, `found` meters away along the view direction (infinity for
-    /// the sky), is right but for less than a 64th of a pixel. `at` is column and row of a picture of
-    /// `size`; transparent surfaces are asked of apart from those that hide.
+    /// Returns `true` if the surface drawn at a pixel, `found` meters away along the view direction (infinity for
+    /// the sky), is right up to a shift of less than a 64th of a pixel. `at` is column and row of a picture of
+    /// `size`; transparent surfaces are tested apart from opaque ones.
     #[must_use]
     pub fn is_right(
         &self,
@@ -152,7 +151,7 @@ impl<'w> Oracle<'w> {
             if a.is_infinite() || b.is_infinite() {
                 return a == b;
             }
-            // Rounding of places, and of depths in 32 bits.
+            // Rounding of positions, and of depths in 32 bits.
             (a - b).abs() <= 2.0 * self.tolerance + 4e-6 * a
         };
         if same(
@@ -161,7 +160,7 @@ impl<'w> Oracle<'w> {
         ) {
             return true;
         }
-        // Nearby: the place where an oblique surface is met moves as well.
+        // Nearby, the position where the ray meets an oblique surface moves as well.
         let near = |a: f64, b: f64| same(a, b) || (a - b).abs() <= 0.02 * a.min(b);
         around().any(|nudge| {
             near(
@@ -171,7 +170,8 @@ impl<'w> Oracle<'w> {
         })
     }
 
-    /// Whether a pixel that differs is lost: what is shown there is wrong, and what was expected is more than a crack.
+    /// Returns `true` if a differing pixel is lost: it shows a wrong surface, and the expected one is more than a
+    /// crack.
     #[must_use]
     pub fn is_lost(
         &self,
@@ -185,13 +185,13 @@ impl<'w> Oracle<'w> {
             && self.is_met(camera, pixel.at, size, pixel.expected.0, is_transparent)
     }
 
-    /// Whether `shown` is what an exact ray through the middle of the pixel meets first, or among several
-    /// in one place; and so do rays moved by a 64th of a pixel and twice the world's tolerance, in at
-    /// least three of eight directions, a direction and its opposite being one.
+    /// Returns `true` if an exact ray through the center of the pixel meets `shown` first, alone or among several
+    /// at the same place, and so do rays moved by a 64th of a pixel and twice the world's tolerance, in at least
+    /// three of eight directions, where opposite directions count as one.
     ///
-    /// What is seen at the middle alone, or along a line through it, is seen through a slit between triangles whose corners
-    /// were rounded, by the adapter or to 32 bits, or moved by less than the tolerance, which no promise of a world is
-    /// about.
+    /// A surface visible only at the center, or only along a line through it, is seen through a slit between
+    /// triangles. Such slits arise where vertices are rounded, by the adapter or to 32 bits, or move within the
+    /// tolerance. A world promises nothing about them.
     #[must_use]
     pub fn is_met(
         &self,
@@ -235,7 +235,7 @@ impl<'w> Oracle<'w> {
         is_met
     }
 
-    /// How far away along the view direction the first surface is. [Units: wu]
+    /// Returns the distance of the first surface along the view direction. [Units: wu]
     fn distance(
         &self,
         camera: &Camera,
@@ -248,7 +248,8 @@ impl<'w> Oracle<'w> {
         self.first_on(&ray, is_transparent) + f64::from(Camera::NEAR)
     }
 
-    /// Where a ray meets the first surface, in lengths of the view direction from the near plane on.
+    /// Returns the position where a ray meets the first surface, in lengths of the view direction from the near
+    /// plane on.
     fn first_on(&self, ray: &Ray, is_transparent: bool) -> f64 {
         let first = |layer: usize| {
             let hits = self.layers.iter().map(|l| &l.bvhs[layer]);
@@ -264,7 +265,7 @@ impl<'w> Oracle<'w> {
     }
 }
 
-/// Leaves, and what fills portals.
+/// Builds the layers of leaves and plugs.
 fn moving(
     world: &World,
     looks: &[Look],
@@ -287,7 +288,7 @@ fn moving(
     filling.finish()
 }
 
-/// Adds a detail object, moved by `pose`.
+/// Adds a detail object moved by `pose`.
 fn add_detail(
     filling: &mut LayersBuilder<'_>,
     world: &World,
@@ -314,7 +315,7 @@ fn add_detail(
     }
 }
 
-/// Sixteen places around the middle of a pixel.
+/// Returns sixteen offsets around the center of a pixel.
 fn around() -> impl Iterator<Item = [f64; 2]> {
     (0..16).map(|i| {
         let angle = (f64::from(i) + 0.31) * std::f64::consts::FRAC_PI_8;
@@ -322,7 +323,7 @@ fn around() -> impl Iterator<Item = [f64; 2]> {
     })
 }
 
-/// From the near plane on, in lengths of the view direction.
+/// Returns a ray that starts at the near plane and whose direction has length 1 along the view direction.
 fn ray_through(camera: &Camera, at: [u32; 2], nudge: [f64; 2], size: [u32; 2]) -> Ray {
     let [right, up, forward] = camera.axes().map(|v| dvec(v.to_array()));
     let tan = f64::from(camera.fov_y * 0.5).tan();
@@ -342,7 +343,7 @@ mod tests {
     use super::*;
     use enfilade_cpg::Batch;
 
-    /// A wall 5 m ahead, from x = 0 on to the right.
+    /// A wall 5 m ahead, from x = 0 to the right.
     fn wall() -> World {
         let primitive = Primitive {
             positions: vec![
@@ -371,7 +372,7 @@ mod tests {
     fn only_what_an_exact_ray_shows_is_right() {
         let world = wall();
         let oracle = oracle(&world);
-        // 4 pixels wide: the wall's edge is between the second and the third.
+        // 4 pixels wide: the wall's edge lies between the second and the third.
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
         let right = |x, d| oracle.is_right(&camera, [x, 2], [4, 4], d, false);
         assert!(right(2, 5.0) && !right(2, f64::INFINITY) && !right(2, 4.0));
@@ -383,7 +384,7 @@ mod tests {
         let world = wall();
         let oracle = oracle(&world);
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
-        // 5 pixels: the middle of the third is on the edge.
+        // 5 pixels: the center of the third lies on the edge.
         for d in [5.0, f64::INFINITY] {
             assert!(oracle.is_right(&camera, [2, 2], [5, 5], d, false));
         }
@@ -396,7 +397,7 @@ mod tests {
         let oracle = oracle(&world);
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
         let met = |x, shown| oracle.is_met(&camera, [x, 2], [4, 4], shown, false);
-        // Chunks put the two triangles in an order of their own.
+        // Chunks reorder the two triangles.
         let wall = [0, 1].map(|triangle| Shown::Structure { triangle });
         assert!(wall.iter().any(|&t| met(2, t)) && !met(2, Shown::Sky));
         assert!(met(1, Shown::Sky) && !wall.iter().any(|&t| met(1, t)));
@@ -405,7 +406,7 @@ mod tests {
 
     #[test]
     fn what_is_seen_through_a_slit_is_not_met() {
-        // Two walls 5 m ahead, a slit between them that leans, and a third behind it.
+        // Two walls 5 m ahead with a leaning slit between them, and a third behind.
         let slit = |width: f32| {
             let wall = |edge: [f32; 2], x: f32, z: f32| Batch {
                 primitive: Primitive {
@@ -420,7 +421,7 @@ mod tests {
                 },
                 ..Batch::default()
             };
-            // Along one of the directions that are tried.
+            // Parallel to one of the tested directions.
             let (a, b) = (2.5 - width * 0.5, -2.5 - width * 0.5);
             World {
                 batches: vec![
@@ -432,7 +433,7 @@ mod tests {
             }
         };
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
-        // The middle of the third of 5 pixels, each 2 m wide there; a 64th of one is 3 cm.
+        // The center of the third of 5 pixels, each 2 m wide there; a 64th of one is 3 cm.
         for (width, is_there) in [(0.004, false), (0.06, true)] {
             let world = slit(width);
             let oracle = oracle(&world);
@@ -440,7 +441,7 @@ mod tests {
             let met = |t: &Shown| oracle.is_met(&camera, [2, 2], [5, 5], *t, false);
             assert_eq!(behind.iter().any(met), is_there, "{width}");
         }
-        // From 10 cm before it a pixel is smaller than the tolerance, by which walls may be off.
+        // 10 cm before the wall, a pixel is smaller than the tolerance, by which walls may be off.
         let camera = Camera::looking_at([0.0, 0.0, -4.9], [0.0, 0.0, -6.0]);
         let tolerance = oracle(&slit(1.0)).tolerance;
         for (width, is_there) in [(tolerance, false), (4.0 * tolerance, true)] {

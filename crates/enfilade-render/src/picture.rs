@@ -1,4 +1,4 @@
-//! Pictures on their way from the adapter to files.
+//! Color pictures read back from the adapter.
 
 use crate::gpu::RenderError;
 
@@ -14,14 +14,14 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The picture as a PNG file.
+    /// Encodes the picture as PNG.
     ///
     /// # Errors
     ///
-    /// A picture whose bytes are not as many as its sides say.
+    /// A number of bytes that does not fit width and height.
     pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         let mut bytes = std::io::Cursor::new(Vec::new());
-        // Nothing shines through: three bytes a pixel do.
+        // Pictures are opaque, so three bytes per pixel suffice.
         let mut rgb = Vec::with_capacity(self.rgba.len() / 4 * 3);
         for pixel in self.rgba.chunks_exact(4) {
             rgb.extend_from_slice(&pixel[..3]);
@@ -33,11 +33,11 @@ impl Picture {
         Ok(bytes.into_inner())
     }
 
-    /// The picture of a PNG file.
+    /// Decodes a PNG file.
     ///
     /// # Errors
     ///
-    /// Bytes that are no PNG.
+    /// Bytes that are not a PNG.
     pub fn from_png(bytes: &[u8]) -> Result<Self, RenderError> {
         let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
             .map_err(|why| RenderError::Encode(why.to_string()))?
@@ -50,7 +50,7 @@ impl Picture {
         })
     }
 
-    /// The picture at a quarter of its pixels, each the mean of four, averaged as light adds up.
+    /// Returns the picture at half the width and height; each pixel is the mean of four in linear light.
     #[must_use]
     pub fn halved(&self) -> Self {
         let to_light: Vec<f32> = (0..256).map(|c| (c as f32 / 255.0).powf(2.2)).collect();
@@ -76,19 +76,18 @@ impl Picture {
         }
     }
 
-    /// The color of a pixel.
+    /// Returns the color of a pixel.
     ///
     /// # Panics
     ///
-    /// Outside of the picture.
+    /// If the pixel lies outside the picture.
     #[must_use]
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let i = ((y * self.width + x) * 4) as usize;
         [0, 1, 2, 3].map(|k| self.rgba[i + k])
     }
 
-    /// Draws another picture over this one, its upper left corner at `(x, y)`; what sticks out is
-    /// left out.
+    /// Draws another picture over this one with its upper left pixel at `(x, y)`; parts outside are clipped.
     pub fn put(&mut self, other: &Self, x: u32, y: u32) {
         let columns = other.width.min(self.width.saturating_sub(x)) as usize;
         for row in 0..other.height.min(self.height.saturating_sub(y)) {

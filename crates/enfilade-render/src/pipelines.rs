@@ -1,5 +1,5 @@
-//! Pipelines and layouts: for an adapter and a format of picture. Those of surfaces are made when the
-//! first frame needs them: each leaves out what its frames do without.
+//! Pipelines and bind group layouts for an adapter and a texture format. Surface pipelines are made when a frame first
+//! needs them: each omits the features that its frames do not use.
 
 use std::collections::BTreeMap;
 
@@ -10,11 +10,11 @@ use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
 pub(crate) struct Layouts {
-    /// Globals; shadow map and its sampler; which cell points are in, and the light there.
+    /// Globals; shadow map and its sampler; the locator and the light of places.
     pub(crate) world: wgpu::BindGroupLayout,
     /// A base color texture.
     texture: wgpu::BindGroupLayout,
-    /// Globals; corners and indices where shaders fetch them.
+    /// Globals; vertices and indices for shaders that fetch them.
     pub(crate) ids: wgpu::BindGroupLayout,
     /// Globals.
     pub(crate) globals: wgpu::BindGroupLayout,
@@ -27,17 +27,17 @@ pub(crate) struct Layouts {
 pub(crate) enum Shading {
     Plain,
     Textured,
-    /// With holes.
+    /// With transparent texels.
     Masked,
-    /// A pane: seen through, and reflecting.
+    /// A pane: transparent and reflecting.
     Glass,
-    /// A picture that is seen through in parts: a leaf, a curtain.
+    /// A partly transparent texture: a leaf of a plant, a curtain.
     Sheer,
-    /// How many times each pixel is drawn.
+    /// Number of times that each pixel is drawn.
     Count,
 }
 
-/// What pipelines of surfaces differ in.
+/// Differences between surface pipelines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Variant {
     pub(crate) shading: Shading,
@@ -45,7 +45,7 @@ pub(crate) struct Variant {
     pub(crate) casts_shadows: bool,
     pub(crate) has_light: bool,
     pub(crate) explains: bool,
-    /// Whether it draws to the output, or to what is made a picture of later.
+    /// True if it draws to the output, not to the intermediate target of the post pass.
     pub(crate) is_last: bool,
 }
 
@@ -55,17 +55,17 @@ pub(crate) struct Pipelines {
     surfaces: BTreeMap<Variant, wgpu::RenderPipeline>,
     pub(crate) id: wgpu::RenderPipeline,
     pub(crate) shadow: wgpu::RenderPipeline,
-    /// Surfaces from the camera, depth alone.
+    /// Surfaces from the camera, depth only.
     pub(crate) depth: wgpu::RenderPipeline,
-    /// Outlines of portals that depth is asked about.
+    /// Outlines of portals for occlusion queries.
     pub(crate) outline: wgpu::RenderPipeline,
     pub(crate) sky: wgpu::RenderPipeline,
-    /// Dark corners.
+    /// Ambient occlusion.
     pub(crate) post: wgpu::RenderPipeline,
     pub(crate) heat_map: wgpu::RenderPipeline,
-    /// Marks that surfaces hide.
+    /// Marks hidden by surfaces.
     pub(crate) marks: wgpu::RenderPipeline,
-    /// Marks that nothing hides.
+    /// Marks on top of surfaces.
     pub(crate) marks_on_top: wgpu::RenderPipeline,
 }
 
@@ -163,17 +163,17 @@ const MARK_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout 
     attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4],
 };
 
-/// Corners of triangles, listed: where shaders cannot fetch them.
+/// Listed vertices of triangles, for adapters whose shaders cannot fetch them.
 const LISTED_LAYOUT: wgpu::VertexBufferLayout<'static> = OUTLINE_LAYOUT;
 
-/// Corners of outlines, relative to nothing: the world's. [Units: wu]
+/// Vertices of outlines in world coordinates. [Units: wu]
 const OUTLINE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: 12,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x3],
 };
 
-/// What one pipeline differs from others in.
+/// Differences between pipelines.
 #[derive(Clone, Copy)]
 struct Kind<'a> {
     label: &'a str,
@@ -217,7 +217,7 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
                 compilation_options: compilation_options.clone(),
                 buffers: &buffers,
             },
-            // Both sides of all: models of buildings seldom say which one is meant.
+            // Draw both sides: models of buildings seldom have a consistent front side.
             primitive: wgpu::PrimitiveState::default(),
             depth_stencil: kind.depth.map(|(writes, compare)| wgpu::DepthStencilState {
                 format: DEPTH,
@@ -240,7 +240,6 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
 
 const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
 
-/// The shaders.
 struct Modules {
     surface: wgpu::ShaderModule,
     ids: wgpu::ShaderModule,
@@ -350,7 +349,7 @@ impl Pipelines {
             shadow: make(Kind {
                 label: "shadow",
                 vertex: "from_sun",
-                // Parallel light: its depths are as fine as they need be.
+                // Parallel light: these depths are fine enough.
                 fragment: None,
                 depth: Some((true, wgpu::CompareFunction::Less)),
                 ..base
@@ -367,7 +366,7 @@ impl Pipelines {
                 label: "sky",
                 fragment: Some("open_air"),
                 layouts: &[&layouts.globals],
-                // At depth 0: where nothing was drawn.
+                // At depth 0: only where nothing was drawn.
                 depth: Some((false, at_least)),
                 ..post
             }),
@@ -389,7 +388,7 @@ impl Pipelines {
         }
     }
 
-    /// Makes a pipeline, unless it is there.
+    /// Makes a pipeline unless it exists.
     pub(crate) fn prepare(&mut self, gpu: &Gpu, layouts: &Layouts, variant: Variant) {
         if self.surfaces.contains_key(&variant) {
             return;
@@ -441,7 +440,7 @@ impl Pipelines {
         self.surfaces.insert(variant, made);
     }
 
-    /// A pipeline that was [prepared](Pipelines::prepare).
+    /// Returns a [prepared](Pipelines::prepare) pipeline.
     pub(crate) fn surface(&self, variant: Variant) -> Option<&wgpu::RenderPipeline> {
         self.surfaces.get(&variant)
     }

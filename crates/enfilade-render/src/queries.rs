@@ -1,12 +1,12 @@
-//! Portals asked of the adapter: a cell is seen when a pixel of its portal is not hidden.
+//! Culling by occlusion queries: a cell is visible if a pixel of its portal is not hidden.
 //!
-//! After the alternative that Luebke & Georges name in "Portals and Mirrors" (I3D 1995), section 1.1: to
-//! let depths decide. In rounds: the depths of the cells found last are drawn, then the outlines of
-//! their portals, each with an occlusion query; what comes back are the cells of the next round. Each
-//! round waits for the adapter, which is what clipping by the processor does without.
+//! After the alternative in Luebke & Georges, "Portals and Mirrors" (I3D 1995), section 1.1: visibility by depth. Each
+//! round draws the depths of the cells found last, then the outlines of their portals, each with an occlusion
+//! query; the visible ones lead to the cells of the next round. Each round waits for the adapter, which clipping on
+//! the processor avoids.
 //!
-//! **Errs to visible** but for the size of a pixel: outlines are grown by one and a half, and drawn a
-//! little nearer than they are; what is thinner than the distance of samples can be missed.
+//! **Errs to visible**, up to the size of a pixel: outlines are grown by one and a half pixels and drawn slightly
+//! nearer than they are; openings thinner than the distance of samples may be missed.
 
 use std::collections::BTreeSet;
 
@@ -23,26 +23,26 @@ use crate::scene::Finish;
 use crate::shadings::set_buffers;
 use crate::studio::Studio;
 
-/// What it took to ask.
+/// Work of a traversal by occlusion queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QueryCounts {
     /// Waits for the adapter.
     pub n_rounds: u32,
-    /// Portals asked about.
+    /// Portals queried.
     pub n_queries: u32,
     /// Cells found.
     pub n_cells: u32,
 }
 
-/// An eye this close to a portal's plane is not asked about: the near plane cuts its outline. [Units: wu]
+/// An eye this close to a portal's plane counts as seeing through it: the near plane cuts the outline. [Units: wu]
 const AT_PORTAL: f32 = 0.05;
-/// Outlines count as this much nearer than they are: so that what lies in the same plane, such as a
-/// door leaf, does not hide them by rounding.
+/// Factor by which outlines count as nearer, so that surfaces in the same plane, such as a door leaf, do not hide
+/// them by rounding.
 const NEARER: f32 = 0.998;
-/// Queries of one round; further portals count as seen.
+/// Most queries in a round; further portals count as visible.
 const MAX_QUERIES: u32 = wgpu::QUERY_SET_MAX_QUERIES;
 
-/// A question: the triangles of an outline, and the cell behind.
+/// A query: the triangles of an outline, and the cell behind.
 struct Asked {
     to: CellId,
     first: u32,
@@ -50,10 +50,10 @@ struct Asked {
 }
 
 impl Studio {
-    /// What is drawn of a view, with the adapter asked which portals are seen; and what that took.
-    /// `world` is the studio's. An eye in no cell sees all in its view.
+    /// Lists the draws of a view, with occlusion queries for portals, and their work. `world` is the studio's. An
+    /// eye outside all cells sees everything in its view.
     ///
-    /// Waits for the adapter once a round: as many as there are doorways one behind the other.
+    /// Waits for the adapter once a round: as many times as there are doorways one behind the other.
     ///
     /// # Errors
     ///
@@ -77,7 +77,7 @@ impl Studio {
         counts.n_cells = cells.as_ref().map_or(0, |c| c.len() as u32);
         let is_in = |of: &[CellId]| {
             let Some(cells) = &cells else { return true };
-            // What no cell lists is drawn wherever one is.
+            // Batches and objects without cells are drawn always.
             of.is_empty() || of.iter().any(|c| cells.contains(c))
         };
         let seen = self.viewer.see_through_walls(&self.sight, &view);
@@ -117,7 +117,7 @@ impl Studio {
         self.renderer.resize(&self.gpu, size)?;
         self.renderer
             .write_globals(&self.gpu, &self.stage, &projection, &Style::default(), size);
-        // Chunks that hide: what is seen through or has holes does not.
+        // Opaque chunks: transparent or masked ones do not hide.
         let in_view: Vec<u32> = self
             .viewer
             .see_through_walls(&self.sight, view)
@@ -181,7 +181,7 @@ impl Studio {
         Ok(seen)
     }
 
-    /// How many samples of each outline no chunk drawn so far hides.
+    /// Returns for each outline the number of samples that no chunk drawn so far hides.
     fn ask(
         &mut self,
         new: &[u32],
@@ -249,7 +249,7 @@ impl Studio {
     }
 }
 
-/// Whether the eye is so near to an opening that the near plane may cut it.
+/// Returns `true` if the eye is so close to an opening that the near plane may cut it.
 fn is_at(eye: [f32; 3], outline: &[[f32; 3]], normal: [f32; 3]) -> bool {
     let Some(&through) = outline.first() else {
         return false;

@@ -1,4 +1,4 @@
-//! Frames: surfaces, then the picture of them, then what is seen through.
+//! The passes of a frame: opaque surfaces, effects on their image, transparent surfaces.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_te
 use crate::scene::{GpuWorld, Instance};
 use crate::shadings::{Shadings, draw_runs, set_buffers};
 
-/// Side of the sun's picture of the world, in texels.
+/// Side of the shadow map. [Units: texels]
 const SHADOW_SIDE: u32 = 4096;
 
 #[repr(C)]
@@ -34,7 +34,7 @@ struct Globals {
     light: LightGlobals,
 }
 
-/// What frames of one size are drawn to on their way.
+/// Intermediate targets of frames of one size.
 pub(crate) struct Targets {
     pub(crate) size: [u32; 2],
     pub(crate) color: wgpu::TextureView,
@@ -42,13 +42,13 @@ pub(crate) struct Targets {
     post: wgpu::BindGroup,
 }
 
-/// Draws worlds; one for each format of picture.
+/// Draws worlds; one for each texture format.
 pub struct Renderer {
     pub(crate) layouts: Layouts,
     pub(crate) pipelines: Pipelines,
     pub(crate) globals: wgpu::Buffer,
     pub(crate) instances: Grown,
-    /// What is written to it, kept from frame to frame.
+    /// Instances of the last list, reused from frame to frame.
     drawn: Vec<Instance>,
     pub(crate) marks: Grown,
     pub(crate) targets: Option<Targets>,
@@ -56,28 +56,28 @@ pub struct Renderer {
     shadow_sampler: wgpu::Sampler,
     /// Direction to the sun.
     pub(crate) sun: Vec3,
-    /// What explains why things are seen or not, while it is asked for.
+    /// The explanation of visibility, if requested.
     explanation: Option<wgpu::TextureView>,
     format: wgpu::TextureFormat,
 }
 
-/// A world's bind groups and the sun's picture of it.
+/// A world's bind groups and shadow map.
 pub struct Stage {
     world: wgpu::BindGroup,
     pub(crate) light: Light,
     shadow_from_world: Mat4,
-    /// Of a texel of the shadow map. [Units: wu]
+    /// Size of a texel of the shadow map. [Units: wu]
     texel: f32,
 }
 
 impl Renderer {
-    /// A renderer of pictures that go to files.
+    /// Returns a renderer of pictures for files.
     #[must_use]
     pub fn new(gpu: &Gpu) -> Self {
         Self::with_format(gpu, COLOR)
     }
 
-    /// A renderer to targets of a format, such as a window's.
+    /// Returns a renderer to targets of a format, such as a window's.
     #[must_use]
     pub fn with_format(gpu: &Gpu, format: wgpu::TextureFormat) -> Self {
         let layouts = Layouts::new(gpu);
@@ -121,9 +121,8 @@ impl Renderer {
         self.format
     }
 
-    /// Makes a world ready to be drawn by this renderer: bind groups, and what the sun sees.
-    /// `everything` is the list of all, `light` what falls where. One world at a time: the sun's picture is of the
-    /// last.
+    /// Prepares a world for this renderer: bind groups and shadow map. `everything` is the list of the whole
+    /// world, `light` its light. One world at a time: the shadow map is that of the last.
     pub(crate) fn set_stage(
         &mut self,
         gpu: &Gpu,
@@ -151,7 +150,7 @@ impl Renderer {
             binding,
             resource: wgpu::BindingResource::Sampler(sampler),
         };
-        // A table of the same kind, which nobody looks at, where nothing is explained.
+        // Without an explanation, bind a table of the same type that shaders ignore.
         let explanation = self.explanation.as_ref().unwrap_or(&light.table);
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("world"),
@@ -169,7 +168,7 @@ impl Renderer {
         })
     }
 
-    /// From now on, surfaces are colored by why they are seen or not; `None` ends that.
+    /// Colors surfaces by why they are visible or not from now on; `None` ends that.
     pub(crate) fn explain(
         &mut self,
         gpu: &Gpu,
@@ -180,7 +179,7 @@ impl Renderer {
         stage.world = self.world_group(gpu, &stage.light);
     }
 
-    /// Parallel light over the whole world.
+    /// Returns the view of the sun: parallel, over the whole world.
     fn sun_view(&self, world: &GpuWorld) -> (Mat4, f32) {
         let [low, high] = world.bounds;
         let center = (low + high) * 0.5;
@@ -190,7 +189,7 @@ impl Renderer {
         (flat * back, 2.0 * radius / SHADOW_SIDE as f32)
     }
 
-    /// What the sun sees.
+    /// Draws the shadow map.
     pub(crate) fn draw_shadows(
         &mut self,
         gpu: &Gpu,
@@ -229,7 +228,7 @@ impl Renderer {
         })
     }
 
-    /// Where what a list draws stands, in its order.
+    /// Writes the instances of a list in its order.
     pub(crate) fn write_instances(&mut self, gpu: &Gpu, world: &GpuWorld, list: &DrawList) {
         self.drawn.clear();
         self.drawn.extend(list.instances.iter().map(|&key| {
@@ -266,7 +265,7 @@ impl Renderer {
                 0,
             ],
             light: {
-                // Flat light has no rooms that are darker than others.
+                // Parallel pictures have one exposure for all rooms.
                 let is_eye = !projection.is_parallel && style.daylight;
                 stage.light.globals(projection.origin, is_eye)
             },
@@ -275,7 +274,7 @@ impl Renderer {
             .write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
     }
 
-    /// Makes the targets of a size, unless they are there.
+    /// Makes the targets of a size unless they exist.
     pub(crate) fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<(), RenderError> {
         if self.targets.as_ref().is_some_and(|t| t.size == size) {
             return Ok(());
@@ -338,7 +337,7 @@ impl Renderer {
         let Some(targets) = &self.targets else {
             return Ok(());
         };
-        // What darkens corners or counts needs the whole picture; else all is drawn in one go.
+        // Ambient occlusion and counts need the whole image; otherwise one pass draws everything.
         let in_two = !shadings.is_last;
         let first = if in_two { &targets.color } else { output };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -379,7 +378,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Writes the corners of marks, those hidden behind surfaces first; returns both ranges.
+    /// Writes the vertices of marks, those hidden by surfaces first; returns both ranges.
     fn write_marks(
         &mut self,
         gpu: &Gpu,
@@ -420,7 +419,7 @@ impl Renderer {
         }
     }
 
-    /// Draws what was painted so far to `output`, with dark corners or as counts.
+    /// Draws the image of the surfaces to `output`, with ambient occlusion or as counts.
     fn draw_picture(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -463,7 +462,7 @@ impl Renderer {
         pass.draw(on_top.clone(), 0..1);
     }
 
-    /// Draws a frame and brings it back.
+    /// Draws a frame and reads it back.
     ///
     /// # Errors
     ///
@@ -471,7 +470,7 @@ impl Renderer {
     ///
     /// # Panics
     ///
-    /// When the renderer was made for a window's format: those are not brought back.
+    /// If the renderer was made for a window's format, which cannot be read back.
     pub fn picture(
         &mut self,
         gpu: &Gpu,

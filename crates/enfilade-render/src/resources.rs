@@ -1,4 +1,4 @@
-//! Buffers, textures and attachments, and how their bytes come back.
+//! Buffers, textures and attachments, and the reading of their bytes.
 
 use crate::gpu::{Gpu, RenderError};
 
@@ -94,7 +94,7 @@ pub(crate) fn depth_attachment(
     }
 }
 
-/// The bytes of a texture, rows one after the other.
+/// Returns the bytes of a texture, row by row.
 pub(crate) fn read_texture(
     gpu: &Gpu,
     texture: &wgpu::Texture,
@@ -138,23 +138,23 @@ pub(crate) fn read_texture(
     })
 }
 
-/// The bytes of a buffer, once all that was submitted is done.
+/// Returns the bytes of a buffer after all submitted work.
 pub(crate) fn map_bytes(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
     with_bytes(gpu, buffer, <[u8]>::to_vec)
 }
 
-/// Returns what `read` makes of the bytes of a buffer, once all that was submitted is done.
+/// Returns the result of `read` on the bytes of a buffer after all submitted work.
 fn with_bytes<T>(
     gpu: &Gpu,
     buffer: &wgpu::Buffer,
     read: impl FnOnce(&[u8]) -> T,
 ) -> Result<T, RenderError> {
     let lost = |why: String| RenderError::Lost(why);
-    // A buffer that there was no memory for is not mapped.
+    // A buffer whose allocation failed is not mapped.
     gpu.check_failed()?;
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-        // Nobody listens any more where waiting failed.
+        // If waiting failed, the receiver is gone.
         let _ = sender.send(result);
     });
     gpu.wait()?;

@@ -1,11 +1,11 @@
-//! What the colors of overdraw mean, drawn into its picture.
+//! The color scale of overdraw pictures.
 
 use crate::picture::Picture;
 
-/// The count that the last color stands for, with all above: as in `post.wgsl`.
+/// The count of the last color, which stands for more, too: as in `post.wgsl`.
 const MOST: u32 = 16;
 
-/// The color of so many draws, as the shader paints it: linear.
+/// Returns the color of a number of draws as the shader paints it. Linear.
 fn heat(n: f32) -> [f32; 3] {
     const STOPS: [[f32; 3]; 5] = [
         [0.0; 3],
@@ -19,7 +19,7 @@ fn heat(n: f32) -> [f32; 3] {
     [0, 1, 2].map(|k| STOPS[i][k] + (STOPS[i + 1][k] - STOPS[i][k]) * (t - i as f32))
 }
 
-/// The color of so many draws in a finished picture. sRGB.
+/// Returns the color of a number of draws in a finished picture. sRGB.
 fn pixel_of(n: u32) -> [u8; 4] {
     let encoded = |x: f32| {
         let x = if x <= 0.003_130_8 {
@@ -33,7 +33,7 @@ fn pixel_of(n: u32) -> [u8; 4] {
     [r, g, b, 255]
 }
 
-/// Digits and a plus, three pixels wide and five high: a row to three bits, the highest is left.
+/// Digits and a plus, three pixels wide and five high: three bits per row, the highest on the left.
 const GLYPHS: [(char, [u8; 5]); 11] = [
     ('0', [0b111, 0b101, 0b101, 0b101, 0b111]),
     ('1', [0b010, 0b110, 0b010, 0b010, 0b111]),
@@ -70,8 +70,8 @@ impl Picture {
         }
     }
 
-    /// Draws the scale of [`Paint::Overdraw`](crate::Paint::Overdraw) into the lower left corner: a color for each number
-    /// of times that a pixel is drawn, to 16 and more. Pictures less than 160 pixels wide have no room for it.
+    /// Draws the scale of [`Paint::Overdraw`](crate::Paint::Overdraw) at the lower left: a color for each number
+    /// of draws of a pixel, up to 16 and more. Pictures less than 160 pixels wide have no room for it.
     pub fn add_overdraw_scale(&mut self) {
         // As legible in a large picture as in a small one.
         let dot = (self.width / 480).max(1);

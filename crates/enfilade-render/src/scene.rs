@@ -1,8 +1,8 @@
-//! A world on the adapter: corners, indices, materials, textures, placed objects.
+//! A world on the adapter: vertices, indices, materials, textures, placed objects.
 //!
-//! All triangles stand in one buffer, in the order in which chunks of [`Sight`] are ranges, and those of
-//! detail meshes after them, each mesh once. What is drawn is a list of ranges, so that neighboring
-//! chunks join to one draw whatever room they belong to.
+//! One buffer holds all triangles: first those of the chunks of [`Sight`], in the same order, then those of
+//! detail meshes, each mesh once. Draws are ranges of it, so that adjacent chunks join to one draw whatever their
+//! room.
 
 mod color;
 mod filling;
@@ -33,31 +33,31 @@ pub(crate) use textures::texture_layout;
 pub struct GpuWorld {
     pub(crate) corners: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,
-    /// Where the corners of all triangles are, three to each: where shaders cannot fetch them.
+    /// Positions of the vertices of all triangles, three each, for adapters whose shaders cannot fetch them.
     pub(crate) listed: Option<wgpu::Buffer>,
-    /// By number of an instance: 0 for structure, then objects.
+    /// Instances: structure first, then objects.
     pub(crate) instances: Vec<Instance>,
     /// Base color textures; the first is white.
     pub(crate) textures: Vec<wgpu::BindGroup>,
-    /// By chunk of the sight.
+    /// One entry per chunk of the sight.
     pub(crate) chunks: Vec<Span>,
-    /// By chunk: its batch.
+    /// For each chunk, its batch.
     pub(crate) batch_of: Vec<u32>,
-    /// By batch: the cells that see it.
+    /// For each batch, the cells that see it.
     pub(crate) batch_cells: Vec<Vec<CellId>>,
-    /// By detail mesh: its levels, the finest first.
+    /// For each detail mesh, its levels, the finest first.
     pub(crate) meshes: Vec<Vec<Level>>,
     pub(crate) details: Vec<Placed>,
     moving: Vec<Moving>,
-    /// By portal: what fills it when it is shut.
+    /// For each portal, its plug.
     pub(crate) plugs: Vec<Span>,
-    /// By portal.
+    /// One entry per portal.
     pub(crate) portal_cells: Vec<[CellId; 2]>,
-    /// Least and greatest corner of all that is drawn. [Units: wu]
+    /// Minimum and maximum of everything drawn. [Units: wu]
     pub(crate) bounds: [Vec3; 2],
-    /// By portal: its outline. [Units: wu]
+    /// For each portal, its outline. [Units: wu]
     pub(crate) outlines: Vec<Vec<[f32; 3]>>,
-    /// By cell: the color of what stands in for it far away, lit.
+    /// For each cell, the lit color of its stand-in far away.
     pub(crate) cell_looks: Vec<[f32; 3]>,
     pub(crate) n_triangles: u64,
     n_missing_pictures: u32,
@@ -65,9 +65,9 @@ pub struct GpuWorld {
 }
 
 impl GpuWorld {
-    /// Puts a world on the adapter. `sight` was made of the same world.
+    /// Uploads a world. `sight` must be built from the same world.
     ///
-    /// Pictures that are missing, damaged or too large are drawn as their material's color.
+    /// Images that are missing, damaged or too large are replaced by their material's color.
     ///
     /// # Errors
     ///
@@ -76,8 +76,8 @@ impl GpuWorld {
         Self::load_with(gpu, world, sight, false)
     }
 
-    /// The same with levels of detail for objects: see [`Sparing::lod`](crate::Sparing::lod). Takes about half a
-    /// minute for each million triangles of meshes, nearly all of it to measure how far levels are off.
+    /// Uploads a world with levels of detail for objects: see [`Sparing::lod`](crate::Sparing::lod). Takes about
+    /// half a minute per million triangles of meshes, nearly all of it to measure the error of levels.
     ///
     /// # Errors
     ///
@@ -116,7 +116,7 @@ impl GpuWorld {
             })
             .collect();
         let bounds = bounds_of(world, &details);
-        // What draws ids fetches corners from these buffers.
+        // The id shaders fetch vertices from these buffers.
         let fetched = if gpu.fetches() {
             wgpu::BufferUsages::STORAGE
         } else {
@@ -127,7 +127,7 @@ impl GpuWorld {
         let indices = bytemuck::cast_slice(&filling.indices);
         Ok(Self {
             corners: buffer(
-                "the world's corners",
+                "the world's vertices",
                 corners,
                 wgpu::BufferUsages::VERTEX | fetched,
             )?,
@@ -142,7 +142,7 @@ impl GpuWorld {
                 let listed = filling.listed();
                 let listed = bytemuck::cast_slice(&listed);
                 Some(buffer(
-                    "the triangles' corners",
+                    "the triangles' vertices",
                     listed,
                     wgpu::BufferUsages::VERTEX,
                 )?)
@@ -171,7 +171,7 @@ impl GpuWorld {
         })
     }
 
-    /// Moves leaves to where `state` has them.
+    /// Moves leaves as `state` has them.
     pub(crate) fn place(&mut self, state: &SightState) {
         for leaf in &self.moving {
             let at = leaf.detail.0 as usize;
@@ -179,19 +179,20 @@ impl GpuWorld {
         }
     }
 
-    /// The level that an object is drawn at, to be off by `lod` pixels at most. `pixels` tells how many a meter has.
+    /// Returns the level at which an object is drawn to be off by at most `lod` pixels. `pixels` returns the
+    /// pixels per meter.
     pub(crate) fn level(&self, placed: &Placed, lod: f32, pixels: impl FnOnce() -> f32) -> u32 {
         let levels = self.meshes.get(placed.mesh as usize).map_or(&[][..], |l| l);
         if lod <= 0.0 || levels.len() < 2 {
             return 0;
         }
         let scale = placed.stretch * pixels();
-        // Not a number where the eye is in the object: the finest.
+        // Not a number if the eye is in the object: the finest level.
         let n = levels.partition_point(|l| l.error * scale <= lod);
         n.saturating_sub(1) as u32
     }
 
-    /// What is drawn in a portal instead of what is behind it.
+    /// Returns the polygon drawn in a portal instead of the cell behind it.
     pub(crate) fn stand_in(&self, portal: PortalId, cell: CellId) -> Mark {
         let [r, g, b] = self
             .cell_looks
@@ -211,36 +212,35 @@ impl GpuWorld {
         }
     }
 
-    /// Triangles of structure and placed objects.
+    /// Returns the number of triangles of structure and placed objects.
     #[must_use]
     pub fn n_triangles(&self) -> u64 {
         self.n_triangles
     }
 
-    /// Pictures of textures that are missing or damaged.
+    /// Returns the number of missing or damaged texture images.
     #[must_use]
     pub fn n_missing_pictures(&self) -> u32 {
         self.n_missing_pictures
     }
 
-    /// Pictures of textures that are larger than 8192 x 8192 pixels, or would come to more than 512 MiB together and 128 bytes for each
-    /// byte of the file.
+    /// Returns the number of texture images beyond the limits: 8192 × 8192 pixels each; 512 MiB plus 128 bytes
+    /// per byte of the file together.
     #[must_use]
     pub fn n_large_pictures(&self) -> u32 {
         self.n_large_pictures
     }
 
-    /// Least and greatest corner of all that is drawn; of an empty world, a box around its origin.
-    /// [Units: wu]
+    /// Returns minimum and maximum of everything drawn; of an empty world, a box around its origin. [Units: wu]
     #[must_use]
     pub fn bounds(&self) -> [[f32; 3]; 2] {
         self.bounds.map(|p| p.to_array())
     }
 
-    /// The chunk of a structural triangle, by its number in an id picture.
+    /// Returns the chunk of a structural triangle, given its index in an id picture.
     #[must_use]
     pub fn chunk_of_triangle(&self, triangle: u32) -> Option<u32> {
-        // Chunks come in ascending order of their ranges.
+        // Chunks are in ascending order of their ranges.
         let at = self
             .chunks
             .partition_point(|c| c.first + c.n <= triangle * 3);
@@ -248,7 +248,7 @@ impl GpuWorld {
         (chunk.first <= triangle * 3).then_some(at as u32)
     }
 
-    /// The portal that a triangle fills when it is shut.
+    /// Returns the portal whose plug contains a triangle.
     pub(crate) fn portal_of_plug(&self, triangle: u32) -> Option<PortalId> {
         let at = self
             .plugs
@@ -257,7 +257,7 @@ impl GpuWorld {
         (plug.first <= triangle * 3).then_some(PortalId(at as u32))
     }
 
-    /// The batch of a chunk, and the triangle's place in it as [`Sight::indices`] orders them.
+    /// Returns the batch of a chunk.
     #[must_use]
     pub fn batch_of_chunk(&self, chunk: u32) -> Option<u32> {
         self.batch_of.get(chunk as usize).copied()
@@ -279,7 +279,7 @@ fn make_buffer(
             limits.max_storage_buffer_binding_size,
         )?;
     }
-    // A buffer must not be empty; 64 bytes are as large as the largest element.
+    // A buffer must not be empty; the largest element has 64 bytes.
     let empty = [0; 64];
     let contents = if bytes.is_empty() { &empty } else { bytes };
     Ok(gpu

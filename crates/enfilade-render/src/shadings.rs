@@ -1,4 +1,4 @@
-//! Which pipelines a frame draws its runs with.
+//! The choice of pipelines for the runs of a frame.
 
 use crate::frame::{Frame, Paint};
 use crate::gpu::Gpu;
@@ -13,15 +13,15 @@ pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, ins
     pass.set_vertex_buffer(1, instances.buffer.slice(..));
 }
 
-/// Which pipelines a frame draws with.
+/// The pipelines of a frame.
 pub(crate) struct Shadings {
     pub(crate) is_count: bool,
     pub(crate) is_last: bool,
     casts_shadows: bool,
-    /// Whether light is known by place.
+    /// True if light is known by place.
     has_light: bool,
     explains: bool,
-    /// A cut makes holes in everything.
+    /// True if a cut makes holes in everything.
     has_cut: bool,
 }
 
@@ -73,7 +73,7 @@ impl Shadings {
     }
 
     pub(crate) fn glass(&self, run: &Run) -> Variant {
-        // A picture that is seen through is a leaf or a curtain, no pane.
+        // A transparent texture is a leaf of a plant or a curtain, not a pane.
         let shading = if run.finish == Finish::Plain {
             Shading::Glass
         } else {
@@ -82,7 +82,7 @@ impl Shadings {
         self.variant(shading, run.is_smooth, true)
     }
 
-    /// Makes those that a list needs.
+    /// Makes the pipelines that a list needs.
     pub(crate) fn prepare(
         &self,
         gpu: &Gpu,
@@ -106,7 +106,7 @@ impl Shadings {
     }
 }
 
-/// Draws runs, changing pipelines, textures and scissors only where they differ. `surface` by run.
+/// Draws runs; changes pipelines, textures and scissors only where they differ. `surface` by run.
 pub(crate) fn draw_runs<'p>(
     pass: &mut wgpu::RenderPass<'_>,
     world: &GpuWorld,

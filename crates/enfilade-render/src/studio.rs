@@ -1,4 +1,4 @@
-//! All that it takes to draw one world, put together.
+//! Everything needed to draw one world.
 
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
@@ -15,56 +15,56 @@ use crate::picture::Picture;
 use crate::renderer::{Renderer, Stage};
 use crate::scene::GpuWorld;
 
-/// What of a world is drawn.
+/// The part of a world that is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Culling {
-    /// All of it.
+    /// Everything.
     Everything,
-    /// What meets the view frustum.
+    /// Everything that meets the view frustum.
     Frustum,
-    /// What is seen through portals.
+    /// Everything visible through portals.
     #[default]
     Portals,
 }
 
-/// What frames that nobody looks at are drawn to.
+/// An off-screen target, for benchmarks.
 pub struct Target {
     view: wgpu::TextureView,
     size: [u32; 2],
 }
 
-/// An adapter, a world on it, and what answers what is seen of it.
+/// An adapter, a world on it, and the visibility queries that cull it.
 pub struct Studio {
     /// The adapter.
     pub gpu: Gpu,
     /// The world on it.
     pub world: GpuWorld,
-    /// What the viewer asks.
+    /// The world prepared for queries.
     pub sight: Sight,
-    /// Which portals are open.
+    /// The state of doors, such as open portals.
     pub state: SightState,
-    /// Who asks.
+    /// The viewer that runs the queries.
     pub viewer: Viewer,
-    /// What far away rooms are spared, where portals cull. Off unless set.
+    /// Reductions for distant rooms with culling by portals. Off by default.
     pub sparing: Sparing,
     pub(crate) renderer: Renderer,
     pub(crate) stage: Stage,
     pub(crate) lister: Lister,
-    /// How leaves are drawn: [`SightState::shares`].
+    /// Positions of the leaves as drawn last: [`SightState::shares`].
     placed: Vec<Option<f32>>,
 }
 
 impl Studio {
-    /// Puts a world on an adapter.
+    /// Uploads a world to an adapter.
     ///
     /// # Errors
     ///
-    /// A world that breaks invariants, or is larger than the adapter's limits.
+    /// A world that breaks invariants or exceeds the adapter's limits.
     pub fn new(gpu: Gpu, world: &World) -> Result<Self, RenderError> {
         Self::with_format(gpu, world, wgpu::TextureFormat::Rgba8UnormSrgb)
     }
 
-    /// The same for a window, whose pictures are of `format`.
+    /// Uploads a world for a window, whose pictures have this `format`.
     ///
     /// # Errors
     ///
@@ -97,7 +97,7 @@ impl Studio {
         })
     }
 
-    /// Gives objects levels of detail, for [`Sparing::lod`]. `world` is the one that the studio was made of.
+    /// Gives objects levels of detail, for [`Sparing::lod`]. `world` is the one from which the studio was made.
     ///
     /// # Errors
     ///
@@ -105,20 +105,19 @@ impl Studio {
     pub fn add_levels(&mut self, world: &World) -> Result<(), RenderError> {
         self.world = GpuWorld::load_with_levels(&self.gpu, world, &self.sight)?;
         self.world.place(&self.state);
-        // Light has nothing to do with levels.
+        // Light does not depend on levels.
         let light = std::mem::replace(&mut self.stage.light, Light::uniform(&self.gpu)?);
         let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
         self.stage = self.renderer.set_stage(&self.gpu, &self.world, light, all);
         Ok(())
     }
 
-    /// Computes which light falls where: daylight through portals, from room to room. `world` is the one that the studio
-    /// was made of. Without it, all rooms are lit alike. Takes a second at most for a world of a thousand rooms; once is
-    /// enough.
+    /// Computes daylight through portals, from room to room. `world` is the one from which the studio was made.
+    /// Without it, all rooms are lit alike. Takes at most a second for a world of a thousand rooms; once is enough.
     ///
     /// # Errors
     ///
-    /// A world whose locator or cells are more than the adapter's textures hold. It is drawn without this light, as before.
+    /// A world whose locator or cells exceed the adapter's textures. It is drawn without this light, as before.
     pub fn add_light(&mut self, world: &World) -> Result<(), RenderError> {
         if self.stage.light.is_known() {
             return Ok(());
@@ -129,7 +128,7 @@ impl Studio {
         Ok(())
     }
 
-    /// Moves leaves to where the state has them, and what the sun sees with them.
+    /// Moves leaves as the state has them, and redraws the shadow map.
     pub(crate) fn follow_state(&mut self) {
         if self.placed == self.state.shares() {
             return;
@@ -142,7 +141,7 @@ impl Studio {
             .draw_shadows(&self.gpu, &self.world, &self.stage, all);
     }
 
-    /// What is drawn of a view: leaves of doors as [`Studio::state`] has them, and what fills portals that it shuts.
+    /// Lists the draws of a view, with leaves and plugs as [`Studio::state`] has them.
     pub fn list(
         &mut self,
         view: &View,
@@ -181,7 +180,8 @@ impl Studio {
         }
     }
 
-    /// The same, to keep: until it is [given back](Studio::give_list), so that nothing is allocated.
+    /// Same as [`Studio::list`], but moves the list out. [Give it back](Studio::give_list) so that nothing is
+    /// allocated.
     pub fn take_list(
         &mut self,
         view: &View,
@@ -193,12 +193,12 @@ impl Studio {
         self.lister.take()
     }
 
-    /// Gives the buffers of a list back.
+    /// Takes the buffers of a list back.
     pub fn give_list(&mut self, list: DrawList) {
         self.lister.give(list);
     }
 
-    /// A target of the studio's format, for frames that nobody looks at.
+    /// Makes an off-screen target in the studio's format.
     ///
     /// # Errors
     ///
@@ -227,11 +227,11 @@ impl Studio {
         self.draw(frame, &target.view, target.size)
     }
 
-    /// A picture from a camera, with marks over it.
+    /// Draws a picture from a camera, with marks over it.
     ///
     /// # Errors
     ///
-    /// A camera that looks nowhere; a size beyond the adapter's limit; a device that was lost.
+    /// A camera without direction; a size beyond the adapter's limit; a device that was lost.
     pub fn picture(
         &mut self,
         camera: &Camera,
@@ -254,7 +254,7 @@ impl Studio {
         )
     }
 
-    /// A picture of a frame of one's own.
+    /// Draws a picture of a given frame.
     ///
     /// # Errors
     ///
@@ -283,7 +283,7 @@ impl Studio {
             .draw(&self.gpu, &self.world, &self.stage, frame, output, size)
     }
 
-    /// Pictures of numbers from a camera: what hides, and the nearest that does not.
+    /// Draws the id pictures of a camera: opaque surfaces, and the nearest transparent one.
     ///
     /// # Errors
     ///
@@ -302,8 +302,8 @@ impl Studio {
         self.ids_of(camera, &list, size)
     }
 
-    /// Such pictures of everything, and of what portals leave. What they leave is drawn first in both, so that of
-    /// two triangles in one place both show the same.
+    /// Draws the id pictures of everything, and of what portals leave. The latter is drawn first in both, so that
+    /// both show the same one of two coincident triangles.
     ///
     /// # Errors
     ///
@@ -339,11 +339,11 @@ impl Studio {
             .ids(&self.gpu, &self.world, &self.stage, &projection, list, size)
     }
 
-    /// A picture of everything that `projection` shows, colored by why each point is seen from another camera's view or is
-    /// not: what is seen looks as it does, what is out of view is dark, what walls hide is red, what a large polygon
-    /// hides is orange; solid matter, where it is cut, is black.
+    /// Draws everything that `projection` shows, colored by why each point is visible from another camera or not:
+    /// normal if visible, dark out of view, red behind walls, orange behind a large polygon; solid matter, where it
+    /// is cut, is black.
     ///
-    /// Needs [`Studio::add_light`], which tells which cell a point is in; without it, the picture explains nothing.
+    /// Needs [`Studio::add_light`], which provides the cell of each point; without it, the picture explains nothing.
     ///
     /// # Errors
     ///
@@ -371,7 +371,7 @@ impl Studio {
         picture
     }
 
-    /// The list of all that there is.
+    /// Lists everything.
     pub fn everything(&mut self) -> DrawList {
         self.follow_state();
         (self.lister)

@@ -1,4 +1,4 @@
-//! Doors in pictures: leaves where they stand, and what fills an opening that is shut. FEATURES: W5.
+//! Doors in pictures: leaves in their positions, and plugs of shut openings. FEATURES: W5.
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, Oracle, Shown, Studio};
@@ -8,7 +8,7 @@ const SIZE: [u32; 2] = [96, 64];
 
 fn gpu() -> Gpu {
     Gpu::open(&AdapterChoice::Software)
-        .unwrap_or_else(|why| panic!("these tests draw with software, and there is none: {why}"))
+        .unwrap_or_else(|why| panic!("these tests need a software adapter: {why}"))
 }
 
 fn portals(world: &World) -> impl Iterator<Item = PortalId> + use<> {
@@ -31,7 +31,7 @@ fn camera(rng: &mut Rng, world: &World) -> Camera {
     }
 }
 
-/// Whatever doors do, culling changes no pixel; and leaves and what fills openings are among what is shown.
+/// However doors stand, culling changes no pixel; and leaves and plugs are among the visible objects.
 #[test]
 fn culling_changes_no_pixel_however_doors_stand() {
     let world = with_doors(room_grid(&GridParams::offices(40, 3)), |p| p % 4 == 0);
@@ -74,7 +74,7 @@ fn culling_changes_no_pixel_however_doors_stand() {
     assert!(n_leaf > 1000 && n_plug > 100, "{n_leaf} {n_plug}");
 }
 
-/// The share of pixels that show what `is_it` says.
+/// Returns the share of pixels for which `is_it` holds.
 fn share(
     studio: &mut Studio,
     camera: &Camera,
@@ -139,7 +139,7 @@ fn a_shut_leaf_hides_what_fills_its_opening_and_an_open_one_shows_the_room_behin
             studio.state.set_leaves(door, 0.0);
             let shut = share(&mut studio, &camera, culling, is_leaf);
             let plug = share(&mut studio, &camera, culling, is_plug);
-            // Strips between portal and leaf are seen around it, edge-on.
+            // Strips between portal and leaf are visible edge-on around it.
             assert!(
                 shut > 0.1 && plug < 0.3 * shut,
                 "{culling:?}: {shut} {plug}"

@@ -1,6 +1,6 @@
-//! Pictures by OpenGL equal those by Vulkan, also with no more than WebGL 2 has.
+//! Pictures by OpenGL equal those by Vulkan, also with only the features of WebGL 2.
 //!
-//! On machines without one of the two drivers there is nothing to compare: the tests say so and pass.
+//! On machines without one of the two drivers, the tests print that and pass.
 
 use enfilade_cpg::{DetailObject, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive};
@@ -12,12 +12,12 @@ use enfilade_testkit::{GridParams, Rng, room_grid};
 
 const SIZE: [u32; 2] = [96, 64];
 
-/// Software, spoken to by `backends`; the least of OpenGL where `is_least`.
+/// Opens software rendering by `backends`; with the least features of OpenGL if `is_least`.
 fn gpu(backends: wgpu::Backends, is_least: bool) -> Option<Gpu> {
     let mut asked = wgpu::InstanceDescriptor::new_without_display_handle();
     asked.backends = backends;
     if is_least {
-        // 3.0 for embedded systems: WebGL 2 is that.
+        // OpenGL ES 3.0 corresponds to WebGL 2.
         asked.backend_options.gl.gles_minor_version = wgpu::Gles3MinorVersion::Version0;
     }
     let instance = wgpu::Instance::new(asked);
@@ -31,7 +31,7 @@ fn gpu(backends: wgpu::Backends, is_least: bool) -> Option<Gpu> {
     }
 }
 
-/// OpenGL as it is, and with no more than WebGL 2 has.
+/// Opens OpenGL with all its features, and with only those of WebGL 2.
 fn by_opengl() -> Vec<Gpu> {
     let found = [false, true].map(|least| gpu(wgpu::Backends::GL, least));
     found.into_iter().flatten().collect()
@@ -39,7 +39,7 @@ fn by_opengl() -> Vec<Gpu> {
 
 fn grid() -> World {
     let mut world = room_grid(&GridParams::offices(60, 3));
-    // A pane before each eye, so that what is seen through is drawn, too.
+    // A pane before each eye, so that transparent surfaces are drawn, too.
     world.materials.push(Material {
         base_color: [0.9, 0.3, 0.2, 0.4],
         transparent: true,
@@ -88,7 +88,7 @@ fn camera(rng: &mut Rng, world: &World) -> Camera {
     }
 }
 
-/// Pixels whose colors are other than a rounding apart.
+/// Returns the number of pixels whose colors differ by more than rounding.
 fn n_other(a: &Picture, b: &Picture) -> usize {
     let pixels = a.rgba.chunks_exact(4).zip(b.rgba.chunks_exact(4));
     pixels
@@ -96,7 +96,7 @@ fn n_other(a: &Picture, b: &Picture) -> usize {
         .count()
 }
 
-/// Every way to paint, with shadows, marks before and behind surfaces.
+/// Draws every paint, with shadows, and marks before and behind surfaces.
 fn pictures(studio: &mut Studio, world: &World, camera: &Camera) -> Vec<Picture> {
     let portals = world.graph.portals.iter().take(40);
     let marks: Vec<Mark> = portals
@@ -148,7 +148,7 @@ fn pictures_by_opengl_equal_those_by_vulkan() {
             let b = pictures(&mut found, &world, &camera);
             n += a.iter().zip(&b).map(|(a, b)| n_other(a, b)).sum::<usize>();
         }
-        // Of 295,000 pixels a few lie on an edge, where the two round differently.
+        // A few of 295,000 pixels lie on an edge, where the two round differently.
         assert!(n < 150, "{n} pixels");
         eprintln!("{}: {n} pixels", found.gpu.name());
     }
@@ -174,7 +174,7 @@ fn by_opengl_too_culling_by_portals_changes_no_pixel() {
                     assert!(is_right || !is_met, "{l:?}");
                     differing += 1;
                 }
-                // Depths as fine as the rule needs: each pixel shows what is there.
+                // Depths are fine enough for the rule: each pixel shows a right surface.
                 for y in (0..SIZE[1]).step_by(5) {
                     for x in (0..SIZE[0]).step_by(5) {
                         let drawn = f64::from(Camera::distance_of(a.at([x, y]).1));
@@ -218,7 +218,7 @@ fn opengl_asked_about_portals_loses_no_pixel() {
 #[test]
 fn by_opengl_too_surfaces_stay_apart_far_away() {
     let mut world = World::default();
-    // The one behind first: of two that tie, that is shown.
+    // The farther one first: of two at equal depth, the first would win.
     for (i, z) in (0..).zip([-600.5, -600.0]) {
         let positions = [[-90.0, -90.0], [90.0, -90.0], [90.0, 90.0], [-90.0, 90.0]];
         world.detail_meshes.push(Mesh {
@@ -238,7 +238,7 @@ fn by_opengl_too_surfaces_stay_apart_far_away() {
             part_of: None,
         });
     }
-    // A little aslant, so that depths are not the same all over.
+    // Slightly oblique, so that depths vary.
     let camera = Camera::looking_at([40.0, 70.0, 0.0], [0.0, 0.0, -600.0]);
     for gl in by_opengl() {
         let mut studio = Studio::new(gl, &world).unwrap();

@@ -1,4 +1,4 @@
-//! Pictures on the software adapter, which is the same on every machine.
+//! Pictures by the software adapter, which is the same on every machine.
 
 use std::collections::BTreeSet;
 use std::f32::consts::{PI, TAU};
@@ -15,10 +15,10 @@ use glam::Mat4;
 
 const SIZE: [u32; 2] = [96, 64];
 
-/// No test here passes without an adapter: what draws nothing has shown nothing.
+/// Opens the adapter. Without one, tests fail: a test that draws nothing shows nothing.
 fn gpu() -> Gpu {
     Gpu::open(&AdapterChoice::Software)
-        .unwrap_or_else(|why| panic!("these tests draw with software, and there is none: {why}"))
+        .unwrap_or_else(|why| panic!("these tests need a software adapter: {why}"))
 }
 
 fn grid() -> World {
@@ -43,7 +43,7 @@ fn camera(rng: &mut Rng, world: &World) -> Camera {
     }
 }
 
-/// Pixels that culling lost, by the rule of `verify --views`; and those that differ at all.
+/// Returns the number of pixels that culling lost, by the rule of `verify --views`, and of those that differ at all.
 fn n_lost(studio: &mut Studio, world: &World, views: usize, seed: u64) -> [usize; 2] {
     let mut rng = Rng::new(seed);
     let oracle = Oracle::new(world, &studio.sight);
@@ -68,7 +68,7 @@ fn culling_by_portals_changes_no_pixel() {
     let mut studio = Studio::new(gpu(), &world).unwrap();
     let [lost, differing] = n_lost(&mut studio, &world, 60, 1);
     assert_eq!(lost, 0);
-    // Of 370,000 pixels a few lie on an edge, where adapters round; more would be something else.
+    // A few of 370,000 pixels lie on an edge, where adapters round; more would be a fault.
     assert!(differing < 20, "{differing} pixels");
 }
 
@@ -114,12 +114,12 @@ fn the_adapter_asked_about_portals_loses_no_pixel_either() {
         let n = (asked.rgba.chunks_exact(4).zip(whole.rgba.chunks_exact(4)))
             .filter(|(a, b)| a != b)
             .count();
-        // Dark corners are of depths around: one rounding on an edge shows in a few pixels.
+        // Ambient occlusion depends on depths nearby: one rounding on an edge shows in a few pixels.
         assert!(n < 8, "{n} pixels, {counts:?}");
         assert!(list.n_triangles() < all.n_triangles() / 2, "{counts:?}");
         assert!(counts.n_rounds >= 1 && counts.n_cells >= 1);
     }
-    // Grown outlines and frusta that are not narrowed: more, but not all.
+    // Grown outlines and unnarrowed frusta find more cells, but not all.
     assert!(
         n_cells < 4 * n_clipped,
         "{n_cells} cells, {n_clipped} by clipping"
@@ -171,7 +171,7 @@ fn a_portal_of_few_pixels_is_filled_or_left_out() {
                 };
                 studio.picture_of(&frame, SIZE).unwrap()
             };
-            // Small things: most of the picture stays.
+            // Small portals: most of the picture stays the same.
             let (a, b) = (draw(&whole), draw(&filled));
             let n = (a.rgba.chunks_exact(4).zip(b.rgba.chunks_exact(4)))
                 .filter(|(a, b)| a != b)
@@ -217,7 +217,7 @@ fn objects_far_away_have_fewer_triangles_and_look_the_same() {
         detail_meshes: vec![ball()],
         ..World::default()
     };
-    // In a row away from the eye, twice as far each.
+    // In a row away from the eye, each twice as far as the one before.
     for i in 0..7 {
         let mut transform = Mat4::IDENTITY.to_cols_array();
         transform[12] = i as f32 - 3.0;
@@ -248,7 +248,7 @@ fn objects_far_away_have_fewer_triangles_and_look_the_same() {
     };
     let (n, whole) = drawn(&mut studio, 0.0);
     assert_eq!(n, 7 * 36 * 72);
-    // Nothing to choose from yet.
+    // There are no levels yet.
     assert_eq!(drawn(&mut studio, 1.0).0, n);
     studio.add_levels(&world).unwrap();
     assert_eq!(drawn(&mut studio, 0.0), (n, whole.clone()));

@@ -1,4 +1,4 @@
-//! What depends on the place of a point and not on the triangle that it is on: light, cells, why something is seen.
+//! Features that depend on the place of a point, not on its triangle: light, cells, reasons of visibility.
 
 use enfilade_cpg::{Batch, CellId, World};
 use enfilade_render::{
@@ -11,10 +11,10 @@ const SIZE: [u32; 2] = [160, 120];
 
 fn gpu() -> Gpu {
     Gpu::open(&AdapterChoice::Software)
-        .unwrap_or_else(|why| panic!("these tests draw with software, and there is none: {why}"))
+        .unwrap_or_else(|why| panic!("these tests need a software adapter: {why}"))
 }
 
-/// Rooms whose walls are all in one batch that every cell sees: what a builder might give whose slabs reach through all.
+/// Rooms whose walls are one batch that every cell sees, as from a builder whose slabs reach through all rooms.
 fn shared() -> World {
     let mut world = room_grid(&GridParams::offices(30, 1));
     let mut all = Batch {
@@ -33,7 +33,7 @@ fn shared() -> World {
     world
 }
 
-/// What is below a pixel of a picture straight from above, at a height.
+/// The points below the pixels of a picture from straight above, at a given height.
 struct FromAbove {
     center: [f32; 3],
     height: f32,
@@ -57,11 +57,11 @@ impl FromAbove {
 
     fn projection(&self) -> Projection {
         let aspect = SIZE[0] as f32 / SIZE[1] as f32;
-        // Not quite straight down: that has no upright.
+        // Not quite straight down, where no direction is upright.
         Projection::parallel(self.center, [0.0, -1.0, -1e-3], self.height, aspect, 100.0)
     }
 
-    /// Pixels above the floors of rooms, well inside: with the cell and the point of the floor.
+    /// Returns pixels above the floors of rooms, well inside, with the cell and the point of the floor.
     fn pixels(&self, world: &World) -> Vec<([u32; 2], CellId, [f32; 3])> {
         let projection = self.projection();
         let mut out = Vec::new();
@@ -86,7 +86,7 @@ impl FromAbove {
 }
 
 fn nearest_hue(pixel: [u8; 4], colors: &[[f32; 3]]) -> usize {
-    // By direction: shading makes colors darker, not other.
+    // Compare directions: shading makes colors darker but keeps their hue.
     let unit = |c: [f32; 3]| {
         let length = c.iter().map(|x| x * x).sum::<f32>().sqrt().max(1e-6);
         c.map(|x| x / length)
@@ -131,7 +131,7 @@ fn a_floor_of_many_rooms_is_painted_by_each_of_them() {
         .filter(|([x, y], cell, _)| nearest_hue(picture.pixel(*x, *y), &colors) == cell.idx())
         .count();
     assert!(pixels.len() > 100);
-    // Of 42 hues, two that are told apart by a shade less than the light's tint may be taken for each other.
+    // Two of 42 hues that differ by less than the tint of the light may be confused.
     assert!(
         right * 100 >= pixels.len() * 95,
         "{right} of {}",
@@ -185,7 +185,7 @@ fn what_is_seen_of_a_floor_looks_as_it_does_and_what_is_not_is_dark_or_red() {
         dark += u32::from(!is_bright && !is_red);
     }
     assert!(bright > 2 && dark > 10 && red > 10, "{bright} {dark} {red}");
-    // And after that, pictures explain nothing.
+    // Afterwards, pictures explain nothing.
     let plain = studio.picture_of(&frame, SIZE).unwrap();
     assert!(
         above
@@ -195,7 +195,7 @@ fn what_is_seen_of_a_floor_looks_as_it_does_and_what_is_not_is_dark_or_red() {
     );
 }
 
-/// How bright a picture is on average, 0 to 255.
+/// Returns the mean brightness of a picture, 0 to 255.
 fn brightness(picture: &Picture) -> f64 {
     let sum: u64 = picture.rgba.chunks_exact(4).map(|p| u64::from(p[1])).sum();
     sum as f64 / f64::from(picture.width * picture.height)
@@ -248,7 +248,7 @@ fn glass_mirrors_the_sky_at_a_grazing_angle_and_is_seen_through_from_before() {
         transparent: true,
         ..Material::default()
     });
-    // A level pane over a black floor.
+    // A horizontal pane over a black floor.
     world.materials.push(Material {
         base_color: [0.0, 0.0, 0.0, 1.0],
         ..Material::default()

@@ -1,5 +1,5 @@
-//! Writes a generated scene as `scene.glb` (structure), `detail.glb` and `truth.json`, on request
-//! spoilt, or spoils a scene that is there:
+//! Writes a generated scene as `scene.glb` (structure), `detail.glb` and `truth.json`, optionally disturbed; or
+//! disturbs or shuffles an existing scene:
 //!
 //! `cargo run -p enfilade-testkit --example generate -- tower --rooms 64 --jitter 1e-4 -o DIR`
 
@@ -23,23 +23,23 @@ SCENE    house, tower, maze, cave, gjorup-optimised, gjorup-tessellated, gjorup-
          double-door-corridor, glass-facade-office, pitched-roof-attic;
          or one with a fault: {FAULTS};
          faults: all of these, each in a folder of its own below DIR;
-         or a folder with a scene.glb, to be spoilt or shuffled;
+         or a folder with a scene.glb, to be disturbed or shuffled;
          or a file (GLB, OBJ, Quake map), to be shuffled
-OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave, spoiling (1)
+OPTIONS  --rooms N     rooms of the tower (64)     --seed N      of tower, maze, cave, disturbance (1)
          --cracks, --double-walls, --leaves        of the tower
          --turn DEG    about +Y                    --scale F     about the origin
          --shuffle N   triangles in another order, by seed; of files also nodes, vertices
                        and all other lists, each file by itself
-SPOILT   --jitter M    each corner of each triangle moved, standard deviation M meters
+DISTURB  --jitter M    each vertex of each triangle moved, standard deviation M meters
          --drop SHARE  that share of the triangles is missing
-         --snap M      corners rounded to a grid of M meters per object
+         --snap M      vertices rounded to a grid of M meters per object
          --strip       names and materials gone; structure and detail are one file";
 
-/// The usage with the names of the faults.
+/// Returns the usage with the names of the faults.
 fn usage() -> String {
     let indent = " ".repeat(9);
     let mut names = String::new();
-    // Columns of the line so far: names stand behind a few words.
+    // Columns used in the current line, after the words before the names.
     let mut used = indent.len() + "or one with a fault: ".len();
     for name in Fault::ALL.map(Fault::name) {
         if !names.is_empty() {
@@ -59,7 +59,7 @@ fn usage() -> String {
     USAGE.replace("{FAULTS}", &names)
 }
 
-/// What is asked for.
+/// The parsed arguments.
 #[derive(Default)]
 struct Options {
     folder: PathBuf,
@@ -115,7 +115,7 @@ impl Options {
         d.strip || [d.jitter, d.drop, d.snap].iter().any(|&x| x > 0.0)
     }
 
-    /// Writes a scene with what is asked for done to it.
+    /// Writes a scene with the requested changes.
     fn write(&self, mut generated: Generated, folder: &Path) -> Result<(), Box<dyn Error>> {
         if self.turn != 0.0 {
             generated = rotated(generated, self.turn);
@@ -147,7 +147,7 @@ impl Options {
 
     /// Writes a file in another order, under its name.
     fn shuffle(&self, from: &Path) -> Result<(), Box<dyn Error>> {
-        let seed = self.shuffle.ok_or("a file can only be shuffled")?;
+        let seed = self.shuffle.ok_or("a single file needs --shuffle")?;
         let bytes = std::fs::read(from)?;
         let text = || String::from_utf8_lossy(&bytes);
         let ending = from.extension().unwrap_or_default().to_string_lossy();
@@ -155,14 +155,14 @@ impl Options {
             "glb" => shuffled_glb(&bytes, seed),
             "obj" => shuffled_obj(&text(), seed).into(),
             "map" => shuffled_map(&text(), seed).into(),
-            _ => return Err(format!("no way to shuffle a file that ends in .{ending}").into()),
+            _ => return Err(format!("cannot shuffle a .{ending} file").into()),
         };
         std::fs::create_dir_all(&self.folder)?;
-        let name = from.file_name().ok_or("a file without a name")?;
+        let name = from.file_name().ok_or("the path has no file name")?;
         Ok(std::fs::write(self.folder.join(name), shuffled)?)
     }
 
-    /// Spoils or shuffles the files of a folder, each by itself, and copies the truth.
+    /// Disturbs or shuffles the files of a folder, each by itself, and copies the truth.
     fn change(&self, from: &Path) -> Result<(), Box<dyn Error>> {
         let spoils = self.is_spoilt() || self.shuffle.is_none();
         if spoils {
@@ -182,9 +182,9 @@ impl Options {
         Ok(())
     }
 
-    /// Spoils the files of a folder, each by itself, and copies the truth.
+    /// Disturbs the files of a folder, each by itself, and copies the truth.
     fn spoil(&self, from: &Path) -> Result<(), Box<dyn Error>> {
-        // What is detail is judged when the result is read; here no object may be left out.
+        // Roles are decided when the result is imported; no object may be left out here.
         let options = ImportOptions {
             roles: RoleRules {
                 is_manual: true,
@@ -237,7 +237,7 @@ fn append(scene: &mut Scene, other: Scene) {
     }
 }
 
-/// A folder may hold the detail of an earlier scene.
+/// Writes a scene, or removes the file of an earlier scene if there is nothing to write.
 fn write_or_remove(path: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
     if !scene.objects.is_empty() {
         std::fs::write(path, export_glb(scene))?;

@@ -1,7 +1,7 @@
-//! Spoils a scene as exporters, scanners and web pipelines do.
+//! Disturbs a scene as exporters, scanners and web pipelines do.
 //!
-//! Any [`Scene`] can be spoilt, generated or read: what shares corners no longer does, triangles are
-//! missing, corners lie on a grid, names and materials are gone.
+//! Works on any [`Scene`], generated or imported: triangles no longer share vertices, some are missing, vertices lie
+//! on a grid, names and materials are gone.
 
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
@@ -9,28 +9,27 @@ use enfilade_geom::{Aabb, DMat4, DVec3};
 use crate::rng::Rng;
 use crate::site::Generated;
 
-/// What is done to a scene, in this order.
+/// The changes to a scene, applied in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Disturbance {
-    /// Corners are rounded to a grid of this size that begins at the low corner of their object's
-    /// box, as quantized meshes are; 0 leaves them. [Units: wu]
+    /// Grid to which vertices are rounded; it starts at the minimum of their object's box, as in quantized meshes. 0
+    /// for none. [Units: wu]
     pub snap: f64,
-    /// Share of the triangles that are missing, chosen at random. [Limit: 0 <= drop <= 1]
+    /// Share of the triangles to remove at random. [Limit: 0 <= drop <= 1]
     pub drop: f64,
-    /// Each corner of each triangle is moved by itself, by this standard deviation along each
-    /// axis; 0 leaves them. [Units: wu]
+    /// Standard deviation, along each axis, of the move of each vertex of each triangle; 0 for none. [Units: wu]
     pub jitter: f64,
-    /// Names and materials are gone, and all objects are structural until somebody judges them.
+    /// Removes names and materials, and makes all objects structural.
     pub strip: bool,
-    /// Start of the random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// The scene with each object as a mesh of its own, in world space, its triangles without shared
-/// corners, and then spoilt. The same seed gives the same scene, to the bit.
+/// Returns the scene with each object as a mesh of its own, in world space, without shared vertices, and then
+/// disturbed. The same seed gives the same scene, to the bit.
 ///
-/// Objects that lose all their triangles are gone. Normals and tangents are left out, and so are
-/// brushes: they would say where the triangles were.
+/// Drops objects that lose all their triangles, and normals, tangents and brushes: these would reveal where the
+/// triangles were.
 #[must_use]
 pub fn disturb(scene: &Scene, by: &Disturbance) -> Scene {
     let mut out = Scene {
@@ -82,7 +81,7 @@ pub fn disturb(scene: &Scene, by: &Disturbance) -> Scene {
     out
 }
 
-/// The scene spoilt; its truth stays.
+/// Returns the scene disturbed, with the same truth.
 #[must_use]
 pub fn disturbed(generated: &Generated, by: &Disturbance) -> Generated {
     Generated {
@@ -91,9 +90,9 @@ pub fn disturbed(generated: &Generated, by: &Disturbance) -> Generated {
     }
 }
 
-/// A placed mesh in world space, spoilt; without parts that lost all their triangles.
+/// Returns a placed mesh in world space, disturbed; without parts that lost all their triangles.
 fn spoil(mesh: &Mesh, placed: &DMat4, by: &Disturbance, stream: u64) -> Mesh {
-    // A stream for each object: what is added to a scene leaves the rest as it is.
+    // A stream for each object, so that additional objects do not change the rest.
     let mut rng = Rng::stream(by.seed, stream);
     let world = |p: [f32; 3]| placed.transform_point3(DVec3::from(p.map(f64::from)));
     let used = |p: &Primitive| -> Vec<DVec3> {
@@ -111,10 +110,10 @@ fn spoil(mesh: &Mesh, placed: &DMat4, by: &Disturbance, stream: u64) -> Mesh {
             material: p.material.filter(|_| !by.strip),
             ..Primitive::default()
         };
-        // Where the corners come from: what else they have comes along.
+        // Index of the source of each vertex, for its other attributes.
         let mut from = Vec::new();
         for (t, corners) in used(p).chunks_exact(3).enumerate() {
-            // Drawn for every triangle, whatever the share: more are missing, never others.
+            // Drawn for every triangle, whatever the share: a larger share removes more triangles, never others.
             let is_missing = rng.unit() < by.drop;
             for (k, &corner) in corners.iter().enumerate() {
                 let mut at = corner;
@@ -153,10 +152,10 @@ fn gathered<T: Copy>(items: &[T], from: &[usize]) -> Vec<T> {
     from.iter().map(|&i| items[i]).collect()
 }
 
-/// A number of the normal distribution, mean 0 and deviation 1.
+/// Returns a number of the normal distribution, mean 0 and deviation 1.
 ///
-/// The sum of twelve even ones less their mean (Irwin 1927, Hall 1927): within 0.3 % of the normal
-/// distribution everywhere, and without a logarithm, which differs between machines in its last bit.
+/// The sum of twelve uniform numbers minus their mean (Irwin 1927, Hall 1927): within 0.3 % of the normal distribution
+/// everywhere, and without a logarithm, which differs between machines in its last bit.
 fn normal(rng: &mut Rng) -> f64 {
     (0..12).map(|_| rng.unit()).sum::<f64>() - 6.0
 }
@@ -195,12 +194,12 @@ mod tests {
         let n = steps.len() as f64;
         let mean = steps.iter().sum::<f64>() / n;
         let deviation = (steps.iter().map(|s| s * s).sum::<f64>() / n).sqrt();
-        // Some 10,000 numbers: the mean is known to 1e-5, the deviation to 0.7 %, times five.
+        // About 10,000 numbers: five deviations of the mean (1e-5), and of the deviation (0.7 %).
         assert!(mean.abs() < 5e-5, "{mean}");
         assert!((deviation / by.jitter - 1.0).abs() < 0.04, "{deviation}");
         let two = steps.iter().filter(|s| s.abs() > 2.0 * by.jitter).count() as f64 / n;
         assert!((0.035..0.055).contains(&two), "{two} beyond two deviations");
-        // A wall that shared its edges shares none.
+        // No triangles of a wall share edges any more.
         let wall: Vec<_> = moved
             .triangle_sources(Role::Structural)
             .filter(|s| s.object == 0)
@@ -227,7 +226,7 @@ mod tests {
         };
         let all = dropped(0.0);
         let share = 1.0 - dropped(0.2) as f64 / all as f64;
-        // Some 4,000 triangles: 0.6 % deviation, times four.
+        // About 4,000 triangles: four deviations of 0.6 %.
         assert!((0.175..0.225).contains(&share), "{share}");
         assert_eq!(dropped(1.0), 0);
         let kept = disturb(&house, &Disturbance::default());

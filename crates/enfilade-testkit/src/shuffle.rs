@@ -1,6 +1,6 @@
 //! The same file in another order, as another program might have written it.
 //!
-//! Works on files, not on scenes, so that all that reads them is in what it tests.
+//! Works on files, not on scenes, so that tests include all importers.
 
 mod glb;
 mod text;

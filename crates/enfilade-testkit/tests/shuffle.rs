@@ -1,4 +1,4 @@
-//! A shuffled file holds what the file held, in another order.
+//! A shuffled file has the same contents in another order.
 
 use enfilade_geom::Triangle;
 use enfilade_geom::scene::{Role, Scene};
@@ -10,17 +10,17 @@ fn document(glb: &[u8]) -> Value {
     serde_json::from_slice(&glb[20..20 + n]).unwrap()
 }
 
-/// What a list of the document calls its things, in order.
+/// Returns the names in a list of the document, in order.
 fn names(glb: &[u8], list: &str) -> Vec<String> {
     let document = document(glb);
     let items = document[list].as_array().unwrap().iter();
     items.map(|item| item["name"].to_string()).collect()
 }
 
-/// An object: its name, its material, and its triangles by the bits of their vertices.
+/// An object: its name, its material, and its triangles as the bits of their vertices.
 type Content = (String, String, Vec<[[u64; 3]; 3]>);
 
-/// Each object's triangles by their bits, from the least vertex on, sorted, under its name and material.
+/// Returns each object's triangles as bits, from the least vertex on, sorted, with its name and material.
 fn content(scene: &Scene) -> Vec<Content> {
     let mut out = Vec::new();
     for object in &scene.objects {
@@ -63,7 +63,7 @@ fn a_shuffled_glb_is_the_same_scene_in_another_order() {
         assert_eq!(before, after, "{list}");
     }
     assert!(content(&read(&glb)) == content(&read(&shuffled)));
-    // Positions of the largest part, as they stand in the file.
+    // Positions of the largest part, in the order of the file.
     let positions = |glb: &[u8]| -> Vec<[u8; 12]> {
         let root = document(glb);
         let n_json = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
@@ -95,7 +95,7 @@ fn a_shuffled_glb_is_the_same_scene_in_another_order() {
 #[test]
 fn shuffled_text_has_the_same_lines_in_another_order() {
     let obj = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1//1 2//1 4//1\nf 1 3 4\nf 2 3 4\nusemtl b\nf 1 2 3 4\n";
-    // Positions by number, and the faces as sets of them, by material.
+    // Returns positions by index, and the faces as sets of them, by material.
     fn read(obj: &str) -> Vec<(&str, Vec<&str>)> {
         let positions: Vec<&str> = obj.lines().filter(|l| l.starts_with("v ")).collect();
         let mut faces: Vec<(&str, Vec<&str>)> = Vec::new();

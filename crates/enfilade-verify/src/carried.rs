@@ -1,4 +1,4 @@
-//! Things that a world carries along from its source: names, looks, lights, and which triangle is whose.
+//! Data that a world carries along from its source: names, looks, lights, and the source of each triangle.
 
 use std::collections::HashMap;
 
@@ -9,19 +9,19 @@ use enfilade_geom::{Bvh, Triangle};
 use crate::source::key;
 use crate::subject::{structural_triangles, tolerance};
 
-/// Differences of a kind that are named at most.
+/// Most differences listed per kind.
 const NAMED: usize = 5;
-/// Distance that rounding to `f32` may move a light or camera by. [Units: wu]
+/// Largest move of a light or camera by rounding to `f32`. [Units: wu]
 const MOVED: f64 = 1e-3;
 
-/// Compares what a world tells of its source with what the source says: the tree of names, materials, lights and cameras, and for each
-/// structural triangle where it comes from and what it looks like. Problems, a line each.
+/// Compares a world's data about its source with the source: the tree of names, materials, lights and cameras, and
+/// origin and material of each structural triangle. Returns problems, a line each.
 ///
-/// `O(n log n)` in triangles. `scene` was read as for the bake.
+/// O(n log n) in triangles. `scene` must be read with the settings of the bake.
 #[must_use]
 pub fn compare_scene(world: &World, scene: &Scene) -> Vec<String> {
     let mut out = Vec::new();
-    // A world made in code has no table of sources and claims nothing of names and lights.
+    // A world made in code has no table of sources and claims nothing about names and lights.
     if !world.sources.is_empty() {
         compare_names(world, scene, &mut out);
         compare_fixtures(world, scene, &mut out);
@@ -33,7 +33,7 @@ pub fn compare_scene(world: &World, scene: &Scene) -> Vec<String> {
     out
 }
 
-/// At most [`NAMED`] differences, and how many more there are.
+/// Adds at most [`NAMED`] differences, and the number of the others.
 fn tell(found: impl Iterator<Item = String>, out: &mut Vec<String>) {
     let mut n = 0;
     for what in found {
@@ -52,7 +52,7 @@ fn compare_names(world: &World, scene: &Scene, out: &mut Vec<String>) {
     if own.len() != theirs.len() {
         let (own, theirs) = (own.len(), theirs.len());
         out.push(format!(
-            "the world names {own} sources, the source has {theirs}"
+            "the world lists {own} source nodes, the source has {theirs}"
         ));
         return;
     }
@@ -60,7 +60,7 @@ fn compare_names(world: &World, scene: &Scene, out: &mut Vec<String>) {
     let other = pairs.filter(|(_, (a, b))| a != b);
     let told = other.map(|(i, (a, b))| {
         format!(
-            "source {i} ({}): the source has {:?} there, or says otherwise of it",
+            "source {i} ({}): the source has {:?} there, or other properties",
             a.name, b.name
         )
     });
@@ -77,15 +77,15 @@ fn compare_looks(world: &World, scene: &Scene, out: &mut Vec<String>) {
         return;
     }
     let is_other = |(a, b): (&Material, &Material)| {
-        // Where the source had no glTF, the world has some that was made of the rest.
+        // If the source had no glTF, the world has some that was made from the other properties.
         let is_text = b.gltf.trim().is_empty() || a.gltf.trim() == b.gltf.trim();
         let flags = |m: &Material| (m.transparent, m.double_sided);
         !is_text || a.name != b.name || flags(a) != flags(b)
     };
     let pairs = own.iter().zip(theirs).enumerate();
     let other = pairs.filter(|(_, pair)| is_other(*pair));
-    let told = other
-        .map(|(i, (a, _))| format!("material {i} ({}): looks otherwise in the source", a.name));
+    let told =
+        other.map(|(i, (a, _))| format!("material {i} ({}): differs from the source", a.name));
     tell(told, out);
 }
 
@@ -107,11 +107,11 @@ fn compare_fixtures(world: &World, scene: &Scene, out: &mut Vec<String>) {
         a.kind != b.kind || a.name != b.name || a.gltf.trim() != b.gltf.trim() || !is_there
     });
     let told =
-        other.map(|(i, (a, _))| format!("fixture {i} ({}): is another in the source", a.name));
+        other.map(|(i, (a, _))| format!("fixture {i} ({}): differs from the source", a.name));
     tell(told, out);
 }
 
-/// Where a triangle comes from, and its material.
+/// Source and material of a triangle.
 type Origin = (Option<u32>, Option<u32>);
 
 fn compare_triangles(world: &World, scene: &Scene, out: &mut Vec<String>) {
@@ -141,7 +141,7 @@ fn compare_triangles(world: &World, scene: &Scene, out: &mut Vec<String>) {
         if batch.is_seal {
             return None;
         }
-        // A batch that does not know says nothing wrong.
+        // A batch without sources makes no wrong claim.
         let fits = |&(node, material): &Origin| {
             (batch.sources.is_empty() || node == source) && material == batch.primitive.material
         };
@@ -152,7 +152,7 @@ fn compare_triangles(world: &World, scene: &Scene, out: &mut Vec<String>) {
         };
         let is_right = match same.get(&key(&t)) {
             Some(known) => known.iter().any(|&n| is_one(n)),
-            // A piece of one lies on it.
+            // A piece of a triangle lies on it.
             None => {
                 let middle = (t[0] + t[1] + t[2]) / 3.0;
                 let mut found = false;
@@ -168,7 +168,7 @@ fn compare_triangles(world: &World, scene: &Scene, out: &mut Vec<String>) {
         let [x, y, z] = ((t[0] + t[1] + t[2]) / 3.0).to_array();
         (!is_right && is_met).then(|| {
             let path = source.map_or_else(String::new, |s| world.source_path(s));
-            format!("the triangle at {x:.3} {y:.3} {z:.3} is not of {path:?}, or of another material")
+            format!("the triangle at {x:.3} {y:.3} {z:.3} does not come from {path:?}, or has another material")
         })
     });
     tell(wrong, out);

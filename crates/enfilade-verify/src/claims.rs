@@ -1,18 +1,19 @@
-//! What a world says about its cells in numbers: boxes, volumes, counts and names.
+//! Numbers and names that a world stores about its cells: boxes, volumes, counts.
 
 use enfilade_cpg::{CellId, DetailObject, Seals, World};
 
 use crate::locator_cells::measure;
 use crate::subject::to_dvec;
 
-/// Greatest share by which a volume may be off: builders sum up the same leaves, and slivers go to one side or the other.
+/// Largest relative error of a volume: builders add up the same leaves, but slivers may go to either side.
 const VOLUME_SHARE: f64 = 1e-3;
-/// What a volume may be off in any case, and by each square meter of its box: planes may be snapped by a tolerance. [Units: wu]
+/// Allowed error of a volume in any case, and per square meter of its box: planes may be snapped by a tolerance.
+/// [Units: wu]
 const VOLUME_SKIN: f64 = 1e-4;
-/// What a side of a box may be off. [Units: wu]
+/// Allowed error of a side of a box. [Units: wu]
 const SIDE: f64 = 1e-3;
 
-/// Problems, a line each.
+/// Returns problems, a line each.
 pub(crate) fn check(world: &World) -> Vec<String> {
     let mut out = Vec::new();
     check_names(world, &mut out);
@@ -22,7 +23,7 @@ pub(crate) fn check(world: &World) -> Vec<String> {
     out
 }
 
-/// Checks that seeing is mutual.
+/// Checks that visibility is mutual.
 fn check_mutual(world: &World, out: &mut Vec<String>) {
     let Some(pvs) = &world.pvs else { return };
     let mut one_way = pvs.pairs().filter(|&(a, b)| !pvs.sees(b, a));
@@ -30,23 +31,23 @@ fn check_mutual(world: &World, out: &mut Vec<String>) {
         let n = 1 + one_way.count();
         let [a, b] = [a, b].map(|c| &world.graph[c].name);
         out.push(format!(
-            "{a} is said to see {b}, but {b} not {a}; {n} pairs like these"
+            "{a} sees {b} by the world's set, but {b} does not see {a}; {n} such pairs"
         ));
     }
 }
 
-/// A cell called by a number is called by its own.
+/// Checks that a cell named by a number is named by its own.
 fn check_names(world: &World, out: &mut Vec<String>) {
     for (i, cell) in world.graph.cells.iter().enumerate() {
         let number = cell.name.strip_prefix("cell-");
         let number = number.and_then(|n| n.parse::<usize>().ok());
         if number.is_some_and(|n| n != i) {
-            out.push(format!("cell {i} is called {:?}", cell.name));
+            out.push(format!("cell {i} is named {:?}", cell.name));
         }
     }
 }
 
-/// Triangles are counted by who lists a cell, and seals of the bake are still there.
+/// Checks triangle counts against the lists of cells, and that the seals of the bake still exist.
 fn check_counts(world: &World, out: &mut Vec<String>) {
     let n_cells = world.graph.cells.len();
     let (mut structural, mut detail) = (vec![0; n_cells], vec![0; n_cells]);
@@ -65,7 +66,7 @@ fn check_counts(world: &World, out: &mut Vec<String>) {
             if said as usize != found / 3 {
                 let found = found / 3;
                 out.push(format!(
-                    "{}: says {said} {what}, {found} list it",
+                    "{}: {said} {what} stored, but {found} list the cell",
                     cell.name
                 ));
             }
@@ -76,7 +77,7 @@ fn check_counts(world: &World, out: &mut Vec<String>) {
     let structure = total(&mut of_batches.map(|b| b.primitive.indices.len()));
     let details = total(&mut world.details.iter().map(|d| n_indices(world, d)));
     let count = |name: &str| world.graph.statistics.counts.get(name);
-    // Only who counted both says how many are of details.
+    // Only a world with both counts records the number of triangles of details.
     if let (Some(&all), Some(&structural)) =
         (count("input_triangles"), count("structural_triangles"))
     {
@@ -85,15 +86,17 @@ fn check_counts(world: &World, out: &mut Vec<String>) {
             ("triangles of details", all - structural, details),
         ] {
             if said != found as f64 {
-                out.push(format!("{said} {what} were baked, {found} are there"));
+                out.push(format!(
+                    "{said} {what} were baked, but the file has {found}"
+                ));
             }
         }
     }
-    // Later work may cut a seal in two, but never takes one away.
+    // Later work may cut a seal in two, but never removes one.
     let said = world.graph.statistics.counts.get("seals");
     let found = Seals::of(world).count;
     if let Some(said) = said.filter(|&&said| said > found as f64) {
-        out.push(format!("{said} seals were made, {found} are there"));
+        out.push(format!("{said} seals were made, but the file has {found}"));
     }
 }
 
@@ -108,7 +111,7 @@ fn add(sums: &mut [usize], cells: &[CellId], n: usize) {
     }
 }
 
-/// Boxes and volumes are those of the locator's leaves.
+/// Checks boxes and volumes against the leaves of the locator.
 fn check_extents(world: &World, out: &mut Vec<String>) {
     let bounds = world.graph.locator.bounds;
     if bounds.is_empty() {
@@ -120,21 +123,21 @@ fn check_extents(world: &World, out: &mut Vec<String>) {
         let name = &cell.name;
         let mut skin = found.bounds.surface_area().max(0.0) * VOLUME_SKIN + VOLUME_SKIN;
         if cell.outdoor {
-            // What the rooms leave of the whole: a difference of numbers in `f32`.
+            // The volume outdoors is a difference of numbers in `f32`.
             skin += 1e-6 * bounds.volume();
         }
         let off = (f64::from(cell.volume) - found.volume).abs();
         if off > VOLUME_SHARE * found.volume + skin {
             let (said, found) = (cell.volume, found.volume);
             out.push(format!(
-                "{name}: says {said} m³, the locator has {found:.4} m³ of it"
+                "{name}: the stored volume is {said} m³, that of the locator {found:.4} m³"
             ));
         }
         let is_off = if cell.outdoor {
-            // The outdoors goes on beyond the box.
+            // The outdoors extends beyond the box.
             (min - bounds.min).max_element() > side || (bounds.max - max).max_element() > side
         } else {
-            // Around all but hairs, and no larger than all.
+            // The box contains everything but hairs, and is not larger than all leaves.
             let lacks = (min - found.thick.min).max(found.thick.max - max);
             let exceeds = (found.bounds.min - min).max(max - found.bounds.max);
             let is_small = !found.thick.is_empty() && lacks.max_element() > side;
@@ -143,7 +146,7 @@ fn check_extents(world: &World, out: &mut Vec<String>) {
         if is_off {
             let b = if cell.outdoor { bounds } else { found.bounds };
             out.push(format!(
-                "{name}: says the box {min:.4} to {max:.4}, it fills {:.4} to {:.4}",
+                "{name}: the stored box is {min:.4} to {max:.4}, that of the locator {:.4} to {:.4}",
                 b.min, b.max
             ));
         }

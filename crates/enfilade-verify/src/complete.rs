@@ -1,5 +1,4 @@
-//! *Complete*: a triangle is listed in every cell from which it can be seen without passing a
-//! portal.
+//! *Complete*: a triangle is listed in every cell from which it is visible without passing a portal.
 
 use enfilade_cpg::CellId;
 use enfilade_geom::{DVec3, Ray};
@@ -9,14 +8,14 @@ use crate::rng::Rng;
 use crate::sealed::{Path, follow};
 use crate::subject::{Subject, point_of_triangle};
 
-/// The way of a ray, and the triangles that it ends at, numbered as the world's own: several where they lie on each other.
+/// The path of a ray, and the triangles at its end by index in the world: several where they coincide.
 pub(crate) type Seen = (Path, Vec<u32>);
 
-/// Casts ray number `i` from a random point of a random cell, or every other time towards a random triangle, and judges
-/// what it meets.
+/// Casts ray number `i` from a random point of a random cell, every other time towards a random triangle, and judges
+/// the triangle that it meets.
 ///
-/// A ray that crosses portals on its way judges the cell in which it arrives: from the last portal
-/// on it is a sight line of that cell.
+/// A ray that crosses portals judges the cell in which it arrives: from the last portal on, it is a line of sight of
+/// that cell.
 pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) -> Option<Seen> {
     let counts = &mut tally.complete;
     counts.drawn += 1;
@@ -44,14 +43,14 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
         return None;
     };
     let at = ray.at(hit.t);
-    // A little past the triangle, so that its own edges are among those that are passed.
+    // Extend the ray slightly past the triangle, so that it passes the triangle's own edges, too.
     let b = ray.at(hit.t + 2.0 * subject.eps);
     if subject.is_grazing(a, b) || subject.nearest_portal(at).is_some() {
         counts.grazing += 1;
         return None;
     }
-    // The end of the segment is on a boundary, so it is followed to a point short of the triangle
-    // by more than the triangle may be misplaced.
+    // The end of the segment is on a boundary, so follow the segment to a point before the triangle by more than the
+    // triangle may be misplaced.
     let slack = 3.0 * subject.eps / surface_slope(subject, hit.triangle, ray.direction).max(1e-3);
     let end = ray.at(hit.t - slack);
     let mut crossings = Vec::new();
@@ -65,7 +64,7 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     let path = match follow(subject, rng, [a, end], start, &mut crossings) {
         Ok(path) => path,
         Err(wrong) => {
-            // The way there is a segment like any other, so it breaks the other promise.
+            // The path there is a segment like any other, so it breaks the other promise.
             counts.unresolved += 1;
             if !subject.is_close_to_surface(end) {
                 tally.add_failure(subject, Failure::of_break(&wrong, i, [a, end], &crossings));
@@ -117,10 +116,10 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     None
 }
 
-/// Draws before a ray is no longer aimed: many triangles are inside walls.
+/// Attempts before a ray is not aimed any more: many triangles are inside walls.
 const DRAWS: usize = 4;
 
-/// A point of air from which a ray leads towards a point of any triangle: the small get as many as the large.
+/// Returns a point of air and a direction to a point of a random triangle: small triangles are as likely as large ones.
 fn aim_at_triangle(subject: &Subject, rng: &mut Rng) -> Option<(CellId, DVec3, DVec3)> {
     (0..DRAWS).find_map(|_| {
         let t = &subject.triangles[rng.below(subject.triangles.len())];
@@ -130,7 +129,7 @@ fn aim_at_triangle(subject: &Subject, rng: &mut Rng) -> Option<(CellId, DVec3, D
     })
 }
 
-/// How steeply the ray meets the triangle: 1 head-on, 0 along it.
+/// Returns the sine of the angle between a ray and a triangle: 1 head-on, 0 along it.
 fn surface_slope(subject: &Subject, triangle: u32, direction: DVec3) -> f64 {
     let t = &subject.triangles[triangle as usize];
     let n = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero();

@@ -1,8 +1,8 @@
-//! Details list the cells that they touch: all of these, and no others.
+//! Detail objects list exactly the cells that they touch.
 //!
-//! Judged by the locator alone, leaving room for what builders may round: a cell that an object reaches clearly must be
-//! listed, and one that it does not come near must not. What is buried in solid matter, as a door frame is in its wall,
-//! belongs to the cells around it; of those only the nearest are certain.
+//! Only the locator decides, with room for the rounding of builders: a cell that an object clearly reaches must be
+//! listed, and one that it does not come near must not. An object buried in solid matter, as a door frame is in its
+//! wall, belongs to the cells around it; only the nearest of those are certain.
 
 use enfilade_cpg::{CellId, DetailObject, Locator, World};
 use enfilade_geom::poly::{self, Poly};
@@ -12,16 +12,16 @@ use rayon::prelude::*;
 use crate::locator_cells::plane_of;
 use crate::subject::to_dvec;
 
-/// Touching counts within 0.1 mm of a plane, and a transform in `f32` moves the object a little. [Units: wu]
+/// Distance of possible contact: within 0.1 mm of a plane, plus the move by a transform in `f32`. [Units: wu]
 const NEAR: f64 = 2e-4;
-/// Deeper than this is certain. [Units: wu]
+/// Depth of certain contact. [Units: wu]
 const CLEARLY: f64 = 5e-4;
-/// A buried object belongs to cells at most this far from its box. [Units: wu]
+/// Largest distance of the cells of a buried object from its box. [Units: wu]
 const AROUND: f64 = 0.5;
-/// Cells this near to the box of a buried object are looked for first. [Units: wu]
+/// Distance from the box of a buried object that is searched for cells first. [Units: wu]
 const NEAREST: f64 = 0.05;
 
-/// Problems, a line each.
+/// Returns problems, a line each.
 pub(crate) fn check(world: &World) -> Vec<String> {
     let rounding = 1e-6 * world.graph.locator.bounds.extent().max(0.0);
     let objects = world.details.par_iter().enumerate();
@@ -62,7 +62,7 @@ fn problem(world: &World, detail: &DetailObject, rounding: f64) -> Option<String
     let lacks = sure.iter().find(|c| !detail.cells.contains(c));
     let wrong = detail.cells.iter().find(|c| !possible.contains(c));
     match (lacks, wrong) {
-        (Some(c), _) => Some(format!("is in {}, which it does not list", name(c))),
+        (Some(c), _) => Some(format!("touches {}, which it does not list", name(c))),
         (None, Some(c)) => Some(format!("lists {}, which it does not touch", name(c))),
         (None, None) => None,
     }
@@ -79,7 +79,7 @@ pub(crate) fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle
     out
 }
 
-/// Adds the cells whose leaves the triangle reaches by `depth` at least; by less than nothing is near them.
+/// Adds the cells whose leaves the triangle reaches by at least `depth`; if that is negative, leaves near it, too.
 fn reach(locator: &Locator, triangle: &Triangle, depth: f64, cells: &mut Vec<CellId>) {
     let bounds = locator.bounds;
     let mut whole: Option<Poly> = Some(triangle.iter().copied().collect());
@@ -91,7 +91,7 @@ fn reach(locator: &Locator, triangle: &Triangle, depth: f64, cells: &mut Vec<Cel
         add(cells, locator.outside);
     }
     if depth > 0.0 {
-        // Beyond the box the tree goes on, but means nothing.
+        // Beyond the box the tree goes on, but without meaning.
         whole = (!inner.is_empty())
             .then(|| poly::clip_to_box(triangle, &inner, 0.0))
             .flatten();
@@ -131,7 +131,7 @@ fn add_at_corners(locator: &Locator, b: &Aabb, cells: &mut Vec<CellId>) {
     }
 }
 
-/// Adds all cells that may have a part in the box.
+/// Adds all cells that may share space with the box.
 fn add_around(locator: &Locator, b: &Aabb, cells: &mut Vec<CellId>) {
     if !(locator.bounds.contains(b.min) && locator.bounds.contains(b.max)) {
         add(cells, locator.outside);

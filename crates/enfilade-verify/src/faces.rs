@@ -1,7 +1,7 @@
 //! *Sealed*, without chance: where the locator's answer changes, there is a wall, a seal or a portal.
 //!
-//! Cells change at faces of the convex leaves of the locator's tree. Through each face a few short segments are tried, so that
-//! a slit that a leaf ends at is found however short it is, as long as it is wider than what is judged at all.
+//! Cells change at faces of the convex leaves of the locator's tree. A few short segments through each face find any
+//! slit that ends at a leaf, however short, if it is wider than the distance below which nothing is judged.
 
 use enfilade_geom::DVec3;
 use enfilade_geom::poly;
@@ -13,10 +13,10 @@ use crate::rng::Rng;
 use crate::sealed::judge_segment;
 use crate::subject::Subject;
 
-/// How far to both sides of a face a segment reaches, in tolerances, as those across portals do. Hairs between surfaces that are
-/// nearer to each other may be of either cell.
+/// Half the length of a segment across a face or portal, in tolerances. Hairs between surfaces closer than that may
+/// belong to either cell.
 const ASIDE: f64 = 20.0;
-/// Segments tried together.
+/// Segments per batch.
 const TOGETHER: usize = 1 << 15;
 
 /// Tries short segments across all faces of the locator's leaves at which its answer changes. Linear in faces.
@@ -35,7 +35,7 @@ pub(crate) fn try_all(subject: &Subject, seed: u64) -> Tally {
                 continue;
             };
             let step = normal * (ASIDE * subject.eps);
-            // A point towards each of its edges: of a seal, half may be missing.
+            // A point towards each of its edges: half of a seal may be missing.
             let middle = face.iter().sum::<DVec3>() / face.len() as f64;
             for (k, &p) in face.iter().enumerate() {
                 let p = (middle + p + face[(k + 1) % face.len()]) / 3.0;
@@ -50,7 +50,7 @@ pub(crate) fn try_all(subject: &Subject, seed: u64) -> Tally {
     all
 }
 
-/// Tries the segments between two answers of the locator; they count apart from those drawn by chance.
+/// Tries segments between two answers of the locator; counts them apart from random segments.
 fn try_some(subject: &Subject, seed: u64, n: u64, segments: &[[DVec3; 2]]) -> Tally {
     let chunks = segments.par_chunks(TOGETHER / 16).enumerate();
     let tried = chunks.map(|(chunk, segments)| {
@@ -60,7 +60,7 @@ fn try_some(subject: &Subject, seed: u64, n: u64, segments: &[[DVec3; 2]]) -> Ta
             if subject.locator.locate(a) == subject.locator.locate(b) {
                 continue;
             }
-            // Most are walls.
+            // Most are blocked by walls.
             if subject.blockers.any_hit(a, b, |_| false) {
                 tally.sealed.drawn += 1;
                 tally.sealed.blocked += 1;

@@ -1,30 +1,30 @@
-//! Kinds of portals, as far as a file tells what they must be.
+//! Kinds of portals, as far as a file determines them.
 //!
-//! A crack is narrow and a door stands upright, whoever made the world. What a bake of this version calls a window, a door or
-//! an opening follows from a sill and a height, too, unless the portals were cut since. What leaves tell is judged with them
-//! (`fittings`).
+//! In every world, a crack is narrow and a door stands upright. In a bake of this version, sill and height also
+//! determine which portals are windows, doors or openings, unless portals were cut since. `fittings` judges the kinds
+//! that leaves determine.
 //!
-//! Sills are found anew, by the triangles of the file; what is within a rounding of the other kind is left alone.
+//! Sills are measured anew from the triangles of the file; values within rounding of another kind are not judged.
 
 use enfilade_cpg::{Portal, PortalKind, World};
 use enfilade_geom::{Bvh, DVec3, Plane, Ray, Triangle, Winding};
 
 use crate::subject::to_dvec;
 
-/// Every piece of a crack is narrower than this. [Units: wu]
+/// Largest width of every piece of a crack. [Units: wu]
 const CRACK_WIDTH: f64 = 0.05;
-/// An opening is upright if its normal rises less than this.
+/// Largest rise of the normal of an upright opening.
 const UPRIGHT: f64 = 0.5;
-/// What stands higher over the ground has a sill. [Units: wu]
+/// Least height of a sill over the ground. [Units: wu]
 const SILL: f64 = 0.4;
-/// A lower opening is no door. [Units: wu]
+/// Least height of a door. [Units: wu]
 const LEAST_DOOR: f64 = 1.5;
-/// What outlines were grown by, and more: nearer to a bound than this, nothing is judged. [Units: wu]
+/// More than the growth of outlines: closer to a bound, nothing is judged. [Units: wu]
 const ROOM: f64 = 0.02;
-/// Distance from an opening where the ground is looked for. [Units: wu]
+/// Distance from an opening at which the ground is searched. [Units: wu]
 const BESIDE: f64 = 0.5;
 
-/// Problems, a line each.
+/// Returns problems, a line each.
 pub(crate) fn check(world: &World, own: &[Triangle]) -> Vec<String> {
     let is_by_rule = is_by_rule(world);
     let ground = is_by_rule.then(|| Bvh::build(own));
@@ -33,12 +33,15 @@ pub(crate) fn check(world: &World, own: &[Triangle]) -> Vec<String> {
         .filter_map(|(i, p)| {
             let of_shape = shape_problem(p);
             let what = of_shape.or_else(|| stance_problem(p, ground.as_ref()?))?;
-            Some(format!("portal {i} is called {}, but {what}", word(p.kind)))
+            Some(format!(
+                "portal {i} is of kind {}, but {what}",
+                word(p.kind)
+            ))
         })
         .collect()
 }
 
-/// Whether all portals are as a bake of this version made them.
+/// Returns `true` if all portals are as a bake of this version made them.
 pub(crate) fn is_by_rule(world: &World) -> bool {
     let counts = &world.graph.statistics.counts;
     let is_cut = ["edits", "cost_cuts"]
@@ -72,12 +75,12 @@ fn shape_problem(p: &Portal) -> Option<String> {
     }
 }
 
-/// What is wrong with the kind of an upright portal, by its height and its sill.
+/// Returns a contradiction between kind, height and sill of an upright portal.
 fn stance_problem(p: &Portal, ground: &Bvh) -> Option<String> {
     if p.kind == PortalKind::Crack || !is_upright(p) {
         return None;
     }
-    // Around what is open: outlines of sharp openings are rectangles, and reach below the ground.
+    // Measure the open area: outlines of sharp openings are rectangles and may reach below the ground.
     let corners: Vec<DVec3> = p.pieces.iter().flatten().map(|&c| to_dvec(c)).collect();
     let normal = to_dvec(p.normal).try_normalize()?;
     let plane = Plane::through(*corners.first()?, normal);
@@ -91,7 +94,7 @@ fn stance_problem(p: &Portal, ground: &Bvh) -> Option<String> {
         PortalKind::Door | PortalKind::Open if least > SILL + ROOM => {
             Some(format!("stands {least:.2} m over the ground"))
         }
-        // One of several pieces may be a bay, joined of panes that are lower.
+        // A piece among several may be a bay, joined from panes that are lower.
         PortalKind::Window
             if p.pieces.len() == 1 && height > LEAST_DOOR + ROOM && most < SILL - ROOM =>
         {
@@ -105,8 +108,8 @@ fn is_upright(p: &Portal) -> bool {
     f64::from(p.normal[1]).abs() < UPRIGHT
 }
 
-/// Least and greatest height of an opening's `foot` over the ground on the higher side, of some points around the one that the
-/// rule asks at: a ray that falls beside an edge is not to decide. [Units: wu]
+/// Returns least and greatest height of an opening's `foot` over the ground on the higher side, at several points
+/// around that of the rule, so that a ray beside an edge does not decide. [Units: wu]
 fn sills(n: DVec3, foot: DVec3, ground: &Bvh) -> [f64; 2] {
     let out = DVec3::new(n.x, 0.0, n.z).normalize_or_zero();
     let along = out.cross(DVec3::Y);
@@ -133,7 +136,7 @@ fn sills(n: DVec3, foot: DVec3, ground: &Bvh) -> [f64; 2] {
     bounds
 }
 
-/// Least distance between two parallel lines along an edge that hold the polygon. [Units: wu]
+/// Returns the least distance between two parallel lines along an edge that enclose the polygon. [Units: wu]
 fn width(piece: &[[f32; 3]]) -> f64 {
     let points: Vec<DVec3> = piece.iter().map(|&c| to_dvec(c)).collect();
     let n = points.len();

@@ -1,15 +1,15 @@
-//! The independent checker: does a baked world keep its promises?
+//! The independent checker of a baked world's promises.
 //!
-//! It shares no code with any builder. All it knows is the world as a consumer reads it (cells,
-//! portals, locator, triangles) and, if given, the triangles that the world was baked from.
+//! It shares no code with any builder. Its input is the world as a consumer loads it (cells, portals, locator,
+//! triangles) and, optionally, the triangles from which the world was baked.
 //!
-//! | promise | how it is tried |
+//! | promise | test |
 //! | --- | --- |
-//! | sealed | segments that no structural triangle and no seal blocks; the portals crossed must lead, one by one, from the cell of the start to the cell of the end; short ones across every face of the locator's leaves; and no seal closes more than a gap |
-//! | complete | rays to the first structural triangle; its batch must list the cell that the ray arrives in |
-//! | planar, convex outline | every portal, directly, with its pieces apart from each other and between its two cells; and `validate()` of the world |
-//! | conservative | what the world says is seen of a cell from another (cells, volumes, parts) against all these ways, in both directions, and lines aimed at what it says is not seen; the run-time's answers ([`verify_views`]) |
-//! | true to itself | names, counts, boxes and volumes of cells, and the cells of details, against geometry and locator; kinds of portals, as far as a file tells; leaves, frames and panes against their shapes, and how leaves turn; sources against each other; and all that came with the source against the source ([`compare_details`], [`compare_scene`]) |
+//! | sealed | segments that no structural triangle and no seal blocks; the portals they cross must lead, one by one, from the cell of the start to the cell of the end; short segments across every face of the locator's leaves; and no seal closes more than a gap |
+//! | complete | rays to the first structural triangle; its batch must list the cell in which the ray arrives |
+//! | planar, convex outline | every portal directly: its pieces lie apart from each other and between its two cells; and `validate()` of the world |
+//! | conservative | the world's sets of visible cells, volumes and parts against all these paths, in both directions, and against lines aimed at hidden ones; the run-time's answers ([`verify_views`]) |
+//! | consistent | names, counts, boxes and volumes of cells, and the cells of details, against geometry and locator; kinds of portals, as far as a file determines them; leaves, frames and panes against their shapes, and the motion of leaves; sources against each other; and everything that came with the source against the source ([`compare_details`], [`compare_scene`]) |
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -19,22 +19,22 @@
 //! assert!(report.holds() && report.sealed.judged == 0);
 //! ```
 //!
-//! # What is not judged, and why
+//! # Limits
 //!
-//! A world stores corners as `f32`, and a builder may snap planes together by [`tolerance`] (`eps`).
-//! Two readers of one file may therefore place the same wall or opening up to `eps` apart, each of
-//! two surfaces, so what happens within `2 eps` of one is not a statement about the world:
+//! A world stores vertices as `f32`, and a builder may snap planes together by [`tolerance`] (`eps`). So two readers
+//! of one file may place the same wall or opening up to `eps` apart, and each of two surfaces. An event within
+//! `2 eps` of a surface is not a statement about the world:
 //!
-//! - end points nearer than `2 eps` to a structural triangle or a portal are drawn again;
-//! - a segment that meets no triangle but passes a triangle, or the rim of a portal's piece, nearer
-//!   than that is *grazing*: counted, not judged. So is a ray whose first triangle is met that close
-//!   to an edge.
+//! - end points closer than `2 eps` to a structural triangle or a portal are drawn again;
+//! - a segment that meets no triangle but passes a triangle, or the rim of a portal's piece, closer than that is
+//!   *grazing*: counted, not judged. So is a ray that meets its first triangle that close to an edge.
 //!
-//! Claims of which nothing else in a file knows cannot be proved by the file. `docs/verify.md` lists it, with the reasons: above all
-//! where furniture stands within its room, what walls were called, and what they look like. With the source, it is judged.
+//! A file cannot prove claims to which nothing else in it relates. `docs/verify.md` lists them with reasons: above
+//! all the positions of furniture within its room, the names of walls, and their looks. With the source, they are
+//! judged.
 //!
-//! Everything else is judged. Sampling finds breaks, it does not prove their absence; the report
-//! therefore always says how much was judged.
+//! Everything else is judged. Sampling finds faults, but does not prove their absence; so the report always contains
+//! how much was judged.
 
 mod carried;
 mod claims;
@@ -78,14 +78,13 @@ use rng::Rng;
 use subject::Subject;
 use visible::Visible;
 
-/// Rays that share a random sequence. Fixed, so that threads cannot change what is drawn.
+/// Rays that share a random sequence. Fixed, so that the number of threads does not change the rays.
 const CHUNK: u64 = 2048;
 
-/// Tries the promises on `world`; see the [crate page](crate).
+/// Checks the promises of `world`; see the [crate page](crate).
 ///
-/// `source` are the structural triangles that the world was baked from, in world space; without
-/// them the world's own block. Uses the current rayon pool; the report does not depend on it.
-/// Time: a few microseconds a ray.
+/// `source` are the structural triangles from which the world was baked, in world space; `None` for the world's own.
+/// Uses the current rayon pool; the report does not depend on it. Time: a few microseconds a ray.
 #[must_use]
 pub fn verify_world(
     world: &World,
@@ -95,7 +94,7 @@ pub fn verify_world(
     verify_world_with_progress(world, source, options, &|_, _| ())
 }
 
-/// [`verify_world`], calling `progress` with the rays done and the rays in all, from any thread.
+/// Same as [`verify_world`], but calls `progress` with the finished and all rays, from any thread.
 #[must_use]
 pub fn verify_world_with_progress(
     world: &World,
@@ -160,7 +159,7 @@ pub fn verify_world_with_progress(
     VerifyReport::new(&subject, options, problems, tally)
 }
 
-/// The random sequence of a chunk of a set: those of segments and rays alternate, as they did before there were lines.
+/// Returns the random sequence of a chunk of a set: those of segments and rays alternate, as before lines were added.
 fn stream(set: u64, chunk: u64) -> u64 {
     if set < 2 {
         2 * chunk + set
@@ -169,7 +168,7 @@ fn stream(set: u64, chunk: u64) -> u64 {
     }
 }
 
-/// Tries number `i` of a set: of segments, of rays, of lines aimed at what is said not to be seen.
+/// Tries number `i` of a set: of segments, of rays, or of lines aimed at hidden things.
 fn try_one(
     subject: &Subject,
     visible: Option<&Visible>,
@@ -193,7 +192,7 @@ fn try_one(
     }
 }
 
-/// Whether following rays through a world with this error cannot go out of any list's range.
+/// Returns `true` if following rays through a world with this error cannot index out of any list.
 fn is_harmless_to_rays(error: &GraphError) -> bool {
     matches!(
         error,

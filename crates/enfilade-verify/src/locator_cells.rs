@@ -1,26 +1,26 @@
-//! What the locator's cells are like: the convex leaves of its tree, cut out of its box one by one.
+//! The convex leaves of the locator's tree, cut out of its box one by one.
 
 use enfilade_cpg::{CellId, Locator, World};
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
-/// Volume and box of a cell, as the locator has it.
+/// Volume and box of a cell in the locator.
 #[derive(Clone, Copy)]
 pub(crate) struct Extent {
     pub(crate) volume: f64,
-    /// Around all leaves; some are hairs between planes that nearly coincide, which a builder may give to either side.
+    /// Around all leaves, hairs between nearly coincident planes included, which a builder may assign to either side.
     pub(crate) bounds: Aabb,
-    /// Around the leaves that are no hairs.
+    /// Around the leaves that are not hairs.
     pub(crate) thick: Aabb,
 }
 
-/// Leaves whose volume is less than this times their largest face are hairs. [Units: wu]
+/// A leaf is a hair if its volume is less than this times its largest face. [Units: wu]
 const HAIR: f64 = 1e-3;
 
-/// A convex body by its faces, corners counter-clockwise seen from outside.
+/// A convex body as its faces, vertices counter-clockwise seen from outside.
 pub(crate) type Body = Vec<Poly>;
 
-/// Volume and box of each cell within the locator's box.
+/// Returns volume and box of each cell within the locator's box.
 ///
 /// Time: leaves times faces of a leaf.
 pub(crate) fn measure(world: &World) -> Vec<Extent> {
@@ -46,8 +46,8 @@ pub(crate) fn measure(world: &World) -> Vec<Extent> {
     out
 }
 
-/// Calls `visit` with each leaf of a locator's tree, as a convex body, and its cell; `None` for solid. A valid locator is a tree,
-/// so that each is visited once.
+/// Calls `visit` with each leaf of a locator's tree as a convex body, and its cell; `None` for solid. A valid locator
+/// is a tree, so each leaf is visited once.
 pub(crate) fn for_each_leaf(locator: &Locator, mut visit: impl FnMut(Option<CellId>, &Body)) {
     if locator.bounds.is_empty() {
         return;
@@ -66,7 +66,7 @@ pub(crate) fn for_each_leaf(locator: &Locator, mut visit: impl FnMut(Option<Cell
     }
 }
 
-/// The plane of a node, of unit normal.
+/// Returns the plane of a node, with a unit normal.
 pub(crate) fn plane_of(locator: &Locator, node: usize) -> Plane {
     let [x, y, z, d] = locator.planes[locator.nodes[node].plane as usize];
     let normal = DVec3::new(x, y, z);
@@ -81,7 +81,7 @@ fn box_body(b: &Aabb) -> Body {
     b.faces().map(|face| face.into_iter().collect()).into()
 }
 
-/// The parts before and behind a plane; a part without faces is empty.
+/// Returns the parts in front of and behind a plane; a part without faces is empty.
 fn split(body: Body, plane: &Plane, eps: f64) -> (Body, Body) {
     let heights = body.iter().flatten().map(|p| plane.signed_distance(*p));
     let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), d| (l.min(d), h.max(d)));
@@ -102,7 +102,7 @@ fn split(body: Body, plane: &Plane, eps: f64) -> (Body, Body) {
                 front.push(face);
             }
             Sides::Back => back.push(face),
-            // Flat in the plane, though the body is on both sides of it: a hair that rounding left.
+            // Flat in the plane, although the body is on both sides of it: a hair left by rounding.
             Sides::On => {}
             Sides::Both(f, b) => {
                 rim.extend(f.iter().copied().filter(is_near));

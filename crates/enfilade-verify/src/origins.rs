@@ -1,12 +1,12 @@
-//! Where things come from, as far as a file tells by itself: names, runs of triangles and parts fit together.
+//! Consistency of sources within a file: names, runs of triangles and parts fit together.
 //!
-//! Nothing else in a file knows what a wall was called before the bake; the source does ([`crate::compare_scene`]).
+//! A wall's name before the bake is only in the source ([`crate::compare_scene`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_cpg::{Batch, World};
 
-/// Problems, a line each.
+/// Returns problems, a line each.
 pub(crate) fn check(world: &World) -> Vec<String> {
     let mut out = Vec::new();
     check_vertices(world, &mut out);
@@ -15,7 +15,7 @@ pub(crate) fn check(world: &World) -> Vec<String> {
     out
 }
 
-/// A vertex is of one source: who shifts runs of triangles tears objects apart.
+/// Checks that a vertex has one source: shifted runs of triangles would tear objects apart.
 fn check_vertices(world: &World, out: &mut Vec<String>) {
     for (i, batch) in world.batches.iter().enumerate() {
         if let Some([a, b]) = torn(batch) {
@@ -27,7 +27,7 @@ fn check_vertices(world: &World, out: &mut Vec<String>) {
     }
 }
 
-/// Two sources that share a vertex of a batch.
+/// Returns two sources that share a vertex of a batch.
 fn torn(batch: &Batch) -> Option<[u32; 2]> {
     let p = &batch.primitive;
     let mut source_of = vec![None; p.positions.len()];
@@ -43,7 +43,7 @@ fn torn(batch: &Batch) -> Option<[u32; 2]> {
     None
 }
 
-/// Each source has something, or is above one that has.
+/// Checks that each source has an object, or is above one that has.
 fn check_use(world: &World, out: &mut Vec<String>) {
     let mut is_used = vec![false; world.sources.len()];
     let runs = world.batches.iter().flat_map(|b| b.sources.runs());
@@ -56,7 +56,7 @@ fn check_use(world: &World, out: &mut Vec<String>) {
             is_used[parent as usize] = true;
         }
     }
-    // Without a source for each triangle it may be that of one that lacks it.
+    // A batch without sources for its triangles may contain those of any source.
     let knows = |b: &&Batch| b.is_seal || b.primitive.indices.is_empty() || !b.sources.is_empty();
     if world.batches.iter().filter(|b| !knows(b)).count() > 0 {
         return;
@@ -64,11 +64,14 @@ fn check_use(world: &World, out: &mut Vec<String>) {
     let unused = (0..).zip(&is_used).filter(|(_, used)| !**used);
     for (source, _) in unused.take(3) {
         let path = world.source_path(source);
-        out.push(format!("source {source} ({path}): nothing comes from it"));
+        out.push(format!(
+            "source {source} ({path}): no object or triangle comes from it"
+        ));
     }
 }
 
-/// A detail is called as its source, or, where it has no name of its own and comes from the group around it, as its mesh.
+/// Checks that a detail is named as its source, or, if it has no name of its own and comes from the group around it,
+/// as its mesh.
 fn check_names(world: &World, out: &mut Vec<String>) {
     let named: BTreeSet<&str> = world.sources.iter().map(|s| s.name.as_str()).collect();
     // Sources that have a detail of their name.
@@ -100,7 +103,7 @@ fn check_names(world: &World, out: &mut Vec<String>) {
         if *name != detail.name && (is_elsewhere || is_of_another) {
             let own = &detail.name;
             out.push(format!(
-                "detail {i} ({own}): comes from source {source}, which is called {name:?}"
+                "detail {i} ({own}): comes from source {source}, which is named {name:?}"
             ));
         }
     }

@@ -1,4 +1,4 @@
-//! *Planar, convex outline*: every portal, straight from its corners.
+//! *Planar, convex outline*: every portal, directly from its vertices.
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_geom::poly::{self, Poly};
@@ -7,10 +7,10 @@ use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use crate::subject::to_dvec;
 
-/// What is wrong with outlines and pieces, a line each.
+/// Returns faults of outlines and pieces, a line each.
 ///
-/// Asked independently of `validate()`, from Newell normals, hulls and distances. Lengths within
-/// `eps` pass: that is how far a corner may be snapped and rounded.
+/// Independent of `validate()`: uses Newell normals, hulls and distances. Lengths within `eps` pass, since a vertex
+/// may be snapped and rounded by that much.
 pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
     let mut problems = Vec::new();
     for (id, portal) in (0..).map(PortalId).zip(&world.graph.portals) {
@@ -24,7 +24,7 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
             say("it has no outline".into());
             continue;
         };
-        // The outline may be dented by less than the tolerance; its hull is what it bounds.
+        // The outline may be dented by less than the tolerance; it bounds its hull.
         let plane = Plane::through(origin, normal);
         let hull_of = |polygon: &[DVec3]| Winding::hull_in_plane(&plane, polygon).points;
         let outline_hull = hull_of(&outline);
@@ -43,7 +43,7 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
                 .map(|(p, q)| (p - polygon[0]).cross(q - polygon[0]))
                 .sum();
             if polygon.len() < 3 {
-                say(format!("{name} has {} corners", polygon.len()));
+                say(format!("{name} has {} vertices", polygon.len()));
                 continue;
             }
             if k > 0 {
@@ -73,7 +73,7 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
         if let Some([j, k]) = overlapping(&polygons, normal, eps) {
             say(format!("pieces {j} and {k} overlap"));
         }
-        // Each corner may be off by eps, which moves the area by the circumference times that.
+        // Each vertex may be off by eps, which changes the area by the circumference times that.
         let circumference: f64 = portal
             .pieces
             .iter()
@@ -84,16 +84,16 @@ pub(crate) fn check(world: &World, eps: f64) -> Vec<String> {
         let off = (stored - area).abs();
         if off > eps * circumference + 1e-6 * area + 1e-12 || off.is_nan() {
             say(format!(
-                "area {stored} is stored, the pieces add up to {area}"
+                "the stored area is {stored}, but the pieces add up to {area}"
             ));
         }
     }
     problems
 }
 
-/// Two pieces that overlap by more than rounding may make of them.
+/// Returns two pieces that overlap by more than rounding explains.
 ///
-/// Pieces are swept along the axis in which they spread most; time near-linear where few lie side by side.
+/// Sweeps the pieces along the axis of their largest spread; time near-linear if few lie side by side.
 fn overlapping(pieces: &[Vec<DVec3>], normal: DVec3, eps: f64) -> Option<[usize; 2]> {
     let boxes: Vec<Aabb> = pieces.iter().map(Aabb::of_points).collect();
     let size = boxes.iter().fold(Aabb::EMPTY, |a, &b| a.union(b)).size();
@@ -117,12 +117,12 @@ fn overlapping(pieces: &[Vec<DVec3>], normal: DVec3, eps: f64) -> Option<[usize;
     None
 }
 
-/// Pieces may overlap by so much: a builder's planes nearly coincide there, and each side cuts by its own. [Units: wu]
+/// Allowed overlap of pieces: a builder's planes nearly coincide there, and each side cuts by its own. [Units: wu]
 const SEAM: f64 = 1e-3;
-/// And by this share of the smaller piece's area: slivers may lie in one another.
+/// Allowed overlap as a share of the smaller piece's area: slivers may lie in one another.
 const SEAM_SHARE: f64 = 0.1;
 
-/// Whether something of `b` lies deeper than a seam within all edges of `a`.
+/// Returns `true` if a part of `b` lies deeper than a seam within all edges of `a`.
 fn is_overlap(a: &[DVec3], b: &[DVec3], normal: DVec3, eps: f64) -> bool {
     let seam = SEAM.max(2.0 * eps);
     let mut rest: Poly = b.iter().copied().collect();
@@ -144,8 +144,7 @@ fn edges(polygon: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
     (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
 }
 
-/// How far the farthest of `points` lies from the region that `hull` bounds; `None` when within
-/// `2 eps`.
+/// Returns the distance of the farthest of `points` from the region that `hull` bounds; `None` within `2 eps`.
 fn worst_outside(hull: &[DVec3], points: &[DVec3], normal: DVec3, eps: f64) -> Option<f64> {
     let outside = |x: &DVec3| {
         let is_inside = edges(hull).all(|(p, q)| normal.cross(q - p).dot(*x - p) >= 0.0);
@@ -159,7 +158,7 @@ fn worst_outside(hull: &[DVec3], points: &[DVec3], normal: DVec3, eps: f64) -> O
     (worst > 2.0 * eps).then_some(worst)
 }
 
-/// How far the corner that dents the polygon most lies inside its hull; `None` when within `2 eps`.
+/// Returns the depth in its hull of the vertex that dents the polygon most; `None` within `2 eps`.
 fn worst_dent(hull: &[DVec3], polygon: &[DVec3], eps: f64) -> Option<f64> {
     let worst = polygon
         .iter()
@@ -168,8 +167,8 @@ fn worst_dent(hull: &[DVec3], polygon: &[DVec3], eps: f64) -> Option<f64> {
     (worst > 2.0 * eps).then_some(worst)
 }
 
-/// Measured to the border itself, never to lines through its edges: the direction of an edge not
-/// much longer than `eps` is noise, and a line carries it across the whole polygon.
+/// Measured to the border itself, not to lines through its edges: the direction of an edge not much longer than `eps`
+/// is noise, which a line carries across the whole polygon.
 fn distance_to_border(hull: &[DVec3], x: DVec3) -> f64 {
     edges(hull)
         .map(|(p, q)| closest_point_on_segment(x, p, q).distance(x))

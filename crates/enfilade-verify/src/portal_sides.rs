@@ -1,6 +1,6 @@
 //! *Planar, convex outline*, the other half: a portal's pieces lie in the open, between its own two cells.
 //!
-//! A piece that reaches into a wall is met by no sight line, so nothing else would find it.
+//! No line of sight meets a piece inside a wall, so no other check would find it.
 
 use enfilade_geom::{DVec3, Plane};
 use rayon::prelude::*;
@@ -10,10 +10,10 @@ use crate::subject::{Subject, to_dvec};
 
 /// Points tried on each portal.
 const POINTS: usize = 128;
-/// How far to its sides the cells are asked for, in tolerances.
+/// Distance to both sides at which the locator is queried, in tolerances.
 const ASIDE: f64 = 20.0;
 
-/// Problems, a line for each portal at most.
+/// Returns problems, at most a line per portal.
 pub(crate) fn check(subject: &Subject, seed: u64) -> Vec<String> {
     let portals = subject.crossable.par_iter();
     portals
@@ -43,7 +43,7 @@ fn is_wrong(subject: &Subject, portal: usize, p: DVec3) -> bool {
     if found == view.cells.map(Some) {
         return false;
     }
-    // Beside a surface, a rim or another portal the answer may be any.
+    // Beside a surface, a rim or another portal, any answer is right.
     let mut crossings = Vec::new();
     subject.crossings(p - step * 2.0, p + step * 2.0, &mut crossings);
     let is_clear = subject.blockers.nearest(p, 3.0 * aside).is_none();

@@ -1,4 +1,4 @@
-//! What was tried, what was judged, and what broke.
+//! The report: counts of tries and judgments, and the broken promises.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::options::VerifyOptions;
 use crate::subject::{Crossing, Subject};
 
-/// Where following a segment went wrong.
+/// The place where a followed segment goes wrong.
 pub(crate) struct Break {
     pub(crate) kind: FailureKind,
     pub(crate) expected: Option<CellId>,
@@ -19,34 +19,34 @@ pub(crate) struct Break {
     pub(crate) at: DVec3,
 }
 
-/// Failures of one kind in one chunk whose clearance is measured; it costs many times a ray.
+/// Failures per kind and chunk whose clearance is measured, which takes many times as long as a ray.
 const MEASURED: u64 = 4;
-/// Clearances beyond this are reported as this. [Units: wu]
+/// Largest clearance reported; larger ones are cut to this. [Units: wu]
 const FAR: f64 = 0.25;
 
-/// What became of the segments tried for *sealed*. All but `crossings` and `drawn` add up to `drawn`.
+/// Outcomes of the segments for *sealed*. All but `crossings` and `drawn` add up to `drawn`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SealedCounts {
     /// Segments drawn.
     pub drawn: u64,
-    /// Blocked by no triangle, and followed from end to end.
+    /// Not blocked, and followed from end to end.
     pub judged: u64,
-    /// Blocked by a triangle: says nothing.
+    /// Blocked by a triangle: no statement.
     pub blocked: u64,
     /// Passed an edge within twice the tolerance: not judged.
     pub grazing: u64,
     /// Both ends in solid matter.
     pub solid: u64,
-    /// One end in a cell, the other in what the locator calls solid, and nothing in between: a hole in
-    /// the walls, or in the locator. Each breaks the promise.
+    /// One end in a cell, the other in solid by the locator, and nothing between: a hole in the walls or in the
+    /// locator. Each breaks the promise.
     pub cell_to_solid: u64,
-    /// An end lay on a surface in every draw.
+    /// An end lay on a surface in every attempt.
     pub on_surface: u64,
     /// Portals crossed by judged segments.
     pub crossings: u64,
 }
 
-/// What became of the rays tried for *complete*. All but `drawn` add up to `drawn`.
+/// Outcomes of the rays for *complete*. All but `drawn` add up to `drawn`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CompleteCounts {
     /// Rays drawn.
@@ -59,51 +59,51 @@ pub struct CompleteCounts {
     pub grazing: u64,
     /// Started on a surface.
     pub on_surface: u64,
-    /// The portals on the way did not lead to a cell; listed as breaks of *sealed*.
+    /// The crossed portals did not lead to a cell; listed as breaks of *sealed*.
     pub unresolved: u64,
 }
 
-/// Outcome of the lines tried for *conservative*, where a world says which volumes and parts are seen.
+/// Outcomes of the lines for *conservative*, if a world stores visible volumes and parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct VisibleCounts {
-    /// Lines aimed at what is said not to be seen.
+    /// Lines aimed at hidden things.
     pub drawn: u64,
-    /// Lines that nothing blocks, of those tried for *sealed* and *complete* too: the volumes on their ways were asked.
+    /// Unblocked lines, those for *sealed* and *complete* included: checked against volumes along their paths.
     pub lines: u64,
-    /// Triangles and objects at their ends and on their ways that were looked up.
+    /// Triangles and objects on their paths and at their ends that were looked up.
     pub parts: u64,
 }
 
-/// How a promise broke.
+/// A kind of broken promise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FailureKind {
-    /// *Sealed*: the cell changed along the way, but no portal was crossed there.
+    /// *Sealed*: the cell changed on the path where there is no portal.
     MissedPortal,
-    /// *Sealed*: a portal was crossed that does not belong to the cell left.
+    /// *Sealed*: the path crossed a portal that does not belong to the cell it left.
     WrongSide,
-    /// *Sealed*: a portal was crossed that joins the right cells, against its normal.
+    /// *Sealed*: the path crossed a portal between the right cells, against its normal.
     WrongWay,
     /// *Sealed*: at a portal, the locator's cell changes to another than the portal leads to.
     EndMismatch,
-    /// *Sealed*: between two points of air, the locator says solid.
+    /// *Sealed*: between two points of air, the locator returns solid.
     InSolid,
-    /// *Sealed*: nothing is between a point of a cell and what the locator says is solid.
+    /// *Sealed*: nothing lies between a point of a cell and a point in solid by the locator.
     IntoSolid,
     /// *Complete*: the batch of a triangle does not list a cell that sees it.
     Unlisted,
-    /// *Complete*: no batch holds the triangle of the source that was met.
+    /// *Complete*: no batch contains a triangle of the source that a ray met.
     MissingTriangle,
-    /// *Conservative*: a straight line leads to a cell that the world's own potentially visible set hides from its start.
+    /// *Conservative*: a straight line leads to a cell that the world's potentially visible set hides from its start.
     Hidden,
-    /// *Conservative*: a straight line leads to a point that the volume of what is seen of its cell does not hold.
+    /// *Conservative*: a straight line leads to a point outside the volume visible from its cell.
     OutsideVolume,
-    /// *Conservative*: a straight line leads to a triangle or object that is not among the parts that are said to be seen.
+    /// *Conservative*: a straight line leads to a triangle or object that is not among the visible parts.
     HiddenPart,
 }
 
 impl FailureKind {
-    /// The promise that it breaks.
+    /// Returns the promise that it breaks.
     #[must_use]
     pub fn promise(self) -> &'static str {
         match self {
@@ -115,35 +115,35 @@ impl FailureKind {
 
     fn words(self) -> &'static str {
         match self {
-            Self::MissedPortal => "the cell changes where no portal is",
+            Self::MissedPortal => "the cell changes where there is no portal",
             Self::WrongSide => "a portal of other cells is crossed",
             Self::WrongWay => "a portal faces the wrong way",
             Self::EndMismatch => "the portals lead to another cell",
-            Self::InSolid => "the locator says solid in open air",
+            Self::InSolid => "the locator returns solid in open air",
             Self::IntoSolid => "nothing closes the way from a cell into solid",
             Self::Unlisted => "a triangle's batch lacks a cell that sees it",
             Self::MissingTriangle => "a triangle of the source is in no batch",
-            Self::Hidden => "a cell is seen that the world's set of what is seen lacks",
-            Self::OutsideVolume => "a point is seen that the volume of what is seen lacks",
-            Self::HiddenPart => "a triangle or object is seen that the parts of what is seen lack",
+            Self::Hidden => "a visible cell is missing in the potentially visible set",
+            Self::OutsideVolume => "a visible point is outside the visible volume",
+            Self::HiddenPart => "a visible triangle or object is missing in the visible parts",
         }
     }
 }
 
-/// All failures alike in kind, cells and portal, with the surest example.
+/// All failures of the same kind, cells and portal, with the surest example.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Failure {
-    /// How it broke.
+    /// Kind of broken promise.
     pub kind: FailureKind,
-    /// Rays that failed alike.
+    /// Number of rays with this failure.
     pub count: u64,
-    /// The cell that the ray should be in there.
+    /// The cell in which the ray should be there.
     pub expected: Option<u32>,
-    /// The cell that is there; none for solid, or for triangles.
+    /// The cell found there; none for solid, or for triangles.
     pub found: Option<u32>,
     /// The portal crossed there, or last.
     pub portal: Option<u32>,
-    /// Where it broke. [Units: wu]
+    /// Position of the failure. [Units: wu]
     pub at: [f64; 3],
     /// Start of the example. [Units: wu]
     pub start: [f64; 3],
@@ -151,11 +151,11 @@ pub struct Failure {
     pub end: [f64; 3],
     /// Portals that the example crosses, in order.
     pub crossed: Vec<u32>,
-    /// How far the example stays from every edge, at most 0.25; more is surer. [Units: wu]
+    /// Distance of the example from every edge, at most 0.25; more is surer. [Units: wu]
     pub clearance: f64,
     /// The triangle met.
     pub triangle: Option<[[f64; 3]; 3]>,
-    /// Number of the example's ray.
+    /// Index of the example's ray.
     pub ray: u64,
 }
 
@@ -186,7 +186,7 @@ impl Failure {
         (self.kind, self.expected, self.found, self.portal)
     }
 
-    /// Joins two alike: counts add up, the surer example stays.
+    /// Merges two failures with the same key: counts add up, the surer example stays.
     fn joined(self, other: Self) -> Self {
         let count = self.count + other.count;
         let is_first_surer = other
@@ -203,7 +203,7 @@ impl Failure {
 
 type FailureKey = (FailureKind, Option<u32>, Option<u32>, Option<u32>);
 
-/// Counts and failures of some rays; tallies add up in any order to the same.
+/// Counts and failures of some rays; tallies add up in any order to the same sum.
 #[derive(Default)]
 pub(crate) struct Tally {
     pub(crate) sealed: SealedCounts,
@@ -274,15 +274,15 @@ pub struct VerifyReport {
     pub portals: usize,
     /// Structural triangles in its batches.
     pub triangles: usize,
-    /// Triangles that blocked: the world's own, or those of the source.
+    /// Triangles that block: the world's own, or those of the source.
     pub blockers: usize,
-    /// Whether a source was given.
+    /// True if a source was given.
     pub has_source: bool,
-    /// Distance below which nothing is judged, halved: `eps`. [Units: wu]
+    /// Half the distance below which nothing is judged: `eps`. [Units: wu]
     pub tolerance: f64,
-    /// Start of the random sequences.
+    /// Seed of the random sequences.
     pub seed: u64,
-    /// Broken invariants of graph and outlines, a line each.
+    /// Broken invariants of graph, outlines and numbers, a line each.
     pub problems: Vec<String>,
     /// Segments for *sealed*.
     pub sealed: SealedCounts,
@@ -290,28 +290,28 @@ pub struct VerifyReport {
     pub across: SealedCounts,
     /// Rays for *complete*.
     pub complete: CompleteCounts,
-    /// Lines for *conservative*; none where the world says nothing of volumes and parts.
+    /// Lines for *conservative*; none if the world stores no visible volumes and parts.
     pub visible: VisibleCounts,
     /// Cells in which no point was found, so that nothing is known about them.
     pub unsampled_cells: Vec<u32>,
-    /// Segments, and ways of rays to their triangles, that break *sealed*.
+    /// Segments, and paths of rays to their triangles, that break *sealed*.
     pub unsealed: u64,
     /// Rays that break *complete*.
     pub incomplete: u64,
-    /// Lines that lead to what the world's own potentially visible set hides from their start: a cell, a point, a triangle or
-    /// an object.
+    /// Lines that lead to something that the world's potentially visible set hides from their start: a cell, a point, a
+    /// triangle or an object.
     pub hidden: u64,
-    /// Failures by likeness, the most frequent first; a list of limited length.
+    /// Groups of equal failures, the most frequent first; at most as many as the options allow.
     pub failures: Vec<Failure>,
-    /// How many kinds of failure there are in all.
+    /// Number of all such groups.
     pub failure_groups: usize,
-    /// By cell, its name.
+    /// Names of cells.
     #[serde(skip)]
     names: Vec<String>,
 }
 
 impl VerifyReport {
-    /// Whether no promise was seen broken. Says nothing where nothing was judged.
+    /// Returns `true` if no promise was found broken. Means nothing if nothing was judged.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.problems.is_empty() && self.unsealed == 0 && self.incomplete == 0 && self.hidden == 0
@@ -400,7 +400,7 @@ impl VerifyReport {
         }
         Ok(())
     }
-    /// The name that other commands print for a cell, too.
+    /// Returns the name that other commands print for a cell, too.
     fn name(&self, cell: u32) -> String {
         let name = self.names.get(cell as usize);
         name.map_or_else(|| CellId(cell).to_string(), |n| shown(n).to_string())
@@ -531,7 +531,7 @@ impl fmt::Display for VerifyReport {
         }
         match (self.holds(), s.judged + c.judged) {
             (true, 0) => writeln!(f, "nothing was judged"),
-            (true, _) => writeln!(f, "no promise was seen broken"),
+            (true, _) => writeln!(f, "no broken promise found"),
             (false, _) => writeln!(f, "BROKEN"),
         }
     }

@@ -1,4 +1,4 @@
-//! Random numbers that depend on nothing but seed and chunk.
+//! Random numbers that depend only on seed and chunk.
 
 use enfilade_geom::DVec3;
 
@@ -6,9 +6,9 @@ use enfilade_geom::DVec3;
 pub(crate) struct Rng(u64);
 
 impl Rng {
-    /// The sequence of one chunk of one seed.
+    /// Returns the sequence of one chunk of one seed.
     pub(crate) fn new(seed: u64, chunk: u64) -> Self {
-        // Neighboring chunks start far apart: one output of a generator that starts at the seed.
+        // Spread neighboring chunks: each starts at one output of a generator that starts at the seed.
         let mut start = Self(seed ^ chunk.wrapping_mul(0xd134_2543_de82_ef95));
         let first = start.next();
         Self(first ^ start.next().rotate_left(32))
@@ -22,32 +22,32 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// In `[0, 1)`.
+    /// Returns a number in `[0, 1)`.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// In `[low, high)`.
+    /// Returns a number in `[low, high)`.
     pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// In `[low, high)`, every factor of ten as likely as the next.
+    /// Returns a number in `[low, high)`, uniform in its logarithm.
     pub(crate) fn log_range(&mut self, low: f64, high: f64) -> f64 {
         (self.range(low.ln(), high.ln())).exp()
     }
 
-    /// Below `n`, which is not 0.
+    /// Returns a number below `n`, which must not be 0.
     pub(crate) fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n - 1)
     }
 
-    /// One of two signs.
+    /// Returns 1 or -1.
     pub(crate) fn sign(&mut self) -> f64 {
         if self.next() & 1 == 0 { 1.0 } else { -1.0 }
     }
 
-    /// Uniform on the unit sphere.
+    /// Returns a direction, uniform on the unit sphere.
     pub(crate) fn direction(&mut self) -> DVec3 {
         let z = self.range(-1.0, 1.0);
         let phi = self.range(0.0, std::f64::consts::TAU);

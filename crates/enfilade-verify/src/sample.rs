@@ -1,17 +1,17 @@
-//! Which segments are tried: a mix, so that small cells and narrow openings get theirs.
+//! Random segments: a mix that includes small cells and narrow openings.
 
 use enfilade_geom::DVec3;
 
 use crate::rng::Rng;
 use crate::subject::{Subject, point_in, point_of_triangle};
 
-/// Farthest that aimed segments reach from what they aim at. [Units: wu]
+/// Largest reach of aimed segments from their target. [Units: wu]
 const REACH: f64 = 10.0;
 
-/// Ways to draw a segment.
+/// Number of ways to draw a segment.
 const KINDS: u64 = 10;
 
-/// Draws the two ends of segment number `i`; the number picks the way to draw.
+/// Draws both ends of segment number `i`, which selects the way of drawing.
 pub(crate) fn draw_segment(subject: &Subject, rng: &mut Rng, i: u64) -> (DVec3, DVec3) {
     let near = 3.0 * subject.eps;
     let has_portals = !subject.crossable.is_empty();
@@ -93,7 +93,7 @@ pub(crate) fn draw_segment(subject: &Subject, rng: &mut Rng, i: u64) -> (DVec3, 
     }
 }
 
-/// A segment through `p` in any direction.
+/// Returns a segment through `p` in a random direction.
 fn around(rng: &mut Rng, p: DVec3, near: f64) -> (DVec3, DVec3) {
     let d = rng.direction();
     (

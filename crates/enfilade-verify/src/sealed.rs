@@ -8,10 +8,10 @@ use crate::rng::Rng;
 use crate::sample::draw_segment;
 use crate::subject::{Crossing, Subject};
 
-/// Draws before a segment is given up because its ends lie on surfaces.
+/// Attempts to find a segment whose ends are off all surfaces.
 const DRAWS: usize = 4;
 
-/// Draws segment number `i` and judges it; returns its way if nothing blocks it and it is as it should be.
+/// Draws segment number `i` and judges it; returns its path if nothing blocks it and no promise breaks.
 pub(crate) fn try_segment(
     subject: &Subject,
     rng: &mut Rng,
@@ -76,7 +76,7 @@ pub(crate) fn judge_segment(
     followed.ok()
 }
 
-/// A segment from a cell into solid that nothing blocks.
+/// Returns the failure of an unblocked segment from a cell into solid.
 fn into_solid(subject: &Subject, i: u64, [a, b]: [DVec3; 2], cell: CellId) -> Failure {
     let mut crossings = Vec::new();
     subject.crossings(a, b, &mut crossings);
@@ -87,16 +87,16 @@ fn into_solid(subject: &Subject, i: u64, [a, b]: [DVec3; 2], cell: CellId) -> Fa
     Failure::of_break(&wrong, i, [a, b], &crossings)
 }
 
-/// The way of a segment that was followed to its end.
+/// The path of a segment that was followed to its end.
 pub(crate) struct Path {
     pub(crate) ends: [DVec3; 2],
-    /// The cells that it passes, and from where to where on it, 0 being its start and 1 its end. At least one.
+    /// The cells that it passes, each with the range of the segment in it, from 0 (start) to 1 (end). At least one.
     pub(crate) cells: Vec<(CellId, [f64; 2])>,
 }
 
-/// Follows the segment through `crossings`; ends in the cell of `b`, or says where it does not.
+/// Follows the segment through `crossings` to the cell of `b`, or returns where the portals do not lead there.
 ///
-/// The order of crossings that may be swapped within the tolerance is settled on the way.
+/// Swaps crossings whose order is within the tolerance as needed.
 pub(crate) fn follow(
     subject: &Subject,
     rng: &mut Rng,
@@ -152,7 +152,7 @@ pub(crate) fn follow(
     Err(locate_change(subject, a, b, [t, 1.0], cell, end))
 }
 
-/// Between two crossings the locator must answer the same cell everywhere.
+/// Checks that the locator returns the same cell everywhere between two crossings.
 fn check_between(
     subject: &Subject,
     rng: &mut Rng,
@@ -176,7 +176,7 @@ fn check_between(
     Ok(())
 }
 
-/// Narrows down where the locator's answer leaves `cell` on the way from `from` to `to`.
+/// Bisects the position where the locator's answer leaves `cell` on the way from `from` to `to`.
 fn locate_change(
     subject: &Subject,
     a: DVec3,
@@ -195,7 +195,7 @@ fn locate_change(
         }
     }
     let at = a.lerp(b, to);
-    // At a portal, the locator and that portal disagree about what lies behind it.
+    // At a portal, the locator and that portal disagree about the cell behind it.
     let portal = subject.nearest_portal(at);
     let kind = match (portal, found) {
         (Some(_), _) => FailureKind::EndMismatch,

@@ -5,12 +5,13 @@ use enfilade_geom::{Bvh, DVec3, Triangle};
 
 use crate::subject::structural_triangles;
 
-/// Seals overlap what they join, by what rounding to `f32` may move. [Units: wu]
+/// Overlap of seals with the surfaces that they join: allows for rounding to `f32`. [Units: wu]
 const OVERLAP: f64 = 1e-3;
 
-/// Problems of seals that close more than the file's `smallest_hole` says.
+/// Returns problems of seals that close more than the file's `smallest_hole`.
 ///
-/// A gap is narrower than the hole, or no point of it is farther than half the hole's width from the model.
+/// A seal closes a gap if it is narrower than the hole, or no point of it is farther than half the hole's width from
+/// the model.
 pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
     let all = structural_triangles(world);
     let is_seal = |batch: u32| world.batches[batch as usize].is_seal;
@@ -22,7 +23,7 @@ pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
     let said = settings.get("smallest_hole").and_then(|s| s.parse().ok());
     let Some(hole): Option<f64> = said else {
         return vec![
-            "there are seals, but the file does not say how wide: smallest_hole is missing".into(),
+            "there are seals, but the file lacks smallest_hole, their largest width".into(),
         ];
     };
     let model: Vec<Triangle> = match source {
@@ -52,7 +53,7 @@ pub(crate) fn check(world: &World, source: Option<&[Triangle]>) -> Vec<String> {
     out
 }
 
-/// The least height of a triangle.
+/// Returns the least height of a triangle.
 fn height(t: &Triangle) -> f64 {
     let longest = (0..3)
         .map(|k| t[k].distance(t[(k + 1) % 3]))
@@ -67,7 +68,7 @@ mod tests {
     use enfilade_cpg::Batch;
     use enfilade_geom::scene::Primitive;
 
-    /// Two walls with a slit of so many meters between them, and a seal across it.
+    /// Two walls with a slit of `width` meters between them, and a seal across it.
     fn sealed(width: f32) -> World {
         let strip = |x0: f32, x1: f32, is_seal| Batch {
             primitive: Primitive {

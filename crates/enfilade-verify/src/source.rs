@@ -1,4 +1,4 @@
-//! Is the source what the world was baked from?
+//! Tests that a source is the one from which the world was baked, and comparison of details.
 
 use std::collections::HashSet;
 
@@ -7,15 +7,15 @@ use enfilade_geom::{Aabb, Bvh, Triangle};
 
 use crate::details;
 
-/// Triangles of each that are looked for on the other's surface, at most.
+/// Most triangles of each side that are searched on the other's surface.
 const ASKED: usize = 2000;
-/// Percent of triangles that must be the same, corner by corner. Both round once, so that of one's own nearly all are; two
-/// scenes share next to none.
+/// Least percentage of equal triangles, vertex by vertex. Both sides round once, so nearly all triangles of the right
+/// source are equal; two scenes share next to none.
 const SAME: usize = 50;
-/// Percent of triangles that must lie on the other's surface where fewer are the same: a world may have cut all of them.
+/// Least percentage of triangles on the other's surface if fewer are equal: a world may have cut all of them.
 const ON_SURFACE: usize = 95;
 
-/// What is wrong with the source, if it is another scene's. `reach` is for rounding.
+/// Returns the problem if the source is another scene's. `reach` allows for rounding.
 pub(crate) fn problem(own: &[Triangle], source: &[Triangle], reach: f64) -> Option<String> {
     let known: HashSet<Key> = own.iter().map(key).collect();
     let same = source.iter().filter(|t| known.contains(&key(t))).count();
@@ -26,7 +26,7 @@ pub(crate) fn problem(own: &[Triangle], source: &[Triangle], reach: f64) -> Opti
     let share = percent_on(source, own, reach).min(percent_on(own, source, reach));
     (share < ON_SURFACE).then(|| {
         format!(
-            "the source is another scene, or was read by other settings than in the bake: {same} of its {} triangles are among the \
+            "the source is another scene, or was read with other settings than in the bake: {same} of its {} triangles are among the \
              world's {}",
             source.len(),
             own.len()
@@ -34,11 +34,11 @@ pub(crate) fn problem(own: &[Triangle], source: &[Triangle], reach: f64) -> Opti
     })
 }
 
-/// A triangle by the bits of its corners, whichever comes first.
+/// Key of a triangle: the bits of its vertices, in any order.
 pub(crate) type Key = [[u32; 3]; 3];
 
 pub(crate) fn key(t: &Triangle) -> Key {
-    // Adding zero makes one of the two zeros.
+    // Adding zero makes -0 and 0 the same key.
     let mut key = t.map(|p| p.as_vec3().to_array().map(|v| (v + 0.0).to_bits()));
     key.sort_unstable();
     key
@@ -56,11 +56,11 @@ fn percent_on(of: &[Triangle], within: &[Triangle], reach: f64) -> usize {
     100 * there / n.max(1)
 }
 
-/// A detail object of the scene that a world was baked from, in world space.
+/// A detail object of the source scene, in world space.
 pub struct SourceDetail {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Where it comes from, as the world numbers its sources.
+    /// Its source, numbered as in the world.
     pub source: Option<u32>,
     /// Its triangles.
     pub triangles: Vec<Triangle>,
@@ -68,7 +68,7 @@ pub struct SourceDetail {
 
 /// One object of either side.
 struct Shape {
-    /// Its number on its side.
+    /// Its index on its side.
     id: usize,
     name: String,
     source: Option<u32>,
@@ -78,7 +78,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// `None` without triangles.
+    /// Returns `None` without triangles.
     fn of(id: usize, name: &str, source: Option<u32>, triangles: &[Triangle]) -> Option<Self> {
         (!triangles.is_empty()).then(|| Self {
             id,
@@ -90,7 +90,7 @@ impl Shape {
         })
     }
 
-    /// What rounding may have moved of it. [Units: wu]
+    /// Returns the largest move of its vertices by rounding. [Units: wu]
     fn slack(&self) -> f64 {
         let largest = self.bounds.min.abs().max(self.bounds.max.abs());
         SLACK + ROUNDING * largest.max_element()
@@ -102,19 +102,19 @@ impl Shape {
     }
 }
 
-/// What writing positions and transforms in `f32` may move, at the origin and by the distance from it. [Units: wu]
+/// Largest move by writing positions and transforms in `f32`: at the origin, and per distance from it. [Units: wu]
 const SLACK: f64 = 1e-4;
 const ROUNDING: f64 = 2e-6;
 
-/// Objects named at most, of those that lack a partner.
+/// Most listed objects without a partner.
 const NAMED: usize = 10;
 
-/// Whether a world has the details of its source, each where it was: problems, a line each. `source` gives the one of a number
-/// below `n`, and may be asked for it several times.
+/// Checks that a world has the details of its source, each in its place; returns problems, a line each. `source`
+/// returns the detail of an index below `n`, and may be called several times for each.
 ///
-/// A detail that was moved, changed, added or taken away is found, whatever the world's counts say. Triangles are compared in
-/// their order, which no writer of ours changes, also where parts were taken out of an object; objects in any. Linear in triangles and `O(n log n)` in objects, as long as few
-/// that differ lie in one place.
+/// Finds a detail that was moved, changed, added or removed, whatever the world's counts are. Compares triangles in
+/// their order, which our writers keep, even if parts were taken out of an object; objects in any order. Linear in
+/// triangles and O(n log n) in objects, if few that differ lie in one place.
 #[must_use]
 pub fn compare_details(
     world: &World,
@@ -126,7 +126,7 @@ pub fn compare_details(
         let whole = d.part_of.map_or(i, |w| w as usize);
         parts[whole].push(i);
     }
-    // A whole with what was taken out of it, one after the other.
+    // A whole, followed by the parts taken out of it.
     let of_world = |i: usize| -> Vec<Vec<Triangle>> {
         let own = parts[i].iter().map(|&p| &world.details[p]);
         own.map(|d| details::triangles_of(world, d)).collect()
@@ -144,7 +144,7 @@ pub fn compare_details(
             Shape::of(i, &detail.name, detail.source, &detail.triangles)
         })
         .collect();
-    // By where they begin, so that only what is near is compared.
+    // Sorted by the start of their boxes, so that only near ones are compared.
     for shapes in [&mut own, &mut theirs] {
         shapes.sort_by(|a, b| {
             let by_place = a.bounds.min.x.total_cmp(&b.bounds.min.x);
@@ -172,7 +172,7 @@ pub fn compare_details(
                 .all(|d| d.abs().max_element() <= shape.slack());
             !o.is_met && is_near && is_same(&of_world(o.id), &triangles, shape.slack())
         };
-        // Among several in one place, that of the same name if there is one.
+        // Among several in one place, prefer that of the same name.
         let mut met: Vec<&mut Shape> = near.filter(is_there).collect();
         met.sort_by_key(|o| (o.name != shape.name, o.source != shape.source));
         if let Some(met) = met.into_iter().next() {
@@ -180,7 +180,7 @@ pub fn compare_details(
             shape.is_met = true;
             if met.name != shape.name || met.source != shape.source {
                 renamed.push(format!(
-                    "detail {} ({}): the source calls it {:?}, or has it from elsewhere",
+                    "detail {} ({}): the source names it {:?}, or has it at another node",
                     met.id, met.name, shape.name
                 ));
             }
@@ -191,13 +191,13 @@ pub fn compare_details(
     out.extend(renamed.into_iter().take(NAMED));
     if more > 0 {
         out.push(format!(
-            "{more} more details are called otherwise in the source"
+            "{more} more details differ in name or node from the source"
         ));
     }
     out
 }
 
-/// Whether triangles are those of parts that were taken out of them, each part in their order.
+/// Returns `true` if triangles are those of the parts taken out of them, each part in its order.
 fn is_same(parts: &[Vec<Triangle>], of: &[Triangle], slack: f64) -> bool {
     let is_near = |a: &Triangle, b: &Triangle| {
         let mut corners = a.iter().zip(b);
@@ -215,12 +215,12 @@ fn is_same(parts: &[Vec<Triangle>], of: &[Triangle], slack: f64) -> bool {
     })
 }
 
-/// Those that lack a partner, a line each.
+/// Returns the objects that lack a partner, a line each.
 fn unmet(theirs: &[Shape], own: &[Shape]) -> Vec<String> {
     let n_met = own.iter().filter(|s| s.is_met).count();
     if 2 * n_met < own.len().max(theirs.len()) {
         return vec![format!(
-            "the source's details are those of another scene, or were read by other settings than in the bake: {n_met} of its {} \
+            "the source's details are those of another scene, or were read with other settings than in the bake: {n_met} of its {} \
              are among the world's {}",
             theirs.len(),
             own.len()

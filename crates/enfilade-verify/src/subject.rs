@@ -1,4 +1,4 @@
-//! The world under test, made ready for many rays.
+//! The world under test, prepared for many rays.
 
 use std::ops::ControlFlow;
 
@@ -9,25 +9,25 @@ use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle, world_tolerance};
 use crate::options::VerifyOptions;
 use crate::rng::Rng;
 
-/// Points tried in a cell's box to learn how much of it the cell fills.
+/// Points tried in a cell's box to estimate the share of it that the cell fills.
 const PROBES: usize = 4096;
-/// Points kept of a cell that fills little of its box.
+/// Points kept for a cell that fills little of its box.
 const POOL: usize = 512;
-/// Tries in the box of a cell that fills more than `POOL / PROBES` of it.
+/// Attempts in the box of a cell that fills more than `POOL / PROBES` of it.
 const TRIES: usize = 24;
 
-/// `max(2e-5 m, 4e-7 · extent)`, where extent is the largest absolute coordinate: the distance up to
-/// which a builder may snap planes and an `f32` file may round. [Units: wu]
+/// Returns `max(2e-5 m, 4e-7 · extent)`, where extent is the largest absolute coordinate: the distance up to which a
+/// builder may snap planes and an `f32` file may round. [Units: wu]
 #[must_use]
 pub fn tolerance(bounds: &Aabb) -> f64 {
     world_tolerance(bounds.extent())
 }
 
-/// All structural triangles of a world with the batch of each, in order of batch and index.
+/// Returns all structural triangles of a world with the batch of each, in order of batch and index.
 ///
 /// # Panics
 ///
-/// When an index is out of range; `World::validate` tells.
+/// If an index is out of range; `World::validate` finds that.
 #[must_use]
 pub fn structural_triangles(world: &World) -> Vec<(Triangle, u32)> {
     let mut out = Vec::new();
@@ -51,11 +51,11 @@ pub(crate) fn to_dvec(p: [f32; 3]) -> DVec3 {
 struct PortalTriangle {
     corners: Triangle,
     portal: PortalId,
-    /// Which edges (first at corner 0) are the piece's own, not diagonals of the fan.
+    /// For each edge (the first starts at vertex 0), true if it is the piece's own, not a diagonal of the fan.
     is_rim: [bool; 3],
 }
 
-/// A portal as far as rays care.
+/// The part of a portal that rays need.
 pub(crate) struct PortalView {
     pub(crate) cells: [CellId; 2],
     pub(crate) normal: DVec3,
@@ -68,17 +68,17 @@ pub(crate) struct PortalView {
 pub(crate) struct Crossing {
     pub(crate) t: f64,
     pub(crate) portal: PortalId,
-    /// Along the portal's normal: from the first cell to the second.
+    /// True along the portal's normal: from the first cell to the second.
     pub(crate) is_forward: bool,
-    /// How far `t` may shift when the portal's plane moves by `2 eps`.
+    /// Possible shift of `t` if the portal's plane moves by `2 eps`.
     slack: f64,
 }
 
 pub(crate) struct CellView {
     pub(crate) bounds: Aabb,
-    /// Points in the cell, for cells that rarely come up in their box.
+    /// Points in the cell, for cells that random points of their box rarely hit.
     pool: Vec<DVec3>,
-    /// Whether drawing from the box is hopeless.
+    /// True if drawing from the box is hopeless.
     is_sparse: bool,
 }
 
@@ -88,12 +88,12 @@ pub(crate) struct Subject<'a> {
     pub(crate) locator: &'a Locator,
     pub(crate) eps: f64,
     pub(crate) has_source: bool,
-    /// What blocks.
+    /// The triangles that block.
     pub(crate) triangles: Vec<Triangle>,
     pub(crate) blockers: Bvh,
     /// The world's own triangles with their batches.
     pub(crate) own: Vec<(Triangle, u32)>,
-    /// Over `own`; `None` where that is what blocks.
+    /// Tree over `own`; `None` if those block.
     own_bvh: Option<Bvh>,
     portal_triangles: Vec<PortalTriangle>,
     portal_bvh: Bvh,
@@ -103,7 +103,7 @@ pub(crate) struct Subject<'a> {
     pub(crate) sampled: Vec<CellId>,
     /// Portals with a piece, ascending.
     pub(crate) crossable: Vec<PortalId>,
-    /// Where uniform points are drawn.
+    /// Box from which uniform points are drawn.
     pub(crate) padded: Aabb,
 }
 
@@ -117,7 +117,7 @@ impl<'a> Subject<'a> {
         let own_triangles: Vec<Triangle> = own.iter().map(|t| t.0).collect();
         let (triangles, own_bvh) = match source {
             Some(source) => {
-                // Seals are matter, though no model has them.
+                // Seals are matter, although no model contains them.
                 let is_seal = |t: &&(Triangle, u32)| world.batches[t.1 as usize].is_seal;
                 let seals = own.iter().filter(is_seal).map(|t| t.0);
                 let all = source.iter().copied().chain(seals).collect();
@@ -178,7 +178,7 @@ impl<'a> Subject<'a> {
         this
     }
 
-    /// Learns where points of each cell are found.
+    /// Finds points in each cell.
     fn probe_cells(&mut self, seed: u64) {
         for (i, cell) in self.world.graph.cells.iter().enumerate() {
             let id = CellId(i as u32);
@@ -193,7 +193,7 @@ impl<'a> Subject<'a> {
                 }
             }
             let is_sparse = pool.len() < POOL;
-            // A cell too thin to be met by chance begins behind its portals.
+            // A cell too thin for random points begins behind its portals.
             for portal in cell
                 .portals
                 .iter()
@@ -226,7 +226,7 @@ impl<'a> Subject<'a> {
         &self.world.graph[cell].name
     }
 
-    /// A point of a cell in `sampled`.
+    /// Returns a point of a cell in `sampled`.
     pub(crate) fn point_in_cell(&self, rng: &mut Rng, cell: CellId) -> DVec3 {
         let view = &self.cells[cell.0 as usize];
         if !view.is_sparse {
@@ -238,7 +238,7 @@ impl<'a> Subject<'a> {
             }
         }
         let base = view.pool[rng.below(view.pool.len())];
-        // Shaken, so that a small pool does not mean few points.
+        // Move it randomly, so that a small pool still gives many points.
         let p = base + rng.direction() * rng.log_range(self.eps, 0.3);
         if self.locator.locate(p) == Some(cell) {
             p
@@ -247,41 +247,41 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Uniform over the pieces' fan triangles of a portal in `crossable`.
+    /// Returns a point uniform over the pieces' fan triangles of a portal in `crossable`.
     pub(crate) fn point_of_portal(&self, rng: &mut Rng, portal: PortalId) -> DVec3 {
         let fan = &self.portals[portal.0 as usize].fan;
         let t = &self.portal_triangles[fan.start + rng.below(fan.len())];
         point_of_triangle(rng, &t.corners)
     }
 
-    /// A point on the rim of a piece of a portal in `crossable`.
+    /// Returns a point on the rim of a piece of a portal in `crossable`.
     pub(crate) fn rim_point_of_portal(&self, rng: &mut Rng, portal: PortalId) -> DVec3 {
         let fan = &self.portals[portal.0 as usize].fan;
         let t = &self.portal_triangles[fan.start + rng.below(fan.len())];
-        // The edge from corner 1 to 2 is always the piece's own.
+        // The edge from vertex 1 to 2 is always the piece's own.
         let k = (0..3)
             .find(|&k| t.is_rim[k] && rng.unit() < 0.5)
             .unwrap_or(1);
         t.corners[k].lerp(t.corners[(k + 1) % 3], rng.unit())
     }
 
-    /// Whether `p` is nearer than `2 eps` to a structural triangle or a portal.
+    /// Returns `true` if `p` is closer than `2 eps` to a structural triangle or a portal.
     pub(crate) fn is_close_to_surface(&self, p: DVec3) -> bool {
         !self.is_clear(p, 2.0 * self.eps) || self.nearest_portal(p).is_some()
     }
 
-    /// Returns true where `p` is at least `reach` from all structural triangles. [Units: wu]
+    /// Returns `true` if `p` is at least `reach` from all structural triangles. [Units: wu]
     pub(crate) fn is_clear(&self, p: DVec3, reach: f64) -> bool {
         self.blockers.nearest(p, reach).is_none()
     }
 
-    /// The portal nearest to `p`, if one is within `2 eps`.
+    /// Returns the portal nearest to `p`, if one is within `2 eps`.
     pub(crate) fn nearest_portal(&self, p: DVec3) -> Option<PortalId> {
         let nearest = self.portal_bvh.nearest(p, 2.0 * self.eps)?;
         Some(self.portal_triangles[nearest.triangle as usize].portal)
     }
 
-    /// The portals that the open segment crosses, in order, each once.
+    /// Finds the portals that the open segment crosses, in order, each once.
     pub(crate) fn crossings(&self, a: DVec3, b: DVec3, out: &mut Vec<Crossing>) {
         out.clear();
         self.portal_bvh.for_each_hit(&Ray::segment(a, b), |hit| {
@@ -302,14 +302,13 @@ impl<'a> Subject<'a> {
         out.sort_by(|x, y| x.t.total_cmp(&y.t).then(x.portal.cmp(&y.portal)));
     }
 
-    /// Moves a crossing that leaves `cell` to the front of `rest`, where the first does not and
-    /// both may as well be crossed in the other order.
+    /// Moves a crossing that leaves `cell` to the front of `rest` if the first does not, and both may be crossed in
+    /// either order.
     pub(crate) fn settle_order(&self, cell: CellId, rest: &mut [Crossing]) {
         let Some(first) = rest.first().copied() else {
             return;
         };
-        // The direction counts: two portals between the same cells, a hair apart, may be met in the
-        // wrong order too.
+        // Directions matter: two portals between the same cells, a hair apart, may be met in the wrong order, too.
         let leaves = |c: &Crossing| {
             self.portals[c.portal.0 as usize].cells[usize::from(!c.is_forward)] == cell
         };
@@ -325,14 +324,14 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Whether the segment passes an edge of a blocking triangle, or the rim of a portal's piece,
-    /// nearer than `2 eps`.
+    /// Returns `true` if the segment passes an edge of a blocking triangle, or the rim of a portal's piece, closer than
+    /// `2 eps`.
     pub(crate) fn is_grazing(&self, a: DVec3, b: DVec3) -> bool {
         self.edge_clearance(a, b, 2.0 * self.eps) < 2.0 * self.eps
     }
 
-    /// Distance from the segment to the nearest edge of a blocking triangle or rim of a portal's
-    /// piece: exact where under `reach`, else at least `reach`.
+    /// Returns the distance from the segment to the nearest edge of a blocking triangle or rim of a portal's piece:
+    /// exact below `reach`, else at least `reach`.
     pub(crate) fn edge_clearance(&self, a: DVec3, b: DVec3, reach: f64) -> f64 {
         let mut least = nearest_edge(&self.blockers, a, b, reach);
         let _ = self
@@ -348,7 +347,7 @@ impl<'a> Subject<'a> {
         least
     }
 
-    /// The same for the world's own triangles, which may be cut finer than those that block.
+    /// Same as [`Self::is_grazing`] for the world's own triangles, which may be cut finer than those that block.
     pub(crate) fn is_grazing_own(&self, a: DVec3, b: DVec3) -> bool {
         let reach = 2.0 * self.eps;
         self.own_bvh
@@ -356,8 +355,8 @@ impl<'a> Subject<'a> {
             .is_some_and(|bvh| nearest_edge(bvh, a, b, reach) < reach)
     }
 
-    /// Calls `visit` with each of the world's own triangles that the ray meets and whose plane is within `2 eps` of `at`, and its
-    /// batch.
+    /// Calls `visit` with each of the world's own triangles that the ray meets and whose plane is within `2 eps` of
+    /// `at`, and its batch.
     pub(crate) fn for_each_own_at(&self, ray: &Ray, at: DVec3, mut visit: impl FnMut(u32, u32)) {
         let bvh = self.own_bvh.as_ref().unwrap_or(&self.blockers);
         bvh.for_each_hit(ray, |hit| {
@@ -384,12 +383,12 @@ fn nearest_edge(bvh: &Bvh, a: DVec3, b: DVec3, reach: f64) -> f64 {
     least
 }
 
-/// Uniform in a box.
+/// Returns a point uniform in a box.
 pub(crate) fn point_in(rng: &mut Rng, bounds: &Aabb) -> DVec3 {
     bounds.min + bounds.size() * DVec3::new(rng.unit(), rng.unit(), rng.unit())
 }
 
-/// Uniform on a triangle.
+/// Returns a point uniform on a triangle.
 pub(crate) fn point_of_triangle(rng: &mut Rng, t: &Triangle) -> DVec3 {
     let (mut u, mut v) = (rng.unit(), rng.unit());
     if u + v > 1.0 {

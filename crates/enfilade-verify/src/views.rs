@@ -1,7 +1,7 @@
-//! *Conservative per frame*: whatever a ray inside a view hits first is in the answer.
+//! *Conservative per frame*: the first hit of every ray inside a view is in the answer.
 //!
-//! Who answers is handed in, so that this crate knows no run-time and shares nothing with it but the
-//! geometry below both. What blocks is what the world holds: all structural triangles.
+//! The caller provides the queries, so that this crate does not depend on the run-time and shares only the geometry
+//! below both. All structural triangles of the world block.
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,25 +15,25 @@ use crate::options::VerifyOptions;
 use crate::rng::Rng;
 use crate::subject::{Subject, point_in, to_dvec};
 
-/// Views that share a random sequence and a seer. Fixed, so that threads cannot change what is drawn.
+/// Views that share a random sequence and a seer. Fixed, so that the number of threads does not change the views.
 const CHUNK: u64 = 64;
 
-/// A camera: all that a seer is told.
+/// A camera: the input of a seer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ViewQuery {
-    /// Where it is. [Units: wu]
+    /// Position. [Units: wu]
     pub eye: [f32; 3],
-    /// Where it looks, any length.
+    /// View direction, of any length.
     pub toward: [f32; 3],
-    /// Which way is up in the picture, any length, not parallel to `toward`.
+    /// Up direction of the picture, of any length, not parallel to `toward`.
     pub up: [f32; 3],
-    /// From the lower to the upper edge of the picture. [Units: rad] Over a straight angle: all around.
+    /// Vertical angle of view; all around if larger than pi. [Units: rad]
     pub fov_y: f32,
     /// Width of the picture divided by its height.
     pub aspect: f32,
 }
 
-/// What a seer answers: marks on triangles, details and cells. Marking twice is the same as once.
+/// The answer of a seer: marks on triangles, details and cells. Marking twice has no further effect.
 #[derive(Debug)]
 pub struct ViewAnswer<'a> {
     first_of_batch: &'a [u32],
@@ -45,7 +45,7 @@ pub struct ViewAnswer<'a> {
 }
 
 impl ViewAnswer<'_> {
-    /// Triangle `index` of structural batch `batch` may be seen.
+    /// Marks triangle `index` of structural batch `batch` as visible.
     pub fn add_triangle(&mut self, batch: u32, index: u32) {
         let Some(&first) = self.first_of_batch.get(batch as usize) else {
             return;
@@ -58,12 +58,12 @@ impl ViewAnswer<'_> {
         );
     }
 
-    /// A detail object may be seen.
+    /// Marks a detail object as visible.
     pub fn add_detail(&mut self, detail: u32) {
         mark(&mut self.details, detail, self.stamp, &mut self.n[1]);
     }
 
-    /// A cell may be seen. Not judged, only counted.
+    /// Marks a cell as visible. Only counted, not judged.
     pub fn add_cell(&mut self, cell: u32) {
         mark(&mut self.cells, cell, self.stamp, &mut self.n[2]);
     }
@@ -81,20 +81,20 @@ fn mark(stamps: &mut [u32], at: u32, stamp: u32, n: &mut u64) {
 /// Answers views; one is made for each chunk of them.
 pub type Seer<'a> = Box<dyn FnMut(&ViewQuery, &mut ViewAnswer<'_>) + 'a>;
 
-/// What to try, and how hard.
+/// Extent of a check of views.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewOptions {
     /// Views tried.
     pub views: u64,
-    /// Rays in each.
+    /// Rays per view.
     pub rays_per_view: u64,
-    /// Start of the random sequences; equal seeds give equal reports.
+    /// Seed of the random sequences; equal seeds give equal reports.
     pub seed: u64,
-    /// Distance below which nothing is judged, halved; `None` for
-    /// [`tolerance`](crate::tolerance) of the triangles. [Units: wu]
+    /// Half the distance below which nothing is judged; `None` for [`tolerance`](crate::tolerance) of the triangles.
+    /// [Units: wu]
     pub tolerance: Option<f64>,
-    /// Whether eyes stand in indoor cells only, at ordinary places and angles: for figures of how
-    /// tight answers are. Otherwise they also stand in portals, walls and outside of everything.
+    /// True to place eyes in indoor cells only, at ordinary positions and angles, to measure how tight answers are.
+    /// Otherwise they also stand in portals, in walls and outside of everything.
     pub ordinary: bool,
 }
 
@@ -110,12 +110,12 @@ impl Default for ViewOptions {
     }
 }
 
-/// Something that a ray hit and the answer lacks.
+/// An object that a ray hit but the answer lacks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missed {
     /// The view.
     pub view: ViewQuery,
-    /// Its number.
+    /// Index of the view.
     pub number: u64,
     /// The cell that the eye is in.
     pub eye_cell: Option<u32>,
@@ -124,9 +124,9 @@ pub struct Missed {
     pub eye_cell_name: Option<String>,
     /// The batch of the triangle hit, or none for a detail.
     pub batch: Option<u32>,
-    /// The triangle in its batch, or the detail.
+    /// Index of the triangle in its batch, or of the detail.
     pub index: u32,
-    /// Where it was hit. [Units: wu]
+    /// Position of the hit. [Units: wu]
     pub at: [f64; 3],
 }
 
@@ -135,33 +135,33 @@ pub struct Missed {
 pub struct ViewReport {
     /// Views judged.
     pub views: u64,
-    /// Views passed over: the eye was on a surface in every draw.
+    /// Skipped views: the eye was on a surface in every attempt.
     pub on_surface: u64,
-    /// Views from a point that is in no cell.
+    /// Views from a point outside all cells.
     pub lost_eyes: u64,
     /// Rays cast.
     pub rays: u64,
-    /// Structural triangles and details that rays hit, each time it was hit.
+    /// Hits of structural triangles and details, repeated ones included.
     pub hits: u64,
-    /// Hits that the answer lacks, but that passed an edge within twice the tolerance: not judged.
+    /// Hits missing in the answer that passed an edge within twice the tolerance: not judged.
     pub grazing: u64,
-    /// Hits that the answer lacks.
+    /// Hits missing in the answer.
     pub missed: u64,
-    /// The first few of them.
+    /// The first few of these.
     pub examples: Vec<Missed>,
-    /// Sums over views: triangles, details, cells in the answer.
+    /// Sums over views: triangles, details and cells in the answer.
     pub answered: [u64; 3],
     /// Sums over views: distinct triangles and details hit, and cells in which rays ended.
     pub hit: [u64; 3],
-    /// Sums over views: triangles of details in the answer, and of those hit.
+    /// Sums over views: triangles of the details in the answer, and of those hit.
     pub detail_triangles: [u64; 2],
-    /// By view, for medians: triangles (structural and detail) in the answer, and of what was hit.
+    /// For each view, for medians: triangles (structural and detail) in the answer, and of the hit objects.
     #[serde(skip)]
     pub by_view: Vec<[u64; 2]>,
 }
 
 impl ViewReport {
-    /// Whether nothing was seen missing. Says nothing where nothing was judged.
+    /// Returns `true` if nothing was found missing. Means nothing if nothing was judged.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.missed == 0
@@ -229,13 +229,13 @@ impl fmt::Display for ViewReport {
     }
 }
 
-/// Everything that views are judged by.
+/// Data for judging views.
 struct Court<'a> {
     subject: Subject<'a>,
     first_of_batch: Vec<u32>,
     n_triangles: usize,
     details: Bvh,
-    /// The detail of each of its triangles.
+    /// For each triangle of details, its detail.
     detail_of: Vec<u32>,
     detail_sizes: Vec<u64>,
     indoors: Vec<CellId>,
@@ -243,7 +243,7 @@ struct Court<'a> {
 
 /// Tries random views on `world` with random rays in each; `make_seer` answers them.
 ///
-/// `world` is valid. Uses the current rayon pool; the report does not depend on it.
+/// `world` must be valid. Uses the current rayon pool; the report does not depend on it.
 #[must_use]
 pub fn verify_views<'s>(
     world: &World,
@@ -290,7 +290,7 @@ pub fn verify_views<'s>(
         .fold(ViewReport::default(), ViewReport::merged)
 }
 
-/// What the rays of one view hit.
+/// The hits of the rays of one view.
 struct Hits {
     stamp: u32,
     triangles: Vec<u32>,
@@ -402,7 +402,7 @@ impl<'a> Court<'a> {
         let s = &self.subject;
         let near = 2.0 * s.eps;
         let eye = (0..8).find_map(|_| {
-            // What the seer is told is in `f32`; the rays start from just there.
+            // The seer's input is in `f32`; start the rays from exactly the same point.
             let eye = self.draw_eye(rng, i, options.ordinary).as_vec3().as_dvec3();
             let on_surface = s.blockers.nearest(eye, near).is_some();
             let is_usable = !on_surface && (!options.ordinary || s.locator.locate(eye).is_some());
@@ -427,7 +427,7 @@ impl<'a> Court<'a> {
             let direction = match frame {
                 None => rng.direction(),
                 Some([right, up, forward]) => {
-                    // A millionth short of the edge: where the picture ends is a rounding.
+                    // A millionth short of the edge, where rounding decides what is inside.
                     let inside = 1.0 - 1e-6;
                     let (x, y) = (rng.range(-inside, inside), rng.range(-inside, inside));
                     forward + right * x + up * y
@@ -458,7 +458,7 @@ impl<'a> Court<'a> {
                     self.miss(i, &view, eye_cell, &ray, hit.t, Some(batch), index, report);
                 }
             }
-            // Details block nothing: all of them before the wall are seen.
+            // Details do not block: all of them before the wall are visible.
             self.details.for_each_hit(&ray, |hit| {
                 let detail = self.detail_of[hit.triangle as usize];
                 report.hits += 1;
@@ -521,12 +521,12 @@ impl<'a> Court<'a> {
     }
 }
 
-/// A camera at `eye`, and half the picture's axes with the direction to its middle; `None` for one
-/// that looks all around.
+/// Returns a camera at `eye`, with half the picture's axes and the direction to its center; `None` for a view all
+/// around.
 fn draw_view(rng: &mut Rng, i: u64, eye: DVec3, ordinary: bool) -> (ViewQuery, Option<[DVec3; 3]>) {
     let around = !ordinary && i % 16 == 5;
     let (toward, up) = if ordinary || rng.unit() < 0.5 {
-        // A person's: upright, looking up or down a little.
+        // A person's view: upright, slightly up or down.
         let angle = rng.range(0.0, std::f64::consts::TAU);
         let level = rng.range(-0.3, 0.3);
         (DVec3::new(angle.cos(), level, angle.sin()), DVec3::Y)
@@ -548,7 +548,7 @@ fn draw_view(rng: &mut Rng, i: u64, eye: DVec3, ordinary: bool) -> (ViewQuery, O
         fov_y: fov_y as f32,
         aspect: aspect as f32,
     };
-    // From the rounded values on, as the seer does.
+    // Start from the rounded values, as the seer does.
     let forward = to_dvec(view.toward).normalize();
     let right = forward.cross(to_dvec(view.up)).normalize_or(DVec3::X);
     let tan_y = (f64::from(view.fov_y) * 0.5).tan();

@@ -1,8 +1,8 @@
-//! *Conservative*, finer than cells: volumes and parts of what is seen hold all that lines find there.
+//! *Conservative*, finer than cells: visible volumes and parts contain everything that lines find.
 //!
-//! A line that nothing blocks is a proof in both directions: what lies at its one end is seen from its other. So the ways of all
-//! segments and rays are asked, and further lines are aimed at what the file says is not seen. A file that says more is seen
-//! than is so breaks no promise, and is not found.
+//! An unblocked line is a proof in both directions: each end is visible from the other. So the paths of all segments
+//! and rays are checked, and further lines are aimed at things that the file calls hidden. A file that stores too
+//! much as visible breaks no promise and is not found.
 
 use enfilade_cpg::{CellId, PartNumbers, Pvs, World};
 use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Triangle};
@@ -13,23 +13,23 @@ use crate::rng::Rng;
 use crate::sealed::{Path, follow};
 use crate::subject::{Subject, point_of_triangle, to_dvec};
 
-/// Draws of what to aim at before any is taken.
+/// Attempts to find a target.
 const DRAWS: usize = 8;
-/// Points asked of a portal's piece are this far from its rim, as a share of the way to its middle.
+/// Inset of points of a portal's piece from its rim, as a share of the way to its center.
 const INSET: f64 = 0.02;
 
-/// Claims of a world about what is seen by pair of cells, made ready for questions.
+/// A world's claims about visibility by pair of cells, prepared for queries.
 pub(crate) struct Visible<'a> {
     world: &'a World,
     pvs: &'a Pvs,
     numbers: PartNumbers,
     /// First pair of each cell.
     first_pair: Vec<usize>,
-    /// Ordered pairs of different cells, the first seeing the second.
+    /// Ordered pairs of different cells of which the first sees the second.
     pairs: Vec<[CellId; 2]>,
-    /// Parts in each cell. Empty where no parts are said to be seen.
+    /// Parts in each cell. Empty if the world stores no visible parts.
     parts_of: Vec<Vec<u32>>,
-    /// Triangles of each detail, where parts are said to be seen; and a tree of all with the detail of each.
+    /// Triangles of each detail, if the world stores visible parts; and a tree of all, with the detail of each.
     details: Vec<Vec<Triangle>>,
     detail_bvh: Bvh,
     detail_of: Vec<u32>,
@@ -37,7 +37,7 @@ pub(crate) struct Visible<'a> {
 }
 
 impl<'a> Visible<'a> {
-    /// `None` where the world says nothing but whole cells.
+    /// Returns `None` if the world stores only whole cells.
     pub(crate) fn new(world: &'a World, eps: f64) -> Option<Self> {
         let pvs = world.pvs.as_ref()?;
         if pvs.volumes.is_none() && pvs.parts.is_none() {
@@ -105,7 +105,7 @@ impl<'a> Visible<'a> {
         None
     }
 
-    /// Returns true where the volume of a pair holds a point, up to rounding.
+    /// Returns `true` if the volume of a pair contains a point, up to rounding.
     fn holds(&self, pair: usize, p: DVec3) -> bool {
         let Some(volumes) = &self.pvs.volumes else {
             return true;
@@ -115,7 +115,7 @@ impl<'a> Visible<'a> {
         pieces.any(|piece| piece.iter().all(is_before))
     }
 
-    /// Returns true where a part of any of `cells` is said to be seen from a cell.
+    /// Returns `true` if a part of any of `cells` is stored as visible from a cell.
     fn lists(&self, from: CellId, cells: &[CellId], part: u32) -> bool {
         let Some(parts) = &self.pvs.parts else {
             return true;
@@ -135,18 +135,18 @@ impl<'a> Visible<'a> {
         }
     }
 
-    /// Problems that need no ray, a line each.
+    /// Returns problems that need no ray, a line each.
     pub(crate) fn check(&self) -> Vec<String> {
         let mut out = Vec::new();
         let cells = self.world.graph.cells.iter();
         for (c, cell) in (0..).map(CellId).zip(cells) {
-            // A cell sees itself, so the pair is there.
+            // A cell sees itself, so the pair exists.
             let Some(own) = self.pair(c, c) else { continue };
             let [low, high] = cell.aabb.map(to_dvec);
             let corners = Aabb::new(low, high).corners();
             if !corners.iter().all(|&p| self.holds(own, p)) {
                 out.push(format!(
-                    "{}: its volume says that it does not see all of itself",
+                    "{}: its volume does not contain all of itself",
                     cell.name
                 ));
             }
@@ -155,7 +155,7 @@ impl<'a> Visible<'a> {
             };
             if let Some(part) = parts.iter().find(|&&p| !self.lists(c, &[c], p)) {
                 out.push(format!(
-                    "{}: part {part} is in it, but is not said to be seen from it",
+                    "{}: part {part} is in it, but not visible from it",
                     cell.name
                 ));
             }
@@ -173,7 +173,7 @@ impl<'a> Visible<'a> {
                 if !pair.is_some_and(|pair| points.iter().all(|&p| self.holds(pair, p))) {
                     let [from, to] = [from, to].map(|c| &self.world.graph[c].name);
                     out.push(format!(
-                        "portal {i}: what {from} sees of {to} does not hold it"
+                        "portal {i}: the volume that {from} sees of {to} does not contain it"
                     ));
                 }
             }
@@ -181,7 +181,8 @@ impl<'a> Visible<'a> {
         out
     }
 
-    /// The first two cells on a way of which one is seen from the other, but not where the way runs.
+    /// Returns the first contradiction on a path: one cell sees the other, but not the part of it that the path runs
+    /// through.
     fn break_on(&self, path: &Path) -> Option<Break> {
         let cells = &path.cells;
         for (i, from) in cells.iter().enumerate() {
@@ -210,7 +211,7 @@ impl<'a> Visible<'a> {
         None
     }
 
-    /// Judges a way that nothing blocks.
+    /// Judges an unblocked path.
     pub(crate) fn judge(&self, subject: &Subject, path: &Path, i: u64, tally: &mut Tally) {
         tally.visible.lines += 1;
         if let Some(wrong) = self.break_on(path) {
@@ -219,7 +220,7 @@ impl<'a> Visible<'a> {
         }
     }
 
-    /// Judges what a way ends at: one of these parts, or several in one place, of which one is enough.
+    /// Judges the end of a path: one of these parts, or several in one place, of which one suffices.
     pub(crate) fn judge_parts(
         &self,
         subject: &Subject,
@@ -231,7 +232,7 @@ impl<'a> Visible<'a> {
         let Some(last) = path.cells.last() else {
             return;
         };
-        // A wall that its batch does not list for the cell before it is met from behind, or lies upon another.
+        // A wall whose batch does not list the cell before it is met from behind, or lies upon another.
         let is_met = |part: &&u32| {
             **part >= self.numbers.n_triangles() || self.cells_of(subject, **part).contains(&last.0)
         };
@@ -257,7 +258,7 @@ impl<'a> Visible<'a> {
         }
     }
 
-    /// Aims line number `i` through a portal at what is said not to be seen through it.
+    /// Aims line number `i` through a portal at something stored as hidden.
     pub(crate) fn try_line(&self, subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tally) {
         tally.visible.drawn += 1;
         if self.pairs.is_empty() {
@@ -287,7 +288,7 @@ impl<'a> Visible<'a> {
         self.try_aimed(subject, rng, (from, a), (b, part), i, tally);
     }
 
-    /// Follows a line from a point of a cell to one of air, or to a part.
+    /// Follows a line from a point of a cell to a point of air, or to a part.
     fn try_aimed(
         &self,
         subject: &Subject,
@@ -297,7 +298,7 @@ impl<'a> Visible<'a> {
         i: u64,
         tally: &mut Tally,
     ) {
-        // A triangle of a wall is met a little before; one of an object may be anywhere in the air.
+        // Stop slightly before a triangle of a wall; a triangle of an object may be anywhere in the air.
         let is_wall = part.is_some_and(|p| p < self.numbers.n_triangles());
         let end = if is_wall {
             let back = (a - b).normalize_or_zero();
@@ -315,7 +316,7 @@ impl<'a> Visible<'a> {
         }
         let mut crossings = Vec::new();
         subject.crossings(a, end, &mut crossings);
-        // A way that is broken itself is found by those who look for it.
+        // Other checks find a path that is itself broken.
         let Ok(path) = follow(subject, rng, [a, end], from, &mut crossings) else {
             return;
         };
@@ -328,7 +329,7 @@ impl<'a> Visible<'a> {
         }
     }
 
-    /// Judges the objects that a way passes: they hide nothing, as they may be moved.
+    /// Judges the objects that a path passes: they do not hide, since they may move.
     fn judge_details(&self, subject: &Subject, path: &Path, i: u64, tally: &mut Tally) {
         let [a, b] = path.ends;
         let mut met: Vec<u32> = Vec::new();
@@ -346,7 +347,7 @@ impl<'a> Visible<'a> {
         }
     }
 
-    /// A point of a part that is said not to be seen, best one that lies in the volume that is.
+    /// Returns a point of a part stored as hidden, preferably one in the visible volume.
     fn hidden_part(
         &self,
         subject: &Subject,
@@ -381,7 +382,8 @@ impl<'a> Visible<'a> {
     }
 }
 
-/// Returns true where a triangle of the world is the first that a line to a point of it meets; a source's are not numbered alike.
+/// Returns `true` if a triangle of the world is the first that a line to a point of it meets; a source numbers
+/// triangles differently.
 fn is_first(subject: &Subject, part: u32, [a, b]: [DVec3; 2]) -> bool {
     let ray = Ray {
         origin: a,
@@ -392,14 +394,14 @@ fn is_first(subject: &Subject, part: u32, [a, b]: [DVec3; 2]) -> bool {
     !subject.has_source && hit.is_some_and(|hit| hit.triangle == part)
 }
 
-/// How steeply a line meets the triangle of a wall: 1 head-on, 0 along it.
+/// Returns the sine of the angle between a line and the triangle of a wall: 1 head-on, 0 along it.
 fn slope(subject: &Subject, part: Option<u32>, direction: DVec3) -> f64 {
     let t = part.map(|p| subject.own[p as usize].0);
     let n = t.map(|t| (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero());
     n.map_or(1.0, |n| n.dot(direction).abs())
 }
 
-/// A point of a cell close to one of its portals.
+/// Returns a point of a cell close to one of its portals.
 fn point_beside_portal(subject: &Subject, rng: &mut Rng, cell: CellId) -> Option<DVec3> {
     let portals = &subject.world.graph[cell].portals;
     if portals.is_empty() {

@@ -1,4 +1,4 @@
-//! Tests that a world carries along from its source what the source says.
+//! A world's data about its source match the source.
 
 mod houses;
 
@@ -13,7 +13,7 @@ use houses::{HOUSE, SCENE, SLITS, verify};
 
 type Change = fn(&mut World, usize);
 
-/// One of three details in the house.
+/// Returns one of three details in the house.
 fn detail(w: &World, place: usize) -> usize {
     let is_in_room = |&i: &usize| matches!(w.details[i].cells[..], [c] if !w.graph[c].outdoor);
     let fit: Vec<usize> = (0..w.details.len()).filter(is_in_room).collect();
@@ -40,7 +40,7 @@ fn what_a_file_cannot_tell_its_source_does() {
     assert!(n >= 20, "{n}");
 }
 
-/// Returns what is wrong with the details of the house.
+/// Returns problems of the details of the house.
 fn of_scene(w: &World) -> Vec<String> {
     let ids = 0..SCENE.objects.len();
     let ids: Vec<usize> = ids
@@ -77,7 +77,7 @@ fn an_unrelated_source_is_named_as_such() {
     }
 }
 
-/// A detail of a world, as of the scene that it was baked from.
+/// Returns a detail of a world as a detail of the source scene.
 fn detail_of(w: &World, i: usize) -> SourceDetail {
     let d = &w.details[i];
     let by = DMat4::from_cols_array(&d.transform.map(f64::from));
@@ -102,7 +102,7 @@ fn details_are_where_the_source_has_them() {
     let n = HOUSE.details.len();
     let problems = |w: &World| compare_details(w, n, |i| detail_of(&HOUSE, i));
     assert_eq!(problems(&HOUSE), [""; 0]);
-    // Order says nothing.
+    // Order does not matter.
     let mut turned = HOUSE.clone();
     turned.details.reverse();
     assert_eq!(problems(&turned), [""; 0]);
@@ -144,7 +144,7 @@ fn details_are_where_the_source_has_them() {
     assert!(said.len() == 1 && said[0].contains("other settings"));
 }
 
-/// The world with every third triangle of a detail taken out as a part.
+/// Returns the world with every third triangle of a detail taken out as a part.
 fn divided(whole: usize) -> World {
     let mut world = HOUSE.clone();
     let mesh = world.detail_meshes[world.details[whole].mesh as usize].clone();

@@ -1,4 +1,4 @@
-//! Whoever changes a baked world against what it says is found out: each kind of change, at three places.
+//! Every kind of tampering with a baked world is found, at three places each.
 
 mod houses;
 
@@ -8,10 +8,10 @@ use enfilade_testkit::tamper::{ShownBy, recounted, tamperings};
 use houses::{HOUSE, SLITS, verify};
 use serde_json::Value;
 
-/// Whether a reader refuses the world, or a check finds something.
+/// Returns `true` if decoding rejects the world, or a check finds a problem.
 fn is_found(world: &World) -> bool {
     let read = encode_glb(world).map(|bytes| decode_glb(&bytes));
-    // Without rays first: most is found at once.
+    // Without rays first, which finds most tampering at once.
     !matches!(read, Ok(Ok(_)))
         || [0, 20_000, 200_000, 1_000_000]
             .iter()
@@ -44,7 +44,8 @@ fn every_kind_of_change_is_found_at_three_places() {
                 missed.push(format!("{}, place {place}", tampering.name));
             }
         }
-        // Neither world has parts of details, nor seals and sources at once; `sources.rs` and the reader's tests have.
+        // Neither world has parts of details, nor seals and sources at once; `sources.rs` and the decoder's tests
+        // cover those.
         n_kinds += u32::from(n_places > 0);
     }
     assert!(n_kinds >= 80, "{n_kinds}");
@@ -65,7 +66,7 @@ fn a_removed_seal_is_found() {
     assert_eq!(n, 6);
 }
 
-/// A slit is found by the face that ends at it, whatever rays are drawn.
+/// The face that ends at a slit finds it, whatever rays are drawn.
 #[test]
 fn a_slit_is_found_without_a_ray() {
     let removed = tamperings().find(|t| t.name == "a seal removed").unwrap();
@@ -75,7 +76,7 @@ fn a_slit_is_found_without_a_ray() {
     }
 }
 
-/// The JSON of a world, changed; the rest of the file as it was.
+/// Returns the file of a world with its JSON changed and the rest unchanged.
 fn with_json(world: &World, change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let bytes = encode_glb(world).unwrap();
     let len = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
@@ -145,7 +146,7 @@ fn kinds_of_portals_are_those_of_the_rule_as_far_as_a_file_tells() {
         w.graph.portals[window].fittings.clear();
     };
     assert!(is_found(&as_door));
-    // Who cuts portals or has another rule says so, and is not judged by this one.
+    // A tool that cuts portals or has another rule records that, and is not judged by this rule.
     let by_another = |w: &mut World| {
         as_door(w);
         w.graph.provenance.generator = "another".into();

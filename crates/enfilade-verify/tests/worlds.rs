@@ -1,4 +1,4 @@
-//! Worlds that keep their promises pass; each promise, broken once, is seen broken.
+//! Worlds that keep their promises pass; each promise, broken once, is found broken.
 
 mod common;
 
@@ -43,7 +43,7 @@ fn a_house_by_hand_keeps_its_promises() {
         c.judged + c.escaped + c.grazing + c.on_surface + c.unresolved,
         c.drawn
     );
-    // Enough of both to mean something, and nothing skipped without need.
+    // Enough of both to be significant, and nothing skipped without need.
     assert!(
         s.judged > 10_000 && s.crossings > 5_000 && c.judged > 20_000,
         "{report}"
@@ -114,7 +114,7 @@ fn a_portal_that_faces_the_wrong_way_is_seen() {
     let mut world = house();
     world.graph.portals[DOOR].cells = [B, A];
     assert_eq!(kinds(&verify(&world)), [FailureKind::WrongWay]);
-    // Turned altogether it is right again, except that its corners then run the other way.
+    // With all of it reversed, it would be right again, but its vertices then run the other way.
     let door = &mut world.graph.portals[DOOR];
     door.normal = door.normal.map(|x| -x);
     let report = verify(&world);
@@ -126,8 +126,8 @@ fn a_portal_that_faces_the_wrong_way_is_seen() {
 
 #[test]
 fn a_sliver_thinner_than_rounding_may_have_its_portals_in_any_order() {
-    // A wedge of B in A right at the door, a micrometer thin: in, out, and in again. Rounding has
-    // put the way out before the first way in.
+    // A wedge of B in A right at the door, a micrometer thin: in, out, and in again. Rounding has put the way out
+    // before the first way in.
     let mut world = house();
     let door = world.graph.portals[DOOR].clone();
     let shifted = |by: f32| {
@@ -256,7 +256,7 @@ fn the_source_blocks_even_where_the_batches_are_cut_finer() {
         let p = &mut batch.primitive;
         let old = std::mem::take(&mut p.indices);
         for t in old.chunks_exact(3) {
-            // A new corner off the middle of the longest edge, rounded: both halves share it.
+            // A new vertex off the middle of the longest edge, rounded: both halves share it.
             let mid = |k: usize| {
                 (
                     0.37 * p.positions[t[0] as usize][k] + 0.63 * p.positions[t[2] as usize][k],
@@ -285,7 +285,7 @@ fn the_source_blocks_even_where_the_batches_are_cut_finer() {
     );
 }
 
-/// `world` with all its triangles replaced.
+/// Returns `world` with all its triangles replaced.
 fn with_triangles(world: &World, triangles: &[[DVec3; 3]]) -> World {
     let mut out = world.clone();
     out.batches.truncate(1);
@@ -311,9 +311,9 @@ fn broken_outlines_are_named() {
     assert!(broken(&|p| p.outline[1][0] += 0.01).contains("leaves the portal's plane"));
     assert!(broken(&|p| p.outline[2] = [0.0, 1.2, 1.7]).contains("not convex"));
     assert!(broken(&|p| p.pieces[0][2][1] += 0.1).contains("reaches out of the outline"));
-    assert!(broken(&|p| p.area = 0.9).contains("area 0.9"));
+    assert!(broken(&|p| p.area = 0.9).contains("area is 0.9"));
     assert!(broken(&|p| p.pieces[0].reverse()).contains("clockwise"));
-    assert!(broken(&|p| p.outline.truncate(2)).contains("2 corners"));
+    assert!(broken(&|p| p.outline.truncate(2)).contains("2 vertices"));
     assert!(broken(&|p| p.cells = [A, enfilade_cpg::CellId(9)]).contains("no ray was shot"));
 }
 

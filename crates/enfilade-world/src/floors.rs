@@ -1,14 +1,15 @@
-//! Floors: where a walker can stand, and from where to where step.
+//! Floors: the places where a walker can stand, and the steps between them.
 //!
-//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009): a floor is the
-//! top of matter that is flat enough and has room for the walker above; a step leads to the floor beside it that is not too much
-//! higher or lower, with room on the way. Floors nearer to a wall or an edge than the walker's radius are left out, by distances
-//! along the floors (Danielsson, "Euclidean distance mapping", 1980). Each floor knows its cell, and a step from cell to cell its
-//! portal: cracks are none for walkers, nor windows with anything in them, nor what is too narrow, too low or above a sill that is no step.
+//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009):
+//! a floor is the top of matter that is flat enough and has room for the walker above; a step leads to the floor
+//! beside it that is not too much higher or lower, with room on the path. Floors closer to a wall or an edge than the
+//! walker's radius are left out, by distances along the floors (Danielsson, "Euclidean distance mapping", 1980). Each
+//! floor stores its cell, and a step between cells its portal. Walkers cannot pass cracks, windows with anything in
+//! them, or openings that are too narrow, too low, or above a sill too high for a step.
 //!
-//! O(squares covered) memory, about 40 bytes a floor, and a heap's logarithm more time. Walls are up to one square too thick, and
-//! distances up to half a square wrong: a walker may come nearer to a wall than its radius by half a square, and fails at a doorway
-//! that is wider than itself by less than two.
+//! O(squares covered) memory, about 40 bytes a floor; time grows by the logarithm of a heap more. Walls are up to one
+//! square too thick, and distances up to half a square wrong: a walker may come closer to a wall than its radius by
+//! half a square, and fails at a doorway less than two squares wider than itself.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -19,12 +20,12 @@ use enfilade_geom::{Aabb, DVec3, Triangle};
 use crate::columns::{Span, Squares, spans};
 use crate::layout::Layout;
 
-/// Who walks.
+/// The size and abilities of a walker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agent {
-    /// Keeps so far from walls. [Units: wu] [Limit: above 0]
+    /// Distance kept from walls. [Units: wu] [Limit: above 0]
     pub radius: f64,
-    /// Needs so much room above the floor. [Units: wu] [Limit: above 0]
+    /// Room needed above the floor. [Units: wu] [Limit: above 0]
     pub height: f64,
     /// The highest step, up or down. [Units: wu] [Limit: at least 0]
     pub step: f64,
@@ -33,7 +34,7 @@ pub struct Agent {
 }
 
 impl Default for Agent {
-    /// A grown-up: 0.3 m around, 1.8 m high, steps of 0.4 m, slopes of 45°.
+    /// An adult: radius 0.3 m, 1.8 m high, steps of 0.4 m, slopes of 45°.
     fn default() -> Self {
         Self {
             radius: 0.3,
@@ -44,35 +45,35 @@ impl Default for Agent {
     }
 }
 
-/// No floor.
+/// Marks the absence of a floor.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Squares at most: more make them wider.
+/// Most squares: beyond that, they get wider.
 const MAX_SQUARES: f64 = 8e6;
 
-/// For the sake of a small walker alone, squares are no finer than this where there would be more of them than that. [Units: wu]
+/// Narrowest squares for a small walker, if there would be more than `MAX_FINE_SQUARES`. [Units: wu]
 const FINE: f64 = 0.05;
 const MAX_FINE_SQUARES: f64 = 5e5;
 
-/// Squares that triangles cover at most, each counted: more make them wider.
+/// Most squares that triangles cover, each counted: beyond that, squares get wider.
 const MAX_COVERED: f64 = 3e7;
 
-/// Floors outdoors are laid out this far around the rooms. [Units: wu]
+/// Extent of floors outdoors around the rooms. [Units: wu]
 const GROUND: f64 = 30.0;
 
 /// The floors of a world for one walker.
 #[derive(Clone, Debug)]
 pub struct Floors {
     squares: Squares,
-    /// By square its first floor, and the number of all.
+    /// For each square, its first floor; and the number of all.
     first: Vec<u32>,
     floors: Vec<Floor>,
-    /// Floors of each cell, cell by cell.
+    /// Steps between cells, sorted.
     crossings: Vec<Crossing>,
     walker: Agent,
 }
 
-/// A place to stand, of one square.
+/// A place to stand, one square in size.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Floor {
     pub(crate) square: u32,
@@ -90,7 +91,7 @@ pub(crate) struct Crossing {
     pub(crate) portal: PortalId,
 }
 
-/// A floor before all is known of it.
+/// A floor in construction.
 struct Ground {
     square: u32,
     y: f32,
@@ -99,9 +100,10 @@ struct Ground {
 }
 
 impl Floors {
-    /// Floors of the structure of a world, without its objects, outdoors included as far as there is ground, which is laid out to 30 m around
-    /// the rooms. Squares are a quarter of the walker's radius wide, but wider where there would be more than 8 million, and up to 5 cm
-    /// wide where there would be more than half a million: somebody thin walks the same floors as somebody of 0.2 m.
+    /// Lays out the floors of a world's structure, without its objects; outdoors, ground up to 30 m around the rooms.
+    /// Squares are a quarter of the walker's radius wide, or wider if there would be more than 8 million; if there
+    /// would be more than half a million, they are at least 5 cm wide, so a thinner walker gets the same floors as
+    /// one with a radius of 0.2 m.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
         let triangles = || {
@@ -117,7 +119,7 @@ impl Floors {
         drop(spans);
         let first = first_of(&squares, grounds.iter().map(|g| g.square));
         step_from_each(&squares, &first, &mut grounds, &walker);
-        // A square's side is as exact as distances are.
+        // Distances are only as exact as a square's side.
         let is_clear = clear(&squares, &grounds, walker.radius - 0.5 * squares.side);
         let mut floors = Self {
             squares,
@@ -127,7 +129,8 @@ impl Floors {
             walker,
         };
         floors.keep(layout, &grounds, &is_clear);
-        // What bakes call a window may be an opening with a sill on one side only: there the floor tells. Behind glass, none does.
+        // An opening that bakes call a window may have a sill on one side only: there the floor decides. Behind
+        // glass, none does.
         let is_open = |p: PortalId| match layout.opening(p).kind() {
             PortalKind::Open | PortalKind::Door => true,
             PortalKind::Window => world.graph[p].fittings.is_empty(),
@@ -142,7 +145,7 @@ impl Floors {
         let mut number = vec![NONE; grounds.len()];
         for (i, ground) in grounds.iter().enumerate().filter(|g| is_clear[g.0]) {
             let at = self.center(ground.square, f64::from(ground.y));
-            // Doors are as high as walkers; what is at the feet may be the matter of a step.
+            // Doors are as high as walkers; at the feet, the matter of a step may be in the way.
             let heights = [0.5, 0.25, 0.75].map(|share| DVec3::Y * share * self.walker.height);
             if let Some(cell) = heights.into_iter().find_map(|up| layout.locate(at + up)) {
                 number[i] = self.floors.len() as u32;
@@ -161,7 +164,7 @@ impl Floors {
         self.first = first_of(&self.squares, self.floors.iter().map(|f| f.square));
     }
 
-    /// Finds the portals of steps from cell to cell; takes away those through none.
+    /// Finds the portals of steps between cells; removes steps without one.
     fn find_crossings(&mut self, layout: &Layout, is_open: impl Fn(PortalId) -> bool) {
         for i in 0..self.floors.len() as u32 {
             for direction in 0..2 {
@@ -177,7 +180,7 @@ impl Floors {
                 let between = layout.exits(floor.cell).iter();
                 let open = between.filter(|e| e.to == other.cell && is_open(e.portal));
                 let nearest = open.min_by(|a, b| near(&a.portal).total_cmp(&near(&b.portal)));
-                // A square is as near as a step can tell.
+                // Steps resolve distances to a square.
                 let reach = self.walker.radius.max(self.squares.side);
                 let is_there = |p: &PortalId| near(p) <= reach.powi(2);
                 let portal = nearest.map(|e| e.portal).filter(is_there);
@@ -205,19 +208,19 @@ impl Floors {
         self.crossings.sort_unstable();
     }
 
-    /// How many there are: squares, some above one another.
+    /// Returns the number of floors: squares, some above one another.
     #[must_use]
     pub fn n_floors(&self) -> usize {
         self.floors.len()
     }
 
-    /// For whom they are.
+    /// Returns the walker of these floors.
     #[must_use]
     pub fn walker(&self) -> &Agent {
         &self.walker
     }
 
-    /// How wide its squares are. [Units: wu]
+    /// Returns the width of a square. [Units: wu]
     #[must_use]
     pub fn side(&self) -> f64 {
         self.squares.side
@@ -235,7 +238,7 @@ impl Floors {
         &self.crossings
     }
 
-    /// The middle of a floor. [Units: wu]
+    /// Returns the center of a floor. [Units: wu]
     pub(crate) fn point(&self, floor: u32) -> DVec3 {
         let floor = self.floor(floor);
         self.center(floor.square, f64::from(floor.y))
@@ -248,8 +251,9 @@ impl Floors {
         DVec3::new(x, y, z)
     }
 
-    /// The floor that someone stands on whose feet, or any part up to the head, are at a point; the nearest one within the walker's
-    /// diameter in plan, where the point is nearer to a wall than walkers get. `None` where there is none. [Units: wu]
+    /// Returns the floor of a walker with any part, from the feet to the head, at a point: the nearest within the
+    /// walker's diameter in plan, if the point is closer to a wall than walkers get. `None` if there is none. [Units:
+    /// wu]
     pub(crate) fn below(&self, p: DVec3) -> Option<u32> {
         let reach = (2.0 * self.walker.radius / self.squares.side).ceil() as isize;
         let is_near = |k: usize| {
@@ -275,7 +279,7 @@ impl Floors {
                     if down < -self.walker.step || down > self.walker.height {
                         continue;
                     }
-                    // Anywhere in its own square it is on the floor.
+                    // A point anywhere in its own square is on the floor.
                     let beside = (q - p).with_y(0.0).length() * f64::from(dx != 0 || dz != 0);
                     let away = beside + down.abs() * 0.5;
                     if best.is_none_or(|b| away < b.0) {
@@ -287,7 +291,7 @@ impl Floors {
         best.map(|b| b.1)
     }
 
-    /// The portal of a step from cell to cell.
+    /// Returns the portal of a step between cells.
     pub(crate) fn portal_of(&self, from: u32, direction: usize) -> Option<PortalId> {
         let key = (from, direction as u32);
         let i = self
@@ -297,7 +301,7 @@ impl Floors {
         ((crossing.from, crossing.direction) == key).then_some(crossing.portal)
     }
 
-    /// The floor beside one, if a step leads there that `may_pass` lets through: it is asked where cells change.
+    /// Returns the floor beside one, if a step leads there; calls `may_pass` if the cell changes.
     #[inline]
     pub(crate) fn step(
         &self,
@@ -324,7 +328,7 @@ fn triangles_of(primitive: &enfilade_geom::scene::Primitive) -> impl Iterator<It
     (primitive.indices.chunks_exact(3)).map(move |t| [corner(t[0]), corner(t[1]), corner(t[2])])
 }
 
-/// Around all corners, but not far from the rooms: there may be a sky.
+/// Returns a box around all vertices, but not far beyond the rooms: the model may contain a sky.
 fn bounds_of(layout: &Layout, corners: impl Iterator<Item = DVec3>) -> Aabb {
     let finite = corners.filter(|p| p.is_finite());
     let all = finite.fold(Aabb::EMPTY, Aabb::including);
@@ -338,12 +342,12 @@ fn bounds_of(layout: &Layout, corners: impl Iterator<Item = DVec3>) -> Aabb {
     }
 }
 
-/// As wide as asked for, or wider.
+/// Returns squares of this side, or wider ones.
 fn squares_of(bounds: &Aabb, side: f64, triangles: impl Iterator<Item = Triangle>) -> Squares {
     let size = bounds.size().max(DVec3::ZERO);
     let side_of = |area: f64, n: f64| (area / n).sqrt();
     let all = size.x * size.z;
-    // Squares that triangles cover within the bounds: areas in plan, and lengths along the axes, as borders cover squares, too.
+    // Estimate the squares covered within the bounds by areas in plan, and by lengths along the axes for borders.
     let (mut areas, mut lengths) = (0.0, 0.0);
     for t in triangles.filter(|t| t.iter().all(|p| p.is_finite())) {
         let whole = t.into_iter().fold(Aabb::EMPTY, Aabb::including);
@@ -398,7 +402,7 @@ fn first_of(squares: &Squares, floors: impl Iterator<Item = u32>) -> Vec<u32> {
     first
 }
 
-/// Links each floor with the nearest in height beside it.
+/// Links each floor to the one nearest in height beside it.
 fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walker: &Agent) {
     for i in 0..grounds.len() {
         let Ground {
@@ -422,7 +426,7 @@ fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walk
             });
             let rise = |j: &u32| (grounds[*j as usize].y - y).abs();
             if let Some(j) = beside.min_by(|a, b| rise(a).total_cmp(&rise(b))) {
-                // One that two lead to is beside the nearer one.
+                // If two floors lead to one, it keeps the nearer.
                 let other = grounds[j as usize].steps[direction + 2];
                 if other != NONE {
                     if rise(&other) <= rise(&j) {
@@ -437,9 +441,9 @@ fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walk
     }
 }
 
-/// Which floors are at least `radius` from where no step leads on.
+/// Marks the floors that are at least `radius` from the nearest place without a step.
 fn clear(squares: &Squares, grounds: &[Ground], radius: f64) -> Vec<bool> {
-    // From each floor to the nearest border, in half squares.
+    // Offset from each floor to the nearest border, in half squares.
     let mut offset = vec![[i16::MAX / 4; 2]; grounds.len()];
     let length = |v: [i16; 2]| i32::from(v[0]).pow(2) + i32::from(v[1]).pow(2);
     let directions: [[i16; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
@@ -461,7 +465,7 @@ fn clear(squares: &Squares, grounds: &[Ground], radius: f64) -> Vec<bool> {
             if to == NONE {
                 continue;
             }
-            // Along the diagonal, too, or distances would be those of streets and blocks.
+            // Along the diagonal, too: otherwise distances would be Manhattan distances.
             let turn = grounds[to as usize].steps[(direction + 1) % 4];
             let [a, b] = [direction, (direction + 1) % 4].map(|d| directions[d]);
             let straight = [own[0] - 2 * a[0], own[1] - 2 * a[1]];

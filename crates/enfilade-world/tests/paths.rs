@@ -53,7 +53,7 @@ fn point_on_floor(layout: &Layout, rng: &mut Rng) -> DVec3 {
     }
 }
 
-/// W10: a path stays clear of walls by the radius, on the floor, and passes open portals of the cells it is in.
+/// W10: a path keeps the radius from walls, stays on the floor, and passes open portals of its cells.
 #[test]
 fn a_path_keeps_clear_of_walls_and_passes_open_portals_only() {
     let (mut path, mut search) = (Path::default(), PathSearch::new());
@@ -95,7 +95,7 @@ fn a_path_keeps_clear_of_walls_and_passes_open_portals_only() {
                     let p = w[0].lerp(w[1], f64::from(i) / 20.0);
                     assert!(p.y.abs() < 1e-6, "on the floor");
                     let near = bvh.nearest(p + DVec3::Y, 1.0).map_or(1.0, |n| n.distance);
-                    // A square is 0.075 m wide; the ends may be nearer.
+                    // A square is 0.075 m wide; the ends may be closer.
                     let is_end = ends.iter().any(|e| e.with_y(0.0).distance(p) < 1.0);
                     assert!(near > 0.3 - 0.09 || is_end, "{near} at {p}, seed {seed}");
                 }
@@ -106,7 +106,7 @@ fn a_path_keeps_clear_of_walls_and_passes_open_portals_only() {
     assert!(n_found > 40 && n_turned > 20, "{n_found} {n_turned}");
 }
 
-/// Least distance of two segments in plan.
+/// Returns the least distance of two segments in plan.
 fn distance(a: [DVec3; 2], b: [DVec3; 2]) -> f64 {
     let cross = |u: DVec3, v: DVec3| u.x * v.z - u.z * v.x;
     let side = |s: [DVec3; 2], p: DVec3| cross(s[1] - s[0], p - s[0]);
@@ -123,7 +123,7 @@ fn distance(a: [DVec3; 2], b: [DVec3; 2]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Walls in plan, at a height where doorways are open.
+/// Returns the walls in plan, at a height where doorways are open.
 fn walls_in_plan(world: &World) -> Vec<[DVec3; 2]> {
     let mut walls = Vec::new();
     for t in triangles(world) {
@@ -141,7 +141,7 @@ fn walls_in_plan(world: &World) -> Vec<[DVec3; 2]> {
     walls
 }
 
-/// The shortest way by a graph of all points around ends of walls that see each other with room for the walker.
+/// Returns the shortest length in a graph of points around ends of walls that see each other with room for the walker.
 fn by_visibility(walls: &[[DVec3; 2]], ends: [DVec3; 2], radius: f64) -> Option<f64> {
     let clear = |a: DVec3, b: DVec3| walls.iter().all(|&w| distance(w, [a, b]) >= radius);
     let mut points = ends.to_vec();
@@ -173,7 +173,7 @@ fn by_visibility(walls: &[[DVec3; 2]], ends: [DVec3; 2], radius: f64) -> Option<
     }
 }
 
-/// W10: paths are within a hundredth or two of the shortest, which a graph of visible points gives, also around corners in a cell.
+/// W10: paths are within a hundredth or two of the shortest in a visibility graph, also around bends within a cell.
 #[test]
 fn paths_are_hardly_longer_than_the_shortest() {
     let (mut path, mut search) = (Path::default(), PathSearch::new());
@@ -206,7 +206,8 @@ fn paths_are_hardly_longer_than_the_shortest() {
     assert!(ours <= 1.01 * shortest, "{ours} {shortest}");
 }
 
-/// W10: cells within a length come in ascending order, and things are as far as paths are long, also in concave cells.
+/// W10: cells within a length come in ascending order, and distances of things equal lengths of paths, even in
+/// concave cells.
 #[test]
 fn what_is_near_is_as_far_as_one_walks() {
     let (mut path, mut search, mut paths) = (Path::default(), PathSearch::new(), PathSearch::new());
@@ -230,7 +231,7 @@ fn what_is_near_is_as_far_as_one_walks() {
                     "{far} {}",
                     path.length
                 );
-                // A way that leaves the radius and comes back is not known.
+                // A path that leaves the radius and comes back is not found.
                 assert!(
                     far < 1.05 * path.length + 0.3 || path.length > 8.0,
                     "{far} {path:?}"
@@ -243,7 +244,7 @@ fn what_is_near_is_as_far_as_one_walks() {
     assert!(n_near > 50 && n_far > 10);
 }
 
-/// W10: no walker passes a crack or a window that holds something; an opening above a parapet on one side only is passed.
+/// W10: a walker passes no crack and no window that holds something, but an opening with a sill on one side only.
 #[test]
 fn cracks_and_panes_are_not_passed() {
     let world = room_grid(&GridParams {
@@ -299,7 +300,7 @@ fn lengths_between_portals_go_around_walls() {
     assert!(n_bent > 10, "{n_bent}");
 }
 
-/// W10: nothing is allocated once the buffers have grown.
+/// W10: queries allocate nothing once the buffers have grown.
 #[test]
 fn a_second_path_allocates_nothing() {
     let (_, layout, map) = rooms(2);
@@ -310,12 +311,12 @@ fn a_second_path_allocates_nothing() {
         let _ = search.cells_within(&map, &layout, ends[0], 20.0, |_| true);
         let _ = search.distance(&map, &layout, ends[1]);
     };
-    // Buffers change places, so that it takes a few to grow all.
+    // Buffers change places, so several queries are needed to grow all.
     (0..4).for_each(|_| ask());
     assert_eq!(allocation_counter::measure(ask).count_total, 0);
 }
 
-/// One cell with these boxes in it, and a floor of 10 m by 4 m.
+/// Returns one cell with these boxes in it, and a floor of 10 m by 4 m.
 fn hall(boxes: &[Aabb]) -> (World, Layout) {
     let bounds = Aabb::new(DVec3::new(0.0, -0.5, 0.0), DVec3::new(10.0, 6.0, 4.0));
     let floor = Aabb::new(bounds.min, bounds.max.with_y(0.0));
@@ -365,7 +366,7 @@ fn block(low: [f64; 3], high: [f64; 3]) -> Aabb {
     Aabb::new(DVec3::from_array(low), DVec3::from_array(high))
 }
 
-/// W10: stairs are walked up, at the height of their steps; a step that is too high is not.
+/// W10: walkers climb stairs, at the height of the steps; they do not climb a step that is too high.
 #[test]
 fn stairs_are_walked_and_ledges_are_not() {
     let stairs = |rise: f64| -> Vec<Aabb> {
@@ -379,7 +380,7 @@ fn stairs_are_walked_and_ledges_are_not() {
     let path = walk(&stairs(0.17), 1.7).unwrap();
     assert!((path.length_in_plan - 8.0).abs() < 0.05);
     assert!(path.length > 8.2 && path.length < 8.7, "{}", path.length);
-    // At each place the line is as high as the floor, to half a step of a walker.
+    // At each place the line is as high as the floor, up to half a step of a walker.
     for p in &path.points {
         let n = ((p.x - 3.0) / 0.3).floor().clamp(-1.0, 9.0) + 1.0;
         assert!((p.y - 0.17 * n).abs() < 0.21, "{p}");
@@ -387,13 +388,14 @@ fn stairs_are_walked_and_ledges_are_not() {
     assert_eq!(walk(&stairs(0.5), 5.0).unwrap_err(), NoPath::NoWay);
 }
 
-/// W10: what is too low or too narrow is not passed, what stands free is walked around.
+/// W10: a walker passes no opening that is too low or too narrow, and walks around free-standing obstacles.
 #[test]
 fn a_walker_needs_its_room() {
     let straight = walk(&[], 0.0).unwrap();
     assert!((straight.length - 8.0).abs() < 1e-6 && straight.points.len() == 2);
     let pillar = walk(&[block([4.0, 0.0, 1.0], [5.0, 3.0, 3.2])], 0.0).unwrap();
-    // By the side of z = 1, which is nearer, at 0.3 m from it: tangents, arcs about both corners, and the meter between.
+    // Along the side of z = 1, which is nearer, at 0.3 m from it: tangents, arcs about two vertices, and the meter
+    // between.
     let corner = |far: f64| {
         let d = far.hypot(1.0);
         (d * d - 0.09).sqrt() + 0.3 * ((1.0 / far).atan() + (0.3 / d).asin())
@@ -421,7 +423,7 @@ fn a_walker_needs_its_room() {
     assert_eq!(walk(&[], 3.0).unwrap_err(), NoPath::NoFloorAtEnd);
 }
 
-/// W10: what is no point, or far from everything, has no floor; a world of nothing neither. Nothing panics.
+/// W10: invalid points, and points far from everything, have no floor; nor does an empty world. Nothing panics.
 #[test]
 fn points_from_nowhere_have_no_floor() {
     let (world, layout) = hall(&[]);
@@ -454,7 +456,7 @@ fn points_from_nowhere_have_no_floor() {
     assert_eq!(search.distance(&map, &layout, inside), None);
 }
 
-/// W10: a path to where one stands has no length.
+/// W10: a path from a point to itself has no length.
 #[test]
 fn a_path_to_where_one_stands_has_no_length() {
     let (world, layout) = hall(&[]);
@@ -467,7 +469,7 @@ fn a_path_to_where_one_stands_has_no_length() {
     assert!(path.length < 1e-9 && path.portals.is_empty() && !path.points.is_empty());
 }
 
-/// W10: somebody thin walks where somebody of 0.1 m does, and takes no more squares for it.
+/// W10: a thinner walker finds the same path as one with a radius of 0.1 m, with no more squares.
 #[test]
 fn a_thin_walker_finds_a_way_on_no_finer_floors() {
     let world = room_grid(&GridParams {

@@ -1,4 +1,4 @@
-//! Scenes of strangers, which have no truth; what was seen in them by looking is counted.
+//! Scenes from strangers, without a truth: counts of features identified by eye.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,12 +12,12 @@ use super::measure::n_indoors;
 use crate::score::{V3, inspect};
 use crate::{RELEASE, output_of, scenes_dir};
 
-/// A storey that is glazed all around encloses this point. [Units: wu]
+/// A point inside a storey that is glazed all around. [Units: wu]
 const IN_HALL: V3 = [10.0, 3.0, -6.0];
-/// Portals that a hotel room has at most.
+/// Most portals of a hotel room.
 const MOST_PORTALS: f64 = 30.0;
 
-/// Rows of the scenes that are there.
+/// Prints rows of the available scenes.
 pub(super) fn run(bench: &mut Bench<'_>) -> anyhow::Result<()> {
     bench.rows.label = "foreign".into();
     let Some(folder) = scenes_dir().map(|d| d.join("foreign")) else {
@@ -75,7 +75,7 @@ fn boxes(bench: &mut Bench<'_>, path: &Path, world: &Path, graph: &Value) -> any
     Ok(())
 }
 
-/// Middles of the boxes of an OBJ file: sets of faces that share corners, eight in all.
+/// Returns the centers of the boxes of an OBJ file: connected sets of faces with eight vertices.
 fn box_middles(text: &str) -> Vec<V3> {
     let (mut at, mut parent): (Vec<V3>, Vec<usize>) = (Vec::new(), Vec::new());
     fn root(parent: &mut [usize], mut i: usize) -> usize {

@@ -1,4 +1,4 @@
-//! One bake, and all that can be counted about it.
+//! A bake and its figures.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -11,28 +11,27 @@ use serde_json::Value;
 use crate::score::{V3, center_and_area, dot, inspect, locate, score_world, sub, unit, vec3};
 use crate::{RELEASE, add_scene_files};
 
-/// What came out of a bake.
+/// The figures of a bake.
 #[derive(Clone)]
 pub(super) struct Measured {
-    /// Shares as in `docs/benchmarks/rooms.md`; `None` where the scene has nothing of the kind.
+    /// Shares as in `docs/benchmarks/rooms.md`; `None` if the scene has nothing of the kind.
     pub(super) rooms: Option<f64>,
     pub(super) doors: Option<f64>,
     pub(super) windows: Option<f64>,
     pub(super) extra: Option<f64>,
     pub(super) portals: usize,
-    /// Openings to outdoors that are listed as possible holes, and holes in surfaces.
+    /// Openings to the outdoors that are listed as possible holes, and holes in surfaces.
     pub(super) holes: usize,
-    /// Most crack portals between one pair of cells in one plane.
+    /// Most crack portals between the same pair of cells in one plane.
     pub(super) cracks: usize,
-    /// Points of the truth in closed solids, and those of them that lie in an indoor cell.
+    /// Points of the truth in closed solids, and those that lie in an indoor cell.
     pub(super) n_matter: usize,
     pub(super) in_matter: usize,
     /// Wall time of the bake. [Units: s]
     pub(super) seconds: f64,
-    /// Broken promises by `verify`, or why it could not say.
+    /// Broken promises found by `verify`, or why it failed.
     pub(super) broken: Result<u64, String>,
-    /// Of what the bake should have said something about, how much it did not; `None` where there
-    /// was nothing to say.
+    /// Number of conditions that the bake should have reported but did not; `None` if there were none to report.
     pub(super) unsaid: Option<usize>,
 }
 
@@ -42,11 +41,11 @@ impl Measured {
     }
 }
 
-/// Bakes that take less are repeated, and the fastest counts. [Units: s]
+/// Shorter bakes are repeated, and the fastest counts. [Units: s]
 const SHORT: f64 = 2.0;
 const REPEATS: usize = 3;
 
-/// Bakes a scene folder with `settings`, scores and verifies it. Without `rays` nothing is verified.
+/// Bakes a scene folder with `settings`, scores and verifies it. Without `rays`, it is not verified.
 pub(super) fn measure(
     dir: &Path,
     world: &Path,
@@ -98,7 +97,7 @@ fn list(v: &Value) -> &[Value] {
     v.as_array().map_or(&[], Vec::as_slice)
 }
 
-/// How many of the points lie in cells indoors that are no rooms: a box taken for furniture stands in a room's air.
+/// Counts the points in indoor cells that are not rooms: a box taken for furniture stands in a room's air.
 fn n_cells_of_matter(
     graph: &Value,
     world: &Path,
@@ -119,7 +118,7 @@ fn n_cells_of_matter(
     Ok(cells.iter().filter(is_wrong).count())
 }
 
-/// How many of the points lie in cells indoors.
+/// Counts the points in indoor cells.
 pub(super) fn n_indoors(graph: &Value, world: &Path, points: &[V3]) -> anyhow::Result<usize> {
     if points.is_empty() {
         return Ok(0);
@@ -135,7 +134,7 @@ fn indoor_ids(graph: &Value) -> BTreeSet<String> {
     indoors.map(|c| c["id"].to_string()).collect()
 }
 
-/// Holes in surfaces that the bake counts.
+/// Returns the number of holes in surfaces that the bake reports.
 fn n_missing(said: &str) -> usize {
     let rows = said.lines();
     let count = |row: &str| {
@@ -145,14 +144,14 @@ fn n_missing(said: &str) -> usize {
     rows.filter_map(count).sum()
 }
 
-/// Promises that `verify` finds broken; lines that the source's triangles block are not tried.
+/// Counts the promises that `verify` finds broken; lines blocked by the source's triangles are not tried.
 fn broken(dir: &Path, world: &Path, rays: u64) -> Result<u64, String> {
     let mut command = Command::new(RELEASE.binary("enfilade"));
     command.arg("verify").arg(world);
     add_scene_files(&mut command, dir, Some("--source"));
     command.args(["--rays", &rays.to_string(), "--json"]);
     let done = command.output().map_err(|e| e.to_string())?;
-    // It exits with 1 where promises are broken, after its report.
+    // If promises are broken, it exits with 1 after its report.
     let report: Value = serde_json::from_slice(&done.stdout)
         .map_err(|_| String::from_utf8_lossy(&done.stderr).trim().to_owned())?;
     let count = |name: &str| {
@@ -163,17 +162,17 @@ fn broken(dir: &Path, world: &Path, rays: u64) -> Result<u64, String> {
     Ok(count("unsealed")? + count("incomplete")? + list(&report["problems"]).len() as u64)
 }
 
-/// A portal's normal and middle.
+/// Returns a portal's normal and center.
 fn place(portal: &Value) -> Option<(V3, V3)> {
     let outline: Vec<V3> = list(&portal["outline"]).iter().filter_map(vec3).collect();
     Some((unit(vec3(&portal["normal"])?), center_and_area(&outline).0))
 }
 
-/// Cracks lie in one plane if their normals differ by less than 5 degrees and the middle of each lies
-/// within this of the other's plane: the least width of what is meant to be open. [Units: wu]
+/// Cracks lie in one plane if their normals differ by less than 5 degrees and the center of each lies within this
+/// distance of the other's plane: the least width of an intended opening. [Units: wu]
 const ONE_PLANE: f64 = 0.01;
 
-/// Most crack portals between one pair of cells in one plane.
+/// Returns the most crack portals between the same pair of cells in one plane.
 fn cracks_in_one_plane(graph: &Value) -> usize {
     let cracks: Vec<(&Value, V3, V3)> = list(&graph["portals"])
         .iter()
@@ -190,15 +189,15 @@ fn cracks_in_one_plane(graph: &Value) -> usize {
     cracks.iter().map(of).max().unwrap_or(0)
 }
 
-/// What a bake must not keep to itself, and the words by which it says so.
+/// Conditions that a bake must report, and the words that do.
 const NO_CELLS: [&str; 3] = ["no cell", "no room", "without a cell"];
 const NO_DOORWAY: [&str; 2] = ["no doorway", "without doorway"];
 const CRACKS: [&str; 2] = ["crack", "gap"];
 
-/// Lower or narrower cells are ducts and hollow walls: nobody misses a doorway there. [Units: wu]
+/// Smaller cells are ducts and hollow walls, which need no doorway. [Units: wu]
 const PERSON: [f64; 3] = [0.6, 1.8, 0.6];
 
-/// How many of these hold and are not said; `None` where none holds.
+/// Counts the conditions that hold but are not reported; `None` if none holds.
 fn unsaid(graph: &Value, said: &str) -> Option<usize> {
     let (cells, portals) = (list(&graph["cells"]), list(&graph["portals"]));
     let is_doorway = |p: &&Value| p["kind"] == "open" || p["kind"] == "door";

@@ -1,8 +1,8 @@
-//! `cargo xtask bench messy`: how rooms and doors survive spoilt models, figure by figure with its bar.
+//! `cargo xtask bench messy`: robustness of rooms and doors against disturbed models, each figure with its bar.
 //!
-//! Scenes with a truth are baked as they are and spoilt by the test kit's `generate`; what changes is
-//! compared. Each figure is a row: as JSON a line `{"row", "scene", "value", "bar", "ok"}`, where
-//! `value` and `ok` are null if something that it needs is not there, and `note` then says what.
+//! Scenes with a truth are baked unchanged and disturbed by the test kit's `generate`, and the results compared. Each
+//! figure is a row: in JSON a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if a
+//! requirement is missing, which `note` then names.
 
 mod foreign;
 mod measure;
@@ -17,23 +17,23 @@ use serde_json::json;
 use crate::{RELEASE, output_of, run_to_end, scenes, scenes_in, target_dir};
 use measure::{Measured, measure};
 
-/// What is asked for.
+/// The options of the bench.
 #[derive(Default)]
 pub(crate) struct Options {
-    /// A JSON object a line instead of a table.
+    /// Print a JSON object per row instead of a table.
     pub(crate) is_json: bool,
-    /// Beginnings of rows; all where empty.
+    /// Beginnings of row names; empty for all.
     pub(crate) rows: Vec<String>,
-    /// Beginnings of scenes' names; all where empty.
+    /// Beginnings of scene names; empty for all.
     pub(crate) scenes: Vec<String>,
     /// Segments that `verify` tries, and as many rays.
     pub(crate) rays: Option<u64>,
 }
 
-/// The rays of the promise.
+/// Default number of rays.
 const RAYS: u64 = 1_000_000;
 
-/// Generated scenes that are spoilt like the real ones.
+/// Generated scenes, disturbed like the real ones.
 const GENERATED: [&str; 7] = [
     "house",
     "tower",
@@ -44,13 +44,13 @@ const GENERATED: [&str; 7] = [
     "pitched-roof-attic",
 ];
 
-/// A way to spoil scenes, or none.
+/// A way to disturb scenes, or none.
 struct Case {
-    /// What its rows begin with.
+    /// Beginning of its row names.
     label: &'static str,
-    /// For `generate`; `None` for `gltf-transform quantize`.
+    /// Arguments of `generate`; `None` for `gltf-transform quantize`.
     spoilt: Option<&'static [&'static str]>,
-    /// For `bake`.
+    /// Arguments of `bake`.
     settings: &'static [&'static str],
     judge: fn(&mut Rows, &Measured, &Measured),
 }
@@ -120,7 +120,7 @@ fn near_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
     rows.broken(now);
 }
 
-/// Gaps are wider than the default hole: cracks are allowed, but not many.
+/// Gaps are wider than the default hole: cracks are allowed, but only a few.
 fn far_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
     rows.at_least("rooms", now.rooms, before.rooms, 0.05);
     rows.at_least("doors", now.doors, before.doors, 0.05);
@@ -140,7 +140,7 @@ struct Rows {
     is_json: bool,
     label: String,
     scene: String,
-    /// The scene is a real one: its figures count for averages.
+    /// True for a real scene: its figures count for averages.
     is_real: bool,
     figures: BTreeMap<String, Vec<f64>>,
     n: [usize; 3],
@@ -167,11 +167,11 @@ impl Rows {
         }
     }
 
-    /// A share that may be lower by `slack` than `wanted`. No row where the scene has no such thing.
+    /// Prints a share that may be lower than `wanted` by `slack`. No row if the scene has no such thing.
     fn at_least(&mut self, row: &str, value: Option<f64>, wanted: Option<f64>, slack: f64) {
         if let (Some(value), Some(wanted)) = (value, wanted) {
             let least = (wanted - slack).max(0.0);
-            // Shares that are equal but for rounding are equal.
+            // Shares that differ only by rounding are equal.
             let ok = value >= least - 1e-9;
             self.print(row, Some(value), &format!(">= {least:.2}"), Some(ok), "");
         }
@@ -195,20 +195,20 @@ impl Rows {
         }
     }
 
-    /// Kept for an average.
+    /// Keeps a figure for an average.
     fn figure(&mut self, name: &str, value: Option<f64>) {
         if let Some(value) = value.filter(|_| self.is_real) {
             self.figures.entry(name.into()).or_default().push(value);
         }
     }
 
-    /// The average of what was kept, if anything was.
+    /// Prints the average of the kept figures, if there are any.
     fn average(&mut self, name: &str, least: f64) {
         let kept = self.figures.remove(name).unwrap_or_default();
         if !kept.is_empty() {
             self.scene = format!("average of {}", kept.len());
             let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-            // Bars are given to two digits, and so it is compared.
+            // Bars have two digits, so round to these first.
             let ok = (mean * 100.0).round() >= (least * 100.0).round();
             self.print(name, Some(mean), &format!(">= {least:.2}"), Some(ok), "");
         }
@@ -229,7 +229,7 @@ fn shown(x: f64) -> String {
     }
 }
 
-/// A scene with a truth, and what it is as it is.
+/// A scene with a truth, and its undisturbed figures.
 struct Base {
     name: String,
     dir: PathBuf,
@@ -237,7 +237,7 @@ struct Base {
     measured: Option<Measured>,
 }
 
-/// The bench at work.
+/// The bench and its state.
 struct Bench<'a> {
     options: &'a Options,
     rows: Rows,
@@ -257,7 +257,7 @@ impl Bench<'_> {
         self.options.rays.unwrap_or(RAYS)
     }
 
-    /// Bakes a scene folder and judges it, or says why not.
+    /// Bakes a scene folder and judges it, or prints why that failed.
     fn try_scene(
         &mut self,
         dir: &Path,
@@ -281,7 +281,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The scenes that are spoilt: real ones with a truth, and generated ones.
+    /// Returns the scenes to disturb: real ones with a truth, and generated ones.
     fn bases(&self) -> anyhow::Result<Vec<Base>> {
         let base = |dir: PathBuf, is_real| Base {
             name: name_of(&dir),
@@ -303,7 +303,7 @@ impl Bench<'_> {
         Ok(all)
     }
 
-    /// Rows of one way to spoil one scene.
+    /// Prints rows of one disturbance of one scene.
     fn case(&mut self, case: &Case, base: &mut Base) -> anyhow::Result<()> {
         self.rows.label = "undisturbed".into();
         self.rows.scene.clone_from(&base.name);
@@ -383,7 +383,7 @@ impl Bench<'_> {
     }
 }
 
-/// Measures what is asked for and prints a row a figure.
+/// Measures the chosen figures and prints a row for each.
 pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
     for example in [
         &["enfilade-cli"][..],
@@ -462,7 +462,7 @@ fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
     output_of(Command::new(example).args(args).arg("-o").arg(to), None).map(drop)
 }
 
-/// What quantizes, if it is there.
+/// The program that quantizes, if installed.
 const QUANTIZE: &str = "gltf-transform";
 
 /// Quantizes the files of a scene folder.

@@ -1,9 +1,9 @@
-//! Budgets and outputs: files that ask for much, small scenes that are hard, large ones.
+//! Budgets and outputs: files with huge demands, small scenes that are hard, large ones.
 
 use super::scenes::{cuboid, obj, scenes};
 use super::{Figures, Ran, holds};
 
-/// Files of a few bytes that would take gigabytes, and outputs that would be lost.
+/// Files of a few bytes that would need gigabytes, and outputs that would be lost.
 pub(super) fn cases(rows: &mut Figures) -> anyhow::Result<()> {
     for n in [100_000, 1_048_576] {
         rows.write("clusters.prt", &format!("PRT1\n{n}\n0\n"))?;
@@ -32,7 +32,7 @@ pub(super) fn cases(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Small scenes of shapes that no building has, by each method: done or refused with a way out, in bounded time and memory.
+/// Small scenes of unusual shapes, with each method: baked, or rejected with a remedy, in bounded time and memory.
 pub(super) fn nasty(rows: &mut Figures) -> anyhow::Result<()> {
     for (scene, text) in scenes() {
         rows.write("nasty.obj", &text)?;
@@ -49,7 +49,7 @@ pub(super) fn nasty(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Large scenes, where they are at hand.
+/// Large scenes, if available.
 pub(super) fn large(rows: &mut Figures) -> anyhow::Result<()> {
     for (name, file, most) in [
         ("recast-dungeon", "recast-dungeon/scene.glb", 15.0),
@@ -72,13 +72,14 @@ pub(super) fn large(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Seconds and memory that are given to each command on each nasty scene, and what a command may take of them by its word.
+/// Seconds and memory allowed for each command on each nasty scene, and the most that it may use of them by its
+/// promise.
 const TIME: f64 = 4.0;
 const MOST_TIME: f64 = 1.5 * TIME + 1.0;
 const MEMORY: &str = "300M";
 const MOST_MEMORY: f64 = 1.2 * 300.0 / 1024.0 + 100e6 / (1u64 << 30) as f64;
 
-/// Nasty scenes by the commands that build worlds from them, within a time and within memory: done, or refused with a way out.
+/// Nasty scenes in commands that build worlds, within time and memory limits: built, or rejected with a remedy.
 pub(super) fn bounds(rows: &mut Figures) -> anyhow::Result<()> {
     let methods = ["watershed", "bsp", "delaunay"];
     for (scene, text) in scenes() {
@@ -108,7 +109,7 @@ fn bound(rows: &mut Figures, name: &str, args: &[&str]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What a bake says beforehand that it takes against what it takes, and what its stages charge for their time.
+/// Estimates of a bake compared with its use, and the time per unit of work of its stages.
 pub(super) fn estimates(rows: &mut Figures) -> anyhow::Result<()> {
     let dirs = crate::scenes();
     let files = dirs.iter().map(|dir| dir.join("scene.glb"));
@@ -129,7 +130,7 @@ pub(super) fn estimates(rows: &mut Figures) -> anyhow::Result<()> {
             ];
             let ran = rows.enfilade(&args, 600)?;
             let scene = format!("{scene} {method}");
-            // Of several, the last.
+            // The last of several.
             let said = ran.said.lines().rev().find_map(|line| {
                 let (_, rest) = line.split_once("about ")?;
                 rest.split_once(" MB")?.0.parse::<f64>().ok()
@@ -145,7 +146,7 @@ pub(super) fn estimates(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Of the stages that took a while, the most time that one took for a unit of work, as `bake -v` says. [Units: ns]
+/// Returns the longest time per unit of work among stages that took a while, from `bake -v`. [Units: ns]
 fn dearest_unit(said: &str) -> Option<f64> {
     let of_line = |line: &str| {
         let words: Vec<&str> = line

@@ -1,4 +1,4 @@
-//! Budgets of all commands but `bake`: nasty input, and the time and memory that were allowed.
+//! Budgets of all commands but `bake`: nasty input, with limits on time and memory.
 
 use std::io::Write as _;
 
@@ -8,10 +8,10 @@ use flate2::write::ZlibEncoder;
 use super::scenes::{Triangle, cuboid, obj, scenes};
 use super::{Figures, Ran};
 
-/// Limits that each command is given. [Units: s, MiB]
+/// Limits given to each command. [Units: s, MiB]
 const TIME: f64 = 4.0;
 const MEMORY: f64 = 300.0;
-/// Promised bounds: half as much time again and a second; a fifth more memory and 100 MB. [Units: s, GiB]
+/// Promised bounds: 1.5 times the time plus a second; 1.2 times the memory plus 100 MB. [Units: s, GiB]
 const MOST_TIME: f64 = 1.5 * TIME + 1.0;
 const MOST_MEMORY: f64 = (1.2 * MEMORY + 100.0) / 1024.0;
 
@@ -35,7 +35,7 @@ const COMMANDS: [&str; 16] = [
     "verify w.glb --source w.obj",
 ];
 
-/// Arguments that ask for far too much of a small world; each is refused at once.
+/// Arguments that demand far too much of a small world; each is rejected at once.
 const REFUSED: [&str; 6] = [
     "sound w.glb --listener 1,1,1;1e6,1,1 --source 2,1,2",
     "sound w.glb --listener 1,1,1;1e30,1,1 --source 2,1,2 -o out.wav",
@@ -53,13 +53,13 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
         }
         let bake = ["bake", "w.obj", "-o", "w.glb", "--max-time", "60"];
         if rows.enfilade(&bake, 200)?.code != Some(0) {
-            // There is no world to ask about.
+            // There is no world to query.
             rows.print("commands", &scene, None, "a world", None);
             continue;
         }
         for line in COMMANDS {
             let ran = bounded(rows, line)?;
-            // Bound and refusal are said; broken promises of `verify` and ways that are none are answers.
+            // Limits and rejections are reported; broken promises of `verify` and paths that do not exist are answers.
             let ok = matches!(ran.code, Some(0 | 1)) && !ran.said.contains("panicked");
             let case = format!("{scene}: {line}");
             rows.is("commands ends", &case, ok);
@@ -85,10 +85,10 @@ fn bounded(rows: &Figures, line: &str) -> anyhow::Result<Ran> {
     rows.enfilade(&args, 120)
 }
 
-/// A name, the scene as OBJ, and files that it refers to.
+/// A name, the scene as OBJ, and the files to which it refers.
 type NastyInput = (String, String, Vec<(&'static str, Vec<u8>)>);
 
-/// The scenes that bakes are tried with, and rooms with what is nasty to those who read worlds: long names, large pictures.
+/// Returns the scenes of the bakes, and rooms that are nasty for readers of worlds: long names, large images.
 fn inputs() -> Vec<NastyInput> {
     let mut all: Vec<NastyInput> = scenes()
         .into_iter()
@@ -114,7 +114,7 @@ fn inputs() -> Vec<NastyInput> {
     all
 }
 
-/// A room of 10 m and one beside it, with a doorway between.
+/// Returns a room of 10 m and one beside it, with a doorway between.
 fn rooms() -> Vec<Triangle> {
     let mut out = cuboid([0.0; 3], [10.0, 3.0, 10.0]);
     for (low, high) in [
@@ -127,7 +127,7 @@ fn rooms() -> Vec<Triangle> {
     out
 }
 
-/// A black picture of so many pixels a side, as PNG of a few hundred kilobytes.
+/// Returns a black image of this size a side, as PNG of a few hundred kilobytes.
 fn black(side: u32) -> Vec<u8> {
     let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
     let mut chunk = |name: &[u8; 4], data: &[u8]| {
@@ -146,7 +146,7 @@ fn black(side: u32) -> Vec<u8> {
     let mut pixels = ZlibEncoder::new(Vec::new(), flate2::Compression::best());
     let row = vec![0; 1 + 3 * side as usize];
     for _ in 0..side {
-        // Into memory, where writing cannot fail.
+        // Writing to memory cannot fail.
         let _ = pixels.write_all(&row);
     }
     chunk(b"IDAT", &pixels.finish().unwrap_or_default());

@@ -1,4 +1,4 @@
-//! Tests that drive a window, a browser, pipes or a clock, on a busy machine: load must not decide whether they pass.
+//! Tests that drive a window, a browser, pipes or a clock, on a busy machine: load must not make them fail.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,10 +11,10 @@ use super::Figures;
 use crate::check::node_path;
 use crate::{GATE, output_of, root};
 
-/// Runs of each.
+/// Runs of each test.
 const RUNS: u32 = 10;
 
-/// Busy loops beside.
+/// Busy loops running at the same time.
 const LOOPS: usize = 4;
 
 /// A crate, and its tests that wait for something outside of them.
@@ -26,7 +26,7 @@ const WAITING: [(&str, &[&str]); 2] = [
     ("enfilade-geom", &["enfilade_geom"]),
 ];
 
-/// Runs that pass of ten, for each test, beside four busy loops.
+/// Counts the runs out of ten that pass, for each test, beside four busy loops.
 pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     for (package, targets) in WAITING {
         let built = test_binaries(package)?;
@@ -40,7 +40,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The names and paths of the test binaries of a crate, built as the gate builds them.
+/// Returns names and paths of a crate's test binaries, built as in the gate.
 fn test_binaries(package: &str) -> anyhow::Result<Vec<(String, PathBuf)>> {
     let args = ["-p", package, "--no-run", "--message-format=json"];
     let told = output_of(&mut GATE.cargo("test", &args), None)?;
@@ -65,7 +65,7 @@ fn passes(package: &str, binary: &Path) -> bool {
     done.is_ok_and(|status| status.success())
 }
 
-/// Does `work` while other threads keep all processors busy.
+/// Runs `work` while other threads keep all processors busy.
 fn beside_load<T>(work: impl FnOnce() -> T) -> T {
     let is_done = AtomicBool::new(false);
     std::thread::scope(|scope| {

@@ -1,5 +1,5 @@
-//! What a user relies on without asking: names are data, nobody's files are lost, an extension says what is in a file, half a
-//! file is a failure, and the same input gives the same bytes.
+//! Habits that users rely on: names are data, no file is lost, an extension determines the format, half a file is a
+//! failure, and the same input gives the same bytes.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -9,10 +9,10 @@ use anyhow::Context;
 use super::{Figures, holds};
 use crate::RELEASE;
 
-/// A name that sets a terminal's title, clears it, begins a line and turns text around.
+/// A name that sets a terminal's title, clears the screen, begins a line and reverses text.
 const NAME: &str = "odd\u{1b}]0;owned\u{7}\u{1b}[2J\nwrote all\u{9b}31m\u{202e}gnp\u{2066}";
 
-/// Real buildings, where they are at hand.
+/// Real buildings, if available.
 const BUILDINGS: [&str; 3] = ["duplex", "fzk-haus", "samplehouse4"];
 
 pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
@@ -32,7 +32,7 @@ fn enfilade(folder: &Path, args: &[&str]) -> anyhow::Result<Output> {
     command.output().context("cannot start the command")
 }
 
-/// Counts what a terminal would obey, by a list of its own.
+/// Counts characters that a terminal would obey, by an independent list.
 fn n_hidden(done: &Output) -> usize {
     let text = String::from_utf8_lossy(&done.stdout) + String::from_utf8_lossy(&done.stderr);
     let is_hidden = |c: &char| {
@@ -44,7 +44,7 @@ fn n_hidden(done: &Output) -> usize {
     text.chars().filter(is_hidden).count() + lines.count()
 }
 
-/// Objects, materials and files of odd names, through the commands that print them.
+/// Objects, materials and files with odd names, through the commands that print them.
 fn names(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
     let name = serde_json::to_string(NAME)?;
     let done = enfilade(folder, &["demo", "-o", "."])?;
@@ -84,7 +84,7 @@ fn names(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A GLB with an odd name for each name in it.
+/// Returns a GLB with all its names replaced by an odd one.
 fn renamed(glb: &[u8], name: &str) -> anyhow::Result<Vec<u8>> {
     let n = u32::from_le_bytes(glb[12..16].try_into()?) as usize;
     let json = std::str::from_utf8(&glb[20..20 + n])?.trim_end();
@@ -105,7 +105,7 @@ fn renamed(glb: &[u8], name: &str) -> anyhow::Result<Vec<u8>> {
     Ok([&head, &chunk, rest].concat())
 }
 
-/// Files that nobody named are not written over, nor what a link leads to.
+/// Files not named as output are not overwritten, nor the targets of links.
 fn kept(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
     for (command, file) in [
         ("demo -o", "house.glb"),
@@ -201,7 +201,7 @@ fn streams(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
         "pvs - -o x.pvs",
         "simplify - -o x.glb --max-cells 2",
     ] {
-        // As much as the program and its threads take, and no gigabytes.
+        // Enough memory for the program and its threads, but not gigabytes.
         let shell = format!("ulimit -v 2097152; exec \"{binary}\" {line} </dev/zero");
         let done = Command::new("sh")
             .args(["-c", &shell])
@@ -215,7 +215,7 @@ fn streams(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Two reports on one world, byte by byte.
+/// Compares two reports on one world, byte by byte.
 fn same(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
     let scenes = crate::scenes();
     let scene_of = |name: &str| {

@@ -1,4 +1,4 @@
-//! Two rooms in every format that is read, and the commands that read them.
+//! Two rooms in every input format, and the commands that read them.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,8 +8,8 @@ use serde_json::json;
 
 use super::scenes::{Triangle, cuboid};
 
-/// A file that is damaged, the commands that read it (words; `@` is the file, what stands behind `<` is its standard input),
-/// and how often it is chosen.
+/// A file to damage, the commands that read it (words; `@` is the file, the word after `<` is standard input), and
+/// how often it is chosen.
 pub(super) struct Input {
     pub(super) file: &'static str,
     pub(super) commands: &'static [&'static str],
@@ -28,7 +28,8 @@ const SCENE: &[&str] = &[
     "verify world.glb --source @ --rays 200 --sight 5",
 ];
 
-/// All but the last: without names the chair is structure, and a map has other units, but the world was baked of `two.obj`.
+/// All but the last: without names the chair is structure, and a map has other units, but the world was baked from
+/// `two.obj`.
 const BARE: &[&str] = SCENE.split_at(SCENE.len() - 1).0;
 
 const BAKE: &[&str] = &[
@@ -189,7 +190,7 @@ pub(super) const INPUTS: [Input; 22] = [
     },
 ];
 
-/// What is made of these by the command itself, in order.
+/// Commands that make further inputs from these, in order.
 pub(super) const MADE: [&str; 4] = [
     "bake two.obj -o world.glb --method watershed",
     "pvs world.glb -o out.pvs --into world.glb --parts --volumes --evidence world.ev",
@@ -197,7 +198,7 @@ pub(super) const MADE: [&str; 4] = [
     "pvs grid.prt -o out.pvs --checkpoint grid.search --budget 0",
 ];
 
-/// Writes the files that are not made by the command.
+/// Writes the files that no command makes.
 pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
     let boxes = boxes();
     let (json, bin) = gltf(&boxes);
@@ -269,7 +270,8 @@ const PICTURE: &[u8] = b"\x89PNG\x0d\x0a\x1a\x0a\x00\x00\x00\x0dIHDR\x00\x00\x00
 
 type Corners = [[f64; 3]; 2];
 
-/// Name and corners of each box: two rooms with a doorway between them and a window to the outdoors, and a chair.
+/// Returns name and extent of each box: two rooms with a doorway between them and a window to the outdoors, and a
+/// chair.
 fn boxes() -> Vec<(&'static str, Corners)> {
     vec![
         ("floor", [[-0.2, -0.2, -0.2], [8.4, 0.0, 5.2]]),
@@ -326,7 +328,7 @@ fn ply(boxes: &[(&str, Corners)]) -> String {
     text
 }
 
-/// With the highest byte of each number first.
+/// Big-endian.
 fn binary_ply(boxes: &[(&str, Corners)]) -> Vec<u8> {
     let all = triangles(boxes);
     let mut bytes = format!(
@@ -349,7 +351,7 @@ fn binary_ply(boxes: &[(&str, Corners)]) -> Vec<u8> {
     bytes
 }
 
-/// A tenth of a second of a tone, in 16 bits.
+/// Returns a tone of a tenth of a second, in 16 bits.
 fn wav() -> Vec<u8> {
     let samples = (0..800).map(|i| (f64::from(i) * 0.3).sin() * 20_000.0);
     let body: Vec<u8> = samples.flat_map(|s| (s as i16).to_le_bytes()).collect();
@@ -381,7 +383,7 @@ fn floats(triangle: &Triangle) -> impl Iterator<Item = u8> + use<'_> {
     all.flat_map(|&x| (x as f32).to_le_bytes())
 }
 
-/// A mesh and a node for each box, but for the buffer's place; and the buffer.
+/// Returns a document with a mesh and a node per box, but without the buffer's address; and the buffer.
 fn gltf(boxes: &[(&str, Corners)]) -> (serde_json::Value, Vec<u8>) {
     let mut bin = Vec::new();
     let (mut views, mut accessors, mut meshes, mut nodes) = (vec![], vec![], vec![], vec![]);
@@ -423,7 +425,7 @@ fn glb(mut json: String, bin: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Brushes, z up, 32 units to the meter; the window is filled, as a map must not leak.
+/// Returns brushes, z up, 32 units per meter; the window is filled, since a map must not leak.
 fn map(boxes: &[(&str, Corners)]) -> String {
     let mut text = "{\n\"classname\" \"worldspawn\"\n".to_owned();
     let pane = ("pane", [[8.2, 1.0, 2.0], [8.4, 2.0, 3.0]]);
@@ -453,7 +455,7 @@ fn map(boxes: &[(&str, Corners)]) -> String {
     text
 }
 
-/// Three times three rooms of 64 units, with an opening in each wall between two.
+/// Returns 3 × 3 rooms of 64 units, with an opening in each wall between two.
 fn prt() -> String {
     let mut portals = Vec::new();
     for a in 0..9 {

@@ -1,7 +1,7 @@
-//! `cargo xtask bench trust`: hostile and huge input, figure by figure with its bar.
+//! `cargo xtask bench trust`: hostile and huge input, each figure with its bar.
 //!
-//! Each figure is a row: as JSON a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if
-//! something that it needs is not there, and `note` then says what.
+//! Each figure is a row: in JSON a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if a
+//! requirement is missing, which `note` then names.
 
 mod budgets;
 mod commands;
@@ -25,18 +25,18 @@ use serde_json::json;
 
 use crate::{RELEASE, run_to_end, target_dir};
 
-/// What is asked for.
+/// The options of the bench.
 #[derive(Default)]
 pub(crate) struct TrustOptions {
-    /// A JSON object a line instead of a table.
+    /// Print a JSON object per row instead of a table.
     pub(crate) is_json: bool,
-    /// Beginnings of rows; all where empty.
+    /// Beginnings of row names; empty for all.
     pub(crate) rows: Vec<String>,
-    /// Which damaged files are tried, by number.
+    /// Indices of the damaged files to try.
     pub(crate) runs: Range<usize>,
-    /// Which shuffles are tried, by number.
+    /// Indices of the shuffles to try.
     pub(crate) shuffles: Range<usize>,
-    /// Beginnings of the names of scenes that are shuffled; all where empty.
+    /// Beginnings of the names of scenes to shuffle; empty for all.
     pub(crate) scenes: Vec<String>,
 }
 
@@ -58,17 +58,17 @@ const PARTS: &[(&str, Part)] = &[
 
 type Part = fn(&mut Figures) -> anyhow::Result<()>;
 
-/// The `n` damaged files from number `from` on; as many as there are by default if `n` is not given.
+/// Returns the indices of `n` damaged files starting at `from`; of the default number if `n` is not given.
 pub(crate) fn runs(from: usize, n: Option<usize>) -> Range<usize> {
     from..from.saturating_add(n.unwrap_or(mutated::COUNT))
 }
 
-/// As [`runs`], of shuffles.
+/// Same as [`runs`] for shuffles.
 pub(crate) fn shuffles(from: usize, n: Option<usize>) -> Range<usize> {
     from..from.saturating_add(n.unwrap_or(order::COUNT))
 }
 
-/// Measures and prints; fails where a bar is not met.
+/// Measures and prints; fails if a bar is missed.
 pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
     run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-cli"]))?;
     let folder = target_dir().join("trust");
@@ -88,23 +88,23 @@ pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
         }
     }
     let [failed, passed, unknown] = rows.n;
-    eprintln!("{passed} bars met, {failed} not met, {unknown} unknown");
-    anyhow::ensure!(failed == 0, "{failed} bars are not met");
+    eprintln!("{passed} bars met, {failed} missed, {unknown} unknown");
+    anyhow::ensure!(failed == 0, "{failed} bars are missed");
     Ok(())
 }
 
-/// What is printed.
+/// The printed figures.
 struct Figures {
     is_json: bool,
-    /// Where inputs and outputs go.
+    /// Folder of inputs and outputs.
     folder: PathBuf,
-    /// Damaged files that are tried.
+    /// Indices of the damaged files to try.
     runs: Range<usize>,
-    /// Shuffles that are tried.
+    /// Indices of the shuffles to try.
     shuffles: Range<usize>,
-    /// Beginnings of the names of scenes that are shuffled.
+    /// Beginnings of the names of scenes to shuffle.
     scenes: Vec<String>,
-    /// Bars not met, met and unknown.
+    /// Number of bars missed, met and unknown.
     n: [usize; 3],
 }
 
@@ -137,7 +137,7 @@ impl Figures {
         self.print(row, scene, Some(f64::from(u8::from(ok))), "= 1", Some(ok));
     }
 
-    /// Runs the command `enfilade` under GNU time, for at most so many seconds.
+    /// Runs the command `enfilade` under GNU time, for at most `most` seconds.
     fn enfilade(&self, args: &[&str], most: u32) -> anyhow::Result<Ran> {
         let mut timed = Command::new("/usr/bin/time");
         timed.args(["-f", "%e %M", "timeout", &most.to_string()]);
@@ -169,7 +169,7 @@ impl Figures {
     }
 }
 
-/// What came of a command.
+/// The result of a command.
 struct Ran {
     code: Option<i32>,
     seconds: f64,
@@ -178,7 +178,7 @@ struct Ran {
     said: String,
 }
 
-/// Whether a file has these bytes.
+/// Returns `true` if a file has these bytes.
 fn holds(path: &Path, bytes: &[u8]) -> bool {
     std::fs::read(path).is_ok_and(|found| found == bytes)
 }

@@ -1,4 +1,4 @@
-//! Small damages to a file: to its bytes, its numbers and its words.
+//! Small damage to a file: to its bytes, numbers and words.
 
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -9,7 +9,7 @@ use flate2::write::ZlibEncoder;
 
 use super::random::Random;
 
-/// Numbers that are at an end of something, as text.
+/// Extreme numbers, as text.
 const NUMBERS: [&str; 22] = [
     "0",
     "-0",
@@ -35,7 +35,7 @@ const NUMBERS: [&str; 22] = [
     "nan",
 ];
 
-/// The same as 32 bits, whole and floating.
+/// Extreme numbers as 32 bits, integers and floats.
 const WORDS: [u32; 12] = [
     0,
     1,
@@ -51,7 +51,7 @@ const WORDS: [u32; 12] = [
     0x0000_0400,
 ];
 
-/// What stands in the files that are read, and names of files that should not.
+/// Texts that occur in input files, and names of files that should not.
 const TEXTS: [&[u8]; 22] = [
     b"\0",
     b"\xff\xfe",
@@ -77,9 +77,9 @@ const TEXTS: [&[u8]; 22] = [
     b"data:;base64,AAAA",
 ];
 
-/// A damaged copy. The same random numbers damage the same way.
+/// Returns a damaged copy. The same random numbers give the same damage.
 pub(super) fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
-    // Of what is compressed and summed, damage that the sums do not tell is the more interesting.
+    // For compressed files with check sums, damage that the sums do not reveal is more interesting.
     if is_packed(bytes) && random.below(4) > 0 {
         return repacked(bytes, |body| damage(body, random)).unwrap_or_default();
     }
@@ -117,7 +117,7 @@ fn damage_once(bytes: &mut Vec<u8>, random: &mut Random) {
         }
         6 | 7 => {
             let word = random.one_of(&WORDS).to_le_bytes();
-            // Fields are aligned more often than not.
+            // Fields are mostly aligned.
             let at = if random.below(4) > 0 { at & !3 } else { at };
             for (to, from) in bytes[at..].iter_mut().zip(word) {
                 *to = from;
@@ -128,7 +128,7 @@ fn damage_once(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
-/// Puts another number, or one from elsewhere in the file, in the place of the next one.
+/// Replaces the next number by another, or by one from elsewhere in the file.
 fn change_number(bytes: &mut Vec<u8>, random: &mut Random, at: usize) {
     let Some(place) = number_after(bytes, at) else {
         return;
@@ -142,7 +142,7 @@ fn change_number(bytes: &mut Vec<u8>, random: &mut Random, at: usize) {
     bytes.splice(place, new);
 }
 
-/// The first run of digits, signs and points at or after `at` that has a digit.
+/// Returns the first run of digits, signs and points at or after `at` that contains a digit.
 fn number_after(bytes: &[u8], at: usize) -> Option<Range<usize>> {
     let digit = at + bytes[at..].iter().position(u8::is_ascii_digit)?;
     let is_part = |b: &&u8| b.is_ascii_digit() || b"+-.".contains(b);
@@ -151,7 +151,7 @@ fn number_after(bytes: &[u8], at: usize) -> Option<Range<usize>> {
     Some(digit - before..digit + after)
 }
 
-/// Lines change places, or one of them is there twice, or not at all.
+/// Swaps two lines, duplicates one, or removes one.
 fn swap_lines(bytes: &mut Vec<u8>, random: &mut Random, at: usize) {
     let line = |bytes: &[u8], at: usize| {
         let begin = bytes[..at]
@@ -178,12 +178,12 @@ fn swap_lines(bytes: &mut Vec<u8>, random: &mut Random, at: usize) {
     }
 }
 
-/// Evidence and checkpoints: a head of 24 bytes, of which the last 8 are the sum of what follows.
+/// Returns `true` for evidence and checkpoints: a head of 24 bytes, the last 8 of which are the check sum of the rest.
 fn is_packed(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ENFEVID") || bytes.starts_with(b"ENFVCHK")
 }
 
-/// Changes what is compressed, and mends sum and length.
+/// Changes the compressed data, and corrects sum and length.
 fn repacked(bytes: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> std::io::Result<Vec<u8>> {
     let mut body = Vec::new();
     ZlibDecoder::new(&bytes[24..]).read_to_end(&mut body)?;
@@ -202,7 +202,7 @@ fn repacked(bytes: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> std::io::Result<
     Ok(out)
 }
 
-/// Sets the lengths in a GLB's header and before its chunks to what the bytes hold.
+/// Sets the lengths in a GLB's header and before its chunks to those of its bytes.
 fn mend_lengths(bytes: &mut [u8]) {
     if bytes.len() < 28 {
         return;
@@ -236,7 +236,7 @@ mod tests {
         for i in 0..200 {
             assert_eq!(mutated(text, &mut Random(i)), mutated(text, &mut Random(i)));
         }
-        // Nothing to damage is no reason to fail.
+        // Empty input must not fail.
         for i in 0..200 {
             let _ = mutated(b"", &mut Random(i));
         }

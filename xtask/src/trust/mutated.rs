@@ -1,7 +1,7 @@
-//! Damaged files of every kind, given to every command that reads them: each run is done or refused, in time.
+//! Damaged files of every kind, given to every command that reads them: each run succeeds or is rejected, in time.
 //!
-//! Run `i` chooses and damages by random numbers that `i` alone begins, so any run can be repeated. Each runs with little memory
-//! in a folder that holds nothing else; the file and what was said of a run that ended badly are kept.
+//! Random numbers seeded by `i` alone choose and damage the file of run `i`, so any run can be repeated. Each runs
+//! with little memory in a folder of its own; the file and the output of a run that ended badly are kept.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -18,22 +18,22 @@ use super::mutate::mutated;
 use super::random::Random;
 use crate::RELEASE;
 
-/// Runs if no other number is asked for.
+/// Default number of runs.
 pub(super) const COUNT: usize = 20_000;
 
-/// How long a run may take, with one thread: of the processor's time, which a busy machine does not add to. [Units: s]
+/// Limit of processor time of a run with one thread, which a busy machine does not increase. [Units: s]
 const LIMIT: u64 = 20;
 
-/// A run that waits for something takes none of that, and is ended after this. [Units: s]
+/// Limit of wall time, for a run that waits for something. [Units: s]
 const PATIENCE: u64 = 300;
 
 /// Address space of a run. [Units: KiB]
 const MEMORY: u64 = 4 << 20;
 
-/// Runs at a time.
+/// Concurrent runs.
 const AT_ONCE: usize = 2;
 
-/// How a run ends badly; the last: something that the command itself calls a bug, or a world that it cannot read again.
+/// Bad ends of a run; the last: an error that the command calls a bug, or a world that it cannot decode again.
 const ENDS: [&str; 4] = ["panics", "aborts", "hangs", "bugs"];
 
 pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
@@ -84,7 +84,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes the files that are damaged, and sees that every command likes them as they are.
+/// Makes the files to damage, and checks that every command accepts them undamaged.
 fn prepare(clean: &Path) -> anyhow::Result<()> {
     write(clean)?;
     let pass = |line: &str, file: &str| -> anyhow::Result<()> {
@@ -101,14 +101,14 @@ fn prepare(clean: &Path) -> anyhow::Result<()> {
     for Input { file, commands, .. } in &INPUTS {
         for line in *commands {
             pass(line, file)?;
-            // A search that is done removes it.
+            // A finished search removes it.
             std::fs::write(clean.join("grid.search"), &search)?;
         }
     }
     Ok(())
 }
 
-/// One that runs commands, in a folder of its own.
+/// A worker that runs commands in a folder of its own.
 struct Worker<'a> {
     clean: &'a Path,
     finds: &'a Path,
@@ -155,7 +155,7 @@ impl Worker<'_> {
         }
     }
 
-    /// How a run ended badly, and what was said; `None` where it did not.
+    /// Returns how a run ended badly, with its output; `None` if it ended well.
     fn judged(&self, line: &str, file: &str) -> anyhow::Result<Option<(usize, String)>> {
         let out = self.folder.join("out.glb");
         if out.exists() {
@@ -169,7 +169,7 @@ impl Worker<'_> {
             Some(None) => bad("aborts"),
             Some(Some(101)) => bad("panics"),
             Some(Some(_)) if said.contains("(a bug)") => bad("bugs"),
-            // A shell says so of what a signal ended.
+            // A shell's exit code after a signal.
             Some(Some(code)) if code > 128 => bad("aborts"),
             Some(Some(0)) if out.exists() => {
                 let (read, why) = command(&self.folder, "inspect out.glb", "")?;
@@ -182,11 +182,11 @@ impl Worker<'_> {
     }
 }
 
-/// Whether a process was ended because it took too much of the processor's time.
+/// Returns `true` if a process was killed for exceeding its processor time.
 #[cfg(unix)]
 fn is_out_of_time(status: &ExitStatus) -> bool {
     use std::os::unix::process::ExitStatusExt as _;
-    // SIGKILL and SIGXCPU, on all of them.
+    // SIGKILL and SIGXCPU, the same number on all systems.
     matches!(status.signal(), Some(9 | 24))
 }
 
@@ -195,7 +195,7 @@ fn is_out_of_time(_: &ExitStatus) -> bool {
     false
 }
 
-/// What run `i` damages, how, and who reads it.
+/// Returns the input, command and damaged bytes of run `i`.
 fn choose(clean: &Path, i: usize) -> anyhow::Result<(&'static Input, &'static str, Vec<u8>)> {
     let mut random = Random((i as u64) << 20);
     let mut left = random.below(INPUTS.iter().map(|input| input.weight).sum());
@@ -212,7 +212,7 @@ fn choose(clean: &Path, i: usize) -> anyhow::Result<(&'static Input, &'static st
     Ok((input, line, mutated(&bytes, &mut random)))
 }
 
-/// Runs the command; `None` where it took too long and was ended.
+/// Runs the command; `None` if it took too long and was killed.
 fn command(folder: &Path, line: &str, file: &str) -> anyhow::Result<(Option<ExitStatus>, String)> {
     let line = line.replace('@', file);
     let (args, input) = match line.split_once(" < ") {

@@ -10,12 +10,12 @@ use serde_json::Value;
 use super::Figures;
 use crate::{RELEASE, output_of, run_to_end, scenes_dir};
 
-/// Shuffles of each scene.
+/// Shuffles per scene.
 pub(super) const COUNT: usize = 20;
 
 const METHODS: [&str; 3] = ["watershed", "bsp", "delaunay"];
 
-/// A bake that takes longer is ended, and counts as one that gives nothing. [Units: s]
+/// A bake that takes longer is killed, and counts as a failure. [Units: s]
 const MOST: u32 = 3600;
 
 /// A scene as files.
@@ -35,7 +35,7 @@ impl Subject {
         self.files().map(size).sum()
     }
 
-    /// The same files in a folder.
+    /// Returns the same files in a folder.
     fn within(&self, folder: &Path) -> Self {
         let moved = |file: &PathBuf| folder.join(file.file_name().unwrap_or_default());
         Self {
@@ -46,8 +46,8 @@ impl Subject {
     }
 }
 
-/// By scene and builder, shuffles after which cells or portals are others, and after which any byte is. What is refused must be
-/// refused in any order.
+/// Counts, by scene and builder, shuffles that change cells or portals, and those that change any byte. A rejected
+/// scene must be rejected in any order.
 pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     run_to_end(&mut RELEASE.cargo(
         "build",
@@ -85,8 +85,8 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The folders with a scene in the folder of real scenes and in the one beside it with a 2 at its end, and single files in folders
-/// without; the small ones first.
+/// Returns the scene folders in the folder of real scenes and in the one beside it whose name ends in 2, and single
+/// files in folders without; the small ones first.
 fn subjects(asked: &[String]) -> anyhow::Result<Vec<Subject>> {
     let first = scenes_dir().context("no real scenes: set ENFILADE_SCENES to their folder")?;
     let mut second = first.clone().into_os_string();
@@ -139,7 +139,7 @@ fn list(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// What came of a bake; nothing where it was refused.
+/// The result of a bake; empty if it was rejected.
 struct Baked {
     bytes: Option<Vec<u8>>,
     /// Cells and portals.
@@ -148,7 +148,7 @@ struct Baked {
 
 fn bake(rows: &Figures, subject: &Subject, method: &str) -> anyhow::Result<Baked> {
     let world = rows.path("order.glb");
-    // What is left of another bake is none of this one.
+    // Remove the output of an earlier bake.
     let _ = std::fs::remove_file(&world);
     let mut args = vec![
         "bake",

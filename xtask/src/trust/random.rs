@@ -1,4 +1,4 @@
-//! Random numbers that are the same every time.
+//! Deterministic random numbers.
 
 /// SplitMix64.
 pub(super) struct Random(pub(super) u64);
@@ -12,12 +12,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In `0..1`.
+    /// Returns a number in `0..1`.
     pub(super) fn next(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// In `0..n`; 0 where `n` is 0.
+    /// Returns a number in `0..n`; 0 if `n` is 0.
     pub(super) fn below(&mut self, n: usize) -> usize {
         (self.bits() >> 32) as usize % n.max(1)
     }

@@ -1,4 +1,4 @@
-//! Scenes of shapes that no building has, small as files and hard to bake.
+//! Scenes of unusual shapes, small as files and hard to bake.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -7,7 +7,7 @@ use super::random::Random;
 
 pub(super) type Triangle = [[f64; 3]; 3];
 
-/// Forty scenes of at most 2,000 triangles, but for a few with copies and dust.
+/// Returns forty scenes of at most 2,000 triangles, except a few with copies and dust.
 pub(super) fn scenes() -> Vec<(&'static str, String)> {
     let mut random = Random(7);
     let mut all = Vec::new();
@@ -70,7 +70,7 @@ pub(super) fn scenes() -> Vec<(&'static str, String)> {
     all
 }
 
-/// Shapes that came up in attacks, in several sizes.
+/// Adds shapes from attacks, in several sizes.
 fn more(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     for (name, n, edge, size) in [
         ("confetti 500 of 6 m", 500, 6.0, 20.0),
@@ -112,7 +112,7 @@ fn more(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     thin(random, all);
 }
 
-/// Shapes that are built like rooms, but for their sizes.
+/// Adds shapes that are built like rooms, except for their sizes.
 fn built(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     for (name, n) in [("balls 12", 12), ("balls 3", 3)] {
         let balls = (0..n).flat_map(|_| ball(random.point(6.0), 1.0 + 2.0 * random.next(), 12));
@@ -150,7 +150,7 @@ fn built(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     }
 }
 
-/// Sheets, needles and slits.
+/// Adds sheets, needles and slits.
 fn thin(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     let comb = (0..400).flat_map(|i| {
         let x = 0.05 * f64::from(i);
@@ -229,7 +229,7 @@ fn thin(random: &mut Random, all: &mut Vec<(&'static str, String)>) {
     ));
 }
 
-/// A triangle with edges up to `edge` about a place in a box.
+/// Returns a triangle with edges up to `edge` at a random place in a box.
 fn scrap(random: &mut Random, edge: f64, size: f64) -> Triangle {
     let at = random.point(size);
     [0; 3].map(|_| {
@@ -238,7 +238,7 @@ fn scrap(random: &mut Random, edge: f64, size: f64) -> Triangle {
     })
 }
 
-/// Turned about a point, axis by axis.
+/// Returns triangles rotated about a point, axis by axis.
 fn turned(triangles: Vec<Triangle>, about: [f64; 3], angles: [f64; 3]) -> Vec<Triangle> {
     let turn = |p: [f64; 3]| {
         let mut p = [0, 1, 2].map(|k| p[k] - about[k]);
@@ -252,7 +252,7 @@ fn turned(triangles: Vec<Triangle>, about: [f64; 3], angles: [f64; 3]) -> Vec<Tr
     triangles.into_iter().map(|t| t.map(turn)).collect()
 }
 
-/// A ball of `2 n²` triangles.
+/// Returns a ball of `2 n²` triangles.
 fn ball(middle: [f64; 3], radius: f64, n: i32) -> Vec<Triangle> {
     let at = |i: i32, j: i32| {
         let (s, c) = (PI * f64::from(i) / f64::from(n)).sin_cos();

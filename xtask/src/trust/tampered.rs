@@ -1,6 +1,6 @@
-//! Falsified worlds: each kind of tampering at three places of four scenes, and whether `verify` finds it by default.
+//! Tampered worlds: each kind of tampering at three places of four scenes, and the rate at which `verify` finds it.
 //!
-//! The lies, and where they are, are the test kit's (`tamper`), which tests use, too; the benchmarks apply it.
+//! Kinds and places come from the test kit (`tamper`), as in tests; the benchmarks apply them.
 
 use std::process::Command;
 
@@ -10,10 +10,11 @@ use serde_json::Value;
 use super::Figures;
 use crate::{RELEASE, output_of, run_to_end, scenes};
 
-/// Real buildings, of three programs.
+/// Real buildings, from three programs.
 const SCENES: [&str; 3] = ["samplehouse4", "duplex", "fzk-haus"];
 
-/// A row a kind and scene: places at which it is found, all of them where `ok`; unknown where a scene has no such place.
+/// Prints a row per kind and scene: places at which it is found, all of them if `ok`; unknown if a scene has no such
+/// place.
 pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-bench"]))?;
     let mut command = Command::new(RELEASE.binary("enfilade-bench"));

@@ -1,4 +1,4 @@
-//! How long `pvs --parts` takes, beside an earlier build of the command.
+//! Time of `pvs --parts`, compared with an earlier build of the command.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,12 +8,12 @@ use anyhow::Context;
 use super::Figures;
 use crate::RELEASE;
 
-/// Where the earlier build is.
+/// Path of the earlier build.
 const BEFORE: &str = "ENFILADE_BEFORE";
 
 const SCENES: [&str; 3] = ["institute", "kit-edc", "clinic"];
 
-/// Most processor seconds for each that the earlier build takes.
+/// Largest ratio of its processor time to that of the earlier build.
 const MOST: f64 = 2.0;
 
 pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
@@ -40,7 +40,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What it takes to find all parts that are seen in a world, on one thread.
+/// Returns the time to find all visible parts of a world, on one thread. [Units: s]
 fn user_seconds(rows: &Figures, binary: &Path, world: &str) -> anyhow::Result<f64> {
     let mut timed = Command::new("/usr/bin/time");
     timed.args(["-f", "%U"]).arg(binary);

@@ -1,4 +1,4 @@
-//! Whether doors know their leaves: each has one, shut it hides what is behind, and no picture shows less for it.
+//! Doors and their leaves: each door has one, shut leaves hide the rooms behind, and culling loses no pixel.
 
 use enfilade::cpg::{PortalId, PortalKind, World};
 use enfilade::runtime::{Sight, SightState, View, Viewer};
@@ -11,7 +11,7 @@ use crate::rows::Figure;
 /// Views in random states of doors, and the size of their pictures.
 const VIEWS: usize = 1000;
 const SIZE: [u32; 2] = [320, 240];
-/// How far before a shut door one stands. [Units: wu]
+/// Distance of the eye from a shut door. [Units: wu]
 const BEFORE: f32 = 0.6;
 
 fn doors(world: &World) -> Vec<PortalId> {
@@ -20,7 +20,7 @@ fn doors(world: &World) -> Vec<PortalId> {
     doors.map(|(id, _)| id).collect()
 }
 
-/// Doors that know no leaf.
+/// Counts doors without a leaf.
 pub(super) fn without_leaf(world: &World) -> anyhow::Result<Figure> {
     let sight = Sight::build(world)?;
     let doors = doors(world);
@@ -32,8 +32,8 @@ pub(super) fn without_leaf(world: &World) -> anyhow::Result<Figure> {
     })
 }
 
-/// Sides of doors from which, all doors being shut, another cell is seen, or the leaf is not. Through leaves of glass one may
-/// see.
+/// Counts sides of doors from which, with all doors shut, another cell is visible, or the leaf is not. Excludes
+/// leaves of glass.
 pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
     let sight = Sight::build(world)?;
     let mut state = SightState::new(&sight);
@@ -51,11 +51,11 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
         for (side, cell) in [(-1.0, portal.cells[0]), (1.0, portal.cells[1])] {
             let n = portal.normal.map(|n| n * side);
             let eye = [0, 1, 2].map(|k| middle[k] + BEFORE * n[k]);
-            // Where something else is right before the door, nobody stands.
+            // Skip eyes that are not in the cell, because something else is right before the door.
             if sight.locate(eye) != Some(cell) {
                 continue;
             }
-            // Narrow enough that nothing but the door is in view.
+            // Narrow enough that only the door is in view.
             let view = View::perspective(eye, n.map(|x| -x), [0.0, 1.0, 0.0], 0.3, 1.0)?;
             let seen = viewer.see(&sight, &state, &view);
             let has_leaf = sight
@@ -63,7 +63,7 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
                 .iter()
                 .any(|l| seen.details().contains(&l.detail));
             n_sides += 1;
-            // Outdoors other openings lie behind the wall that the door is in: it hides them, and no portal does.
+            // Outdoors, other openings lie behind the wall with the door; the wall hides them, but only portals cull.
             let n_cells = if world.graph[cell].outdoor {
                 1 + usize::from(seen.portals().contains(&door))
             } else {
@@ -79,13 +79,13 @@ pub(super) fn seen_through(world: &World) -> anyhow::Result<Figure> {
         value: bad.len() as f64,
         most: 0.0,
         note: format!(
-            "of {n_sides} sides of {n_solid} doors that are not of glass show another cell or no leaf; at most {most} cells seen {}",
+            "of {n_sides} sides of {n_solid} doors without glass show another cell or no leaf; at most {most} cells seen {}",
             bad.join(", ")
         ),
     })
 }
 
-/// Pixels that culling loses in random states of doors, by the rule of `verify --views --doors`.
+/// Counts pixels that culling loses in random states of doors, by the rule of `verify --views --doors`.
 pub(super) fn pixels_lost(world: &World) -> anyhow::Result<Figure> {
     let gpu = Gpu::open(&AdapterChoice::Software)?;
     let mut studio = Studio::new(gpu, world)?;

@@ -1,6 +1,6 @@
-//! `bench bring`: what worlds bring to those who use them, figure by figure with its bar.
+//! `bench bring`: the value of worlds to programs and modelers, each figure with its bar.
 //!
-//! A row is a file beside this one and a line in [`ROWS`].
+//! To add a row, add a file beside this one and a line in [`ROWS`].
 
 mod doors;
 mod statistics;

@@ -1,4 +1,4 @@
-//! Whether the statistics for modellers say what is seen: triangles that count as seen from a cell, against those that rays from it reach.
+//! Accuracy of the statistics for modelers: triangles that count as visible from a cell, against those that rays reach.
 
 use enfilade::cpg::{CellId, PartNumbers, SightGraph, VisibleParts, World};
 use enfilade::geom::scene::{Material, Primitive};
@@ -13,19 +13,20 @@ use crate::rows::Figure;
 /// Rays from each cell.
 const RAYS: usize = 100_000;
 
-/// Rays from each cell to each triangle that counts as seen and that those missed.
+/// Rays from each cell to each triangle that counts as visible but that the rays above missed.
 const AIMED: usize = 256;
 
 /// Points tried in a cell's box for each ray.
 const TRIES: usize = 1000;
 
-/// Most seen triangles for each that rays reach.
+/// Largest ratio of visible triangles to those that rays reach.
 const BAR: f64 = 2.0;
 
-/// The mean over cells of the triangles that count as seen, over that of those that rays reach.
+/// Measures the mean over cells of the triangles that count as visible, divided by that of those that rays reach.
 ///
-/// Rays in all directions miss what is small or far, so that even what is truly seen is more than they reach: the note tells
-/// how many triangles rays reach that are aimed at each, below which no answer can go that leaves nothing out.
+/// Rays in all directions miss small or distant triangles, so even the exact visible set is larger. The note contains
+/// the number of triangles that rays aimed at each of them reach, a lower bound for every set that leaves nothing
+/// out.
 pub(super) fn measure(world: &World) -> anyhow::Result<Figure> {
     let walls: Vec<Triangle> = structural_triangles(world)
         .into_iter()
@@ -73,7 +74,7 @@ pub(super) fn measure(world: &World) -> anyhow::Result<Figure> {
         value: seen / f64::max(reached, 1.0),
         most: BAR,
         note: format!(
-            "of {n_all} triangles a cell sees {:.0} on average, {:.0} of whole cells; rays reach {:.0}, rays aimed at each {:.0}",
+            "of {n_all} triangles a cell sees {:.0} on average, {:.0} by whole cells; rays reach {:.0}, rays aimed at each {:.0}",
             seen / n,
             whole / n,
             reached / n,
@@ -88,10 +89,11 @@ fn mark(is_seen: &mut [bool], parts: &VisibleParts, pair: usize) {
     }
 }
 
-/// How many triangles each part has.
+/// Triangle counts of parts.
 struct Sums {
     numbers: PartNumbers,
-    /// By detail object the triangles before it, and then those of all; each primitive's by object.
+    /// For each detail object, the number of triangles of those before it, and last that of all; each primitive's by
+    /// object.
     first: Vec<usize>,
 }
 
@@ -114,7 +116,7 @@ impl Sums {
         walls.iter().filter(|&&w| w).count() + objects.sum::<usize>()
     }
 
-    /// All triangles in world space, each with its part and its place among the marks of hits.
+    /// Returns all triangles in world space, each with its part and its index among the marks of hits.
     fn triangles(&self, world: &World) -> Vec<(usize, usize, Triangle)> {
         let mut all = Vec::new();
         for (i, batch) in world.batches.iter().enumerate() {
@@ -135,7 +137,7 @@ impl Sums {
         all
     }
 
-    /// Marks all that is in a cell.
+    /// Marks all parts in a cell.
     fn mark_cell(&self, is_in: &mut [bool], world: &World, cell: CellId) {
         for (i, batch) in world.batches.iter().enumerate() {
             if batch.cells.contains(&cell) {
@@ -169,7 +171,8 @@ struct Rays<'a> {
 }
 
 impl Rays<'_> {
-    /// The triangles that rays from random points of a cell in random directions reach, what is behind glass included.
+    /// Returns the triangles, those behind glass included, that rays from random points of a cell in random
+    /// directions reach.
     fn reached(&self, cell: CellId, sums: &Sums) -> Vec<bool> {
         let mut is_hit = vec![false; sums.first[sums.first.len() - 1]];
         let mut rng = Rng::new(u64::from(cell.0));
@@ -188,7 +191,7 @@ impl Rays<'_> {
         is_hit
     }
 
-    /// Marks the triangles that count as seen and that rays to random points of each reach.
+    /// Marks the visible triangles that rays aimed at random points of them reach.
     fn aim(&self, cell: CellId, sums: &Sums, is_seen: &[bool], is_hit: &mut [bool]) {
         let mut rng = Rng::new(!u64::from(cell.0));
         for (part, triangle, corners) in sums.triangles(self.world) {
@@ -212,7 +215,7 @@ impl Rays<'_> {
         }
     }
 
-    /// A random point of a cell; `None` where none is found.
+    /// Returns a random point of a cell; `None` if none is found.
     fn point_in(&self, cell: CellId, rng: &mut Rng) -> Option<[f32; 3]> {
         let [low, high] = self.world.graph.cells[cell.idx()].aabb;
         let mut inside =

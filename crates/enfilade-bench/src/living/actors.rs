@@ -1,7 +1,7 @@
-//! Actors far and near: that who is where does not depend on who looks, and what a frame of many costs.
+//! Actors near and far: their state does not depend on the camera; and the cost of a frame with many.
 //!
-//! People in generated offices without an outdoors go to one of 64 rooms, by the middles of openings, stay, and go on. What a
-//! camera perceives is all within three portals of its cell.
+//! People in generated offices without an outdoors walk to one of 64 rooms through the centers of openings, stay, and
+//! walk on. The camera perceives everything within three portals of its cell.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -20,19 +20,19 @@ use crate::rows::Figure;
 const ACTORS: u32 = 100_000;
 const PLACES: u32 = 64;
 const SEED: u64 = 5;
-/// Of frames a second.
+/// Frames per second.
 const RATE: f64 = 60.0;
-/// No exit.
+/// Marks the absence of an exit.
 const NONE: u8 = u8::MAX;
 
-/// Rooms, and from each the way to some places.
+/// Rooms, and the path from each to some places.
 struct Town {
     layout: Layout,
     places: Vec<CellId>,
-    /// By exit of cell: the point of the opening, and the cell behind it; where each cell's begin.
+    /// For each exit of each cell, the point of the opening and the cell behind it; and where each cell's exits begin.
     hops: Vec<(DVec3, CellId)>,
     first: Vec<u32>,
-    /// By place and cell: which exit of it is the next; [`NONE`] at the place, and from where there is no way.
+    /// For each place and cell, the index of the next exit; [`NONE`] at the place, and where there is no path.
     next: Vec<Vec<u8>>,
     pvs: Pvs,
 }
@@ -132,7 +132,7 @@ impl Town {
         }
     }
 
-    /// The cell of a camera that strolls.
+    /// Returns the next cell of a strolling camera.
     fn stroll(&self, eye: CellId, rng: &mut Rng) -> CellId {
         let exits = self.layout.exits(eye);
         if exits.is_empty() || rng.chance(0.02) {
@@ -142,7 +142,7 @@ impl Town {
     }
 }
 
-/// Of all places, to the bit.
+/// Returns a hash of all positions, exact to the bit.
 fn hash(actors: &Actors) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for id in 0..actors.len() as u32 {
@@ -158,7 +158,7 @@ fn hash(actors: &Actors) -> u64 {
     hash
 }
 
-/// An actor that every frame steps.
+/// An actor stepped in every frame.
 struct Stepped {
     at: DVec3,
     cell: CellId,
@@ -204,7 +204,7 @@ impl Stepped {
     }
 }
 
-/// Camera walks after which somebody is elsewhere, and actors that are not where stepping them takes them.
+/// Counts camera walks that change any actor's state, and actors whose state differs from that of stepping every frame.
 pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
     const WALKS: u64 = 100;
     const END: f64 = 300.0;
@@ -255,19 +255,19 @@ pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
         value: (n_other + n_off) as f64,
         most: 0.0,
         note: format!(
-            "of {WALKS} camera walks of {n_frames} frames in all, {n_other} have another state of {ACTORS} actors after {END} s; \
-             {n_off} actors are not where stepping all through every frame takes them, to the bit; that takes {stepping:.0} µs a frame"
+            "of {WALKS} camera walks of {n_frames} frames in all, {n_other} end with another state of {ACTORS} actors after {END} s; \
+             {n_off} actors differ, to the bit, from stepping all of them every frame, which takes {stepping:.0} µs a frame"
         ),
     })
 }
 
-/// Microseconds a frame of all actors: time goes by, cells wake, those who are in them are placed.
+/// Measures a frame of all actors: time advances, cells wake, actors in them are placed. [Units: µs]
 pub(super) fn cost(scene: &str) -> anyhow::Result<Figure> {
     const FRAMES: usize = 3600;
     let town = Town::new(scene)?;
     let mut actors = town.populate();
     let mut plans = town.plans();
-    // Past the first minutes, in which all set out at once.
+    // After the first minutes, in which all actors start at once.
     let begin = 600.0;
     actors.advance(begin, &mut plans);
     let mut awake = AwakeCells::new(town.layout.n_cells(), 3.0);
@@ -275,7 +275,7 @@ pub(super) fn cost(scene: &str) -> anyhow::Result<Figure> {
     let mut eye = CellId(17);
     let (mut times, mut advancing, mut n_updates, mut n_awake) = (Vec::new(), Vec::new(), 0, 0);
     for frame in 0..FRAMES {
-        // From room to room every three seconds.
+        // Into another room every three seconds.
         if frame % 180 == 0 {
             eye = town.stroll(eye, &mut rng);
         }
@@ -299,11 +299,11 @@ pub(super) fn cost(scene: &str) -> anyhow::Result<Figure> {
     times.sort_by(f64::total_cmp);
     advancing.sort_by(f64::total_cmp);
     Ok(Figure {
-        // The middle: on a machine that others use, the mean tells how often they took over.
+        // The median: on a shared machine, the mean measures the interruptions.
         value: times[FRAMES / 2],
         most: 50.0,
         note: format!(
-            "µs a frame in the middle, {:.1} of them for time to go by; {mean:.1} in the mean, 99 in 100 below {:.1}; {ACTORS} actors in {} rooms, of whom {:.0} a frame change their room or plan and {:.0} are awake",
+            "µs per frame in the median, {:.1} of them to advance time; mean {mean:.1}, 99th percentile {:.1}; {ACTORS} actors in {} rooms, {:.0} of which change room or plan each frame and {:.0} are awake",
             advancing[FRAMES / 2],
             times[FRAMES * 99 / 100],
             town.layout.n_cells(),

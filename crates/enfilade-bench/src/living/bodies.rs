@@ -1,9 +1,9 @@
-//! Casts of bodies: what trying every reachable triangle meets and casts miss, how many triangles are tried, and how long it
-//! takes; the last two beside `parry3d` with one mesh of the whole world.
+//! Casts of bodies: impacts that casts miss, compared with a test of every reachable triangle; and the number of
+//! triangles tested and the time, compared with `parry3d` on one mesh of the whole world.
 //!
-//! Bodies are spheres, standing capsules and turned boxes of 0.1 to 0.5 m, free at their start, anywhere in rooms; they move in
-//! all directions, by 5 cm to 10 m, short ways as often as long ones in the logarithm. Leaves of doors stand as the model has
-//! them, portals are open.
+//! Bodies are spheres, upright capsules and rotated boxes of 0.1 to 0.5 m, free at their start, anywhere in rooms.
+//! They move in random directions by 5 cm to 10 m, uniform in the logarithm. Leaves of doors stand as modeled,
+//! portals are open.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -24,17 +24,17 @@ use parry3d::shape::{Ball, Capsule, Cuboid, Shape, TriMesh};
 use crate::rows::Figure;
 
 const CASTS: usize = 1_000_000;
-/// Bodies that touch more than so much less are free to move. [Units: wu]
+/// Largest penetration of a body that counts as free. [Units: wu]
 const FREE: f64 = 1e-3;
 
-/// The world of generated scenes, by name.
+/// Generates a world by the name of its scene.
 fn made(scene: &str) -> anyhow::Result<World> {
     let n = scene.strip_prefix("offices-").context("offices-N")?;
     let world = room_grid(&GridParams::offices(n.parse()?, 1));
     Ok(with_doors(world, |_| false))
 }
 
-/// A world made ready.
+/// A world prepared for casts.
 struct Site {
     world: World,
     sight: Sight,
@@ -49,7 +49,7 @@ impl Site {
         let layout = Layout::new(world);
         let contacts = Contacts::new(world, &sight, &layout);
         let mut state = SightState::new(&sight);
-        // Doors that stand as the model has them are shut mostly; half of them are opened.
+        // Most doors are shut as modeled; open half of them.
         for portal in world.graph.portal_ids().filter(|p| p.0 % 2 == 0) {
             state.open(portal);
         }
@@ -62,7 +62,7 @@ impl Site {
         })
     }
 
-    /// A free body in some room, and a way to go.
+    /// Returns a free body in some room, and a motion.
     fn any(&self, rng: &mut Rng, caster: &mut Caster) -> Way {
         loop {
             let kind = rng.below(10);
@@ -120,7 +120,7 @@ impl Site {
         (0..n).map(|_| self.any(&mut rng, &mut caster)).collect()
     }
 
-    /// The triangles of an object where it stands.
+    /// Returns the triangles of an object in the world.
     fn of_detail(&self, id: DetailId) -> impl Iterator<Item = Triangle> + '_ {
         let object = &self.world[id];
         let pose = self.state.pose(id).unwrap_or(DMat4::IDENTITY);
@@ -133,7 +133,7 @@ impl Site {
         })
     }
 
-    /// All triangles of the world, each once.
+    /// Returns all triangles of the world, each once.
     fn mesh(&self) -> anyhow::Result<TriMesh> {
         let mut all: Vec<Triangle> = Vec::new();
         for batch in self.world.batches.iter().filter(|b| !b.cells.is_empty()) {
@@ -176,7 +176,7 @@ fn grown(body: &Body, margin: f64) -> Body {
     grown
 }
 
-/// Obstacles and openings of each cell, with the boxes around them, for trying all.
+/// Obstacles and openings of each cell with their boxes, for exhaustive tests.
 struct Brute {
     obstacles: Vec<Vec<(Aabb, Triangle)>>,
     openings: Vec<Vec<(CellId, Aabb, Triangle)>>,
@@ -218,7 +218,7 @@ impl Brute {
         }
     }
 
-    /// Whether a body touches, more than by `margin`, some reachable triangle on its way before `until`.
+    /// Returns `true` if a body penetrates some reachable triangle by more than `margin` on its way before `until`.
     fn touches_before(&self, way: &Way, until: f64, margin: f64) -> bool {
         let body = grown(&way.body, -margin);
         let mut since: Vec<(CellId, f64)> = vec![(way.cell, 0.0)];
@@ -251,7 +251,7 @@ impl Brute {
     }
 }
 
-/// How far a body is from a triangle; at most 0 where it touches.
+/// Returns the distance of a body from a triangle; at most 0 if it touches.
 fn gap(body: &Body, at: DVec3, t: &Triangle) -> f64 {
     match *body {
         Body::Sphere { radius } => closest_point_on_triangle(at, t).distance(at) - radius,
@@ -287,8 +287,8 @@ fn gap(body: &Body, at: DVec3, t: &Triangle) -> f64 {
     }
 }
 
-/// The first time between two that a body touches a triangle: its gap is a convex function of time, so the least is found by
-/// sections, and the first zero before that by halving.
+/// Returns the first time in a range at which a body touches a triangle. Its gap is a convex function of time, so
+/// golden sections find the minimum, and bisection the first zero before it.
 fn first_touch(body: &Body, way: &Way, times: [f64; 2], t: &Triangle) -> Option<f64> {
     let gap_at = |s: f64| gap(body, way.from + way.by * s, t);
     let [since, until] = times;
@@ -297,7 +297,7 @@ fn first_touch(body: &Body, way: &Way, times: [f64; 2], t: &Triangle) -> Option<
         return Some(low);
     }
     let end = gap_at(high);
-    // Still nearing at the end without touching, or on the way off from the start.
+    // Still approaching at the end without touching, or receding from the start.
     let step = (high - low) * 1e-6;
     if end > 0.0 && (gap_at(high - step) > end || gap_at(low + step) > gap_at(low)) {
         return None;
@@ -330,7 +330,7 @@ fn first_touch(body: &Body, way: &Way, times: [f64; 2], t: &Triangle) -> Option<
     Some(after)
 }
 
-/// Casts that miss, or meet late, what trying every reachable triangle meets.
+/// Counts casts that miss an impact of the exhaustive test, or report it late.
 pub(super) fn missed(world: &World) -> anyhow::Result<Figure> {
     let site = &Site::new(world)?;
     let brute = &Brute::new(site);
@@ -346,12 +346,12 @@ pub(super) fn missed(world: &World) -> anyhow::Result<Figure> {
                     let way = site.any(&mut rng, &mut caster);
                     let impact = site.cast(&mut caster, &way);
                     let t = impact.map_or(1.0, |i| i.t);
-                    // Deeper than a micrometer, or what the layout allows for.
+                    // Deeper than a micrometer, or than the layout's tolerance.
                     let margin = 1e-6_f64.max(site.layout.tolerance());
                     let is_missed = brute.touches_before(&way, t, margin);
                     n_missed.fetch_add(u64::from(is_missed), Ordering::Relaxed);
                     n_impacts.fetch_add(u64::from(impact.is_some()), Ordering::Relaxed);
-                    // And there is something where it says.
+                    // The reported impact must touch something.
                     let at = way.from + way.by * t;
                     let is_off = impact.is_some_and(|i| {
                         let cell = brute.obstacles[i.cell.idx()].iter();
@@ -375,7 +375,7 @@ pub(super) fn missed(world: &World) -> anyhow::Result<Figure> {
     })
 }
 
-/// A body as the peer has it.
+/// Converts a body for the peer.
 fn peer(body: &Body) -> (Box<dyn Shape>, Pose) {
     match *body {
         Body::Sphere { radius } => (Box::new(Ball::new(radius as f32)), Pose::IDENTITY),
@@ -406,7 +406,7 @@ fn peer_pose(way: &Way, own: Pose) -> Pose {
     }
 }
 
-/// Triangles that the peer tries: the same as its own cast on a mesh, counted.
+/// Counts the triangles that the peer tests in a cast on a mesh.
 fn peer_candidates(mesh: &TriMesh, way: &Way) -> u64 {
     let (shape, own) = peer(&way.body);
     let (pose, by) = (peer_pose(way, own), vector(way.by));
@@ -432,7 +432,7 @@ fn peer_candidates(mesh: &TriMesh, way: &Way) -> u64 {
     n.get()
 }
 
-/// Triangles tried by casts, beside those that the peer tries.
+/// Compares the triangles that casts test with those of the peer.
 pub(super) fn candidates(world: &World) -> anyhow::Result<Figure> {
     let site = Site::new(world)?;
     let mesh = site.mesh()?;
@@ -460,7 +460,7 @@ pub(super) fn candidates(world: &World) -> anyhow::Result<Figure> {
     })
 }
 
-/// Time of casts, beside that of the peer.
+/// Compares the time of casts with that of the peer.
 pub(super) fn time(world: &World) -> anyhow::Result<Figure> {
     let site = Site::new(world)?;
     let mesh = site.mesh()?;

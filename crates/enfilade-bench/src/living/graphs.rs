@@ -1,4 +1,4 @@
-//! Graphs of many cells, without a bake: corridors and rooms of a tower, and streets of a city.
+//! Graphs of many cells, without a bake: corridors and rooms of a tower, streets of a city.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use enfilade::geom::DVec3;
 use enfilade::world::Layout;
 use enfilade_testkit::{OpeningKind, Rng, Side, TowerParams, office_tower};
 
-/// The graph of a scene's name: the middles of its cells, and the layout.
+/// Returns the named graph: the centers of its cells, and the layout.
 pub(super) fn graph(name: &str) -> anyhow::Result<(Vec<DVec3>, Layout)> {
     match name {
         "tower-1500" => Ok(tower()),
@@ -18,7 +18,8 @@ pub(super) fn graph(name: &str) -> anyhow::Result<(Vec<DVec3>, Layout)> {
     }
 }
 
-/// The graph by which a tower of 1,500 rooms was generated: rooms along corridors, stairwells. Doors and openings.
+/// Returns the graph from which a tower of 1,500 rooms is generated: rooms along corridors, stairwells, doors,
+/// openings.
 fn tower() -> (Vec<DVec3>, Layout) {
     let params = TowerParams {
         furniture: false,
@@ -43,7 +44,8 @@ fn tower() -> (Vec<DVec3>, Layout) {
     layout(middles.collect(), &portals.collect::<Vec<_>>())
 }
 
-/// Streets after the city of Gjørup 1999, §3.3.4: crossings joined by streets of several segments, each a cell; `n_cells` in all.
+/// Returns streets after the city of Gjørup 1999, §3.3.4: crossings joined by streets of several segments, each a cell;
+/// `n_cells` in all.
 fn city(n_cells: usize, n_crossings: usize, seed: u64) -> (Vec<DVec3>, Layout) {
     let mut rng = Rng::new(seed);
     let along = (n_crossings as f64).sqrt().round() as usize;
@@ -57,7 +59,7 @@ fn city(n_cells: usize, n_crossings: usize, seed: u64) -> (Vec<DVec3>, Layout) {
     for i in 0..n_nodes {
         let right = (i % along + 1 < along).then_some(i + 1);
         let down = Some(i + along).filter(|&j| j < n_nodes);
-        // Some blocks are joined.
+        // Some blocks are merged.
         streets.extend(
             [right, down]
                 .into_iter()
@@ -84,7 +86,7 @@ fn city(n_cells: usize, n_crossings: usize, seed: u64) -> (Vec<DVec3>, Layout) {
     layout(middles, &portals)
 }
 
-/// Rooms side by side, most with doors to all sides: nothing of it is a chain.
+/// Returns rooms side by side, most with doors to all sides: no part of it is a chain.
 fn lattice(n_cells: usize) -> (Vec<DVec3>, Layout) {
     let mut rng = Rng::new(3);
     let along = (n_cells as f64).sqrt().ceil() as usize;
@@ -103,7 +105,7 @@ fn lattice(n_cells: usize) -> (Vec<DVec3>, Layout) {
     layout(middles, &portals)
 }
 
-/// A layout of cells that have no walls: portals of 1 m².
+/// Returns a layout of cells without walls: portals of 1 m².
 fn layout(middles: Vec<DVec3>, portals: &[([usize; 2], DVec3)]) -> (Vec<DVec3>, Layout) {
     let mut of_cell: BTreeMap<usize, Vec<PortalId>> = BTreeMap::new();
     let mut made = Vec::new();

@@ -1,6 +1,6 @@
-//! `bench living`: what lives in worlds, figure by figure with its bar.
+//! `bench living`: things that live in worlds, each figure with its bar.
 //!
-//! A row is a file beside this one and a line in [`ROWS`].
+//! To add a row, add a file beside this one and a line in [`ROWS`].
 
 mod actors;
 mod bodies;
@@ -16,7 +16,7 @@ use crate::rows::{Figure, Measure, Row};
 
 /// Graphs of 1,500 cells.
 const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
-/// Those of them that contract.
+/// Those of the graphs that contract.
 const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
 pub(crate) const ROWS: &[Row] = &[

@@ -1,4 +1,4 @@
-//! Rows of paths: distances between all cells, how small their table is, how fast hops and flips are; walked lengths beside Recast.
+//! Paths: distances between all cells, size of their table, time of hops and flips; lengths of walks beside Recast.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -16,7 +16,7 @@ use enfilade_testkit::{GridParams, Rng, room_grid};
 use super::graphs::graph;
 use crate::rows::Figure;
 
-/// Times that something is done to time it.
+/// Repetitions of a timed operation.
 const REPEATS: usize = 5;
 
 fn hops(name: &str) -> anyhow::Result<(Layout, Vec<f64>, Hops)> {
@@ -34,7 +34,7 @@ fn hops(name: &str) -> anyhow::Result<(Layout, Vec<f64>, Hops)> {
     Ok((layout, steps, hops))
 }
 
-/// Lengths from a cell to all, in whole tenths of a millimeter.
+/// Returns lengths from a cell to all others, in whole tenths of a millimeter.
 fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -> Vec<u64> {
     let mut lengths = vec![u64::MAX; layout.n_cells()];
     let mut heap = BinaryHeap::from([Reverse((0, from.0))]);
@@ -48,8 +48,8 @@ fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -
     lengths
 }
 
-/// Pairs of cells whose distance is not that of Dijkstra's algorithm on all cells, or whose next portal leads elsewhere: after
-/// making, and after doors were flipped by chance.
+/// Counts pairs of cells whose distance differs from Dijkstra's algorithm on all cells, or whose next portal leads
+/// elsewhere: initially, and after random flips of doors.
 pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
     let (layout, steps, mut hops) = hops(name)?;
     let mut rng = Rng::new(1);
@@ -87,7 +87,7 @@ pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Junctions by cells.
+/// Measures junctions per cell.
 pub(super) fn contraction(name: &str) -> anyhow::Result<Figure> {
     let (layout, _, hops) = hops(name)?;
     let (n, of) = (hops.n_junctions(), layout.n_cells());
@@ -101,14 +101,14 @@ pub(super) fn contraction(name: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Nanoseconds to the next portal, for pairs of cells by chance.
+/// Measures the time to find the next portal, for random pairs of cells. [Units: ns]
 pub(super) fn next_hop(name: &str) -> anyhow::Result<Figure> {
     let (layout, _, hops) = hops(name)?;
     let mut rng = Rng::new(2);
     let mut cell = || CellId(rng.below(layout.n_cells()) as u32);
     let pairs: Vec<[CellId; 2]> = (0..1 << 16).map(|_| [cell(), cell()]).collect();
     let mut least = f64::INFINITY;
-    // The table is larger than what is near a processor: others on the machine slow most of them down.
+    // The table exceeds the processor's caches: other programs slow most repetitions down.
     for _ in 0..20 * REPEATS {
         let start = Instant::now();
         for &[from, to] in &pairs {
@@ -123,10 +123,10 @@ pub(super) fn next_hop(name: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Milliseconds of each flip of all doors, and the number of junctions.
+/// Measures each flip of every door, and returns the number of junctions. [Units: ms]
 fn flips(name: &str) -> anyhow::Result<(Vec<f64>, usize)> {
     let (layout, _, mut hops) = hops(name)?;
-    // Of each flip the quickest of several: what another program takes is none of its.
+    // The fastest of several repetitions of each flip, to exclude time of other programs.
     let mut least = vec![f64::INFINITY; 2 * layout.n_portals()];
     for _ in 0..REPEATS {
         for (i, least) in least.iter_mut().enumerate() {
@@ -138,7 +138,7 @@ fn flips(name: &str) -> anyhow::Result<(Vec<f64>, usize)> {
     Ok((least, hops.n_junctions()))
 }
 
-/// The slowest flip and the mean, with a note.
+/// Returns the slowest flip and the mean, with a note.
 fn slowest_and_mean(name: &str) -> anyhow::Result<(f64, f64, String)> {
     let (flips, n_junctions) = flips(name)?;
     let slowest = flips.iter().copied().fold(0.0, f64::max);
@@ -149,7 +149,7 @@ fn slowest_and_mean(name: &str) -> anyhow::Result<(f64, f64, String)> {
     Ok((slowest, mean, note))
 }
 
-/// Milliseconds of the slowest flip of all doors.
+/// Measures the slowest flip of all doors. [Units: ms]
 pub(super) fn door_flip(name: &str) -> anyhow::Result<Figure> {
     let (value, _, note) = slowest_and_mean(name)?;
     Ok(Figure {
@@ -159,7 +159,7 @@ pub(super) fn door_flip(name: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Milliseconds of a flip on average, where hardly a cell leaves the table.
+/// Measures the mean flip where hardly a cell leaves the table. [Units: ms]
 pub(super) fn mean_flip(name: &str) -> anyhow::Result<Figure> {
     let (_, value, note) = slowest_and_mean(name)?;
     Ok(Figure {
@@ -169,7 +169,7 @@ pub(super) fn mean_flip(name: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Milliseconds of a length search through 1,000 rooms, to all portals, with one point in each.
+/// Measures a length search through 1,000 rooms, to all portals, with one point in each. [Units: ms]
 pub(super) fn search(_: &str) -> anyhow::Result<Figure> {
     let params = GridParams {
         outdoors: false,
@@ -191,7 +191,7 @@ pub(super) fn search(_: &str) -> anyhow::Result<Figure> {
     times.sort_by(f64::total_cmp);
     Ok(Figure {
         value: times[0],
-        // What 64 sources have that take 5 µs each.
+        // The budget of 64 sources at 5 µs each.
         most: 0.32,
         note: format!(
             "ms with one point a portal; {:.2} ms with ten; {} portals",
@@ -201,11 +201,11 @@ pub(super) fn search(_: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Pairs of points and Recast's lengths, made by `scripts/recast_lengths.mjs`.
+/// Pairs of points and Recast's lengths, generated by `scripts/recast_lengths.mjs`.
 const INSTITUTE: &str = include_str!("../../peers/recast-institute.csv");
 const DUNGEON: &str = include_str!("../../peers/recast-dungeon.csv");
 
-/// Our length by Recast's where both find a way, of the worst pair and on average.
+/// Compares our lengths with Recast's where both find a path: the worst pair and the mean.
 fn lengths(world: &World, pairs: &str) -> anyhow::Result<Figure> {
     let layout = Layout::new(world);
     let start = Instant::now();

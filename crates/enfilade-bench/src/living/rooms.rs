@@ -1,4 +1,4 @@
-//! Rooms that move: passings of doors, what is seen at a pose, lamps, and the cost of a frame.
+//! Moving rooms: crossings of openings, visibility at a pose, lamps, and the cost of a frame.
 
 use std::time::Instant;
 
@@ -15,14 +15,14 @@ use super::things::{offices, random_indoors, random_turn};
 use crate::rows::Figure;
 
 const MOTIONS: usize = 1_000_000;
-/// Straight lines that stand for the curve of a motion.
+/// Straight lines that approximate the curve of a motion.
 const SUB_STEPS: usize = 1024;
-/// Greatest turn of a motion. [Units: rad]
+/// Largest turn of a motion. [Units: rad]
 const MOST_TURN: f64 = 30.0 * std::f64::consts::PI / 180.0;
 
 const POSES: usize = 1000;
 const DEEP: usize = 16;
-/// Of a picture whose pixels are rays.
+/// Size of a picture whose pixels are rays.
 const PICTURE: [usize; 2] = [96, 72];
 
 const LAMPS: usize = 200;
@@ -32,7 +32,7 @@ fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// One room with a window in each wall, 3 to 6 m, times `size`.
+/// Returns a room with a window in each wall, 3 to 6 m, times `size`.
 fn cabin(seed: u64, size: f32, furniture: usize) -> World {
     let world = room_grid(&GridParams {
         size: [1, 1, 1],
@@ -47,7 +47,7 @@ fn vector(rng: &mut Rng, reach: f64) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|_| rng.range(-reach, reach)))
 }
 
-/// Passings that 1,024 straight lines a motion find, and that are not told.
+/// Counts crossings that 1,024 straight lines per motion find and the run-time does not report.
 pub(super) fn passings(_: &str) -> anyhow::Result<Figure> {
     let world = cabin(1, 1.0, 0);
     let mut space = Space::new(&room_grid(&GridParams::two_rooms()))?;
@@ -101,7 +101,7 @@ pub(super) fn passings(_: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Inside an opening by more than a tenth of a millimeter: at its rim, lines and curves differ.
+/// Returns `true` for a point inside an opening by more than 0.1 mm: at its rim, lines and curves differ.
 fn is_inside(opening: &enfilade::world::Opening, q: DVec3) -> bool {
     opening.pieces().any(|piece| {
         (0..piece.len()).all(|i| {
@@ -117,7 +117,7 @@ enum Item {
     Detail(PartId, DetailId),
 }
 
-/// All triangles of all parts where they are, as one model without cells.
+/// Returns all triangles of all parts in their positions, as one model without cells.
 fn model(space: &Space, worlds: &[World]) -> (Bvh, Vec<Item>) {
     let mut triangles: Vec<Triangle> = Vec::new();
     let mut items = Vec::new();
@@ -147,7 +147,8 @@ fn model(space: &Space, worlds: &[World]) -> (Bvh, Vec<Item>) {
     (Bvh::build(&triangles), items)
 }
 
-/// Pixels of views from rooms nested 16 deep whose first hit, in the whole model at that instant, is not in the answer.
+/// Counts pixels of views from rooms nested 16 deep whose first hit, in the whole model at that time, is not in the
+/// answer.
 pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
     let size = |k: usize| 1.6_f32.powi((DEEP - k) as i32);
     let worlds: Vec<World> = (0..=DEEP)
@@ -204,14 +205,14 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
         value: n_lost as f64,
         most: 0.0,
         note: format!(
-            "pixels lost of {n_hits} in {POSES} poses of {DEEP} rooms in one another, each drawn ray by ray from all its triangles; \
+            "pixels lost of {n_hits} in {POSES} poses of {DEEP} nested rooms, each ray-traced against all its triangles; \
              {:.1} rooms a view",
             n_parts as f64 / POSES as f64
         ),
     })
 }
 
-/// A small motion about the middle of where a cabin stands in a larger one.
+/// Returns a small motion around the position of a cabin in the middle of a larger one.
 fn pose_within(rng: &mut Rng, own: &World, host: &World) -> Pose {
     let boxes = [own, host].map(|w| w.graph.cells[0].aabb.map(point));
     let [own, host_middle] = boxes.map(|b| (b[0] + b[1]) * 0.5);
@@ -225,7 +226,7 @@ fn pose_within(rng: &mut Rng, own: &World, host: &World) -> Pose {
     }
 }
 
-/// How far off a point of a room is that moves ten kilometers away, after as many motions. [Units: mm]
+/// Measures the error of a point of a room that moves ten kilometers away, after as many motions. [Units: mm]
 pub(super) fn far(_: &str) -> anyhow::Result<Figure> {
     let worlds = [cabin(5, 1.0, 0), cabin(5, 1.0, 0), cabin(6, 0.3, 0)];
     let mut space = Space::new(&worlds[0])?;
@@ -259,7 +260,7 @@ pub(super) fn far(_: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Points that a lamp reaches in a straight line, and that it does not know of.
+/// Counts points that a lamp reaches in a straight line without the space reporting so.
 pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
     let mut world = offices(scene)?;
     world.details.clear();
@@ -286,14 +287,14 @@ pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
     for _ in 0..SAMPLES {
         let k = rng.below(LAMPS);
         let at = point(lamps[k].at);
-        // Within its range, so that most samples tell something.
+        // Within its range, so that most samples matter.
         let p = at + random_turn(&mut rng) * DVec3::X * f64::from(lamps[k].range) * rng.unit();
         let Some(place) = space.locate(PartId::ROOT, p) else {
             continue;
         };
         let may = lights.may_light(&space, LampId(k as u32), place, p);
         n_known += usize::from(may);
-        // And a little beyond: what lies on a wall, by rounding, may be of either side.
+        // And slightly beyond: by rounding, a point on a wall may be on either side.
         let beyond =
             p + (p - at).normalize_or_zero() * 8.0 * space.layout(PartId::ROOT).tolerance();
         if lines.is_clear(state, lamps[k].at, beyond.as_vec3().to_array()) {
@@ -306,13 +307,14 @@ pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
         value: n_lost as f64,
         most: 0.0,
         note: format!(
-            "of {n_lit} lit samples of {SAMPLES}; {n_known} are said to be lit, {:.2} × as many",
+            "of {n_lit} lit samples of {SAMPLES}; {n_known} are reported as lit, {:.2} × as many",
             n_known as f64 / n_lit as f64
         ),
     })
 }
 
-/// The time of a frame with 10,000 cells over that with 1,000: a lift moves, 200 of 10,000 things move, an eye looks.
+/// Measures the time of a frame with 10,000 cells relative to 1,000: a lift moves, 200 of 10,000 things move, an eye
+/// looks.
 pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
     let [small, large] = [1000, 10_000].map(frame_us);
     let (small, large) = (small?, large?);
@@ -325,7 +327,7 @@ pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Median time of a frame. [Units: µs]
+/// Returns the median time of a frame. [Units: µs]
 fn frame_us(n_cells: usize) -> anyhow::Result<f64> {
     let world = offices(&format!("offices-{n_cells}"))?;
     let mut space = Space::new(&world)?;

@@ -1,4 +1,4 @@
-//! What is heard through portals: lengths, directions, doorways, cost.
+//! Sound through portals: lengths, directions, doorways, cost.
 
 use std::time::Instant;
 
@@ -53,7 +53,8 @@ impl Office {
     }
 }
 
-/// Worst length by the least over all sequences of at most 8 portals, and worst angle of its arrival.
+/// Returns the worst length relative to the least over all sequences of at most 8 portals, and the worst angle of
+/// arrival.
 fn worst(name: &str) -> anyhow::Result<(f64, f64, usize)> {
     let n_seeds = if name == "offices-16" { 20 } else { 5 };
     let (mut length, mut angle, mut n): (f64, f64, usize) = (0.0, 0.0, 0);
@@ -88,7 +89,7 @@ fn worst(name: &str) -> anyhow::Result<(f64, f64, usize)> {
     Ok((length, angle, n))
 }
 
-/// All sequences, cut off by the bound of the string through the portals so far, which the tests hold against `clarabel`.
+/// Searches all sequences, bounded by the string through the portals so far, which tests compare with `clarabel`.
 fn least(
     layout: &Layout,
     (cell, from): (CellId, DVec3),
@@ -136,7 +137,7 @@ pub(super) fn direction(name: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Decibels a centimeter, at most, on walks straight through each doorway.
+/// Measures the largest change of level per centimeter on walks straight through each doorway. [Units: dB/cm]
 fn steepest(site: &Office, note: &str) -> anyhow::Result<Figure> {
     let mut rng = Rng::new(9);
     let (mut value, mut n): (f64, usize) = (0.0, 0);
@@ -167,7 +168,7 @@ fn steepest(site: &Office, note: &str) -> anyhow::Result<Figure> {
     Ok(Figure {
         value,
         most: 0.5,
-        note: format!("dB a centimeter, the most on {n} walks through {note}"),
+        note: format!("dB per centimeter, the largest on {n} walks through {note}"),
     })
 }
 
@@ -179,7 +180,8 @@ pub(super) fn doorway_baked(world: &World) -> anyhow::Result<Figure> {
     steepest(&Office::new(world)?, "portals of all kinds")
 }
 
-/// Coupled rooms against the balance of energy in closed form, and a room alone against Sabine's formula: the worst share off.
+/// Compares coupled rooms with the closed-form balance of energy, and a single room with Sabine's formula: worst
+/// relative error.
 pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
     let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
     let door = layout.opening(PortalId(0)).area();
@@ -217,7 +219,7 @@ pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// Microseconds a source on a walk of steps of 2 cm, searches included, by the bar.
+/// Measures the time per source on a walk in steps of 2 cm, searches included. [Units: µs]
 pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
     let site = Office::offices(1000, 7)?;
     let mut rng = Rng::new(3);

@@ -1,4 +1,5 @@
-//! Things in cells: which cells a shape reaches, against all openings; how long a move takes; what movers cost in Dirkse's maze.
+//! Things in cells: the cells that a shape reaches, tested against all openings; time of a move; cost of movers in
+//! Dirkse's maze.
 
 use std::time::Instant;
 
@@ -15,7 +16,7 @@ use enfilade_testkit::{GridParams, Rng, dirkse_maze, room_grid};
 
 use crate::rows::Figure;
 
-/// Random shapes, and steps of a thing.
+/// Number of random shapes, and of steps of a thing.
 const SHAPES: usize = 1_000_000;
 const STEPS: usize = 10_000_000;
 /// As in Dirkse 2002, section 8.2.
@@ -23,7 +24,7 @@ const SAMPLES: usize = 290;
 const GHOSTS: usize = 4;
 const GHOST_TRIANGLES: f64 = 11_188.0;
 
-/// The world of generated scenes, by name.
+/// Generates a world by the name of its scene.
 pub(super) fn offices(scene: &str) -> anyhow::Result<World> {
     let n = scene.strip_prefix("offices-").context("offices-N")?;
     Ok(room_grid(&GridParams {
@@ -34,7 +35,7 @@ pub(super) fn offices(scene: &str) -> anyhow::Result<World> {
     }))
 }
 
-/// A random point in a cell that is not outdoors.
+/// Returns a random point in a cell that is not outdoors.
 pub(super) fn random_indoors(space: &Space, rng: &mut Rng) -> DVec3 {
     let layout = space.layout(PartId::ROOT);
     loop {
@@ -53,7 +54,8 @@ pub(super) fn random_turn(rng: &mut Rng) -> DQuat {
     DQuat::from_xyzw(one(), one(), one(), one()).normalize()
 }
 
-/// Shapes whose flood reaches other cells than those that the openings which they meet join to their own, by other code.
+/// Counts shapes whose flood differs from the cells that the openings they meet join to their own, computed by other
+/// code.
 pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
     let space = Space::new(&offices(scene)?)?;
     let layout = space.layout(PartId::ROOT);
@@ -73,7 +75,7 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
             Shape::block(&Aabb::new(-half, half))?
         };
         let start = layout.locate(pose.at).context("an air point")?;
-        // What lies within rounding of an opening may count as meeting it or not.
+        // An opening within rounding may count as met or not.
         let margin = 4.0 * layout.tolerance();
         let mut least = joined(layout, half, is_ball, &pose);
         let mut most = joined(layout, half + margin, is_ball, &pose);
@@ -100,7 +102,7 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// The cells, joined where a ball or a box meets an opening between them.
+/// Returns the sets of cells joined by openings that a ball or box meets.
 fn joined(layout: &Layout, half: DVec3, is_ball: bool, pose: &Pose) -> Sets {
     let mut sets = Sets::new(layout.n_cells());
     for portal in (0..layout.n_portals() as u32).map(PortalId) {
@@ -123,7 +125,7 @@ fn joined(layout: &Layout, half: DVec3, is_ball: bool, pose: &Pose) -> Sets {
     sets
 }
 
-/// Whether a turned box meets a polygon: something is left of it between the box's sides.
+/// Returns `true` if a rotated box meets a polygon: a part of it lies between the box's sides.
 fn box_meets(half: DVec3, pose: &Pose, piece: &[DVec3]) -> bool {
     let mut left = Some(Winding::new(piece.to_vec()));
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -142,7 +144,7 @@ fn ball_meets(radius: f64, center: DVec3, piece: &[DVec3]) -> bool {
     })
 }
 
-/// A walk of a thing of 0.3 m: steps after which it is not where the locator says.
+/// Walks a thing of 0.3 m and counts steps after which its cell differs from the locator's.
 pub(super) fn moved(scene: &str) -> anyhow::Result<Figure> {
     let steps = Steps::take(scene)?;
     Ok(Figure {
@@ -155,20 +157,20 @@ pub(super) fn moved(scene: &str) -> anyhow::Result<Figure> {
     })
 }
 
-/// The time of a step after which the cell is the same. [Units: ns]
+/// Measures a step that stays in its cell. [Units: ns]
 pub(super) fn stays(scene: &str) -> anyhow::Result<Figure> {
     let steps = Steps::take(scene)?;
     Ok(Figure {
         value: steps.stay_ns,
         most: 150.0,
         note: format!(
-            "ns a step that stays in its cell; to ask the locator alone takes {:.0} ns; {STEPS} steps",
+            "ns a step that stays in its cell; a query of the locator alone takes {:.0} ns; {STEPS} steps",
             steps.locate_ns
         ),
     })
 }
 
-/// The time of a step into another cell. [Units: ns]
+/// Measures a step into another cell. [Units: ns]
 pub(super) fn crosses(scene: &str) -> anyhow::Result<Figure> {
     let steps = Steps::take(scene)?;
     Ok(Figure {
@@ -201,7 +203,7 @@ impl Steps {
             Pose::from_translation(at),
             Tie::Carried,
         )?;
-        // Where it goes is known beforehand, so that steps alone are timed.
+        // The path is known beforehand, so that only steps are timed.
         let mut way = Vec::with_capacity(STEPS);
         let mut cells = Vec::with_capacity(STEPS);
         let mut heading = DVec3::X;
@@ -232,7 +234,7 @@ impl Steps {
             std::hint::black_box(space.locate(root, *p));
         }
         own.locate_ns = start.elapsed().as_nanos() as f64 / STEPS as f64;
-        // Runs of steps that stay are timed together; a crossing alone, less what the clock takes.
+        // Runs of steps that stay are timed together; a crossing alone, minus the time of the clock.
         let clock = {
             let start = Instant::now();
             for _ in 0..1000 {
@@ -274,14 +276,14 @@ impl Steps {
     }
 }
 
-/// The most of all triangles that a view of the maze processes with four ghosts in it, in percent.
+/// Measures the largest share of all triangles that a view of the maze with four ghosts processes, in percent.
 pub(super) fn maze(_: &str) -> anyhow::Result<Figure> {
     let scene = dirkse_maze(1).scene;
     let context = BakeContext::new(&Silent, None);
     let world = bake(&scene, &BakeConfig::default(), &context)?.world;
     let space = Space::new(&world)?;
     let root = PartId::ROOT;
-    // Triangle by triangle, as Dirkse counts.
+    // One triangle per chunk, as Dirkse counts.
     let by_triangle = SightOptions {
         chunk_triangles: 1,
         ..SightOptions::default()
@@ -308,7 +310,7 @@ pub(super) fn maze(_: &str) -> anyhow::Result<Figure> {
     let mut fine = Viewer::new(sight);
     let (mut most, mut most_whole, mut global, mut own) = (0.0_f64, 0.0_f64, 0.0, 0.0);
     for (i, &(eye, toward)) in steps.iter().enumerate() {
-        // They chase along the same way, each so far behind.
+        // They follow the same path, each at its own distance.
         for (k, &ghost) in ghosts.iter().enumerate() {
             let behind = (i + steps.len() * (2 * k + 1) / (2 * GHOSTS)) % steps.len();
             let at = DVec3::from_array(steps[behind].0.map(f64::from));
@@ -327,7 +329,7 @@ pub(super) fn maze(_: &str) -> anyhow::Result<Figure> {
         let seen = viewer.see(&space, root, &view);
         let n_own = things.see(&space, &seen).len() as f64 * GHOST_TRIANGLES;
         most_whole = most_whole.max((n_frustum + n_global) / all * 100.0);
-        // As Dirkse counts it: the maze and its dots; the ghosts are told apart.
+        // As Dirkse counts: the maze and its dots; ghosts separately.
         most = most.max(n_seen / sight.n_triangles() as f64 * 100.0);
         global += n_global;
         own += n_own;

@@ -1,17 +1,18 @@
-//! How bright the walls of each cell are: radiosity over the graph.
+//! Brightness of the walls of each cell: radiosity over the graph.
 //!
-//! A cell is an enclosure, whose walls send back a share of what falls on them, the same everywhere (Goral, Torrance,
-//! Greenberg & Battaile, "Modeling the Interaction of Light Between Diffuse Surfaces", SIGGRAPH 1984, with one patch to a
-//! cell); this is the internally reflected component of Hopkinson, Longmore & Petherbridge, "An Empirical Formula for the
-//! Computation of the Indirect Component of Daylight Factor" (Trans. Illum. Eng. Soc. 19, 1954). Portals exchange light between
-//! cells by their area. Of each cell `c` with walls of area `S` and reflectance `ρ`, and portals of areas `A`:
+//! A cell is an enclosure whose walls reflect a share of the light that falls on them, the same everywhere
+//! (Goral, Torrance, Greenberg & Battaile, "Modeling the Interaction of Light Between Diffuse Surfaces", SIGGRAPH
+//! 1984, with one patch per cell); this is the internally reflected component of Hopkinson, Longmore & Petherbridge,
+//! "An Empirical Formula for the Computation of the Indirect Component of Daylight Factor" (Trans. Illum. Eng. Soc.
+//! 19, 1954). Portals exchange light between cells by their area. For a cell `c` with walls of area `S` and
+//! reflectance `ρ`, and portals of areas `A`:
 //!
 //! ```text
-//! H(c) = (Σ A τ B(behind the portal) + sun + S B(c)) / (S + Σ A)      what falls on its walls
-//! B(c) = ρ(c) H(c)                                                    what they send back
+//! H(c) = (Σ A τ B(behind the portal) + sun + S B(c)) / (S + Σ A)      incident on its walls
+//! B(c) = ρ(c) H(c)                                                    reflected by them
 //! ```
 //!
-//! solved by Gauss-Seidel iteration in the order of the cells, so that the answer is the same every time.
+//! solved by Gauss-Seidel iteration in the order of the cells, so that the result is deterministic.
 
 use enfilade_cpg::{CellId, PortalKind, World};
 use enfilade_runtime::Sightlines;
@@ -19,45 +20,45 @@ use glam::Vec3;
 
 use crate::materials::Look;
 
-/// What the sky sends, in all directions alike: the unit of all that follows. Linear.
+/// Radiance of the sky, in all directions: the unit of everything below. Linear.
 pub(super) const SKY: Vec3 = Vec3::new(0.90, 0.98, 1.12);
-/// What the ground outdoors sends back. Linear, in skies.
+/// Radiance of the ground outdoors. Linear, in skies.
 pub(super) const GROUND: Vec3 = Vec3::new(0.30, 0.28, 0.24);
-/// What the sun adds on a surface that faces it. Linear, in skies.
+/// Light of the sun on a surface that faces it. Linear, in skies.
 const SUN: Vec3 = Vec3::new(3.2, 2.9, 2.4);
-/// Where no daylight comes, somebody has switched on a light: so much falls on the walls at least. Linear, in skies.
+/// Least light on walls: a room without daylight has its lamps on. Linear, in skies.
 const LAMP: f32 = 0.05;
-/// The light of that lamp.
+/// Color of that lamp.
 const LAMP_COLOR: Vec3 = Vec3::new(1.12, 0.99, 0.82);
 const ROUNDS: usize = 80;
 
-/// An opening of the graph, as light passes it.
+/// An opening of the graph for light.
 #[derive(Clone, Debug)]
 pub(super) struct Hole {
-    /// The normal points from the first to the second.
+    /// The normal points from the first cell to the second.
     pub(super) cells: [CellId; 2],
     pub(super) normal: Vec3,
     /// Convex polygons. [Units: wu]
     pub(super) pieces: Vec<Vec<Vec3>>,
     /// [Units: wu²]
     pub(super) area: f32,
-    /// The share of the light that passes.
+    /// Transmitted share of the light.
     pub(super) passes: f32,
 }
 
 impl Hole {
-    /// The cell on the other side.
+    /// Returns the cell on the other side.
     pub(super) fn other(&self, cell: CellId) -> CellId {
         self.cells[usize::from(self.cells[0] == cell)]
     }
 }
 
-/// How bright a color is. Linear.
+/// Returns the luminance of a linear color.
 pub(super) fn luminance(c: Vec3) -> f32 {
     c.dot(Vec3::new(0.21, 0.72, 0.07))
 }
 
-/// The openings by portal.
+/// Returns the openings by portal.
 pub(super) fn holes(world: &World) -> Vec<Hole> {
     let vectors = |outline: &Vec<[f32; 3]>| outline.iter().map(|&p| Vec3::from(p)).collect();
     (world.graph.portals.iter())
@@ -66,7 +67,7 @@ pub(super) fn holes(world: &World) -> Vec<Hole> {
             Hole {
                 cells: portal.cells,
                 normal: portal.normal.into(),
-                // Of many pieces the outline will do: light has no sharp edges here.
+                // The outline stands in for many pieces: light has no sharp edges here.
                 pieces: if portal.pieces.is_empty() || portal.pieces.len() > 4 {
                     vec![vectors(&portal.outline)]
                 } else {
@@ -75,7 +76,7 @@ pub(super) fn holes(world: &World) -> Vec<Hole> {
                 area: portal.area.max(0.0),
                 passes: match portal.kind {
                     PortalKind::Window => 0.8,
-                    // Its leaf may stand open or shut; the one to the outdoors is mostly shut.
+                    // A leaf may stand open or shut; a leaf to the outdoors is mostly shut.
                     PortalKind::Door if to_outdoors => 0.2,
                     PortalKind::Door => 0.6,
                     PortalKind::Open | PortalKind::Crack => 1.0,
@@ -85,10 +86,10 @@ pub(super) fn holes(world: &World) -> Vec<Hole> {
         .collect()
 }
 
-/// Whether nothing but glass stands between two points.
+/// Returns `true` if nothing but glass lies between two points.
 pub(super) fn is_clear(world: &World, lines: &Sightlines, a: Vec3, b: Vec3) -> bool {
     let mut from = a;
-    // Panes have two sides, windows two panes; more than that and it is dark.
+    // Panes have two sides, windows two panes; more than that counts as opaque.
     for _ in 0..6 {
         let Some(hit) = lines.first_hit(from.to_array(), b.to_array()) else {
             return true;
@@ -104,7 +105,7 @@ pub(super) fn is_clear(world: &World, lines: &Sightlines, a: Vec3, b: Vec3) -> b
     false
 }
 
-/// Points spread over a convex polygon: its middle, and halfway to up to four of its corners.
+/// Returns points spread over a convex polygon: its center, and points halfway to up to four vertices.
 pub(super) fn spread(polygon: &[Vec3]) -> impl Iterator<Item = Vec3> + '_ {
     let middle: Vec3 = polygon.iter().sum::<Vec3>() / polygon.len().max(1) as f32;
     let step = polygon.len().div_ceil(4).max(1);
@@ -112,15 +113,15 @@ pub(super) fn spread(polygon: &[Vec3]) -> impl Iterator<Item = Vec3> + '_ {
     std::iter::once(middle).chain(halfway.map(move |&p| (p + middle) * 0.5))
 }
 
-/// What the walls of each cell send back, and what lamps give.
+/// Light reflected by the walls of each cell, and light of lamps.
 pub(super) struct Balance {
-    /// By cell: of its walls, lamps' light included. Linear, in skies.
+    /// For each cell, light from its walls, lamps included. Linear, in skies.
     pub(super) sent: Vec<Vec3>,
-    /// By cell: what its lamp adds to what falls on a wall. Linear, in skies.
+    /// For each cell, light of its lamp on a wall. Linear, in skies.
     pub(super) lamps: Vec<Vec3>,
 }
 
-/// Area and reflectance of the walls of each cell.
+/// Returns area and reflectance of the walls of each cell.
 fn walls(world: &World) -> Vec<(f32, Vec3)> {
     let mut sums = vec![(0.0, Vec3::ZERO); world.graph.cells.len()];
     for batch in &world.batches {
@@ -131,7 +132,7 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
             continue;
         }
         let [r, g, b, _] = look.base_color;
-        // A picture darkens what it is on: by half, without looking at it.
+        // A texture counts as halving the reflectance; it is not decoded.
         let dim = if look.texture.is_some() { 0.5 } else { 1.0 };
         let color = (Vec3::new(r, g, b) * dim).clamp(Vec3::splat(0.02), Vec3::splat(0.85));
         let corner = |i: u32| Vec3::from(p.positions[i as usize]);
@@ -141,7 +142,7 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
                 (b - a).cross(c - a).length() * 0.5
             })
             .sum();
-        // What several see is shared among them.
+        // Cells that see the same batch share its area.
         let area = area / batch.cells.len() as f32;
         for cell in &batch.cells {
             let sum = &mut sums[cell.idx()];
@@ -150,7 +151,7 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
     }
     let mean = |(area, sum): (f32, Vec3)| {
         if area > 0.0 {
-            // Half its tint: eyes take the light of a room for white.
+            // Half the tint: eyes adapt to the light of a room as white.
             let color = sum / area;
             (area, color.lerp(Vec3::splat(luminance(color)), 0.5))
         } else {
@@ -160,7 +161,7 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
     sums.into_iter().map(mean).collect()
 }
 
-/// What the sun sends into a cell through an opening to the outdoors. Linear, in skies times wu².
+/// Returns the sunlight that enters a cell through an opening to the outdoors. Linear, in skies times wu².
 fn sunshine(world: &World, lines: &Sightlines, hole: &Hole, sun: Vec3) -> Vec3 {
     let is_out = |c: CellId| world.graph[c].outdoor;
     let outwards = match hole.cells.map(is_out) {
@@ -180,7 +181,7 @@ fn sunshine(world: &World, lines: &Sightlines, hole: &Hole, sun: Vec3) -> Vec3 {
     SUN * (facing * hole.area * hole.passes * lit as f32 / n.max(1) as f32)
 }
 
-/// Finds out how bright walls are. Time grows with the portals, and with the rays that ask whether the sun shines in.
+/// Computes the brightness of walls. Time grows with the portals, and with the rays that test for sunlight.
 pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Vec3) -> Balance {
     let cells = &world.graph.cells;
     let walls = walls(world);
@@ -195,7 +196,7 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
             }
         }
     }
-    // Where light comes from outdoors, it is half sky, half ground.
+    // Light from outdoors is half sky, half ground.
     let outdoors = (SKY + GROUND) * 0.5;
     let solve = |lamps: &[Vec3]| -> Vec<Vec3> {
         let sent_at_first = |c: &enfilade_cpg::Cell| if c.outdoor { outdoors } else { Vec3::ZERO };
@@ -221,7 +222,7 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
     for (i, cell) in cells.iter().enumerate() {
         let falls = luminance(by_day[i] / walls[i].1);
         if !cell.outdoor {
-            // What walls send back comes on top.
+            // Reflected light comes on top.
             let own = 1.0 - luminance(walls[i].1);
             lamps[i] = LAMP_COLOR * ((LAMP - falls).max(0.0) * own);
         }
@@ -232,13 +233,13 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
     }
 }
 
-/// Where the sun stands: of sixteen directions, the one from which most light falls through openings to the outdoors.
+/// Returns the direction of the sun: of sixteen, the one that sends most light through openings to the outdoors.
 pub(crate) fn sun_of(world: &World) -> Vec3 {
-    // As high as on a spring afternoon: lower, and rooms are all glare; higher, and no sun reaches their floors.
+    // As high as on a spring afternoon: a lower sun makes rooms all glare, a higher one never reaches their floors.
     let (height, flat) = 40_f32.to_radians().sin_cos();
     let mut best = (f32::NEG_INFINITY, Vec3::Y);
     for i in 0..16 {
-        // The first stands aside of both axes that walls mostly run along.
+        // The first direction is oblique to the axes along which most walls run.
         let angle = (i as f32 + 0.58) * std::f32::consts::TAU / 16.0;
         let sun = Vec3::new(angle.cos() * flat, height, angle.sin() * flat);
         let mut sum = 0.0;
@@ -252,7 +253,7 @@ pub(crate) fn sun_of(world: &World) -> Vec3 {
             };
             sum += facing.max(0.0) * portal.area;
         }
-        // A clear gain, or the earlier stays: rounding has no say.
+        // Only a clear gain replaces an earlier direction, so rounding does not decide.
         if sum > best.0 * 1.001 + 1e-3 || i == 0 {
             best = (sum, sun);
         }

@@ -1,30 +1,31 @@
-//! Which cell a point lies in, as a shader finds it out: the locator's tree as a texture, and where in it to begin.
+//! The locator for shaders: its tree as a texture, and a grid of places to start in it.
 //!
-//! Each box of a grid stores the deepest node of the tree that holds all of it, so that a point takes a few planes and not
-//! twenty. Points are relative to the middle of the locator's box, so that 32-bit floats tell millimeters apart.
+//! Each box of the grid stores the deepest node of the tree that contains it, so that locating a point takes a
+//! few planes instead of twenty. Points are relative to the center of the locator's box, so that 32-bit floats
+//! resolve millimeters.
 
 use enfilade_cpg::Locator;
 use glam::{DVec3, UVec3, Vec3};
 
-/// Boxes of the grid, about.
+/// Approximate number of boxes of the grid.
 const BOXES: f64 = 260_000.0;
-/// Boxes are counted as this much larger all around: which of two neighbors a point is in is rounded. [Units: wu]
+/// Margin around boxes: rounding may assign a point to a neighboring box. [Units: wu]
 const MARGIN: f64 = 2e-3;
 
-/// The locator, as a shader reads it.
+/// The locator in the layout that shaders read.
 pub(crate) struct Field {
-    /// What points are relative to. [Units: wu]
+    /// Origin of its coordinates. [Units: wu]
     pub(super) origin: DVec3,
-    /// Least corner of the grid, relative to the origin. [Units: wu]
+    /// Minimum of the grid, relative to the origin. [Units: wu]
     pub(super) low: Vec3,
-    /// Boxes in a meter.
+    /// Boxes per meter.
     pub(super) density: Vec3,
     pub(super) n: UVec3,
-    /// By box: a node, or a leaf as [`Locator::leaf`] encodes it. x fastest, then y.
+    /// For each box, a node, or a leaf as [`Locator::leaf`] encodes it. x fastest, then y.
     pub(super) starts: Vec<i32>,
-    /// Four words to a texel: of each node its plane, then its children.
+    /// Two texels of four words per node: its plane, then its children.
     pub(super) nodes: Vec<[u32; 4]>,
-    /// What stands for points outside.
+    /// Leaf of points outside.
     pub(super) outside: i32,
 }
 
@@ -37,7 +38,7 @@ struct Filler<'l> {
 }
 
 impl Filler<'_> {
-    /// The deepest node that holds all of a box.
+    /// Returns the deepest node that contains a box.
     fn descend(&self, mut at: i32, low: DVec3, high: DVec3) -> i32 {
         let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5 + MARGIN);
         while let Some(node) = usize::try_from(at).ok().map(|i| &self.locator.nodes[i]) {
@@ -78,7 +79,7 @@ impl Filler<'_> {
 }
 
 impl Field {
-    /// Makes a locator ready: O(boxes + nodes).
+    /// Converts a locator. O(boxes + nodes).
     pub(super) fn build(locator: &Locator, side: u32) -> Self {
         let bounds = &locator.bounds;
         let (low, high) = if bounds.min.x < bounds.max.x {
@@ -121,7 +122,7 @@ impl Field {
         }
     }
 
-    /// What the shader answers of a point of the world: a cell, or -1.
+    /// Returns the shader's answer for a point of the world: a cell, or -1.
     pub(super) fn locate(&self, p: [f32; 3]) -> i32 {
         let leaf = self.leaf(p);
         if leaf < -1 { -2 - leaf } else { -1 }

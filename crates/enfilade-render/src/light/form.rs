@@ -1,15 +1,15 @@
-//! Form factors: how much of what a point sees of one side is a polygon.
+//! Form factors: the share of a point's hemisphere, weighted by cosine, that a polygon covers.
 //!
 //! Lambert's formula for a point and a polygon that radiates diffusely, as in Baum, Rushmeier & Winget, "Improving
-//! Radiosity Solutions Through the Use of Analytically Determined Form-Factors" (SIGGRAPH 1989), section 4. Polygons are
-//! seen from the origin.
+//! Radiosity Solutions Through the Use of Analytically Determined Form-Factors" (SIGGRAPH 1989), section 4. The
+//! point is the origin.
 
 use glam::Vec3;
 
-/// A convex polygon seen from a point: corners relative to it. [Units: wu]
+/// Vertices of a convex polygon relative to the point that sees it. [Units: wu]
 pub(super) type Polygon = Vec<Vec3>;
 
-/// What of a convex polygon is on the side `n · p >= 0` of a plane through the origin, into `out`.
+/// Clips a convex polygon to the side `n · p >= 0` of a plane through the origin, into `out`.
 pub(super) fn clip_into(polygon: &[Vec3], n: Vec3, out: &mut Polygon) {
     out.clear();
     for (i, &b) in polygon.iter().enumerate() {
@@ -24,7 +24,8 @@ pub(super) fn clip_into(polygon: &[Vec3], n: Vec3, out: &mut Polygon) {
     }
 }
 
-/// What of `polygon` is seen through `hole`, both convex, from the origin. `hole` may turn either way.
+/// Returns the part of `polygon` visible through `hole` from the origin; both are convex. `hole` may have either
+/// orientation.
 pub(super) fn clip_through(polygon: &[Vec3], hole: &[Vec3]) -> Polygon {
     let middle: Vec3 = hole.iter().sum::<Vec3>() / hole.len().max(1) as f32;
     let (mut out, mut next) = (polygon.to_vec(), Vec::new());
@@ -40,8 +41,8 @@ pub(super) fn clip_through(polygon: &[Vec3], hole: &[Vec3]) -> Polygon {
     out
 }
 
-/// The share of the light that falls on a surface with unit normal `n` at the origin, were all that it sees as bright, that
-/// comes from a polygon: 0 to 1. `scratch` spares an allocation.
+/// Returns the share of the light on a surface with unit normal `n` at the origin that comes from a polygon, if
+/// everything visible were equally bright: 0 to 1. `scratch` avoids an allocation.
 pub(super) fn form_factor(polygon: &[Vec3], n: Vec3, scratch: &mut Polygon) -> f32 {
     clip_into(polygon, n, scratch);
     if scratch.len() < 3 {
@@ -58,7 +59,7 @@ pub(super) fn form_factor(polygon: &[Vec3], n: Vec3, scratch: &mut Polygon) -> f
         }
         a = b;
     }
-    // Positive whichever way the polygon turns.
+    // Positive for either orientation of the polygon.
     (sum.abs() / std::f32::consts::TAU).min(1.0)
 }
 
@@ -87,8 +88,8 @@ mod tests {
 
     #[test]
     fn a_square_overhead_agrees_with_the_closed_form() {
-        // Of a corner's quarter, a by b at a distance of 1: Baum et al. give (a / √(1 + a²) · atan(b / √(1 + a²)) + the
-        // same with a and b exchanged) / 2π; four of them.
+        // For a quarter of it, a by b at a distance of 1, Baum et al. give (a / √(1 + a²) · atan(b / √(1 + a²)) +
+        // the same with a and b exchanged) / 2π; four of them.
         let a = 1.0_f32;
         let root = (1.0 + a * a).sqrt();
         let quarter = 2.0 * a / root * (a / root).atan() / std::f32::consts::TAU;

@@ -1,10 +1,11 @@
-//! Light in the air of each cell, at the points of a grid: what would fall there on a surface that faces one of six ways.
+//! Light in the air of each cell at grid points: the light that would fall on a surface facing one of six directions.
 //!
-//! Probes stand in boxes, one for each cell, so that no light leaks through a wall however thin. A probe's light is what it
-//! sees through portals, by exact [form factors](super::form), through up to three portals in a row as a view is narrowed,
-//! and the light of the [walls](super::balance) all around. Six colors to a probe are the ambient cube of McTaggart, "Half-Life
-//! 2 / Valve Source Shading" (GDC 2004). What is shown is a power of it, as eyes adapt: Stevens, "To Honor Fechner and Repeal
-//! His Law" (Science 133, 1961); so that a cellar and a winter garden may be in one picture.
+//! Probes are grouped by cell, so that no light leaks through walls, however thin. The light at a probe is that of the
+//! polygons it sees through up to three portals in a row, by exact [form factors](super::form) with the view
+//! narrowed at each portal, plus that of the [walls](super::balance) around it. Six colors per probe are the ambient
+//! cube of McTaggart, "Half-Life 2 / Valve Source Shading" (GDC 2004). The displayed value is a power of it, as eyes
+//! adapt: Stevens, "To Honor Fechner and Repeal His Law" (Science 133, 1961); so a cellar and a winter garden can
+//! share one picture.
 
 use enfilade_cpg::{CellId, World};
 use enfilade_runtime::{Sight, Sightlines};
@@ -13,20 +14,20 @@ use glam::{UVec3, Vec3};
 use super::balance::{Balance, GROUND, Hole, SKY, balance, holes, is_clear, luminance, spread};
 use super::form::{Polygon, clip_into, clip_through, form_factor};
 
-/// Between probes. [Units: wu]
+/// Distance between probes. [Units: wu]
 const SPACING: f32 = 0.7;
-/// Most probes of a cell along each axis: a hall has no more.
+/// Most probes of a cell along each axis, even in a hall.
 const MOST: [u32; 3] = [14, 4, 14];
-/// Most probes in all; where there were more, they stand farther apart.
+/// Most probes in all; beyond that, the spacing grows.
 const MOST_IN_ALL: u64 = 30_000;
-/// A portal behind a portal is looked through where it gives so large a share of the light at least.
+/// Least share of the light for which portals behind a portal are followed.
 const WORTH: f32 = 0.004;
-/// Brightness over light, as an exponent.
+/// Exponent from light to brightness.
 const ADAPTATION: f32 = 0.72;
-/// Of a surface under the open sky.
+/// Brightness of a surface under the open sky.
 const BRIGHTEST: f32 = 1.0;
 
-/// The six ways that surfaces may face, in the order of the slabs of a box.
+/// The six directions that surfaces may face, in the order of the slabs of a box.
 const WAYS: [Vec3; 6] = [
     Vec3::X,
     Vec3::NEG_X,
@@ -36,32 +37,32 @@ const WAYS: [Vec3; 6] = [
     Vec3::NEG_Z,
 ];
 
-/// The probes of one cell: a box of texels, six slabs above each other, one for each way.
+/// The probes of one cell: a box of texels of six stacked slabs, one per direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
-    /// Least corner of the space it stands for. [Units: wu]
+    /// Minimum of its space. [Units: wu]
     pub(super) low: Vec3,
-    /// Probes in a meter.
+    /// Probes per meter.
     pub(super) density: Vec3,
     /// Probes along each axis.
     pub(super) n: UVec3,
-    /// Where its first texel is.
+    /// Position of its first texel.
     pub(super) at: UVec3,
 }
 
 /// The probes of a world.
 pub(super) struct Probes {
-    /// By cell; none outdoors.
+    /// One entry per cell; none outdoors.
     pub(super) grids: Vec<Option<Grid>>,
     /// Texels along each axis.
     pub(super) size: UVec3,
     /// Shared-exponent colors, x fastest, then y.
     pub(super) texels: Vec<u32>,
-    /// By cell: how bright its air is on average; 0 outdoors.
+    /// For each cell, mean brightness of its air; 0 outdoors.
     pub(super) brightness: Vec<f32>,
 }
 
-/// Where probes stand: at most `side` texels along each axis.
+/// Lays out the probes, at most `side` texels along each axis.
 fn grids(world: &World, side: u32) -> (Vec<Option<Grid>>, UVec3) {
     let mut spacing = SPACING;
     loop {
@@ -91,7 +92,7 @@ fn grids(world: &World, side: u32) -> (Vec<Option<Grid>>, UVec3) {
             n_all += u64::from(n.x * n.y * n.z);
             size = size.max(UVec3::new(x, 6 * n.y, z + row));
         }
-        // One to a cell is the least there can be.
+        // One probe per cell is the minimum.
         if (n_all <= MOST_IN_ALL && size.max_element() <= side) || spacing > 1e6 {
             return (out, size);
         }
@@ -99,7 +100,7 @@ fn grids(world: &World, side: u32) -> (Vec<Option<Grid>>, UVec3) {
     }
 }
 
-/// What is asked about while probes are computed.
+/// Data for the computation of probes.
 struct Room<'a> {
     world: &'a World,
     lines: &'a Sightlines,
@@ -107,7 +108,7 @@ struct Room<'a> {
     balance: &'a Balance,
 }
 
-/// Light that falls on six surfaces, and the share of all they see that it came from.
+/// Light on six surfaces, and the share of each hemisphere that it came from.
 #[derive(Clone, Copy, Default)]
 struct Falling {
     light: [Vec3; 6],
@@ -115,7 +116,7 @@ struct Falling {
 }
 
 impl Room<'_> {
-    /// Adds what comes through the portals of `cell` to the point `p`, as far as `through` shows them.
+    /// Adds the light that reaches the point `p` through the portals of `cell`, as far as `through` shows them.
     fn add(
         &self,
         out: &mut Falling,
@@ -129,7 +130,7 @@ impl Room<'_> {
             if path.contains(&portal.0) || hole.pieces.is_empty() {
                 continue;
             }
-            // Portals are looked at from their cell's side.
+            // View portals from their cell's side.
             let side = if hole.cells[0] == cell { 1.0 } else { -1.0 };
             let ahead = hole.normal * side;
             if ahead.dot(hole.pieces[0][0] - p) <= 1e-4 {
@@ -150,8 +151,8 @@ impl Room<'_> {
         }
     }
 
-    /// The share of a polygon that nothing of the structure hides; of portals behind portals, all of it: they are
-    /// clipped by what is seen, and rays are dear.
+    /// Returns the share of a polygon that no structure hides. Portals behind portals count in full: they are
+    /// clipped by the view already, and rays are expensive.
     fn clear_share(&self, p: Vec3, seen: &[Vec3], is_near: bool) -> f32 {
         if !is_near {
             return 1.0;
@@ -186,7 +187,7 @@ impl Room<'_> {
             }
             return;
         }
-        // The walls behind, and whatever is seen through these.
+        // The walls behind, and everything visible through those walls' portals.
         let mut beyond = Falling::default();
         let shares = WAYS.map(|way| form_factor(seen, way, &mut scratch) * passes);
         if path.len() < 2 && shares.iter().any(|&s| s > WORTH) {
@@ -201,7 +202,7 @@ impl Room<'_> {
         }
     }
 
-    /// What falls on surfaces at a point of a cell. Linear, in skies.
+    /// Returns the light on surfaces at a point of a cell. Linear, in skies.
     fn falling(&self, p: Vec3, cell: CellId) -> [Vec3; 6] {
         let mut out = Falling::default();
         self.add(&mut out, p, cell, None, &mut Vec::new());
@@ -215,7 +216,7 @@ impl Room<'_> {
     }
 }
 
-/// Where in its cell a probe stands: in the middle of what it stands for, or near that.
+/// Returns the position of a probe in its cell: the center of its box, or a point near that.
 fn place(sight: &Sight, cell: CellId, grid: &Grid, i: UVec3) -> Option<Vec3> {
     let size = 1.0 / grid.density;
     let middle = grid.low + (i.as_vec3() + 0.5) * size;
@@ -233,13 +234,13 @@ fn place(sight: &Sight, cell: CellId, grid: &Grid, i: UVec3) -> Option<Vec3> {
         .find(|p| sight.locate(p.to_array()) == Some(cell))
 }
 
-/// What eyes make of light.
+/// Returns the brightness that eyes perceive.
 fn adapted(light: Vec3) -> Vec3 {
     let sum = luminance(light).max(1e-4);
     light * (BRIGHTEST * sum.powf(ADAPTATION - 1.0))
 }
 
-/// Fills probes that stand in no air from their neighbors, nearest first.
+/// Fills probes outside of air from their neighbors, nearest first.
 fn spread_into_gaps(n: UVec3, values: &mut [Option<[Vec3; 6]>]) {
     let index = |x: u32, y: u32, z: u32| ((z * n.y + y) * n.x + x) as usize;
     for _ in 0..n.x.max(n.y).max(n.z) {
@@ -276,21 +277,22 @@ fn spread_into_gaps(n: UVec3, values: &mut [Option<[Vec3; 6]>]) {
     }
 }
 
-/// A color as `RGB9E5` stores it: nine bits each, and an exponent for the three.
+/// Encodes a color as `RGB9E5`: nine bits per channel and a shared exponent.
 fn shared_exponent(c: Vec3) -> u32 {
     const BIAS: i32 = 15;
     let c = c.clamp(Vec3::ZERO, Vec3::splat(65408.0));
     let exponent = (c.max_element().max(1e-30).log2().floor() as i32).max(-BIAS - 1) + 1 + BIAS;
     let scale = |e: i32| f32::powi(2.0, 9 + BIAS - e);
-    // Rounded up to 512, the greatest takes the next exponent.
+    // If the greatest channel rounds up to 512, take the next exponent.
     let e = exponent + i32::from((c.max_element() * scale(exponent)).round() >= 512.0);
     let [r, g, b] = (c * scale(e)).to_array().map(|x| x.round() as u32);
     r | g << 9 | b << 18 | (e as u32) << 27
 }
 
 impl Probes {
-    /// Computes the light of a world under a sun in direction `sun`, in a picture of at most `side` texels along each
-    /// axis. Time grows with the probes, 30,000 at most, and the portals that each sees: mostly below a second.
+    /// Computes the light of a world under a sun in direction `sun`, in a texture of at most `side` texels along
+    /// each axis.
+    /// Time grows with the probes, 30,000 at most, and the portals that each sees: mostly below a second.
     pub(super) fn build(world: &World, sight: &Sight, sun: Vec3, side: u32) -> Self {
         let lines = Sightlines::build(world);
         let holes = holes(world);
@@ -317,7 +319,7 @@ impl Probes {
             let lights = || values.iter().flatten().flatten();
             let sum: f32 = lights().map(|&light| luminance(light)).sum();
             brightness[cell.idx()] = sum / lights().count().max(1) as f32;
-            // A cell without air at any probe: as its walls.
+            // Without any probe in air, use the light of the walls.
             let walls = [adapted(balance.sent[cell.idx()] + balance.lamps[cell.idx()]); 6];
             for (i, value) in (0..).zip(values) {
                 let at = grid.at + UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y));
@@ -345,8 +347,8 @@ mod tests {
 
     const SUN: Vec3 = Vec3::new(0.0, 0.6, -0.8);
 
-    /// Two rooms in a row along x, 4 m a side, 3 m high, in an air without walls: a window in the first at x = 0, a doorway
-    /// between them. Nothing but the graph: what light passes is what portals say.
+    /// Two rooms in a row along x, 4 m a side, 3 m high, without walls: a window in the first at x = 0, a doorway
+    /// between them. There is only the graph: portals alone decide where light passes.
     fn two_rooms(window: bool, doorway: bool) -> World {
         let cell = |name: &str, low: f32, high: f32, outdoor| Cell {
             name: name.into(),
@@ -382,7 +384,7 @@ mod tests {
         world
     }
 
-    /// What falls on surfaces at a point of a cell of such rooms.
+    /// Returns the light on surfaces at a point of a cell of such rooms.
     fn falling(world: &World, p: [f32; 3], cell: u32) -> [f32; 6] {
         let lines = Sightlines::build(world);
         let holes = holes(world);
@@ -401,7 +403,7 @@ mod tests {
         let world = two_rooms(true, true);
         let (near, far) = ([0.5, 1.5, 2.0], [3.5, 1.5, 2.0]);
         let (near, far) = (falling(&world, near, 1), falling(&world, far, 1));
-        // Slab 1 faces the window, slab 0 turns its back to it.
+        // Slab 1 faces the window, slab 0 faces away from it.
         assert!(near[1] > 3.0 * far[1], "{near:?} {far:?}");
         assert!(far[1] > 1.3 * far[0], "{far:?}");
     }
@@ -410,12 +412,12 @@ mod tests {
     fn light_comes_from_room_to_room_through_doorways_alone() {
         let p = [4.5, 1.5, 2.0];
         let [lit, dark] = [true, false].map(|doorway| falling(&two_rooms(true, doorway), p, 2));
-        // Before the doorway, the window two rooms away is seen.
+        // Before the doorway, the window two rooms away is visible.
         assert!(
             lit[1] > 1.5 * lit[0] && lit[1] > 1.2 * dark[1],
             "{lit:?} {dark:?}"
         );
-        // Behind a wall, no window changes anything: the lamp is all there is.
+        // Behind a wall, a window changes nothing: the lamp is the only light.
         assert_eq!(dark, falling(&two_rooms(false, false), p, 2));
         assert!(
             dark.iter().all(|&x| x > 0.01),
@@ -451,7 +453,7 @@ mod tests {
                 }
             }
         }
-        // In a picture of few texels, fewer probes stand.
+        // A texture with few texels has fewer probes.
         let small = Probes::build(&world, &sight, SUN, 32);
         assert!(small.size.max_element() <= 32, "{}", small.size);
     }

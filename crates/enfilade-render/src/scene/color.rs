@@ -1,8 +1,8 @@
-//! The colors that cells have where they are told apart.
+//! Colors that distinguish cells.
 
 use enfilade_cpg::CellId;
 
-/// The color of a cell, here and in drawings: neighbors in number differ most. sRGB, 0 to 1.
+/// Returns the color of a cell in pictures and drawings; consecutive ids differ most. sRGB, 0 to 1.
 #[must_use]
 pub fn cell_color(cell: CellId) -> [f32; 3] {
     let hue = (cell.0 as f32 * 0.618_034 + 0.08).fract() * 6.0;
@@ -18,7 +18,7 @@ pub(super) fn packed(c: [f32; 3]) -> u32 {
     r | g << 8 | b << 16 | 0xff << 24
 }
 
-/// The same as a shader unpacks it.
+/// Returns the color of a cell in the layout that shaders unpack.
 pub(crate) fn packed_cell_color(cell: CellId) -> u32 {
     packed(cell_color(cell))
 }

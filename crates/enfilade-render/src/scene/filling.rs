@@ -1,4 +1,4 @@
-//! Triangles of all batches and meshes, side by side in one buffer.
+//! The triangles of all batches and meshes in one buffer.
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_geom::scene::Primitive;
@@ -10,21 +10,20 @@ use super::plug::plug;
 use crate::levels::coarser;
 use crate::materials::Look;
 
-/// A corner of a triangle, 40 bytes. The shader that draws ids reads it as ten words where it can.
+/// A vertex of a triangle, 40 bytes. The id shader reads it as ten words if it can.
 ///
-/// What a material says comes with each corner: to look it up by pixel costs software more than light
-/// does.
+/// It carries the material's properties: a look-up per pixel costs software more than lighting does.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Corner {
     position: [f32; 3],
     normal: [i8; 4],
     uv: [f32; 2],
-    /// The material's times the corner's own; 16 bits, for dark ones.
+    /// The material's color times the vertex's own; 16 bits, for dark colors.
     color: [u16; 4],
-    /// Light of its own, and the least alpha that is drawn.
+    /// Emission, and the least alpha that is drawn.
     emissive: [u8; 4],
-    /// Color of the cell that it belongs to, of structure.
+    /// Color of its cell, for structure.
     cell: u32,
 }
 
@@ -36,7 +35,7 @@ pub(crate) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     ],
 };
 
-/// Triangles that are drawn alike.
+/// Triangles with the same state of the pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Span {
     pub(crate) first: u32,
@@ -44,34 +43,34 @@ pub(crate) struct Span {
     /// Index into [`GpuWorld::textures`].
     pub(crate) texture: u32,
     pub(crate) finish: Finish,
-    /// Whether its corners have normals.
+    /// True if its vertices have normals.
     pub(crate) is_smooth: bool,
     pub(crate) is_transparent: bool,
 }
 
-/// What it takes to shade a surface.
+/// Shading that a surface needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Finish {
     Plain = 0,
     Textured = 1,
-    /// With holes.
+    /// With transparent texels.
     Masked = 2,
 }
 
-/// A detail mesh as drawn from some distance.
+/// A version of a detail mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct Level {
-    /// How far its surface is from where it should be, at most. [Units: wu of the mesh]
+    /// Largest distance between its surface and the original. [Units: wu of the mesh]
     pub(crate) error: f32,
-    /// By part.
+    /// One entry per primitive.
     pub(crate) spans: Vec<Span>,
 }
 
-/// Fills the buffers; what is on the adapter is made of it at the end.
+/// Collects the contents of the buffers for upload.
 pub(super) struct Filling<'w> {
     pub(super) world: &'w World,
     pub(super) looks: Vec<Look>,
-    /// By texture of the world: index into the textures drawn, 0 for none.
+    /// For each texture of the world, index into the uploaded textures, 0 for none.
     pub(super) texture_of: Vec<u32>,
     pub(super) corners: Vec<Corner>,
     pub(super) indices: Vec<u32>,
@@ -79,13 +78,13 @@ pub(super) struct Filling<'w> {
 
 impl Filling<'_> {
     fn look(&self, primitive: &Primitive) -> Look {
-        // The last stands for none.
+        // The last look stands for no material.
         let none = self.looks.len() - 1;
         let at = primitive.material.map_or(none, |m| m as usize).min(none);
         self.looks[at]
     }
 
-    /// Adds a primitive's triangles, by `order` of its positions; returns where they stand.
+    /// Adds a primitive's triangles by `order`, indices of its positions; returns their span.
     fn add(&mut self, primitive: &Primitive, order: &[u32], cell: u32) -> Span {
         let look = self.look(primitive);
         let [r, g, b] = look.emissive;
@@ -134,7 +133,7 @@ impl Filling<'_> {
         }
     }
 
-    /// Where the corners of all triangles are, three to each.
+    /// Returns the positions of the vertices of all triangles, three each.
     pub(super) fn listed(&self) -> Vec<[f32; 3]> {
         let position = |&i: &u32| self.corners[i as usize].position;
         self.indices.iter().map(position).collect()
@@ -152,14 +151,14 @@ impl Filling<'_> {
             .collect()
     }
 
-    /// By portal: what fills it when it is shut.
+    /// Adds the plugs; returns their spans by portal.
     pub(super) fn add_plugs(&mut self, sight: &Sight) -> Vec<Span> {
         let look = Look {
             base_color: super::plug::COLOR,
             ..Look::default()
         };
         let own = self.looks.len() - 1;
-        // Plugs have no material: the look of none is theirs for now.
+        // Plugs have no material, so the look of none is theirs for now.
         let none = std::mem::replace(&mut self.looks[own], look);
         let world = self.world;
         let plugs = (0..world.graph.portals.len() as u32)
@@ -172,7 +171,7 @@ impl Filling<'_> {
         plugs
     }
 
-    /// The mean color of what is seen of each cell's surfaces, by area, in the light of the sky.
+    /// Returns the mean color of the surfaces of each cell, by area, in the light of the sky.
     pub(super) fn cell_looks(&self) -> Vec<[f32; 3]> {
         const SKY: f32 = 0.55;
         let mut sums = vec![[0.0; 4]; self.world.graph.cells.len()];
@@ -210,7 +209,7 @@ impl Filling<'_> {
                     .iter()
                     .filter(|p| !p.indices.is_empty())
                     .collect();
-                // Where the corners of each part begin.
+                // First vertex of each primitive.
                 let mut bases = Vec::new();
                 let spans = parts
                     .iter()

@@ -1,4 +1,4 @@
-//! Where structure and detail objects stand.
+//! Transforms of structure and detail objects.
 
 use enfilade_cpg::{CellId, World};
 use enfilade_runtime::{DetailId, Sight, SightState};
@@ -6,19 +6,19 @@ use glam::{DMat4, Mat4, Vec3, Vec4};
 
 use super::color::{color_of, packed};
 
-/// Where something stands, 56 bytes: structure, or a detail object.
+/// The transform of structure or of a detail object, 56 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Instance {
     rows: [[f32; 4]; 3],
-    /// Its number and the reason why it is drawn, as in [`crate::DrawList`].
+    /// Its index and the reason why it is drawn, as in [`crate::DrawList`].
     key: u32,
     /// Color of its cell.
     color: u32,
 }
 
 impl Instance {
-    /// The same, drawn for a reason.
+    /// Returns it with the key of a draw.
     pub(crate) fn drawn(self, key: u32) -> Self {
         Self { key, ..self }
     }
@@ -36,25 +36,25 @@ pub(crate) const INSTANCE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vert
 #[derive(Clone, Debug)]
 pub(crate) struct Placed {
     pub(crate) mesh: u32,
-    /// Those that it stands in.
+    /// The cells that it stands in.
     pub(crate) cells: Vec<CellId>,
     pub(crate) center: Vec3,
-    /// Of a sphere that holds it. [Units: wu]
+    /// Radius of a sphere that contains it. [Units: wu]
     pub(crate) radius: f32,
-    /// How much longer than in the mesh a length of it can be.
+    /// Largest factor by which a length of the mesh can grow.
     pub(crate) stretch: f32,
 }
 
 /// The leaf of a door.
 pub(super) struct Moving {
     pub(super) detail: DetailId,
-    /// As the model has it.
+    /// As modeled.
     transform: DMat4,
     center: Vec3,
 }
 
 impl Moving {
-    /// Moves it to where `state` has it.
+    /// Moves it as `state` has it.
     pub(super) fn place(&self, state: &SightState, instance: &mut Instance, placed: &mut Placed) {
         let pose = state.pose(self.detail);
         let m = pose.map_or(self.transform, |p| p * self.transform);
@@ -69,7 +69,7 @@ fn rows(m: &Mat4) -> [[f32; 4]; 3] {
 }
 
 pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed>, Vec<Moving>) {
-    // The first is where structure stands: where it is.
+    // The first instance is structure, which is not transformed.
     let mut instances = vec![Instance {
         rows: [
             [1.0, 0.0, 0.0, 0.0],
@@ -124,10 +124,10 @@ pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed
     (instances, details, moving)
 }
 
-/// How much longer a map can make a length, at most; exact where its axes stay at right angles.
+/// Returns a bound on the factor by which a map stretches a length; exact if its axes stay at right angles.
 fn stretch(m: &Mat4) -> f32 {
     let axes = [m.x_axis, m.y_axis, m.z_axis].map(Vec4::truncate);
-    // The greatest eigenvalue of the matrix of these products is its square; Gershgorin's bound on that.
+    // Its square is the greatest eigenvalue of the matrix of these products; this is Gershgorin's bound.
     let rows = axes.map(|a| axes.iter().map(|b| a.dot(*b).abs()).sum::<f32>());
     rows.into_iter().fold(0.0, f32::max).sqrt()
 }

@@ -1,17 +1,18 @@
-//! What fills a portal that is shut: triangles like any others, so that it is drawn the same whatever is culled.
+//! Plugs of shut portals: ordinary triangles, so that they are drawn the same whatever is culled.
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
 use glam::Vec3;
 
-/// sRGB of old oak, in linear light.
+/// Old oak, in linear light.
 pub(crate) const COLOR: [f32; 4] = [0.043, 0.015, 0.006, 1.0];
 
-/// The outline of a portal, moved to where its leaves are when shut, and the strips between there and its plane: what
-/// enters the outline meets one of them. Hidden by leaves that fill it; where there are none, it lies in the portal's plane.
+/// Returns the outline of a portal, moved to its shut leaves, and the strips from there to the portal's plane:
+/// every line through the outline meets one of them. Leaves that fill the outline hide it; without leaves, it lies in
+/// the portal's plane.
 ///
-/// Empty where there is no such portal.
+/// Empty if there is no such portal.
 pub(crate) fn plug(world: &World, sight: &Sight, portal: PortalId) -> Primitive {
     let Some(p) = world.graph.portals.get(portal.0 as usize) else {
         return Primitive::default();

@@ -6,7 +6,7 @@ use wgpu::util::DeviceExt;
 use crate::gpu::{Gpu, RenderError};
 use crate::materials::{Decoder, Look, NoPicture, wrapping};
 
-/// The layout of a texture's bind group.
+/// Returns the layout of a texture's bind group.
 pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     gpu.device
         .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -34,17 +34,17 @@ pub(crate) fn texture_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
 
 /// Textures on the adapter.
 pub(super) struct Textures {
-    /// The textures that materials use; the first is white.
+    /// Textures used by materials; the first is white.
     pub(super) groups: Vec<wgpu::BindGroup>,
-    /// Indices into these by texture of the world.
+    /// For each texture of the world, index into `groups`.
     pub(super) of: Vec<u32>,
-    /// Pictures that are missing or damaged.
+    /// Number of images missing or damaged.
     pub(super) n_missing: u32,
-    /// Pictures that would take more than they may.
+    /// Number of images beyond the limits.
     pub(super) n_too_large: u32,
 }
 
-/// The textures that materials use.
+/// Uploads the textures used by materials.
 pub(super) fn load_textures(
     gpu: &Gpu,
     world: &World,
@@ -57,7 +57,7 @@ pub(super) fn load_textures(
     let mut texture_of = vec![0; world.textures.len()];
     let (mut n_missing, mut n_too_large) = (0, 0);
     let mut decoder = Decoder::new(world);
-    // A texture without a picture is asked once.
+    // Try a texture without an image only once.
     let mut is_without = vec![false; world.textures.len()];
     for look in looks {
         let Some(t) = look.texture else { continue };

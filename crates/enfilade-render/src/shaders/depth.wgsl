@@ -1,4 +1,4 @@
-// Depth alone: the sun's picture of the world, and what hides portals.
+// Depth only: the shadow map, and surfaces that hide portals.
 
 struct Corner {
     @location(0) position: vec3<f32>,
@@ -17,7 +17,7 @@ fn from_eye(in: Corner) -> @builtin(position) vec4<f32> {
     return to_clip(place(in.position, in.row_x, in.row_y, in.row_z) - globals.origin.xyz);
 }
 
-// Of an outline, by its corners alone.
+// For outlines, from their vertices alone.
 @vertex
 fn outline(@location(0) position: vec3<f32>) -> @builtin(position) vec4<f32> {
     return to_clip(position - globals.origin.xyz);

@@ -1,4 +1,4 @@
-// What surfaces draw where the adapter's depth is as fine as the shader's.
+// Output of surfaces where the adapter's depth is as fine as the shader's.
 
 struct Drawn {
     @location(0) color: vec4<f32>,

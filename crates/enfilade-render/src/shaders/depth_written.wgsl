@@ -1,7 +1,7 @@
-// What surfaces draw on OpenGL: depth as well.
+// Output of surfaces on OpenGL: depth as well.
 //
-// There, clip space runs from -1 to 1, and what is far away, at 0 here, would be at -1, where floats are
-// coarse: at 600 m, surfaces half a meter apart tie. So the depth is computed again, exactly.
+// There, clip space runs from -1 to 1, and distant points, here at 0, would be at -1, where floats are coarse: at
+// 600 m, surfaces half a meter apart have equal depths. So the depth is computed again, exactly.
 
 struct Drawn {
     @location(0) color: vec4<f32>,
@@ -9,11 +9,11 @@ struct Drawn {
 }
 
 fn depth_of(clip: vec4<f32>) -> f32 {
-    // Parallel lines: as fine as it need be.
+    // Parallel lines: fine enough.
     if globals.eye.w > 0.5 {
         return clip.z;
     }
-    // The near plane's distance over the surface's; `w` of a fragment is 1 / distance.
+    // Distance of the near plane over that of the surface; `w` of a fragment is 1 / distance.
     return globals.clip_from_relative[3].z * clip.w;
 }
 
@@ -34,7 +34,7 @@ fn drawn_at(color: vec4<f32>, depth: f32) -> Drawn {
     return Drawn(color, depth);
 }
 
-// Depth alone.
+// Depth only.
 @fragment
 fn only_depth(@builtin(position) clip: vec4<f32>) -> @builtin(frag_depth) f32 {
     return depth_of(clip);

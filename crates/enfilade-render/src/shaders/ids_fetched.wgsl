@@ -1,10 +1,10 @@
-// Corners are fetched by number, without an index buffer, so that three corners in a row know their
-// triangle, however a draw is divided into ranges.
+// Vertices are fetched by index, without an index buffer, so that three vertices in a row determine their triangle,
+// however a draw is divided into ranges.
 
 @group(0) @binding(1) var<storage, read> corners: array<u32>;
 @group(0) @binding(2) var<storage, read> indices: array<u32>;
 
-// Words of a corner.
+// Words per vertex.
 const STRIDE: u32 = 10u;
 
 @vertex

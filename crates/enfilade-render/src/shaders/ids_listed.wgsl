@@ -1,4 +1,4 @@
-// Where vertex shaders read no storage buffers, each triangle's corners are listed once more.
+// If vertex shaders cannot read storage buffers, each triangle's vertices are listed once more.
 
 @vertex
 fn corner(

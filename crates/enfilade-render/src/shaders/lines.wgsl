@@ -1,9 +1,9 @@
-// Lines and see-through polygons over the picture; already in clip space.
+// Lines and translucent polygons over the picture, already in clip space.
 
 struct Mark {
     @builtin(position) clip: vec4<f32>,
     @location(0) color: vec4<f32>,
-    // Depth and distance: marks lie nearer than surfaces in the same place.
+    // Depth and distance: marks lie nearer than coincident surfaces.
     @location(1) depth: vec2<f32>,
 }
 

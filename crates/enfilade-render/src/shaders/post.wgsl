@@ -1,7 +1,7 @@
-// From surfaces to the picture where that takes all of them: dark corners, heat of overdraw.
+// Effects on the image of the surfaces: ambient occlusion, heat map of overdraw.
 
 @group(1) @binding(0) var color: texture_2d<f32>;
-// Numbers, not a depth texture: of those, GLSL loads no texels.
+// Floats instead of a depth texture: GLSL cannot load texels of those.
 @group(1) @binding(1) var depth: texture_2d<f32>;
 
 fn depth_at(p: vec2<i32>) -> f32 {
@@ -10,13 +10,13 @@ fn depth_at(p: vec2<i32>) -> f32 {
 }
 
 const SAMPLES: i32 = 20;
-// How far corners darken. [Units: wu]
+// Reach of ambient occlusion. [Units: wu]
 const REACH: f32 = 0.6;
 
 // Ambient occlusion from depths alone, after McGuire et al., "The Alchemy Screen-Space Ambient
 // Obscurance Algorithm" (HPG 2011), section 2.
 fn open_sky(p: vec2<i32>, at: vec3<f32>, z: f32) -> f32 {
-    // Of the two neighbors along an axis, the one on the same surface.
+    // The neighbor along an axis that lies on the same surface.
     let left = point_at(p + vec2(-1, 0), depth_at(p + vec2(-1, 0)));
     let right = point_at(p + vec2(1, 0), depth_at(p + vec2(1, 0)));
     let above = point_at(p + vec2(0, -1), depth_at(p + vec2(0, -1)));
@@ -26,7 +26,7 @@ fn open_sky(p: vec2<i32>, at: vec3<f32>, z: f32) -> f32 {
     var dy = above - at;
     if distance(below, at) < distance(above, at) { dy = at - below; }
     let normal = normalize(cross(dx, dy));
-    // How many pixels the reach is, here.
+    // The reach in pixels at this depth.
     let clip = globals.clip_from_relative * vec4(at, 1.0);
     let scale = length(vec3(
         globals.clip_from_relative[0].y,
@@ -34,7 +34,7 @@ fn open_sky(p: vec2<i32>, at: vec3<f32>, z: f32) -> f32 {
         globals.clip_from_relative[2].y,
     ));
     let radius = clamp(0.5 * globals.size.y * scale * REACH / clip.w, 3.0, 0.2 * globals.size.y);
-    // Turned differently in each pixel of a block: noise finer than the eye, the same in each frame.
+    // Rotated differently in each pixel of a block: noise finer than the eye sees, the same in each frame.
     let noise = fract(52.9829189 * fract(dot(vec2<f32>(p), vec2(0.06711056, 0.00583715))));
     var sum = 0.0;
     for (var i = 0; i < SAMPLES; i++) {
@@ -70,7 +70,7 @@ fn heat_map(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
 fn finish(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     let p = vec2<i32>(clip.xy);
     let z = depth_at(p);
-    // Nothing is as far as the far end: the sky is.
+    // Only the sky is at the far end.
     if z <= 0.0 {
         return vec4(sky(p), 1.0);
     }

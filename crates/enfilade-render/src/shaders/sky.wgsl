@@ -1,24 +1,24 @@
-// The sky, and the triangle around the screen that it is painted with.
+// The sky, and the triangle that covers the screen to paint it.
 
 @vertex
 fn whole(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {
-    // As far as can be: depth 0.
+    // Farthest: depth 0.
     return vec4(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
-// Where a pixel's surface is, relative to the camera.
+// Returns the position of a pixel's surface relative to the camera.
 fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
     let uv = (vec2<f32>(p) + 0.5) * globals.size.zw;
     let q = globals.relative_from_clip * vec4(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0, z, 1.0);
     return q.xyz / q.w;
 }
 
-// What is seen of the sky, and of the ground far below, along a line.
+// Returns the color of the sky, or of the ground far below, along a line.
 fn sky_along(ray: vec3<f32>) -> vec3<f32> {
     let t = clamp(ray.y, -0.15, 1.0);
     let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.66, 0.70, 0.74), min(-t / 0.12, 1.0));
     let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
-    // Too bright for who stands in a room.
+    // Overexposed for an eye in a room.
     return min(select(above, below, t < 0.0) * (0.7 + 0.3 * globals.field_shift.w), vec3(1.0));
 }
 

@@ -1,15 +1,15 @@
-// Surfaces as they look: textures, sun, sky.
+// Surfaces: textures, sun, sky.
 //
-// What a frame does without is left out of the shader, not skipped by a branch: software that shades
-// eight pixels at a time takes both ways of each branch, and nine shadow samples for nothing cost more
-// than all else. For the same reason whatever is the same along a surface comes with its corners.
+// Features that a frame does not use are left out of the shader, not skipped by a branch: a software renderer
+// that shades eight pixels at a time takes both sides of each branch, and nine unused shadow samples cost more than
+// everything else. For the same reason, values that are constant along a surface come with its vertices.
 
 override CASTS_SHADOWS: bool = false;
-// Whether the light of each place is known.
+// True if the light of each place is known.
 override HAS_LIGHT: bool = false;
-// Whether corners have normals.
+// True if vertices have normals.
 override IS_SMOOTH: bool = false;
-// Whether cells, or the reasons why something is drawn, may give the color.
+// True if cells, or reasons of visibility, may determine the color.
 override EXPLAINS: bool = false;
 
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
@@ -21,23 +21,23 @@ struct Corner {
     @location(0) position: vec3<f32>,
     @location(1) normal: vec4<f32>,
     @location(2) uv: vec2<f32>,
-    // The material's times the corner's own.
+    // The material's color times the vertex's own.
     @location(3) color: vec4<f32>,
     // w: least alpha that is drawn.
     @location(4) emissive: vec4<f32>,
-    // Color of the cell that it belongs to, of structure.
+    // Color of its cell, for structure.
     @location(5) cell: u32,
     // Rows of the map from mesh to world.
     @location(6) row_x: vec4<f32>,
     @location(7) row_y: vec4<f32>,
     @location(8) row_z: vec4<f32>,
-    // Number and reason; color of its cell.
+    // Index and reason; color of its cell.
     @location(9) key: vec2<u32>,
 }
 
 struct Surface {
     @builtin(position) clip: vec4<f32>,
-    // To the camera's place.
+    // Relative to the camera.
     @location(0) relative: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) uv: vec2<f32>,
@@ -54,7 +54,7 @@ fn corner(in: Corner) -> Surface {
     out.clip = to_clip(out.relative);
     if IS_SMOOTH {
         let n = in.normal.xyz;
-        // By the cofactors: the inverse transposed, but for a factor.
+        // The cofactors: the inverse transposed, up to a factor.
         out.normal = vec3(
             dot(cross(in.row_y.xyz, in.row_z.xyz), n),
             dot(cross(in.row_z.xyz, in.row_x.xyz), n),
@@ -77,7 +77,7 @@ fn unpacked(c: u32) -> vec3<f32> {
     return pow(v.rgb, vec3(2.2));
 }
 
-// 1 in the sun, 0 in the shade.
+// Returns 1 in the sun, 0 in shadow.
 fn sunlit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     let lifted = world + normal * globals.sun.w * 2.0;
     let q = globals.shadow_from_world * vec4(lifted, 1.0);
@@ -93,7 +93,7 @@ fn sunlit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     return lit / 9.0;
 }
 
-// What a surface sends to the eye, and what it takes to add a reflection.
+// The light from a surface to the eye, and the data for a reflection.
 struct Shaded {
     color: vec4<f32>,
     normal: vec3<f32>,
@@ -103,16 +103,16 @@ struct Shaded {
 }
 
 fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
-    // From an eye at the camera's place, or along parallel lines.
+    // From the camera's position, or along parallel lines.
     let eye = (globals.eye.xyz - globals.origin.xyz) - in.relative * (1.0 - globals.eye.w);
     let toward_eye = normalize(eye);
     var normal = in.normal;
     if !IS_SMOOTH {
         normal = cross(dpdx(in.relative), dpdy(in.relative));
     }
-    // None at all of a sliver, or where a file says so: then only the sky's light is left.
+    // A sliver, or a faulty file, has none: then only the sky's light is left.
     normal *= inverseSqrt(max(dot(normal, normal), 1e-30));
-    // What is seen of a surface is the side towards the eye.
+    // Turn the normal towards the eye.
     var facing = dot(normal, toward_eye);
     normal = select(normal, -normal, facing < 0.0);
     facing = abs(facing);
@@ -135,14 +135,14 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
             if cell >= 0 { color = color_of_cell(cell); }
             base = vec4(unpacked(color), base.a);
             emissive = vec3(0.0);
-            // Why it is not seen: out of view, behind no open portals, behind an occluder; or no surface of a room.
+            // Reason: out of view, behind walls, behind an occluder; or not a surface of a room.
             if reason == 1u { base = vec4(0.10, 0.10, 0.11, base.a); }
             if reason == 2u { base = vec4(0.42, 0.10, 0.07, base.a); }
             if reason == 3u { base = vec4(0.62, 0.36, 0.05, base.a); }
             if reason == 4u { base = vec4(0.015, 0.015, 0.018, base.a); }
         }
     }
-    // Flat light, which shows what faces the eye; or what falls there.
+    // Flat light, brightest on surfaces that face the eye; or the light of the place.
     var ambient = open_light(normal) + vec3(0.16 * facing);
     if HAS_LIGHT {
         ambient = light_in(cell, place, normal) * (0.94 + 0.08 * facing);
@@ -152,12 +152,12 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
         sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
     var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * globals.field_shift.w;
-    // What is not seen is told by its color alone: shading would make it look like something.
+    // Invisible surfaces get a plain color: shading would make them look real.
     if reason != 0u { light = vec3(1.0 + 0.25 * normal.y); }
     return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
 }
 
-// Bright is compressed rather than cut off.
+// Compresses bright values instead of clipping them.
 fn toned(c: vec3<f32>) -> vec3<f32> {
     return c * (1.0 / (1.0 + 0.28 * max(c.r, max(c.g, c.b))));
 }
@@ -172,8 +172,8 @@ fn cut(in: Surface, texel: vec4<f32>) {
     }
 }
 
-// Three ways, from cheap to dear: what may discard a pixel is shaded before its depth is known, and a
-// texture costs software as much as all else.
+// Three kinds, from cheap to expensive: a surface that may discard pixels is shaded before its depth is known, and a
+// texture costs software as much as everything else.
 
 @fragment
 fn plain(in: Surface) -> Drawn {
@@ -199,10 +199,10 @@ fn glass(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let s = shaded(in, texel);
     cut(in, texel);
-    // Schlick, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), of glass with two faces.
+    // Schlick, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), for glass with two faces.
     let grazing = 1.0 - abs(dot(s.normal, s.toward_eye));
     let mirror = 0.08 + 0.92 * pow(grazing, 5.0);
-    // Outdoors the sky is reflected, or the ground; indoors the room.
+    // Outdoors, panes reflect the sky or the ground; indoors, the room.
     let along = reflect(-s.toward_eye, s.normal);
     var around = sky_along(along);
     if HAS_LIGHT {
@@ -211,7 +211,7 @@ fn glass(in: Surface) -> Drawn {
             around = 0.7 * toned(light_in(s.cell, place, along) * globals.field_shift.w);
         }
     }
-    // A pane's own color is thin: what is behind it shows, mostly.
+    // A pane's own color is faint: mostly, it shows the things behind it.
     let alpha = s.color.a * 0.6;
     let body = toned(s.color.rgb) * alpha * (1.0 - mirror);
     return drawn(in.clip, vec4(body + around * mirror, alpha + (1.0 - alpha) * mirror));
@@ -225,7 +225,7 @@ fn sheer(in: Surface) -> Drawn {
     return drawn(in.clip, vec4(toned(c.rgb), c.a));
 }
 
-// A step of brightness for each time that a pixel is drawn.
+// A step of brightness for each draw of a pixel.
 @fragment
 fn count(in: Surface) -> Drawn {
     if is_above_cut(in) {

@@ -1,4 +1,4 @@
-//! GLB files: everything that the document numbers, numbered another way.
+//! GLB files in another order: everything that the document numbers.
 
 use std::collections::BTreeMap;
 
@@ -6,13 +6,14 @@ use serde_json::{Map, Value, json};
 
 use crate::rng::Rng;
 
-/// A GLB with its nodes, children, meshes, primitives, materials, textures, pictures, triangles and vertices in another order, and
-/// triangles from another of their corners on. Names, shapes and places stay.
+/// Returns a GLB with its nodes, children, meshes, primitives, materials, textures, images, triangles and vertices in
+/// another order, and triangles that start at another vertex. Names, shapes and places stay.
 ///
-/// Vertices are neither joined nor parted. Primitives that are no triangle lists, compressed or sparse keep their order.
+/// Vertices are neither merged nor split. Primitives that are not triangle lists, or are compressed or sparse, keep
+/// their order.
 ///
 /// # Panics
-/// When the bytes are no GLB.
+/// If the bytes are not a GLB.
 #[must_use]
 pub fn shuffled_glb(glb: &[u8], seed: u64) -> Vec<u8> {
     let word =
@@ -44,7 +45,7 @@ struct Document {
 }
 
 impl Document {
-    /// Shuffles a list of the root; by old number the new one.
+    /// Shuffles a list of the root; returns the new index of each old one.
     fn shuffle_list(&mut self, name: &str) -> Vec<usize> {
         let Some(list) = self.root.get_mut(name).and_then(Value::as_array_mut) else {
             return Vec::new();
@@ -169,7 +170,7 @@ impl Document {
         for t in &mut triangles {
             t.rotate_left(self.rng.below(3));
         }
-        // By new vertex the old one.
+        // The old index of each new vertex.
         let mut vertices: Vec<usize> = (0..n).collect();
         if primitive.get("indices").is_some() {
             self.rng.shuffle(&mut vertices);
@@ -209,7 +210,7 @@ impl Document {
         Some(self.root["accessors"][number]["count"].as_u64()? as usize)
     }
 
-    /// The bytes of each element; `None` where they are not plainly in the binary chunk.
+    /// Returns the bytes of each element; `None` if they are not plainly in the binary chunk.
     fn elements(&self, accessor: &Value) -> Option<Elements> {
         let accessor = &self.root["accessors"][accessor.as_u64()? as usize];
         let view = &self.root["bufferViews"][accessor.get("bufferView")?.as_u64()? as usize];
@@ -245,7 +246,7 @@ impl Document {
         Some(self.elements(accessor)?.iter().map(number).collect())
     }
 
-    /// Adds an accessor like `accessor` to these elements; its number.
+    /// Adds an accessor like `accessor` for these elements; returns its index.
     fn add_accessor(&mut self, mut accessor: Value, elements: Elements) -> Value {
         let stride = elements.first().map_or(4, |e| e.len().next_multiple_of(4));
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
@@ -289,7 +290,7 @@ impl Document {
     }
 }
 
-/// By element its bytes.
+/// The bytes of each element.
 type Elements = Vec<Vec<u8>>;
 
 fn push(list: &mut Value, item: Value) -> Value {
@@ -300,7 +301,7 @@ fn push(list: &mut Value, item: Value) -> Value {
     (list.len() - 1).into()
 }
 
-/// Changes a number of something to its new one, where it is one.
+/// Changes an index to its new value, if there is one.
 fn renumber(value: &mut Value, number: &[usize]) {
     if let Some(old) = value.as_u64() {
         *value = number[old as usize].into();
@@ -313,7 +314,7 @@ fn renumber_at(value: &mut Value, key: &str, number: &[usize]) {
     }
 }
 
-/// As [`renumber`], of all textures that a material refers to.
+/// Applies [`renumber`] to all textures of a material.
 fn renumber_textures(value: &mut Value, number: &[usize]) {
     match value {
         Value::Array(items) => items.iter_mut().for_each(|i| renumber_textures(i, number)),

@@ -1,12 +1,12 @@
-//! Scenes as text: lines and blocks in another order.
+//! Text scenes with lines and blocks in another order.
 
 use crate::rng::Rng;
 
-/// An OBJ file with its positions in another order, and the faces between two names or materials, each triangle from another of its
-/// corners on. Texture coordinates and normals stay where they are.
+/// Returns an OBJ file with its positions in another order, as well as the faces between two names or materials, each
+/// triangle starting at another vertex. Texture coordinates and normals stay in their places.
 ///
 /// # Panics
-/// When a face refers to positions from the end, or to none.
+/// If a face refers to positions from the end, or to none.
 #[must_use]
 pub fn shuffled_obj(text: &str, seed: u64) -> String {
     let mut rng = Rng::new(seed);
@@ -46,7 +46,8 @@ pub fn shuffled_obj(text: &str, seed: u64) -> String {
     out.join("\n")
 }
 
-/// A Quake map with its entities, the brushes of each, and the sides of each brush in another order. Properties stay where they are.
+/// Returns a Quake map with its entities, their brushes, and the sides of each brush in another order. Properties
+/// stay in their places.
 #[must_use]
 pub fn shuffled_map(text: &str, seed: u64) -> String {
     let mut rng = Rng::new(seed);
@@ -71,7 +72,7 @@ pub fn shuffled_map(text: &str, seed: u64) -> String {
     out.join("\n")
 }
 
-/// The lines outside of braces, and what stands in each outer pair of them.
+/// Returns the lines outside of braces, and the contents of each outer pair of braces.
 fn blocks<'t>(lines: impl Iterator<Item = &'t str>) -> (Vec<&'t str>, Vec<Vec<&'t str>>) {
     let (mut outside, mut inside) = (Vec::new(), Vec::new());
     let mut depth = 0;

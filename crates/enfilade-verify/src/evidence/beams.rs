@@ -1,9 +1,9 @@
-//! Walls that close all lines from one opening to another.
+//! Walls that block all lines from one opening to another.
 //!
-//! A tree says how the two openings are halved; each of its leaves names triangles. They close the lines between
-//! the two pieces if their rim (the edges that an odd number of them have) stays off the hull of the pieces,
-//! none of them touches a piece, and some line between the pieces crosses an odd number of them: the number
-//! changes by twos as a line moves, unless it passes over the rim or an end of it passes through a triangle.
+//! A tree describes how to halve the two openings; each of its leaves lists triangles. They block the lines between
+//! two pieces if their rim (the edges that an odd number of them have) stays off the hull of the pieces, none of them
+//! touches a piece, and some line between the pieces crosses an odd number of them: as a line moves, that number
+//! changes by twos, unless the line passes over the rim or an end of it passes through a triangle.
 
 use enfilade_geom::{DVec3, Triangle};
 
@@ -15,10 +15,10 @@ const FIRST: u8 = 0;
 const SECOND: u8 = 1;
 const SHEET: u8 = 2;
 
-/// Deepest halving: what recursion can take, and more than numbers can tell apart.
+/// Deepest halving: within recursion limits, and more than floats can resolve.
 const MAX_DEPTH: u32 = 200;
 
-/// Checks that every tree closes all lines between its two openings.
+/// Checks that every tree blocks all lines between its two openings.
 pub(super) fn check(
     openings: &Openings,
     trees: &[Tree],
@@ -31,11 +31,13 @@ pub(super) fn check(
             to: tree.to,
             problem,
         };
-        let walls = walls.ok_or(fail("walls are to hide them, and none are known"))?;
+        let walls = walls.ok_or(fail(
+            "they are claimed hidden by walls, but there are no walls",
+        ))?;
         let mut reader = BeamReader {
             rest: &tree.bytes,
             walls,
-            // Distances below this are rounding.
+            // Smaller distances are rounding.
             apart: 8.0 * openings.rounding(),
         };
         let (s, t) = (tree.from, tree.to);
@@ -50,7 +52,7 @@ pub(super) fn check(
             }
         }
         if !reader.rest.is_empty() {
-            return Err(fail("there is more of their tree than pieces"));
+            return Err(fail("their tree continues after the last piece"));
         }
     }
     Ok(())
@@ -96,15 +98,18 @@ impl BeamReader<'_> {
                         .ok_or("their tree ends early")?;
                     self.rest = rest;
                     let triangle = self.walls.get(u32::from_le_bytes(*id) as usize);
-                    sheet.push(*triangle.ok_or("their tree names no triangle of the world")?);
+                    sheet.push(
+                        *triangle
+                            .ok_or("their tree contains a triangle that is not in the world")?,
+                    );
                 }
                 self.sheet(&sheet, first, second)
             }
-            _ => Err("their tree has no such symbol"),
+            _ => Err("their tree has an unknown symbol"),
         }
     }
 
-    /// Checks that triangles close all lines between two polygons.
+    /// Checks that triangles block all lines between two polygons.
     fn sheet(
         &self,
         sheet: &[Triangle],
@@ -117,7 +122,7 @@ impl BeamReader<'_> {
         let hull = hull(first, second, self.apart);
         for rim in rim(sheet) {
             if !is_off(rim, &hull, self.apart) {
-                return Err("a way leads around the triangles between them");
+                return Err("a line may pass around the triangles between them");
             }
         }
         let (p, q) = (near_middle(first), near_middle(second));
@@ -131,12 +136,12 @@ impl BeamReader<'_> {
         if is_odd {
             Ok(())
         } else {
-            Err("a line between them passes the triangles")
+            Err("a line between them passes through the triangles unblocked")
         }
     }
 
     fn is_crossed(&self, triangle: &Triangle, p: DVec3, q: DVec3) -> Result<bool, &'static str> {
-        let unsure = Err("a line between them passes too near to an edge to tell");
+        let unsure = Err("a line between them passes too close to an edge to decide");
         let [a, b, c] = *triangle;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let (above, below) = (normal.dot(p - a), normal.dot(q - a));
@@ -166,7 +171,7 @@ impl BeamReader<'_> {
 }
 
 impl Openings {
-    /// Where lines may cross an opening: its pieces, moved onto its plane, without a border.
+    /// Returns the region where lines may cross an opening: its pieces, moved onto its plane, without a border.
     fn open_parts(&self, d: usize, border: f64) -> Vec<Vec<DVec3>> {
         let opening = &self.all[d];
         let (turn, middle) = (self.turn(d), self.middle(d));
@@ -184,7 +189,7 @@ impl Openings {
         parts
     }
 
-    /// Height of an opening's plane along its normal.
+    /// Returns the height of an opening's plane along its normal.
     fn middle(&self, d: usize) -> f64 {
         let heights = self.all[d]
             .corners
@@ -197,7 +202,7 @@ impl Openings {
     }
 }
 
-/// What of a convex polygon has `normal · p >= least`; nothing where less than a triangle is left.
+/// Returns the part of a convex polygon with `normal · p >= least`; nothing if less than a triangle is left.
 fn kept(polygon: &[DVec3], normal: DVec3, least: f64) -> Vec<DVec3> {
     let mut out = Vec::new();
     for (k, &p) in polygon.iter().enumerate() {
@@ -218,7 +223,7 @@ fn kept(polygon: &[DVec3], normal: DVec3, least: f64) -> Vec<DVec3> {
     out
 }
 
-/// Two halves that together are the whole: across the longest side, the upper half first.
+/// Returns two halves of a polygon, cut across its longest side, the upper half first.
 fn split(polygon: &[DVec3]) -> [Vec<DVec3>; 2] {
     let mut bounds = [DVec3::MAX, DVec3::MIN];
     for &p in polygon {
@@ -236,7 +241,7 @@ fn split(polygon: &[DVec3]) -> [Vec<DVec3>; 2] {
     [kept(polygon, axis, middle), kept(polygon, -axis, -middle)]
 }
 
-/// Edges that an odd number of triangles have; corners are the same where their numbers are.
+/// Returns the edges of an odd number of triangles; vertices are equal if their coordinates are.
 fn rim(sheet: &[Triangle]) -> Vec<[DVec3; 2]> {
     let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
     let mut edges = Vec::with_capacity(3 * sheet.len());
@@ -254,7 +259,7 @@ fn rim(sheet: &[Triangle]) -> Vec<[DVec3; 2]> {
         .collect()
 }
 
-/// Half-spaces that each hold both polygons and touch them: `normal · p >= least`.
+/// Returns half-spaces `normal · p >= least` that contain both polygons and touch them.
 fn hull(first: &[DVec3], second: &[DVec3], apart: f64) -> Vec<(DVec3, f64)> {
     let mut sides = Vec::new();
     let mut add = |normal: DVec3| {
@@ -274,7 +279,7 @@ fn hull(first: &[DVec3], second: &[DVec3], apart: f64) -> Vec<(DVec3, f64)> {
                 let heights = first.iter().chain(second).map(|p| normal.dot(*p - own[k]));
                 let (low, high) =
                     heights.fold((0.0_f64, 0.0_f64), |(l, h), x| (l.min(x), h.max(x)));
-                // Others cut through the polygons, and bound nothing.
+                // Other planes cut through the polygons and bound nothing.
                 if low >= -4.0 * apart {
                     add(normal);
                 }
@@ -287,7 +292,7 @@ fn hull(first: &[DVec3], second: &[DVec3], apart: f64) -> Vec<(DVec3, f64)> {
     sides
 }
 
-/// Whether a segment leaves a hull alone.
+/// Returns `true` if a segment does not meet a hull.
 fn is_off([a, b]: [DVec3; 2], hull: &[(DVec3, f64)], apart: f64) -> bool {
     let mut within = [0.0_f64, 1.0_f64];
     for &(normal, least) in hull {
@@ -305,7 +310,7 @@ fn is_off([a, b]: [DVec3; 2], hull: &[(DVec3, f64)], apart: f64) -> bool {
     within[0] > within[1]
 }
 
-/// Whether no plane passes between a triangle and a convex polygon.
+/// Returns `true` if no plane separates a triangle from a convex polygon.
 fn touches(triangle: &Triangle, polygon: &[DVec3], apart: f64) -> bool {
     let is_between = |axis: DVec3| {
         let axis = axis.normalize_or_zero();
@@ -342,7 +347,7 @@ fn turn_of(polygon: &[DVec3]) -> DVec3 {
     sum.normalize_or_zero()
 }
 
-/// A point inside that is not the middle: walls are often cut into triangles along lines of symmetry.
+/// Returns an inner point other than the centroid: walls are often cut into triangles along lines of symmetry.
 fn near_middle(polygon: &[DVec3]) -> DVec3 {
     let mut sum = DVec3::ZERO;
     let mut weights = 0.0;

@@ -1,4 +1,4 @@
-//! Bytes → claims.
+//! Decoding of evidence.
 
 use std::io::Read;
 
@@ -8,18 +8,18 @@ use enfilade_geom::DVec3;
 use super::EvidenceError;
 use super::shape::{Openings, Table};
 
-/// Everything claimed.
+/// All claims of the evidence.
 pub(super) struct Evidence {
     pub(super) clearance: f64,
     pub(super) far: f64,
     pub(super) n_visible: u64,
     pub(super) n_proved: u64,
-    /// By direction, the directions that are not called hidden from it.
+    /// For each direction, the directions not claimed hidden from it.
     pub(super) might: Table,
-    /// By direction, those called hidden that its trace is to show.
+    /// For each direction, those whose being hidden its trace must show.
     pub(super) claims: Table,
     pub(super) lines: Vec<SightLine>,
-    /// Pairs of openings that walls hide from each other.
+    /// Pairs of openings hidden from each other by walls.
     pub(super) trees: Vec<Tree>,
     pub(super) trace: Vec<u8>,
 }
@@ -30,7 +30,7 @@ pub(super) struct SightLine {
     pub(super) chain: Vec<u32>,
 }
 
-/// How walls close the lines from one opening to another.
+/// How walls block the lines from one opening to another.
 pub(super) struct Tree {
     pub(super) from: usize,
     pub(super) to: usize,
@@ -38,12 +38,12 @@ pub(super) struct Tree {
 }
 
 const MAGIC: &[u8; 8] = b"ENFEVID4";
-/// Deflate cannot do better.
+/// Largest ratio of deflate.
 const MAX_RATIO: u64 = 1032;
-/// Largest clearance, relative to the largest coordinate, that is accepted as a proof.
+/// Largest accepted clearance, relative to the largest coordinate.
 const MAX_CLEARANCE: f64 = 1e-6;
 
-/// FNV-1a, 64 bits.
+/// Returns the 64-bit FNV-1a hash.
 fn check_sum(bytes: &[u8]) -> u64 {
     let mut sum: u64 = 0xcbf2_9ce4_8422_2325;
     for &byte in bytes {
@@ -52,7 +52,7 @@ fn check_sum(bytes: &[u8]) -> u64 {
     sum
 }
 
-/// Reads the bytes. Takes memory for what the bytes can hold, never for what they say.
+/// Decodes the bytes. Memory is bounded by their number, not by the sizes that they declare.
 pub(super) fn decode(
     graph: &SightGraph,
     openings: &Openings,
@@ -69,9 +69,9 @@ pub(super) fn decode(
     }
     let size = u64::from_le_bytes(size.try_into().map_err(|_| damaged("it is too short"))?);
     if size > packed.len() as u64 * MAX_RATIO {
-        return Err(damaged("it cannot be as long as it says"));
+        return Err(damaged("its declared size is impossible"));
     }
-    // Deflate has bits that mean nothing: a change there would go unnoticed.
+    // Deflate ignores some bits: a change there would go unnoticed.
     if sum != check_sum(packed).to_le_bytes() {
         return Err(damaged("its check sum is wrong"));
     }
@@ -90,7 +90,7 @@ pub(super) fn decode(
         return Err(EvidenceError::Weak("its clearance is too wide"));
     }
     if far.is_nan() || far < 0.0 {
-        return Err(damaged("its far plane is no distance"));
+        return Err(damaged("its far plane is not a distance"));
     }
     let (n_visible, n_proved) = (reader.u64()?, reader.u64()?);
     let n = openings.all.len();
@@ -164,7 +164,7 @@ impl Reader<'_> {
             .collect::<Result<Vec<_>, _>>()?;
         if chain.iter().any(|&d| d as usize >= n) {
             return Err(EvidenceError::Damaged(
-                "a line names no opening of the graph",
+                "a line contains an opening that is not in the graph",
             ));
         }
         Ok(SightLine {
@@ -178,7 +178,7 @@ impl Reader<'_> {
         let (from, to) = (self.u32()? as usize, self.u32()? as usize);
         if from.max(to) >= n {
             return Err(EvidenceError::Damaged(
-                "a tree names no opening of the graph",
+                "a tree contains an opening that is not in the graph",
             ));
         }
         let len = self.u32()? as usize;

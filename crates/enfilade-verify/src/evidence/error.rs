@@ -1,59 +1,59 @@
-//! Why evidence is not accepted.
+//! The reason why evidence is rejected.
 
 use enfilade_cpg::SightGraphError;
 
-/// Why evidence is not accepted.
+/// The reason why evidence is rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvidenceError {
     /// The graph itself is broken.
     #[error(transparent)]
     Graph(#[from] SightGraphError),
-    /// The bytes are no evidence, or are cut off or damaged.
+    /// The bytes are not evidence, or are truncated or damaged.
     #[error("the evidence is damaged: {0}")]
     Damaged(&'static str),
-    /// It speaks of another graph.
+    /// It belongs to another graph.
     #[error("the evidence belongs to another graph; compute it again")]
     OtherGraph,
-    /// A setting that would make claims empty.
+    /// A setting that would make its claims empty.
     #[error("the evidence claims too little: {0}")]
     Weak(&'static str),
-    /// A line does not cross the openings it is said to.
+    /// A line does not cross its openings.
     #[error("line {line}: {problem}")]
     Line {
-        /// Its number.
+        /// Index of the line.
         line: u64,
-        /// What does not hold.
+        /// The condition that fails.
         problem: &'static str,
     },
-    /// Two openings are called hidden from each other without reason.
+    /// Two openings are claimed hidden from each other without a valid reason.
     #[error("openings {from} and {to}: {problem}")]
     Hidden {
         /// Direction crossed first.
         from: usize,
         /// Direction crossed later.
         to: usize,
-        /// What does not hold.
+        /// The condition that fails.
         problem: &'static str,
     },
     /// The trace of an opening does not close its chains.
     #[error("trace of opening {opening}, byte {at}: {problem}")]
     Trace {
-        /// Direction it starts from.
+        /// Direction from which it starts.
         opening: usize,
         /// Byte of the trace.
         at: usize,
-        /// What does not hold.
+        /// The condition that fails.
         problem: &'static str,
     },
-    /// The totals are not those that the claims give.
-    #[error("the evidence says {said} {what}, its claims give {found}")]
+    /// The totals differ from those of the claims.
+    #[error("the evidence records {said} {what}, but its claims give {found}")]
     Totals {
-        /// What is counted.
+        /// The counted quantity.
         what: &'static str,
-        /// As said.
+        /// The recorded total.
         said: u64,
-        /// As found.
+        /// The total of the claims.
         found: u64,
     },
 }

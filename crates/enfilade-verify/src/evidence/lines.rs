@@ -1,4 +1,4 @@
-//! Lines that prove cells to see each other.
+//! Lines that prove that cells see each other.
 
 use enfilade_cpg::{CellId, CellSet};
 
@@ -6,7 +6,7 @@ use super::decode::{Evidence, SightLine};
 use super::shape::Openings;
 use super::{Blocks, EvidenceError};
 
-/// Follows every line; gives by cell the cells proved visible from it, itself included.
+/// Follows every line; returns, for each cell, the cells proved visible from it, itself included.
 pub(super) fn check(
     openings: &Openings,
     evidence: &Evidence,
@@ -62,7 +62,7 @@ fn follow(
                     return Err("its openings do not follow each other");
                 }
                 if t < earlier {
-                    return Err("it crosses openings in another order");
+                    return Err("it crosses its openings in another order");
                 }
                 let from = line.origin + line.direction * earlier;
                 if blocks.is_some_and(|blocks| blocks(from, p)) {

@@ -1,8 +1,8 @@
 //! Checks the evidence of a potentially visible set; `docs/evidence.md` describes it.
 //!
-//! Shares no code with the search. Nothing in the evidence is believed: of a pair called visible it wants a
-//! line that crosses the openings one by one, of each two openings called hidden from each other a reason,
-//! and the walk through all portal chains only follows the trace, so that time is bounded by its length.
+//! Shares no code with the search and trusts nothing in the evidence: a pair claimed visible needs a line that
+//! crosses the openings one by one, two openings claimed hidden from each other need a reason, and the walk through
+//! all portal chains only follows the trace, so that its length bounds the time.
 
 mod beams;
 mod decode;
@@ -20,39 +20,39 @@ pub use error::EvidenceError;
 use decode::Evidence;
 use shape::Openings;
 
-/// What evidence shows, after every claim in it was checked.
+/// The result of evidence, after every claim in it was checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EvidenceReport {
-    /// By cell, the cells that are not proved hidden from it, itself included.
+    /// For each cell, the cells not proved hidden from it, itself included.
     pub cells: Vec<CellSet>,
     /// Ordered pairs of cells not proved hidden.
     pub n_visible: u64,
-    /// Those of them that a line proves visible.
+    /// Those of `n_visible` that a line proves visible.
     pub n_proved: u64,
     /// Ordered pairs of cells proved hidden.
     pub n_hidden: u64,
-    /// Pairs of openings that walls hide from each other.
+    /// Pairs of openings hidden from each other by walls.
     pub n_walled: u64,
     /// Lines followed.
     pub n_lines: u64,
     /// Bytes of the trace.
     pub n_trace: u64,
-    /// Lines that pass nearer than this to an opening's edge may be lost. [Units: wu]
+    /// Lines that pass closer than this to an opening's edge may be lost. [Units: wu]
     pub clearance: f64,
 }
 
-/// Tells whether something solid lies between two points.
+/// Returns `true` if something solid lies between two points.
 type Blocks<'a> = &'a (dyn Fn(DVec3, DVec3) -> bool + Sync);
 
 /// Accepts evidence only if every claim in it holds on this graph.
 ///
-/// `walls` are the triangles that stop lines, where the scene is known, in the order in which the search had them
-/// ([`crate::structural_triangles`] of a world). Safe on hostile bytes: memory is bounded by
-/// the graph and the bytes, time by the trace. Uses the current rayon pool.
+/// `walls` are the triangles that block lines, if the scene is known, in the order of the search
+/// ([`crate::structural_triangles`] of a world). Safe on hostile bytes: the graph and the bytes bound the memory, the
+/// trace the time. Uses the current rayon pool.
 ///
 /// # Errors
 ///
-/// The first claim that does not hold.
+/// The first claim that fails.
 pub fn verify_evidence(
     graph: &SightGraph,
     bytes: &[u8],
@@ -88,7 +88,7 @@ pub fn verify_evidence(
     for (visible, proved) in cells.iter().zip(&proved) {
         if !proved.is_subset(visible) {
             return Err(EvidenceError::Damaged(
-                "a line proves what is called hidden",
+                "a line shows a cell that is claimed hidden",
             ));
         }
         n_proved += proved.len() as u64;
@@ -115,7 +115,7 @@ fn total(what: &'static str, said: u64, found: u64) -> Result<(), EvidenceError>
     }
 }
 
-/// Every pair of openings called hidden must follow from sides of planes, distance or its neighbors, or be
+/// Checks that every pair of openings claimed hidden follows from sides of planes, distance or neighbors, or is
 /// claimed by a trace.
 fn check_reasons(openings: &Openings, evidence: &Evidence) -> Result<(), EvidenceError> {
     let n = openings.all.len();
@@ -131,7 +131,7 @@ fn check_reasons(openings: &Openings, evidence: &Evidence) -> Result<(), Evidenc
             problem,
         };
         let might = &evidence.might;
-        // What some next opening might see, beyond what follows from neighbors.
+        // Openings that some next opening might see: all others follow from neighbors.
         let mut open = vec![0u64; might.n_words()];
         for q in openings.exits(openings.all[s].to, s ^ 1) {
             shape::set(&mut open, q);
@@ -164,7 +164,7 @@ fn check_reasons(openings: &Openings, evidence: &Evidence) -> Result<(), Evidenc
                     || openings.are_apart(s, t, evidence.clearance, evidence.far)
                     || last_fails(openings, evidence, s, t);
                 if !has_reason {
-                    return Err(fail(t, "no reason is given why they are hidden"));
+                    return Err(fail(t, "no reason shows that they are hidden"));
                 }
             }
         }
@@ -172,7 +172,7 @@ fn check_reasons(openings: &Openings, evidence: &Evidence) -> Result<(), Evidenc
     })
 }
 
-/// Whether each opening from which a line could go on through `t` is out of sight.
+/// Returns `true` if each opening through which a line could continue after `t` is hidden.
 fn last_fails(openings: &Openings, evidence: &Evidence, s: usize, t: usize) -> bool {
     openings.all[t].from != openings.all[s].to
         && openings

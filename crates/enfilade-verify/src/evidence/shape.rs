@@ -1,15 +1,15 @@
-//! Openings, tables, polygons and planes, as the checker sees them.
+//! Openings, tables, polygons and planes of the checker.
 
 use enfilade_cpg::SightGraph;
 use enfilade_geom::DVec3;
 
-/// Sine of the least angle at which a line crosses an opening; half of what `docs/evidence.md` asks for.
+/// Sine of the least angle at which a line crosses an opening; half the value that `docs/evidence.md` requires.
 const MIN_SINE: f64 = 5e-10;
 
-/// A sum of weighted rows that is longer is not zero.
+/// Length from which a sum of weighted rows counts as not zero.
 const UNBALANCED: f64 = 1e-13;
 
-/// A portal crossed one way. Directions are numbered as in [`SightGraph`]; `d ^ 1` is the way back.
+/// A directed portal. Directions are numbered as in [`SightGraph`]; `d ^ 1` is the reverse.
 pub(super) struct Opening {
     pub(super) from: u32,
     pub(super) to: u32,
@@ -25,8 +25,8 @@ pub(super) struct Openings {
     pub(super) scale: f64,
 }
 
-/// `normal · p >= offset`, or between two polygons a plane that the first lies behind (up to `behind`) and
-/// the second in front of (from `front` on).
+/// `normal · p >= offset`, or, between two polygons, a plane with the first behind (up to `behind`) and the second in
+/// front (from `front` on).
 #[derive(Clone, Copy)]
 pub(super) struct Plane {
     pub(super) normal: DVec3,
@@ -34,7 +34,7 @@ pub(super) struct Plane {
     pub(super) front: f64,
 }
 
-/// Part of an opening.
+/// A part of an opening.
 #[derive(Clone)]
 pub(super) struct Part {
     pub(super) opening: usize,
@@ -83,7 +83,7 @@ impl Openings {
         Self { all, out, scale }
     }
 
-    /// Unit normal that the corners of an opening run counter-clockwise about.
+    /// Returns the unit normal about which the vertices of an opening run counter-clockwise.
     pub(super) fn turn(&self, d: usize) -> DVec3 {
         if d.is_multiple_of(2) {
             self.all[d].normal
@@ -92,12 +92,12 @@ impl Openings {
         }
     }
 
-    /// Rounding of a product of a unit normal and a point, generously.
+    /// Returns a generous bound on the rounding of a product of a unit normal and a point.
     pub(super) fn rounding(&self) -> f64 {
         1e-13 * self.scale
     }
 
-    /// The directions out of a cell, by portal, but for one.
+    /// Returns the directions out of a cell, by portal, except one.
     pub(super) fn exits(&self, cell: u32, but: usize) -> impl Iterator<Item = usize> + '_ {
         self.out[cell as usize]
             .iter()
@@ -105,7 +105,7 @@ impl Openings {
             .filter(move |&d| d != but)
     }
 
-    /// The directions into a cell, by portal, but for one.
+    /// Returns the directions into a cell, by portal, except one.
     pub(super) fn entries(&self, cell: u32, but: usize) -> impl Iterator<Item = usize> + '_ {
         self.out[cell as usize]
             .iter()
@@ -117,10 +117,11 @@ impl Openings {
         least(self.all[d].normal, &self.all[d].corners)
     }
 
-    /// Whether weights, none below zero and of sum one, balance the rows of a chain of openings.
+    /// Returns `true` if weights, none negative and of sum one, balance the rows of a chain of openings.
     ///
-    /// A row of an edge is positive for a line that passes on the inner side, that of an opening for one that
-    /// crosses it the right way. A line would be positive for all; and so for the sum, were it not zero.
+    /// The row of an edge is positive for a line that passes on its inner side, that of an opening for a line that
+    /// crosses it in its direction. All are positive for a line through the chain; then their weighted sum is
+    /// positive, too, not zero.
     pub(super) fn are_balanced(&self, chain: &[usize], weights: &[(usize, f64)]) -> bool {
         let corners = || chain.iter().flat_map(|&d| &self.all[d].corners);
         let n = corners().count() as f64;
@@ -132,7 +133,7 @@ impl Openings {
         for &d in chain {
             let opening = &self.all[d];
             let corners = &opening.corners;
-            // Corners run counter-clockwise about `turn`, so clockwise for who crosses the other way.
+            // Vertices run counter-clockwise about `turn`, so clockwise for the opposite direction.
             let side = if d.is_multiple_of(2) { 1.0 } else { -1.0 };
             for (i, &p) in corners.iter().enumerate() {
                 let q = corners[(i + 1) % corners.len()];
@@ -163,7 +164,7 @@ impl Openings {
             && sum[0].length().hypot(sum[1].length()) <= UNBALANCED
     }
 
-    /// Where a line crosses an opening's plane, from front to back.
+    /// Returns the position on a line where it crosses an opening's plane from front to back.
     pub(super) fn crossing(&self, d: usize, origin: DVec3, direction: DVec3) -> Option<f64> {
         let opening = &self.all[d];
         let speed = opening.normal.dot(direction);
@@ -172,7 +173,7 @@ impl Openings {
             .then(|| (middle - opening.normal.dot(origin)) / speed)
     }
 
-    /// Whether a point of the plane lies inside one of the opening's pieces.
+    /// Returns `true` if a point of the plane lies inside one of the opening's pieces.
     pub(super) fn is_inside(&self, d: usize, p: DVec3, margin: f64) -> bool {
         let turn = self.turn(d);
         self.all[d].pieces.iter().any(|piece| {
@@ -184,7 +185,7 @@ impl Openings {
         })
     }
 
-    /// Whether sides of planes or distance alone show that no line crosses `s` and later `t`.
+    /// Returns `true` if sides of planes or distance alone show that no line crosses `s` and later `t`.
     pub(super) fn are_apart(&self, s: usize, t: usize, clearance: f64, far: f64) -> bool {
         let (a, b) = (&self.all[s], &self.all[t]);
         let thin = |plane: DVec3, other: DVec3| clearance * sine(plane, other) + self.rounding();
@@ -195,7 +196,7 @@ impl Openings {
             || gap(&a.corners, &b.corners) > far
     }
 
-    /// The plane of an opening, to be crossed.
+    /// Returns the plane that a line must cross at an opening.
     pub(super) fn plane(&self, d: usize) -> Plane {
         let opening = &self.all[d];
         Plane {
@@ -205,13 +206,12 @@ impl Openings {
         }
     }
 
-    /// What of a part lies in front of a plane, a hair more at most; `None` where no line with clearance
-    /// meets it.
+    /// Returns the part in front of a plane, up to slightly more; `None` if no line with clearance meets it.
     pub(super) fn in_front(&self, part: Part, plane: &Plane, clearance: f64) -> Option<Part> {
         self.keep(part, plane.normal, plane.front, clearance)
     }
 
-    /// What of a part lies behind a plane.
+    /// Returns the part behind a plane.
     pub(super) fn behind(&self, part: Part, plane: &Plane, clearance: f64) -> Option<Part> {
         self.keep(part, -plane.normal, -plane.behind, clearance)
     }
@@ -243,7 +243,7 @@ impl Openings {
                 corners.push(p);
             }
             let q = part.corners[j];
-            // From the inner end, as the format says.
+            // From the inner end, as the format requires.
             if h > 0.0 && g < 0.0 {
                 corners.push(p + (q - p) * (h / (h - g)));
             } else if h < 0.0 && g > 0.0 {
@@ -253,16 +253,16 @@ impl Openings {
         Some(Part { corners, ..part })
     }
 
-    /// Whether an opening with these heights over a plane has no room for a line with clearance beyond it.
+    /// Returns `true` if an opening with these heights over a plane has no room for a line with clearance beyond it.
     fn is_out(&self, heights: &[f64], normal: DVec3, opening: usize, clearance: f64) -> bool {
         let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // One part in a thousand more than claimed, for what two programs round differently.
+        // A thousandth more than claimed, since two programs round differently.
         let wide = 1.001 * clearance;
         (high < wide && high < wide * sine(normal, self.all[opening].normal))
             || high < -1e-9 * self.scale
     }
 
-    /// Whether a whole opening lies behind a plane.
+    /// Returns `true` if a whole opening lies behind a plane.
     pub(super) fn is_behind(&self, d: usize, plane: &Plane, clearance: f64) -> bool {
         let opening = &self.all[d];
         let heights: Vec<f64> = opening
@@ -273,8 +273,8 @@ impl Openings {
         self.is_out(&heights, plane.normal, d, clearance)
     }
 
-    /// Planes with the first part behind and the second in front, through an edge of one and a corner of
-    /// the other.
+    /// Returns planes with the first part behind and the second in front, through an edge of one and a vertex of the
+    /// other.
     pub(super) fn between(&self, first: &Part, second: &Part) -> Vec<Plane> {
         let mut planes = Vec::new();
         let both = [(first, second), (second, first)];
@@ -284,9 +284,9 @@ impl Openings {
             for (k, &p) in own.corners.iter().enumerate() {
                 let edge = own.corners[(k + 1) % own.corners.len()] - p;
                 let inward = turn.cross(edge);
-                // The corner met first when a half-plane turns about the edge, from the polygon ahead.
+                // The first vertex that a half-plane meets when it turns about the edge, away from the polygon.
                 let seen = |q: DVec3| (inward.dot(q - p), ahead.dot(q - p).max(0.0));
-                // Corners on the edge's line lie in all such planes.
+                // Vertices on the edge's line lie in all such planes.
                 let is_off = |q: &DVec3| {
                     let (x, y) = seen(*q);
                     let near = 1e4 * self.rounding() * self.rounding();
@@ -331,7 +331,7 @@ fn least(normal: DVec3, points: &[DVec3]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// A lower bound of the distance of two polygons: between balls around them.
+/// Returns a lower bound of the distance of two polygons: that of balls around them.
 fn gap(a: &[DVec3], b: &[DVec3]) -> f64 {
     let ball = |points: &[DVec3]| {
         let center = points.iter().sum::<DVec3>() / points.len() as f64;

@@ -1,4 +1,4 @@
-//! The walk through all portal chains that the trace lays down.
+//! The walk through all portal chains that a trace describes.
 
 use enfilade_geom::DVec3;
 
@@ -16,13 +16,13 @@ const CLOSED: u8 = 6;
 const HALVES: u8 = 7;
 const UNSTABBED: u8 = 8;
 
-/// Longest chain, and deepest split: what recursion can take.
+/// Longest chain and deepest split: within recursion limits.
 const MAX_DEPTH: usize = 600;
 
-/// Splits, each within the one before, tried where a chain is said to be closed and planes leave a rest.
+/// Nested splits tried on a chain that the trace calls closed but planes leave open.
 const MAX_TRIES: u32 = 5;
 
-/// Checks that the trace closes every chain from an opening to those it claims to be hidden.
+/// Checks that the trace closes every chain from an opening to those that it claims hidden.
 pub(super) fn check_trace(openings: &Openings, evidence: &Evidence) -> Result<(), EvidenceError> {
     let mut walk = Walk {
         openings,
@@ -46,7 +46,7 @@ pub(super) fn check_trace(openings: &Openings, evidence: &Evidence) -> Result<()
         walk.step(Some(&whole), vec![u64::MAX; claims.len()])?;
     }
     if walk.at != evidence.trace.len() {
-        return Err(walk.error("there is more of it than openings"));
+        return Err(walk.error("it continues after the last opening"));
     }
     Ok(())
 }
@@ -54,10 +54,10 @@ pub(super) fn check_trace(openings: &Openings, evidence: &Evidence) -> Result<()
 struct Walk<'a> {
     openings: &'a Openings,
     evidence: &'a Evidence,
-    /// Next byte of the trace.
+    /// Position of the next byte of the trace.
     at: usize,
     start: usize,
-    /// The openings crossed, and what is left of each; nothing where planes closed the chain already.
+    /// The crossed openings, each with its remaining part; `None` where planes closed the chain already.
     chain: Vec<(usize, Option<Part>)>,
 }
 
@@ -78,8 +78,8 @@ impl Walk<'_> {
         byte.ok_or_else(|| self.error("it ends early"))
     }
 
-    /// Follows the trace behind the last opening of the chain. `reach` holds what all openings of the chain
-    /// but the first might see.
+    /// Follows the trace behind the last opening of the chain. `reach` contains the openings that all openings of the
+    /// chain but the first might see.
     fn step(&mut self, source: Option<&Part>, mut reach: Vec<u64>) -> Checked<()> {
         let (openings, evidence) = (self.openings, self.evidence);
         let depth = self.chain.len() - 1;
@@ -103,9 +103,9 @@ impl Walk<'_> {
         let is_closed = source.is_none() || pass.is_none();
         match self.next()? {
             DONE if is_closed || !meets(&reach, claims) => return Ok(()),
-            DONE => return Err(self.error("it stops while something is left to show")),
+            DONE => return Err(self.error("it stops before it shows everything")),
             EXITS => {}
-            _ => return Err(self.error("no step begins with this symbol")),
+            _ => return Err(self.error("a step begins with an unknown symbol")),
         }
         for &q in &openings
             .exits(openings.all[last].to, usize::MAX)
@@ -143,7 +143,7 @@ impl Walk<'_> {
                 }
                 ENTER | SPLIT => {
                     if symbol == ENTER && is_claimed && target.is_some() {
-                        return Err(self.error("it sees what it is to show hidden"));
+                        return Err(self.error("it sees an opening that it claims hidden"));
                     }
                     self.chain.push((q, target));
                     let done = if symbol == ENTER {
@@ -154,13 +154,13 @@ impl Walk<'_> {
                     self.chain.pop();
                     done?;
                 }
-                _ => return Err(self.error("no exit has this symbol")),
+                _ => return Err(self.error("an exit has an unknown symbol")),
             }
         }
         Ok(())
     }
 
-    /// What is left of the source and of the next opening.
+    /// Returns the remaining parts of the source and of the next opening.
     fn narrow(
         &self,
         source: &Part,
@@ -189,7 +189,7 @@ impl Walk<'_> {
         Some((source, target))
     }
 
-    /// Drops claimed openings that lie behind a plane.
+    /// Removes claimed openings that lie behind a plane.
     fn drop_hidden(&self, planes: &[Plane], reach: &mut [u64]) {
         let clearance = self.evidence.clearance;
         for q in self.evidence.claims.ones(self.start) {
@@ -203,7 +203,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Drops what lies behind a plane or can only be reached through what does.
+    /// Removes openings that lie behind a plane or can only be reached through such openings.
     fn flood(&self, planes: &[Plane], reach: &mut [u64]) {
         let (openings, evidence) = (self.openings, self.evidence);
         let claims = evidence.claims.row(self.start);
@@ -232,7 +232,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Checks that the weighted rows of the chain's openings sum to nothing.
+    /// Checks that the weighted rows of the chain's openings sum to zero.
     fn unstabbed(&mut self) -> Checked<()> {
         let n = self.next()?;
         let mut weights = Vec::new();
@@ -254,7 +254,7 @@ impl Walk<'_> {
         Err(self.error("its weights do not show that no line passes this chain"))
     }
 
-    /// Checks that planes close the chain once its source is split as the trace says.
+    /// Checks that planes close the chain once its source is split as in the trace.
     fn split(&mut self, source: Option<Part>, depth: usize) -> Checked<()> {
         if depth > MAX_DEPTH {
             return Err(self.error("it splits too often"));
@@ -273,14 +273,14 @@ impl Walk<'_> {
                     self.split(half, depth + 1)?;
                 }
             }
-            _ => return Err(self.error("no split has this symbol")),
+            _ => return Err(self.error("a split has an unknown symbol")),
         }
         self.chain = kept;
         Ok(())
     }
 
-    /// Whether more planes, and splits that the trace does not ask for, close the chain through `q`: slivers
-    /// as thin as rounding have edges that two programs see differently.
+    /// Returns `true` if more planes, and splits beyond those of the trace, close the chain through `q`: two programs
+    /// see different edges of slivers as thin as rounding.
     fn closes_with(&mut self, q: usize, target: Option<Part>, source: Option<Part>) -> bool {
         self.chain.push((q, target));
         let is_closed = source.is_none_or(|source| self.closes(source, MAX_TRIES));
@@ -303,8 +303,8 @@ impl Walk<'_> {
         is_closed
     }
 
-    /// Clips the chain by planes between the source and each of its openings, then the source by planes
-    /// between those and the last.
+    /// Clips the chain by planes between the source and each of its openings, then the source by planes between those
+    /// and the last.
     fn tighten(&mut self, mut source: Part) -> Option<Part> {
         let (openings, clearance) = (self.openings, self.evidence.clearance);
         let mut planes: Vec<Plane> = Vec::new();
@@ -326,7 +326,7 @@ impl Walk<'_> {
         Some(source)
     }
 
-    /// The two halves of a part, across its longest side.
+    /// Returns the two halves of a part, cut across its longest side.
     fn halves(&self, part: &Part) -> [Option<Part>; 2] {
         let low = part.corners.iter().copied().fold(DVec3::MAX, DVec3::min);
         let high = part.corners.iter().copied().fold(DVec3::MIN, DVec3::max);

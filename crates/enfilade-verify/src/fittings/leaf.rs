@@ -1,4 +1,4 @@
-//! Leaves: hung at their edge, shut where they close their opening, open where they clear it.
+//! Leaves of doors: hinged at their edge, shut where they close their opening, open where they clear it.
 
 use enfilade_cpg::{Motion, MotionKind};
 use enfilade_geom::{Aabb, DVec3, Triangle};
@@ -6,43 +6,44 @@ use enfilade_geom::{Aabb, DVec3, Triangle};
 use super::opening::{BESIDE, DEEP, FittedOpening};
 use crate::subject::to_dvec;
 
-/// A hinge this near to the edge of its leaf is at it: it may be that of the glass, within rails. [Units: wu]
+/// Largest distance of a hinge from the edge of its leaf: the edge may be that of the glass, within rails. [Units: wu]
 const AT_EDGE: f64 = 0.15;
-/// The sine of about 6 degrees: a direction is along, across or upright if it is off by less.
+/// The sine of about 6 degrees: tolerance for directions along, across or upright.
 const ASKEW: f64 = 0.1;
-/// Least share of an opening that a leaf closes; of the narrower of two leaves, or below a light, it is less than half.
+/// Least share of an opening that a leaf closes: the narrower of two leaves, or one below a light, closes less than
+/// half.
 const CLOSES: f64 = 0.15;
-/// A leaf that is fully open covers at most this share of what it covers shut: 0.5 where it is turned by 60 degrees.
+/// Largest ratio of the area that a leaf covers fully open to that covered shut: 0.5 if it turns by 60 degrees.
 const CLEARS: f64 = 0.6;
-/// A leaf turns by less: beyond, it would be in the wall on its other side. [Units: rad]
+/// Largest turn of a leaf: beyond, it would be in the wall on its other side. [Units: rad]
 const MOST_TURNED: f64 = 3.3;
-/// Rounding of the pose that the file has a leaf in. [Units: rad or wu]
+/// Rounding of a leaf's pose in the file. [Units: rad or wu]
 const ROUNDING: f64 = 1e-4;
-/// Thinner leaves have no side to which they open. [Units: wu]
+/// Thickness below which the side to which a leaf opens is not judged. [Units: wu]
 const THIN: f64 = 0.01;
-/// A hinge is at a face of its leaf if it is off the leaf's middle by more than this share of its thickness.
+/// A hinge is at a face of its leaf if its distance from the middle exceeds this share of the thickness.
 const AT_FACE: f64 = 0.3;
 
 /// Objects that move together in an opening.
 pub(super) struct Leaf<'a> {
     pub(super) motion: &'a Motion,
-    /// Where the file has them.
+    /// As the file poses them.
     pub(super) triangles: Vec<Triangle>,
 }
 
 impl Leaf<'_> {
-    /// Its triangles at a share of its way, in the opening's directions.
+    /// Returns its triangles at a share of its path, in the opening's directions.
     fn at(&self, share: f32, opening: &FittedOpening) -> Vec<Triangle> {
         let by = self.motion.at(share);
         let place = |p| opening.place(by.transform_point3(p));
         self.triangles.iter().map(|t| t.map(place)).collect()
     }
 
-    /// Returns what is wrong with how it moves in an opening.
+    /// Returns a fault of its motion in an opening.
     pub(super) fn problem(&self, opening: &FittedOpening) -> Option<String> {
         let [from, to] = [self.motion.shut, self.motion.open].map(f64::from);
         if from.min(to) > ROUNDING || from.max(to) < -ROUNDING {
-            return Some("the file has it neither shut, nor open, nor between".into());
+            return Some("its pose in the file is not between shut and open".into());
         }
         let is_turn = matches!(self.motion.kind, MotionKind::Turn { .. });
         if is_turn && (to - from).abs() > MOST_TURNED {
@@ -56,7 +57,7 @@ impl Leaf<'_> {
         let reach = opening.bounds.expanded(BESIDE);
         let is_off = around.min.z < -DEEP || around.max.z > DEEP;
         if is_off || !reach.contains(around.center().with_z(0.0)) {
-            return Some("it does not stand in its opening where it is shut".into());
+            return Some("it does not stand in its opening when shut".into());
         }
         let plate = Plate::of(&shut);
         if let Some(askew) = plate.as_ref().map(Plate::askew).filter(|&a| a > ASKEW) {
@@ -69,13 +70,13 @@ impl Leaf<'_> {
         if closes < CLOSES {
             let percent = 100.0 * closes;
             return Some(format!(
-                "it closes {percent:.0} % of its opening where it is shut"
+                "it closes only {percent:.0} % of its opening when shut"
             ));
         }
         if covers > CLEARS * closes {
             let percent = 100.0 * covers / closes;
             return Some(format!(
-                "where it is open it still covers {percent:.0} % of what it covers shut"
+                "open, it still covers {percent:.0} % of the area that it covers shut"
             ));
         }
         let hinge = match self.motion.kind {
@@ -84,11 +85,11 @@ impl Leaf<'_> {
         };
         let toward = beyond.center().z - around.center().z;
         let is_into_jamb = plate.is_some_and(|p| p.is_beyond(hinge.z, toward));
-        is_into_jamb.then(|| "it turns away from the side of its hinge, into its jamb".into())
+        is_into_jamb.then(|| "it turns away from the side of its hinge, into the jamb".into())
     }
 }
 
-/// Returns what is wrong with where a leaf turns or slides, `around` being the box of the shut leaf.
+/// Returns a fault of a leaf's axis or direction; `around` is the box of the shut leaf.
 fn way_problem(motion: &Motion, opening: &FittedOpening, around: &Aabb) -> Option<String> {
     match motion.kind {
         MotionKind::Slide { along } => {
@@ -97,7 +98,7 @@ fn way_problem(motion: &Motion, opening: &FittedOpening, around: &Aabb) -> Optio
         }
         MotionKind::Turn { through, axis } => {
             let (hinge, own) = (opening.place(to_dvec(through)), opening.turn(to_dvec(axis)));
-            // Doors hang upright, also where their opening leans; a hatch along one of its sides.
+            // Doors have upright hinges, even in a leaning opening; a hatch turns about one of its sides.
             let is_up = if opening.is_upright() {
                 to_dvec(axis).with_y(0.0).length() <= ASKEW
             } else {
@@ -116,7 +117,7 @@ fn way_problem(motion: &Motion, opening: &FittedOpening, around: &Aabb) -> Optio
             let off = (at - low).abs().min((at - high).abs());
             let is_deep = hinge.z < around.min.z - reach || hinge.z > around.max.z + reach;
             if off > reach || is_deep {
-                return Some(format!("its hinge is not at its edge, but {off:.2} m off"));
+                return Some(format!("its hinge is {off:.2} m from its edge"));
             }
             let height = hinge.y.clamp(around.min.y - reach, around.max.y + reach);
             (is_up && height != hinge.y).then(|| "its hinge is above or below it".into())
@@ -126,14 +127,14 @@ fn way_problem(motion: &Motion, opening: &FittedOpening, around: &Aabb) -> Optio
 
 /// The large faces of a leaf.
 struct Plate {
-    /// Where they look, up or down not counted.
+    /// Their direction, ignoring its vertical part.
     facing: DVec3,
-    /// Between which heights over the opening's plane most of them lie, those that look along its normal. [Units: wu]
+    /// Range of heights over the opening's plane of most faces that point along its normal. [Units: wu]
     faces: [f64; 2],
 }
 
 impl Plate {
-    /// `None` for what has none: it looks every way alike.
+    /// Returns `None` for a shape without large faces: it points everywhere alike.
     fn of(leaf: &[Triangle]) -> Option<Self> {
         // Twice the angle, so that front and back are the same.
         let (mut cos, mut sin, mut all) = (0.0, 0.0, 0.0);
@@ -171,12 +172,12 @@ impl Plate {
         })
     }
 
-    /// The sine of the angle between it and the opening.
+    /// Returns the sine of the angle between it and the opening.
     fn askew(&self) -> f64 {
         self.facing.x.abs()
     }
 
-    /// Returns true where a hinge at this height lies at the face away from where the leaf opens.
+    /// Returns `true` if a hinge at this height lies at the face opposite to the side to which the leaf opens.
     fn is_beyond(&self, hinge: f64, toward: f64) -> bool {
         let [low, high] = self.faces;
         let off = hinge - (low + high) * 0.5;

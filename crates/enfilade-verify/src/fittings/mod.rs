@@ -1,8 +1,8 @@
-//! Fittings of openings: leaves, frames and panes are what they are called, and stand where they are said to.
+//! Fittings of openings: leaves, frames and panes have the right names and positions.
 //!
-//! Judged by shapes and places alone, anew, without a look at how a bake finds them. Which way a leaf opens is judged as far as its
-//! shape tells: a hinge at a face of the leaf lies on the side to which it opens, else the leaf runs into its jamb. A hinge at
-//! the other edge, or at the other face with the turn reversed, is as good a door.
+//! Only shapes and positions decide, by rules independent of the bake's. The side to which a leaf opens is judged as
+//! far as its shape determines it: a hinge at a face of the leaf lies on the side to which it opens, else the leaf
+//! runs into its jamb. A hinge at the other edge, or at the other face with the turn reversed, makes as good a door.
 
 mod leaf;
 mod opening;
@@ -20,13 +20,13 @@ use opening::{BESIDE, DEEP, FittedOpening};
 
 /// Least share of a window that a pane covers.
 const PANE: f64 = 0.25;
-/// A frame leaves as much of a door or window free.
+/// Least share of a door or window that a frame leaves free.
 const FREE: f64 = 0.4;
-/// An object that covers more of a door, and is not a leaf of another, is a leaf of it. One that covers less leaves the larger part open:
-/// a pane beside a door that is one opening with it, say.
+/// An object that covers more of a door, and is not a leaf of another, must be a leaf of it. An object that covers less
+/// leaves the larger part open: a pane beside a door in the same opening, say.
 const SHUTS: f64 = 0.5;
 
-/// Problems, a line each.
+/// Returns problems, a line each.
 pub(crate) fn check(world: &World) -> Vec<String> {
     let fittings = world.graph.portals.iter().flat_map(|p| &p.fittings);
     let others = Others {
@@ -56,10 +56,10 @@ pub(crate) fn check(world: &World) -> Vec<String> {
     found.collect()
 }
 
-/// All details.
+/// All detail objects.
 struct Others {
     bounds: Vec<Aabb>,
-    /// Those that are leaves of any opening.
+    /// Leaves of any opening.
     leaves: BTreeSet<u32>,
 }
 
@@ -76,7 +76,7 @@ impl OfPortal<'_> {
         )
     }
 
-    /// Checks the fittings of the opening against what they are called.
+    /// Checks the fittings of the opening against their names.
     fn check_fitted(&self, opening: &FittedOpening, out: &mut Vec<String>) {
         let of_part = |part| {
             let fittings = self.portal.fittings.iter();
@@ -86,9 +86,9 @@ impl OfPortal<'_> {
             && let Some(f) = of_part(FittingPart::Leaf).next()
         {
             let leaf = self.called(f.detail);
-            out.push(format!("{leaf} is a leaf in it, but it is called no door"));
+            out.push(format!("{leaf} is a leaf in it, but its kind is not door"));
         }
-        // Objects that move alike are one leaf: with its handles, with the glass in it.
+        // Objects with the same motion are one leaf: with its handles, and the glass in it.
         let mut leaves: Vec<(&Motion, Vec<u32>)> = Vec::new();
         for f in of_part(FittingPart::Leaf) {
             let Some(motion) = &f.motion else { continue };
@@ -111,21 +111,22 @@ impl OfPortal<'_> {
         }
     }
 
-    /// Returns what is wrong with a frame or pane.
+    /// Returns a fault of a frame or pane.
     fn still_problem(&self, f: &Fitting, opening: &FittedOpening) -> Option<String> {
         let near = self.within(f.detail, opening);
         let covered = opening.covered(&near);
         let percent = 100.0 * covered;
         if f.part == FittingPart::Pane {
             if self.portal.kind != PortalKind::Window {
-                return Some("is a pane, but it is called no window".into());
+                return Some("is a pane in it, but its kind is not window".into());
             }
-            return (covered < PANE).then(|| format!("is a pane that covers {percent:.0} % of it"));
+            return (covered < PANE)
+                .then(|| format!("is a pane, but covers only {percent:.0} % of it"));
         }
         if self.portal.kind != PortalKind::Open && covered > 1.0 - FREE {
-            return Some(format!("is a frame that covers {percent:.0} % of it"));
+            return Some(format!("is a frame, but covers {percent:.0} % of it"));
         }
-        // The rest of an object that leaves were taken out of is a frame, whatever it looks like.
+        // The rest of an object from which leaves were taken is a frame, whatever its shape.
         let mut others = self.portal.fittings.iter();
         let is_rest = others.any(|o| {
             let part_of = self.world.details[o.detail as usize].part_of;
@@ -135,12 +136,12 @@ impl OfPortal<'_> {
         let rim = opening.bounds.expanded(-BESIDE);
         let is_around = b.min.x <= rim.min.x && b.max.x >= rim.max.x && b.max.y >= rim.max.y;
         if near.is_empty() || !is_rest && !is_around {
-            return Some("is a frame that does not run around it".into());
+            return Some("is a frame, but does not run around it".into());
         }
         None
     }
 
-    /// Checks that what shuts a door is a leaf of it, and that something does.
+    /// Checks that objects that shut a door are leaves of it, and that there is one.
     fn check_rest(&self, opening: &FittedOpening, others: &Others, out: &mut Vec<String>) {
         if self.portal.kind != PortalKind::Door {
             return;
@@ -158,18 +159,18 @@ impl OfPortal<'_> {
                 is_shut = true;
                 let (d, percent) = (self.called(d), 100.0 * covered);
                 out.push(format!(
-                    "{d} covers {percent:.0} % of it, but is none of its fittings"
+                    "{d} covers {percent:.0} % of it, but is not one of its fittings"
                 ));
             }
         }
         let mut fittings = self.portal.fittings.iter();
         let has_leaf = fittings.any(|f| f.part == FittingPart::Leaf);
         if !has_leaf && !is_shut {
-            out.push("is called a door, but has no leaf".into());
+            out.push("is a door without a leaf".into());
         }
     }
 
-    /// The triangles of a detail that lie about the opening, in its directions.
+    /// Returns the triangles of a detail around the opening, in its directions.
     fn within(&self, detail: u32, opening: &FittedOpening) -> Vec<Triangle> {
         let b = opening.bounds;
         let is_in = |t: &Triangle| {

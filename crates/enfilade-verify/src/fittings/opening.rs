@@ -1,30 +1,30 @@
-//! An opening as what fills it is measured by: in its own directions, and how much of what is open something covers.
+//! An opening in its own directions, to measure how much of it its fittings cover.
 
 use enfilade_cpg::Portal;
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
 use crate::subject::to_dvec;
 
-/// Squares across and up the raster of an opening.
+/// Width and height of the raster of an opening, in squares.
 const SQUARES: usize = 32;
 
-/// How far beside its opening a fitting may end: over the wall, or short of the jamb. [Units: wu]
+/// Distance by which a fitting may extend over the wall, or end short of the jamb. [Units: wu]
 pub(super) const BESIDE: f64 = 0.3;
-/// How far from the opening's plane a fitting may lie, within a wall. [Units: wu]
+/// Largest distance of a fitting from the opening's plane, within a wall. [Units: wu]
 pub(super) const DEEP: f64 = 0.6;
 
 /// The opening of a portal. Its own directions are across, up, and along its normal; its plane lies at 0.
 pub(super) struct FittedOpening {
     origin: DVec3,
     directions: [DVec3; 3],
-    /// Around what is open.
+    /// Box around the open area.
     pub(super) bounds: Aabb,
     is_open: Vec<bool>,
     n_open: usize,
 }
 
 impl FittedOpening {
-    /// `None` where nothing is open.
+    /// Returns `None` if nothing is open.
     pub(super) fn of(portal: &Portal) -> Option<Self> {
         let normal = to_dvec(portal.normal).try_normalize()?;
         let across = DVec3::Y.cross(normal).try_normalize();
@@ -50,23 +50,23 @@ impl FittedOpening {
         (this.n_open > 0).then_some(this)
     }
 
-    /// A point of the world in the opening's own directions.
+    /// Converts a point of the world to the opening's directions.
     pub(super) fn place(&self, p: DVec3) -> DVec3 {
         self.turn(p - self.origin)
     }
 
-    /// A direction of the world in the opening's own.
+    /// Converts a direction of the world to the opening's.
     pub(super) fn turn(&self, d: DVec3) -> DVec3 {
         let [x, y, z] = self.directions.map(|own| own.dot(d));
         DVec3::new(x, y, z)
     }
 
-    /// Returns true where it stands, as doors do.
+    /// Returns `true` if it stands upright, as doors do.
     pub(super) fn is_upright(&self) -> bool {
         self.directions[2].y.abs() < 0.5
     }
 
-    /// The box in the world around all that is nearer to the opening than `reach`. [Units: wu]
+    /// Returns a box in the world around everything closer to the opening than `reach`. [Units: wu]
     pub(super) fn around(&self, reach: f64) -> Aabb {
         let [x, y, z] = self.directions;
         let corners = self.bounds.expanded(reach).corners();
@@ -76,19 +76,19 @@ impl FittedOpening {
             .fold(Aabb::EMPTY, |b, p| b.including(to_world(p)))
     }
 
-    /// The share of what is open that triangles cover, seen along the normal; they are in the opening's own directions.
+    /// Returns the share of the open area that triangles, given in the opening's directions, cover along its normal.
     pub(super) fn covered<'t>(&self, by: impl IntoIterator<Item = &'t Triangle>) -> f64 {
         let covered = self.raster(by.into_iter().copied());
         let both = self.is_open.iter().zip(&covered);
         both.filter(|(open, covered)| **open && **covered).count() as f64 / self.n_open as f64
     }
 
-    /// Which squares have their middle in one of the triangles.
+    /// Marks the squares whose center lies in a triangle.
     fn raster(&self, triangles: impl IntoIterator<Item = Triangle>) -> Vec<bool> {
         let mut marks = vec![false; SQUARES * SQUARES];
         let size = self.bounds.size().max(DVec3::splat(1e-9));
         for t in triangles {
-            // In squares, the middle of the first at 0.
+            // In squares, the center of the first at 0.
             let t = t.map(|p| (p - self.bounds.min) / size * SQUARES as f64 - 0.5);
             let low = t[0].min(t[1]).min(t[2]).ceil().max(DVec3::ZERO);
             let high = t[0].max(t[1]).max(t[2]).floor();
@@ -104,7 +104,7 @@ impl FittedOpening {
     }
 }
 
-/// Returns true where a triangle, seen along z, holds a point.
+/// Returns `true` if a triangle, seen along z, contains a point.
 fn holds(t: &Triangle, x: f64, y: f64) -> bool {
     let side = |a: DVec3, b: DVec3| (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
     let sides = [side(t[0], t[1]), side(t[1], t[2]), side(t[2], t[0])];

@@ -1,4 +1,4 @@
-//! A house by hand: two rooms, a doorway in a thick wall between them, a window to the outdoors.
+//! A small house: two rooms, a doorway in a thick wall between them, a window to the outdoors.
 //!
 //! `A` is the box (0 0 0)–(4 3 4), `B` (4.25 0 0)–(8.25 3 4). The doorway is 1 m wide and 2 m high, its
 //! portal in the middle of the wall; the window is 1 m square in the wall x = 0.
@@ -16,13 +16,13 @@ pub(crate) const B: CellId = CellId(1);
 pub(crate) const OUTDOORS: CellId = CellId(2);
 pub(crate) const DOOR: usize = 0;
 pub(crate) const WINDOW: usize = 1;
-/// Where the door's portal stands.
+/// Position of the door's portal.
 pub(crate) const DOOR_X: f64 = 4.125;
 
 pub(crate) type Quad = [[f64; 3]; 4];
 
-/// A chain of box tests: the first box that holds a point gives its cell. Box `k` has planes `6 k` to `6 k + 5`; a point may fail
-/// at each of them, and what is asked then is a tree of its own.
+/// Builds a chain of box tests: the first box that contains a point gives its cell. Box `k` has planes `6 k` to
+/// `6 k + 5`; a point may fail at each of them, and its next test is then in a tree of its own.
 pub(crate) fn locator_of_boxes(
     boxes: &[([f64; 3], [f64; 3], Option<CellId>)],
     bounds: Aabb,
@@ -53,7 +53,7 @@ pub(crate) fn locator_of_boxes(
     }
 }
 
-/// Adds the tests of box `k` and of those after it; returns the first.
+/// Adds the tests of box `k` and of those after it; returns the first node.
 fn tree_of_boxes(
     cells: &[Option<CellId>],
     k: usize,
@@ -82,7 +82,7 @@ fn tree_of_boxes(
     first as i32
 }
 
-/// The rectangle `a` to `b` in the plane where they share a coordinate, with rectangular holes.
+/// Returns the rectangle `a` to `b` in the plane where they share a coordinate, with a rectangular hole.
 pub(crate) fn wall(a: [f64; 3], b: [f64; 3], hole: Option<([f64; 3], [f64; 3])>) -> Vec<Quad> {
     let flat = (0..3).find(|&k| a[k] == b[k]).expect("a flat rectangle");
     let (u, v) = ((flat + 1) % 3, (flat + 2) % 3);
@@ -158,7 +158,7 @@ pub(crate) fn cell(
     }
 }
 
-/// The house; the locator believes the door's plane to be at `door_x`.
+/// Returns the house with the locator's plane of the door at `door_x`.
 pub(crate) fn house_with_locator_plane(door_x: f64) -> World {
     let bounds = Aabb::new(DVec3::splat(-2.0), DVec3::new(10.25, 5.0, 6.0));
     let locator = locator_of_boxes(
@@ -261,7 +261,7 @@ pub(crate) fn house() -> World {
     house_with_locator_plane(DOOR_X)
 }
 
-/// The world moved as a whole; corners are rounded to `f32` anew, the locator's planes are not.
+/// Returns the world moved as a whole; vertices are rounded to `f32` again, the locator's planes are not.
 pub(crate) fn moved(mut world: World, by: &DMat4) -> World {
     let point = |p: &mut [f32; 3]| {
         let q = by.transform_point3(DVec3::from_array(p.map(f64::from)));

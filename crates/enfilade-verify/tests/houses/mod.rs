@@ -1,4 +1,4 @@
-//! Worlds that tests falsify.
+//! Worlds that tests tamper with.
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use std::sync::LazyLock;
@@ -24,7 +24,7 @@ pub(crate) static SCENE: LazyLock<Scene> = LazyLock::new(|| {
     }
     scene
 });
-/// That house, with what is seen from each cell, as volumes and parts.
+/// That house, with visible volumes and parts for each cell.
 pub(crate) static HOUSE: LazyLock<World> = LazyLock::new(|| seen(baked(&SCENE)));
 /// Walls 2 mm above their slabs: seals close the slits.
 pub(crate) static SLITS: LazyLock<World> =
