@@ -79,7 +79,6 @@ fn is_found(world: &World, scene: &Scene, by: ShownBy) -> bool {
     RAYS.iter().any(|&rays| {
         let options = VerifyOptions {
             rays,
-            faces: true,
             ..VerifyOptions::default()
         };
         !verify_world(&read, None, &options).holds()

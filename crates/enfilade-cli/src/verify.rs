@@ -46,10 +46,6 @@ pub(crate) struct Verify {
     /// Segments for `sealed`, and as many rays for `complete`.
     #[arg(long, default_value_t = 1_000_000, value_name = "N")]
     rays: u64,
-    /// Also test `sealed` with short segments across every face of the locator's leaves. Finds slits however small,
-    /// including openings of micrometers that a bake leaves where triangles miss each other.
-    #[arg(long)]
-    faces: bool,
     /// Views for *conservative per frame*, with 100 rays in each: the run-time's answer must contain all that they
     /// hit. 0: none.
     #[arg(long, default_value_t = 10_000, value_name = "N")]
@@ -105,7 +101,6 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let structure = source.as_ref().map(structure_of);
     let options = VerifyOptions {
         rays: args.rays,
-        faces: args.faces,
         seed: args.seed,
         tolerance: args.tolerance,
         max_listed: args.list,

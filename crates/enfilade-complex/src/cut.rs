@@ -368,6 +368,7 @@ mod tests {
             candidate: NO_CANDIDATE,
             is_narrow: false,
             is_gap: false,
+            is_clear: true,
         };
         let mut graph = LeafGraph {
             facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],

@@ -245,20 +245,19 @@ pub(super) struct OpenPieces {
 impl OpenPieces {
     /// Subtracts the structural covers and divides the rest by the candidates.
     ///
-    /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], count as closed.
+    /// Pieces narrower than the tolerance, or smaller than [`MIN_AREA`], are closed where they lie along triangles: the gap
+    /// may come from moving a triangle into its plane. Away from triangles a sliver is as open as any facet, and closing
+    /// it would part a cell.
     pub(super) fn of(facet: &RawFacet<'_>, normal: DVec3, tolerance: &Tolerance) -> Self {
-        // Beside a triangle that was moved into its plane, a gap may be an artifact of that move. Away from triangles
-        // a sliver is as open as any facet, and closing it would divide a cell.
-        let is_bare = facet.covers.iter().all(|c| c.candidate.is_some());
-        let (min_area, min_width) = if is_bare {
-            (0.0, 2.0 * tolerance.cut)
-        } else {
-            (MIN_AREA, tolerance.width)
+        let structural = || facet.covers.iter().filter(|c| c.candidate.is_none());
+        let open = |p: &Poly| {
+            poly::is_larger(p, MIN_AREA, tolerance.width)
+                || poly::is_larger(p, 0.0, 2.0 * tolerance.cut)
+                    && !is_along(p, structural(), normal, tolerance.width)
         };
-        let open = |p: &Poly| poly::is_larger(p, min_area, min_width);
         let mut rest: Vec<Poly> = vec![facet.points.into()];
         rest.retain(open);
-        for cover in facet.covers.iter().filter(|c| c.candidate.is_none()) {
+        for cover in structural() {
             let mut outside = Vec::with_capacity(rest.len() + 2);
             for p in &rest {
                 poly::cut_out(p, &cover.points, normal, tolerance.cut, 0.0, &mut outside);
@@ -284,6 +283,64 @@ impl OpenPieces {
         pieces.extend(rest.into_iter().map(|p| (p, None)));
         Self { pieces }
     }
+}
+
+/// Returns `true` if the whole length of a narrow polygon lies on `covers` or within `reach` of them, in one plane.
+///
+/// Judges the line between the two vertices farthest from each other. O(covers).
+fn is_along<'a>(
+    narrow: &[DVec3],
+    covers: impl Iterator<Item = &'a Cover>,
+    normal: DVec3,
+    reach: f64,
+) -> bool {
+    let pairs = narrow.iter().enumerate();
+    let pairs = pairs.flat_map(|(i, &a)| narrow[i + 1..].iter().map(move |&b| (a, b)));
+    let Some((a, b)) = pairs.max_by(|p, q| p.0.distance(p.1).total_cmp(&q.0.distance(q.1))) else {
+        return false;
+    };
+    let mut parts: SmallVec<[[f64; 2]; 8]> = covers
+        .filter_map(|c| part_within(a, b, c, normal, reach))
+        .collect();
+    parts.sort_by(|p, q| p[0].total_cmp(&q[0]));
+    let slack = reach / a.distance(b);
+    let end = parts.iter().fold(0.0, |end: f64, part| {
+        if part[0] <= end + slack {
+            end.max(part[1])
+        } else {
+            end
+        }
+    });
+    end >= 1.0 - slack
+}
+
+/// Returns the part of the segment from `a` (0) to `b` (1) that lies within `reach` of a cover in its plane.
+fn part_within(a: DVec3, b: DVec3, cover: &Cover, normal: DVec3, reach: f64) -> Option<[f64; 2]> {
+    let points = &cover.points;
+    let edges = (0..points.len()).filter_map(|i| {
+        let (p, q) = (points[i], points[(i + 1) % points.len()]);
+        Some((p, normal.cross(q - p).try_normalize()?))
+    });
+    // Beside a sharp vertex, the edges moved outwards meet far away.
+    let sides = [
+        (cover.bounds.min, DVec3::X),
+        (cover.bounds.min, DVec3::Y),
+        (cover.bounds.min, DVec3::Z),
+        (cover.bounds.max, DVec3::NEG_X),
+        (cover.bounds.max, DVec3::NEG_Y),
+        (cover.bounds.max, DVec3::NEG_Z),
+    ];
+    let (mut from, mut to) = (0.0_f64, 1.0_f64);
+    for (p, inward) in edges.chain(sides) {
+        let [at_a, at_b] = [a, b].map(|e| inward.dot(e - p) + reach);
+        match (at_a >= 0.0, at_b >= 0.0) {
+            (true, true) => {}
+            (false, false) => return None,
+            (true, false) => to = to.min(at_a / (at_a - at_b)),
+            (false, true) => from = from.max(at_a / (at_a - at_b)),
+        }
+    }
+    (from < to).then_some([from, to])
 }
 
 #[cfg(test)]
@@ -325,5 +382,26 @@ mod tests {
         };
         assert_eq!(pieces_of_sliver(&[beside(None)]), 0);
         assert_eq!(pieces_of_sliver(&[beside(Some(0))]), 1);
+    }
+
+    /// A sliver that begins at a triangle and leads away from it, and one between two triangles that leaves a gap.
+    #[test]
+    fn a_sliver_that_leaves_its_triangle_is_open() {
+        let cover = |from: f64, to: f64| {
+            let points = [
+                DVec3::new(from, 0.0, 0.0),
+                DVec3::new(from, -1.0, 0.0),
+                DVec3::new(to, 0.0, 0.0),
+            ];
+            let bounds = Aabb::of_points(&points);
+            Cover {
+                candidate: None,
+                points: Poly::from_slice(&points),
+                bounds,
+            }
+        };
+        assert_eq!(pieces_of_sliver(&[cover(0.0, 0.1)]), 1);
+        assert_eq!(pieces_of_sliver(&[cover(0.0, 0.4), cover(0.6, 1.0)]), 1);
+        assert_eq!(pieces_of_sliver(&[cover(0.0, 0.6), cover(0.4, 1.0)]), 0);
     }
 }

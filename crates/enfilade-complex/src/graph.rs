@@ -13,6 +13,9 @@ use super::tree::{Tree, leaf_index};
 /// Openings up to this many gaps wide are cracks; for the default gap that is [`CRACK_WIDTH`](super::CRACK_WIDTH).
 const CRACK_GAPS: f64 = 5.0;
 
+/// Points farther than this many roundings from matter lie in the air, so their leaves are not solid.
+const CLEAR: f64 = 4.0;
+
 /// Cost per area of a border on a candidate: only a tie-breaker.
 const CANDIDATE: f64 = 0.01;
 
@@ -34,6 +37,8 @@ pub(super) struct OpenFacet {
     pub(super) is_narrow: bool,
     /// No piece of it lets a ball of the smallest hole pass, so it may be sealed.
     pub(super) is_gap: bool,
+    /// A point of it lies in the air, farther than [`CLEAR`] roundings from matter.
+    pub(super) is_clear: bool,
 }
 
 impl OpenFacet {
@@ -191,6 +196,15 @@ impl Clearance<'_> {
         [is_narrow, is_gap]
     }
 
+    /// Returns `true` if a sampled point of an opening is farther than [`CLEAR`] roundings from matter. Costs as much
+    /// as [`is_gap`](Self::is_gap).
+    fn is_clear(&self, points: &[DVec3], rounding: f64) -> bool {
+        let mut series = NearSeries::default();
+        let is_near = self.is_narrower(points, 2.0 * CLEAR * rounding, true, &mut series);
+        self.spend(&series);
+        !is_near
+    }
+
     /// Spends the cost of queries.
     fn spend(&self, series: &NearSeries) {
         self.purse.spend(series.n_looked / 4);
@@ -301,10 +315,12 @@ impl FacetSink for LeafSink<'_> {
             self.faces[leaf] = self.faces[leaf].max(face);
         }
         let first = self.facets.len();
+        let rounding = self.visitor.tolerance.width;
         for (piece, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let candidate = candidate.unwrap_or(NO_CANDIDATE);
             let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
             let [is_narrow, is_gap] = self.clearance.narrowness(&piece, f64::from(width));
+            let is_clear = !is_gap || self.clearance.is_clear(&piece, rounding);
             match self.facets[first..]
                 .iter_mut()
                 .find(|f| f.candidate == candidate)
@@ -314,6 +330,7 @@ impl FacetSink for LeafSink<'_> {
                     f.area += area;
                     f.is_narrow &= is_narrow;
                     f.is_gap &= is_gap;
+                    f.is_clear |= is_clear;
                 }
                 None => {
                     self.facets.push(OpenFacet {
@@ -323,6 +340,7 @@ impl FacetSink for LeafSink<'_> {
                         candidate,
                         is_narrow,
                         is_gap,
+                        is_clear,
                     });
                 }
             }

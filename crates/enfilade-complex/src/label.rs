@@ -10,7 +10,8 @@
 //! 4. Groups without a label, or with too little volume for a cell, join the neighbor with which a border would cost
 //!    most: the one they open to most, through a candidate if need be. Groups without votes that open only through
 //!    gaps are solid.
-//! 5. Crumbs, too thin for a ball of the smallest hole, join the cell or solid to which they have the largest gaps.
+//! 5. Crumbs, too thin for a ball of the smallest hole, join the cell or solid to which they have the largest gaps,
+//!    through gaps in the air if there are any: a sliver that leads from within a wall into the air is not solid.
 //!
 //! Time: `O(F log F)` in open facets. Every merge reduces the number of groups, so it ends.
 
@@ -21,7 +22,7 @@ use enfilade_geom::Sets;
 use rayon::prelude::*;
 
 use super::cut::{absorb_chips, dissolve_slivers, move_borders};
-use super::graph::{LeafGraph, NO_CANDIDATE};
+use super::graph::{LeafGraph, NO_CANDIDATE, OpenFacet};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
 use super::{LabelSettings, Vote};
 
@@ -363,8 +364,8 @@ fn merge_groups(
 /// Merges crumbs, which have room for nothing, into the cell or solid to which they have the largest gaps; without
 /// seals, does so for everything that opens only through gaps.
 ///
-/// Kruskal's forest over the gaps, largest first, never with two cells or solids in one tree, so that little is left
-/// to be sealed. `O(F log F)` in gaps.
+/// Kruskal's forest over the gaps, those in the air first, then largest first, never with two cells or solids in one
+/// tree, so that little is left to be sealed. `O(F log F)` in gaps.
 fn give_away_crumbs(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
@@ -383,13 +384,10 @@ fn give_away_crumbs(
         }
     }
     // Areas are not negative, so their bits compare like numbers.
-    let gaps = graph.facets.iter().filter(|f| f.is_gap);
-    let mut gaps: Vec<(Reverse<u32>, [u32; 2])> = gaps
-        .map(|f| (Reverse(f.area.to_bits()), f.leaves))
-        .collect();
-    gaps.par_sort_unstable();
-    for (_, leaves) in gaps {
-        let [a, b] = leaves.map(|l| sets.find(l));
+    let mut gaps: Vec<&OpenFacet> = graph.facets.iter().filter(|f| f.is_gap).collect();
+    gaps.par_sort_unstable_by_key(|f| (Reverse((f.is_clear, f.area.to_bits())), f.leaves));
+    for gap in gaps {
+        let [a, b] = gap.leaves.map(|l| sets.find(l));
         let [a_stays, b_stays] = [a, b].map(|s| stays[s as usize]);
         if a != b && !(a_stays && b_stays) {
             stays[sets.join(a, b) as usize] = a_stays || b_stays;
@@ -465,7 +463,6 @@ fn number_cells(
 
 #[cfg(test)]
 mod tests {
-    use super::super::graph::OpenFacet;
     use super::*;
     use enfilade_geom::Purse;
 
@@ -479,6 +476,7 @@ mod tests {
             candidate,
             is_narrow: candidate == NO_CANDIDATE,
             is_gap: false,
+            is_clear: true,
         };
         let graph = LeafGraph {
             facets: vec![facet(0, NO_CANDIDATE, 0.06), facet(1, 0, 0.1)],
@@ -502,5 +500,40 @@ mod tests {
             ..graph
         };
         assert_eq!(home(&shut), Some(1));
+    }
+    /// A needle that leads from within a wall into the air: most of it opens to matter.
+    #[test]
+    fn a_needle_that_reaches_the_air_is_not_matter() {
+        let facet = |other: u32, area: f32, is_clear: bool| OpenFacet {
+            leaves: [other, 1],
+            width: 1e-5,
+            area,
+            candidate: NO_CANDIDATE,
+            is_narrow: true,
+            is_gap: true,
+            is_clear,
+        };
+        let home_of_needle = |is_clear| {
+            let graph = LeafGraph {
+                facets: vec![facet(0, 1e-7, is_clear), facet(2, 2e-6, false)],
+                volumes: vec![30.0, 5e-12, 1.0],
+                faces: vec![10.0, 2e-6, 1.0],
+                at_border: vec![false; 3],
+                hole: 0.023,
+                rounding: 1e-5,
+                purse: Purse::endless(),
+            };
+            let mut sets = Sets::new(3);
+            let groups = merge_groups(
+                &graph,
+                &mut sets,
+                &[10, SOLID, SOLID],
+                &LabelSettings::default(),
+            );
+            give_away_crumbs(&graph, &mut sets, groups, true);
+            [0, 2].map(|other| sets.find(1) == sets.find(other))
+        };
+        assert_eq!(home_of_needle(true), [true, false]);
+        assert_eq!(home_of_needle(false), [false, true]);
     }
 }

@@ -151,11 +151,7 @@ pub fn verify_world_with_progress(
             tally
         })
         .reduce(Tally::default, Tally::merged);
-    let tally = if options.faces {
-        tally.merged(faces::try_all(&subject, options.seed))
-    } else {
-        tally
-    };
+    let tally = tally.merged(faces::try_all(&subject, options.seed));
     VerifyReport::new(&subject, options, problems, tally)
 }
 

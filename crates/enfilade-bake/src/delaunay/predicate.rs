@@ -5,8 +5,8 @@
 //!    (Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 //!    Predicates", 1997, table 4, with the permanent bounded from above);
 //! 2. integers: coordinates are multiples of powers of two, and most differences need at most 40 bits, so that `i128`
-//! (and a sum of 256 bits) is exact. Cospherical vertices of buildings end here, in a tenth of the time that expansions
-//! take;
+//!    (and a sum of 256 bits) is exact. Cospherical vertices of buildings end here, in a tenth of the time that expansions
+//!    take;
 //! 3. the expansions of the `robust` crate.
 
 use enfilade_geom::DVec3;

@@ -55,7 +55,6 @@ fn seen(mut world: World) -> World {
 pub(crate) fn verify(world: &World, rays: u64) -> VerifyReport {
     let options = VerifyOptions {
         rays,
-        faces: true,
         ..VerifyOptions::default()
     };
     verify_world(world, None, &options)
