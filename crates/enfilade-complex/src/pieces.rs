@@ -127,12 +127,18 @@ impl Flat {
 
     /// Returns `true` if a point is inside, or at most `slack` outside of each edge.
     fn is_within(&self, p: DVec2, slack: f64) -> bool {
+        self.depth(p) >= -slack
+    }
+
+    /// Returns the least distance of a point inside to the line of an edge; negative outside.
+    fn depth(&self, p: DVec2) -> f64 {
         let n = self.points.len();
-        (0..n).all(|i| {
-            let (a, b) = (self.points[i], self.points[(i + 1) % n]);
-            let inward = (b - a).perp().try_normalize();
-            inward.is_none_or(|inward| inward.dot(p - a) >= -slack)
-        })
+        (0..n)
+            .filter_map(|i| {
+                let (a, b) = (self.points[i], self.points[(i + 1) % n]);
+                Some((b - a).perp().try_normalize()?.dot(p - a))
+            })
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn width(&self) -> f64 {
@@ -198,7 +204,14 @@ fn convex_union(a: &Flat, b: &Flat) -> Option<Flat> {
     }
     let union = hull(a.points.iter().chain(&b.points).copied());
     let size = (union.max - union.min).max_element();
-    (union.area - a.area - b.area <= STRAIGHT * size).then_some(union)
+    if union.area - a.area - b.area > STRAIGHT * size {
+        return None;
+    }
+    // A notch of a fraction of a millimeter has next to no area, and may be part of another portal.
+    let mut vertices = a.points.iter().chain(&b.points);
+    vertices
+        .all(|&p| union.depth(p) <= 2.0 * STRAIGHT)
+        .then_some(union)
 }
 
 /// Merges until no two neighbors have a convex union. A sweep proposes pairs, each piece with only the next few, so
@@ -495,5 +508,18 @@ mod tests {
             .map(|o| ((o.area * 1e3).round() / 1e3, o.candidate))
             .collect();
         assert_eq!(found, [(3.6, Some(0)), (6.0, None)]);
+    }
+    #[test]
+    fn a_union_with_a_shallow_notch_is_not_convex() {
+        let rectangle = |[x, y, to_x, to_y]: [f64; 4]| {
+            hull(
+                [[x, y], [to_x, y], [to_x, to_y], [x, to_y]]
+                    .map(DVec2::from)
+                    .into_iter(),
+            )
+        };
+        let above = rectangle([0.0, 0.0, 2.4, 1.0]);
+        assert!(convex_union(&above, &rectangle([0.0, -0.002, 2.4, 0.0])).is_some());
+        assert!(convex_union(&above, &rectangle([0.0, -0.002, 2.3998, 0.0])).is_none());
     }
 }
