@@ -162,3 +162,8 @@ pub use runtime::{
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
+
+/// The tutorial of living worlds, compiled with the tests.
+#[cfg(all(doctest, feature = "world"))]
+#[doc = include_str!("../../../docs/living.md")]
+struct Living;

@@ -8,9 +8,9 @@
 //!   start where the separating axes of the triangle's plane and of the world end. Where the body only grazes, steps halve;
 //!   a search that reaches [`MAX_STEPS`] counts as touching.
 //!
-//! All intervals are widened by [`TOUCH`]: a body without thickness touches a triangle for an instant only, which two axes round
-//! differently. The method of the parry library (GJK on the difference) was measured and rejected: see `docs/living.md`.
-//! Coordinates are relative to the body's start, so that their rounding is that of the file.
+//! All intervals are widened by [`TOUCH`]: a body without thickness touches a triangle for an instant only, which two axes
+//! round differently. The method of the parry library (GJK on the difference) was measured and rejected: see
+//! `docs/benchmarks/living.md`. Coordinates are relative to the body's start, so that their rounding is that of the file.
 
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
