@@ -183,6 +183,6 @@ fn an_object_is_found_deep_below_others() {
         encode_glb(&world)
             .unwrap_err()
             .to_string()
-            .contains("above one another")
+            .contains("deeper than")
     );
 }

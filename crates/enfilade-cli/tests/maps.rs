@@ -229,7 +229,7 @@ fn a_broken_map_is_refused_with_its_place() {
     let out = enfilade(&["bake", &input, "-o", &world]);
     assert_eq!(out.status.code(), Some(1));
     assert!(
-        text(&out.stderr).contains("line 4:3: 'x'"),
+        text(&out.stderr).contains("line 4:3: expected a coordinate, found 'x'"),
         "{}",
         text(&out.stderr)
     );

@@ -230,7 +230,7 @@ fn a_leak_path_is_a_line_of_the_world_and_nothing_else() {
 #[test]
 fn a_leak_path_from_nowhere_is_refused() {
     let input = open_rooms(1).write("nowhere.obj");
-    for (point, word) in [("900,1,1", "beyond the scene"), ("1,2", "three numbers")] {
+    for (point, word) in [("900,1,1", "outside the scene"), ("1,2", "three numbers")] {
         let done = bake(&input, &[&format!("--leak-path={point}")]);
         assert!(!done.status.success());
         assert!(said(&done).contains(word), "{}", said(&done));

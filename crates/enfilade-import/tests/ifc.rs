@@ -126,7 +126,7 @@ fn a_converter_is_ended_that_takes_too_long_too_much_or_writes_too_much() {
         converter.max_time = if is_slow { second } else { 300 * second };
         converter.max_memory = Some(50_000_000);
         let error = read(&folder, Some(converter)).unwrap_err().to_string();
-        assert!(error.contains(text) && error.contains("ended"), "{error}");
+        assert!(error.contains(text) && error.contains("stopped"), "{error}");
     }
 }
 

@@ -4,7 +4,7 @@ use enfilade_geom::{DVec3, Plane, Triangle};
 use smallvec::{SmallVec, smallvec};
 
 use super::cut::{Knife, TetrahedraCut, less, shared, turned_to};
-use crate::complex::poly::{Poly, area_normal};
+use crate::complex::poly::{Poly, area_normal, width};
 
 /// An outline smaller than a facet; `None` for the whole facet.
 pub(super) type Outline = Option<Poly>;
@@ -61,7 +61,11 @@ impl Knife<'_> {
         let rest = |(parts, poly): Piece| {
             let covers = self.covers(&near, &poly, normal, 2.0 * eps);
             let open = less(smallvec![poly], &covers, normal, self.tolerance);
-            open.into_iter().map(move |poly| OpenPiece {
+            // Pieces between cuts along walls that meet but for rounding are closed like gaps between covers.
+            let open = open
+                .into_iter()
+                .filter(|p| width(p) >= self.tolerance.width);
+            open.map(move |poly| OpenPiece {
                 parts,
                 outline: Some(poly),
             })

@@ -109,6 +109,17 @@ fn a_hole_joins_though_each_piece_of_it_is_a_crack() {
     assert!(!is_joined([0.0; 2], 0.0, DVec3::ZERO, 1.0));
 }
 
+/// Points where the wall meets a side are rounded, so that a sliver of a cut facet lies on both sides of an edge.
+#[test]
+fn slivers_of_cut_facets_at_an_edge_of_the_box_are_closed() {
+    let turn = DVec3::new(
+        -0.705_024_788_678_412_8,
+        0.765_056_558_937_940_9,
+        0.921_618_801_528_096_9,
+    );
+    assert!(!is_joined([0.0; 2], 0.0, turn, 0.1));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
