@@ -12,10 +12,10 @@ use enfilade_geom::scene::{
     Entity, Fixture, Image, Material, Mesh, Object, Primitive, Scene, SourceNode, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3};
+use enfilade_prepare::GridSteps;
 use serde_json::Value;
 
 use crate::gltf::map_textures;
-use crate::repair::GridSteps;
 
 /// Puts a scene into its canonical order.
 ///

@@ -1,5 +1,6 @@
 //! Repairs of surfaces with known defects. Covers S5.
 
+#[path = "../../enfilade-import/tests/common/mod.rs"]
 mod common;
 
 use std::collections::HashMap;
@@ -8,7 +9,7 @@ use common::{box_primitive, scene_of, world};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene};
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Plane, Triangle};
 use enfilade_import::{
-    CleaningOptions, ImportError, ImportOptions, RepairOptions, RepairReport, cleaning_report,
+    BadOption, CleaningOptions, ImportOptions, RepairOptions, RepairReport, cleaning_report,
     decode_obj, export_glb, repair,
 };
 use enfilade_testkit::oracle::{n_open_edges, object_triangles, signed_volume};
@@ -441,10 +442,7 @@ fn brushes_are_left_alone_and_options_are_checked() {
         (1e-3, 11.0),
     ] {
         let error = repair(&mut scene, &RepairOptions { weld, hole });
-        assert!(
-            matches!(error, Err(ImportError::BadOption { .. })),
-            "{weld} {hole}"
-        );
+        assert!(matches!(error, Err(BadOption { .. })), "{weld} {hole}");
     }
 }
 
