@@ -342,9 +342,9 @@ impl<'a> Builder<'a> {
         }
         let n_before = primitive.indices.len() / 3;
         primitive.indices = primitive
-            .indices
-            .chunks_exact(3)
-            .map(|t| [0, 1, 2].map(|k| remap[t[k] as usize]))
+            .triples()
+            .iter()
+            .map(|t| t.map(|i| remap[i as usize]))
             .filter(|t| !t.contains(&u32::MAX))
             .flatten()
             .collect();

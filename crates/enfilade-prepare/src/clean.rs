@@ -242,8 +242,7 @@ impl Soup {
             {
                 let points = world_points(object, primitive);
                 let welded: Vec<u32> = points.iter().map(|&x| welder.weld(x)).collect();
-                for (t, corners) in primitive.indices.chunks_exact(3).enumerate() {
-                    let corners = [corners[0], corners[1], corners[2]];
+                for (t, corners) in primitive.triples().iter().enumerate() {
                     // Points that are not finite cannot be welded.
                     if corners.iter().any(|&i| !points[i as usize].is_finite()) {
                         continue;

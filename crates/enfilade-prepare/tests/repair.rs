@@ -43,9 +43,7 @@ fn fine_box(n: u32) -> Primitive {
     let mut out = Primitive::default();
     let mut number = HashMap::new();
     let coarse = box_primitive([2.0, 3.0, 4.0]);
-    for t in coarse.indices.chunks_exact(3) {
-        let [a, b, c] =
-            [0, 1, 2].map(|k| DVec3::from_array(coarse.positions[t[k] as usize].map(f64::from)));
+    for [a, b, c] in coarse.triangles() {
         let mut at = |i: u32, j: u32| {
             // Each vertex in whole numbers of steps, so that neighbors agree to the bit.
             let p = (a * f64::from(n - i - j) + b * f64::from(i) + c * f64::from(j)) / f64::from(n);
@@ -546,7 +544,7 @@ proptest! {
         let (one, _) = repaired(&spoilt, &RepairOptions::default());
         let mut other = spoilt.clone();
         let indices = &mut other.meshes[0].primitives[0].indices;
-        let mut triangles: Vec<[u32; 3]> = indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let mut triangles: Vec<[u32; 3]> = indices.as_chunks().0.to_vec();
         Rng::new(seed).shuffle(&mut triangles);
         *indices = triangles.into_iter().flatten().collect();
         let (other, _) = repaired(&other, &RepairOptions::default());
