@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 17] = [
+const FENCES: [Fence; 18] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -50,8 +50,14 @@ const FENCES: [Fence; 17] = [
         words: &["std::fs", "std::thread"],
     },
     Fence {
-        name: "enfilade-import",
+        name: "enfilade-prepare",
         siblings: &["enfilade-geom"],
+        not: FORMATS,
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
+        name: "enfilade-import",
+        siblings: &["enfilade-geom", "enfilade-prepare"],
         not: &["rayon", "anyhow"],
         // Waits for a converter, and so may sleep.
         words: &["thread::spawn", "thread::scope", "thread::Builder"],

@@ -435,14 +435,9 @@ fn cells_of_object(
     let o = &scene.objects[object];
     let mut cells = Vec::new();
     for p in &scene.meshes[o.mesh as usize].primitives {
-        let triangles = p.indices.chunks_exact(3);
-        for t in triangles.filter(allowance.each(WORK_A_TRIANGLE)) {
-            let corners = [0, 1, 2].map(|i| {
-                let [x, y, z] = p.positions[t[i] as usize];
-                o.transform
-                    .transform_point3(DVec3::new(x.into(), y.into(), z.into()))
-            });
-            locator.cells_touching(&corners, &mut cells);
+        let triangles = p.placed_triangles(o.transform);
+        for triangle in triangles.filter(allowance.each(WORK_A_TRIANGLE)) {
+            locator.cells_touching(&triangle, &mut cells);
         }
     }
     if cells.is_empty() {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, Locator};
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, Sets};
 
 use crate::complex::{Complex, Contact, LeafCells, Partition, Vote};
 use crate::structure::OUTDOORS;
@@ -111,30 +111,26 @@ pub(crate) fn join_unparted(
             sum.beside += contact.beside;
         }
     }
-    // The smaller label stands for both. Pairs ascend, so chains end in the smallest label of all.
-    let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
+    // The least label stands for all of a set.
+    let mut labels: Vec<u32> = between.keys().flatten().copied().collect();
+    labels.sort_unstable();
+    labels.dedup();
+    let mut sets = Sets::new(labels.len());
     for (pair, contact) in between {
         // A model full of holes must not lose its rooms to the outdoors.
         let is_unparted = contact.beside > MAX_LEAK && contact.beside > contact.on_candidates;
         if pair[0] != OUTDOORS && is_unparted {
-            let [a, b] = pair.map(|l| root(&stands_for, l));
-            if a != b {
-                stands_for.insert(a.max(b), a.min(b));
-            }
+            let [a, b] = pair.map(|l| labels.partition_point(|&m| m < l) as u32);
+            sets.join(a, b);
         }
     }
-    for v in votes.iter_mut() {
-        v.label = root(&stands_for, v.label);
-    }
-    for (_, region) in voids.iter_mut() {
-        *region = root(&stands_for, *region);
-    }
-    !stands_for.is_empty()
-}
-
-fn root(stands_for: &BTreeMap<u32, u32>, mut label: u32) -> u32 {
-    while let Some(&next) = stands_for.get(&label) {
-        label = next;
-    }
-    label
+    let stands_for = sets.into_least();
+    let relabel = |label: &mut u32| {
+        if let Ok(i) = labels.binary_search(label) {
+            *label = labels[stands_for[i] as usize];
+        }
+    };
+    votes.iter_mut().for_each(|v| relabel(&mut v.label));
+    voids.iter_mut().for_each(|(_, region)| relabel(region));
+    (0..).zip(&stands_for).any(|(i, &least)| i != least)
 }

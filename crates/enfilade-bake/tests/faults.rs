@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_bake::{BakeConfig, BakeContext, Silent, SmallestHole, bake};
 use enfilade_cpg::{CellId, CellPortalGraph, Portal, PortalKind, Seals, World};
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, triangle_area_normal};
 use enfilade_testkit::{
     Disturbance, Fault, Generated, Opening, OpeningKind, disturbed, furnished_house,
 };
@@ -162,11 +162,11 @@ fn holds_up(clean: &CellPortalGraph, world: &World, g: &Generated, what: &str) {
 fn model_area(world: &World) -> f64 {
     let mut area = 0.0;
     for batch in world.batches.iter().filter(|b| !b.is_seal) {
-        let at = |i: u32| DVec3::from(batch.primitive.positions[i as usize].map(f64::from));
-        for t in batch.primitive.indices.chunks_exact(3) {
-            let [a, b, c] = [at(t[0]), at(t[1]), at(t[2])];
-            area += 0.5 * (b - a).cross(c - a).length();
-        }
+        let double = batch.primitive.triangles();
+        area += 0.5
+            * double
+                .map(|t| triangle_area_normal(&t).length())
+                .sum::<f64>();
     }
     area
 }

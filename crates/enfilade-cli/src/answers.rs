@@ -21,9 +21,8 @@ impl<'w> Answers<'w> {
         let mut numbers: Vec<HashMap<[u32; 3], Vec<u32>>> = Vec::new();
         for batch in &world.batches {
             let mut by_corners: HashMap<[u32; 3], Vec<u32>> = HashMap::new();
-            for (i, t) in batch.primitive.indices.chunks_exact(3).enumerate() {
-                let corners = [t[0], t[1], t[2]];
-                by_corners.entry(corners).or_default().push(i as u32);
+            for (i, t) in (0..).zip(batch.primitive.triples()) {
+                by_corners.entry(*t).or_default().push(i);
             }
             numbers.push(by_corners);
         }
@@ -34,8 +33,10 @@ impl<'w> Answers<'w> {
                 let first = c.first_index as usize;
                 let indices = &sight.indices(c.batch)[first..first + c.n_indices as usize];
                 indices
-                    .chunks_exact(3)
-                    .filter_map(|t| numbers[c.batch as usize].get(&[t[0], t[1], t[2]]))
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .filter_map(|t| numbers[c.batch as usize].get(t))
                     .flatten()
                     .copied()
                     .collect()

@@ -536,8 +536,8 @@ fn section(world: &World, height: f32) -> Vec<[[f32; 3]; 2]> {
     let mut out = Vec::new();
     for batch in &world.batches {
         let p = &batch.primitive;
-        for t in p.indices.chunks_exact(3) {
-            let corners = [0, 1, 2].map(|k| p.positions[t[k] as usize]);
+        for t in p.triples() {
+            let corners = t.map(|i| p.positions[i as usize]);
             let mut ends = Vec::new();
             for k in 0..3 {
                 let (a, b) = (corners[k], corners[(k + 1) % 3]);

@@ -240,7 +240,7 @@ fn a_broken_map_is_refused_with_its_place() {
 fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
     use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
     use enfilade::geom::scene::{Role, TriangleSource};
-    use enfilade::geom::{Aabb, BoxTree, Bvh, ConvexSolid, DVec3, Triangle, Winding};
+    use enfilade::geom::{Aabb, BoxTree, Bvh, ConvexSolid, DVec3, Sets, Triangle, Winding};
     let entities = scene.entities.iter().filter(|e| e.object.is_none());
     let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
     let (sources, triangles): (Vec<TriangleSource>, Vec<Triangle>) = scene
@@ -290,31 +290,20 @@ fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
             }
         }
     }
-    // Joins leaves across all portals except some; the root of a set is its smallest leaf.
+    // Joins leaves across all portals except some.
     let n_leaves = portals.iter().flat_map(|p| p.0).max().unwrap_or(0) as usize + 1;
     let of_separator: std::collections::BTreeSet<usize> =
         separators.iter().flatten().copied().collect();
-    let mut set: Vec<usize> = (0..n_leaves).collect();
-    fn root(set: &mut [usize], mut x: usize) -> usize {
-        while set[x] != x {
-            set[x] = set[set[x]];
-            x = set[x];
-        }
-        x
-    }
+    let mut sets = Sets::new(n_leaves);
     for (i, (leaves, _)) in portals.iter().enumerate() {
         if !of_separator.contains(&i) {
-            let [a, b] = leaves.map(|l| root(&mut set, l as usize));
-            set[a.max(b)] = a.min(b);
+            sets.join(leaves[0], leaves[1]);
         }
     }
     for (k, s) in separators.iter().enumerate() {
         let joins = s.iter().any(|&p| {
-            portals[p]
-                .0
-                .map(|l| root(&mut set, l as usize))
-                .windows(2)
-                .any(|w| w[0] != w[1])
+            let [a, b] = portals[p].0.map(|l| sets.find(l));
+            a != b
         });
         assert!(joins, "{name}: nothing touches where separator {k} was");
     }

@@ -103,13 +103,6 @@ impl CellSet {
         }
     }
 
-    /// Keeps only the cells that are also in another set of the same graph.
-    pub fn intersect_with(&mut self, other: &Self) {
-        for (a, b) in self.words.iter_mut().zip(&other.words) {
-            *a &= b;
-        }
-    }
-
     /// Returns `true` if each cell is also in the other set.
     #[must_use]
     pub fn is_subset(&self, other: &Self) -> bool {

@@ -20,12 +20,11 @@ impl Seals {
         let mut out = Self::default();
         for batch in world.batches.iter().filter(|b| b.is_seal) {
             let p = &batch.primitive;
-            let triangles: Vec<&[u32]> = p.indices.chunks_exact(3).collect();
-            for fan in triangles.chunk_by(|a, b| a[0] == b[0]) {
+            for fan in p.triples().chunk_by(|a, b| a[0] == b[0]) {
                 let (mut area, mut middle) = (0.0, [0.0; 3]);
                 for t in fan {
-                    let [a, b, c] = [0, 1, 2].map(|k| {
-                        let corner = p.positions.get(t[k] as usize);
+                    let [a, b, c] = t.map(|i| {
+                        let corner = p.positions.get(i as usize);
                         corner.copied().unwrap_or_default().map(f64::from)
                     });
                     let part = area_of(a, b, c);

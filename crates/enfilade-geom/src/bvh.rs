@@ -13,10 +13,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec4;
 
-use crate::ray::{
-    Hit, Ray, ShearedRay, closest_point_on_triangle, segment_to_triangle_distance,
-    triangle_touches_box,
-};
+use crate::ray::{Hit, Ray, ShearedRay, closest_point_on_triangle, triangle_touches_box};
 use crate::{Aabb, DVec3, Triangle};
 use build::{Built, Node, build_nodes, round_down, round_up};
 
@@ -142,32 +139,6 @@ impl Bvh {
             }
             ControlFlow::Continue(())
         });
-    }
-
-    /// Calls `visit` for each triangle nearer than `radius` to the closed segment from `a` to `b`, with its
-    /// distance, until `visit` breaks.
-    pub fn for_each_near_segment(
-        &self,
-        a: DVec3,
-        b: DVec3,
-        radius: f64,
-        mut visit: impl FnMut(u32, f64) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        self.for_each_around_segment(a, b, radius, |id, triangle| {
-            // Early out for most triangles: both ends on one side of the plane, farther than the radius.
-            let n = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
-            let (da, db) = (n.dot(a - triangle[0]), n.dot(b - triangle[0]));
-            let nearer = da.abs().min(db.abs());
-            if da * db > 0.0 && nearer > 1.001 * radius * n.length() {
-                return ControlFlow::Continue(());
-            }
-            let distance = segment_to_triangle_distance(a, b, triangle);
-            if distance < radius {
-                visit(id, distance)
-            } else {
-                ControlFlow::Continue(())
-            }
-        })
     }
 
     /// Calls `visit` for each triangle in a leaf whose box, grown by `radius` (finite), the closed segment

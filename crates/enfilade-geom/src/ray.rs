@@ -118,6 +118,7 @@ pub fn hit_triangle(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
 }
 
 /// Returns the point of the closed segment `a b` nearest to `p`.
+#[inline]
 #[must_use]
 pub fn closest_point_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     let ab = b - a;

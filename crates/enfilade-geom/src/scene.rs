@@ -117,6 +117,30 @@ pub struct Primitive {
     pub material: Option<u32>,
 }
 
+impl Primitive {
+    /// Returns the triangles as triples of position indices.
+    #[must_use]
+    pub fn triples(&self) -> &[[u32; 3]] {
+        self.indices.as_chunks().0
+    }
+
+    /// Returns the triangles in the space of the positions.
+    ///
+    /// # Panics
+    ///
+    /// If an index is out of range, as [`Primitive::placed_triangles`] does.
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = Triangle> {
+        let vertex = |i: u32| DVec3::from_array(self.positions[i as usize].map(f64::from));
+        self.triples().iter().map(move |t| t.map(vertex))
+    }
+
+    /// Returns the triangles moved by `placement`, without rounding them as [`Scene::world_triangle`] does.
+    pub fn placed_triangles(&self, placement: DMat4) -> impl ExactSizeIterator<Item = Triangle> {
+        let placed = move |p| placement.transform_point3(p);
+        self.triangles().map(move |t| t.map(placed))
+    }
+}
+
 /// A placed mesh.
 #[derive(Clone, Debug)]
 pub struct Object {

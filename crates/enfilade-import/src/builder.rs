@@ -5,13 +5,12 @@ mod naming;
 use crate::mesh::{bytes_of, mirror};
 use crate::order::sort;
 use crate::origins::Origins;
-use crate::repair::{GridSteps, weld_quantized};
-use crate::roles::{Facts, Verdict};
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
     Entity, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
+use enfilade_prepare::{GridSteps, RoleFacts, RoleVerdict, weld_quantized};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -343,9 +342,9 @@ impl<'a> Builder<'a> {
         }
         let n_before = primitive.indices.len() / 3;
         primitive.indices = primitive
-            .indices
-            .chunks_exact(3)
-            .map(|t| [0, 1, 2].map(|k| remap[t[k] as usize]))
+            .triples()
+            .iter()
+            .map(|t| t.map(|i| remap[i as usize]))
             .filter(|t| !t.contains(&u32::MAX))
             .flatten()
             .collect();
@@ -387,11 +386,11 @@ impl<'a> Builder<'a> {
         }
         let (verdict, is_mixed) = self.judge(placement, mesh);
         let (role, reason) = match verdict {
-            Verdict::Ignore(reason) => {
+            RoleVerdict::Ignore(reason) => {
                 self.note(placement.place, format!("left out: {reason}"));
                 return Ok(());
             }
-            Verdict::Keep(role, reason) => (role, reason),
+            RoleVerdict::Keep(role, reason) => (role, reason),
         };
         let limits = self.limits();
         let n_placed = placement.transforms.len() as u64;
@@ -445,7 +444,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the verdict on a placed mesh, and `true` if it has both opaque and see-through parts.
-    fn judge(&self, placement: &Placement<'_>, mesh: &Mesh) -> (Verdict, bool) {
+    fn judge(&self, placement: &Placement<'_>, mesh: &Mesh) -> (RoleVerdict, bool) {
         let drawn = || mesh.primitives.iter().filter(|p| !p.indices.is_empty());
         let is_clear: Vec<bool> = drawn().map(|p| self.is_see_through(p)).collect();
         let is_mixed = is_clear.contains(&true) && is_clear.contains(&false);
@@ -453,7 +452,7 @@ impl<'a> Builder<'a> {
         let materials: Vec<&str> = drawn()
             .map(|p| material(p).map_or("", |m| &m.name))
             .collect();
-        let verdict = self.options.roles.judge(&Facts {
+        let verdict = self.options.roles.judge(&RoleFacts {
             names: placement.names,
             ancestors: placement.ancestors,
             materials: &materials,

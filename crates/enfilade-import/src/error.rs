@@ -106,13 +106,8 @@ pub enum ImportError {
         advice: String,
     },
     /// An option is invalid.
-    #[error("{option}: {problem}")]
-    BadOption {
-        /// The option.
-        option: &'static str,
-        /// The problem with it.
-        problem: String,
-    },
+    #[error(transparent)]
+    BadOption(#[from] enfilade_prepare::BadOption),
 }
 
 /// Formats a length short enough for one line, however wrong it is.

@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn classes_that_roles_know_are_written_as_they_know_them() {
-        for class in crate::roles::ifc_classes() {
+        for class in enfilade_prepare::ifc_classes() {
             let upper = class["Ifc".len()..].to_ascii_uppercase();
             assert_eq!(format!("Ifc{}", capitalized(&upper)), class);
         }

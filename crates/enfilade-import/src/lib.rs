@@ -19,16 +19,12 @@
 //!
 //! Not supported: animation, skins, curves, points and lines; they are left out with a note.
 
-mod auto_roles;
 mod builder;
-mod clean;
-mod crossing;
 mod error;
 mod export;
 mod extent;
 mod files;
 mod foreign;
-mod glob;
 mod gltf;
 mod ifc;
 mod map;
@@ -42,25 +38,21 @@ mod ply;
 mod polygon;
 mod prt;
 mod pvs_text;
-mod repair;
 mod report;
-mod roles;
-mod shells;
 mod soup;
 mod stl;
-mod tjunction;
 
-pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
+pub use enfilade_prepare::{
+    BadOption, CleaningOptions, CleaningReport, Example, Finding, Glob, GlobState, RepairOptions,
+    RepairReport, RoleRules, ShellCounts, is_match, repair,
+};
 pub use error::ImportError;
 pub use export::export_glb;
-pub use glob::{Glob, GlobState, is_match};
 pub use options::{IfcConverter, ImportOptions, Limits, Up};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
-pub use repair::{RepairOptions, RepairReport, repair};
-pub use report::{Example, FileReport, Finding, ImportReport, Note};
-pub use roles::RoleRules;
+pub use report::{FileReport, ImportReport, Note, cleaning_report};
 
 use builder::Builder;
 use enfilade_geom::scene::Scene;
@@ -294,7 +286,7 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     extent::check(&scene, &report, options)?;
     report.unit_doubt = extent::unit_doubt(&scene, &report, options);
     if options.roles.is_automatic && !options.roles.is_manual {
-        auto_roles::judge(&mut scene);
+        enfilade_prepare::judge_undecided(&mut scene);
     }
     if let Some(wanted) = &options.repair {
         report.repair = Some(repair(&mut scene, wanted)?);

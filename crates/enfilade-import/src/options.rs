@@ -1,8 +1,7 @@
 //! Options of the import.
 
-use crate::roles::RoleRules;
-use crate::{ImportError, RepairOptions};
 use enfilade_geom::{DMat4, DVec3};
+use enfilade_prepare::{BadOption, RepairOptions, RoleRules};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -142,10 +141,10 @@ impl Limits {
 
 impl ImportOptions {
     /// Returns the transform from input space to world space.
-    pub(crate) fn base_transform(&self) -> Result<DMat4, ImportError> {
+    pub(crate) fn base_transform(&self) -> Result<DMat4, BadOption> {
         let unit = self.unit.unwrap_or(1.0);
         if !(unit.is_finite() && (1e-9..=1e9).contains(&unit)) {
-            return Err(ImportError::BadOption {
+            return Err(BadOption {
                 option: "unit",
                 problem: format!(
                     "{unit} is not a length in meters; give e.g. 0.001 for millimeters"
@@ -153,7 +152,7 @@ impl ImportOptions {
             });
         }
         if !self.origin.is_finite() {
-            return Err(ImportError::BadOption {
+            return Err(BadOption {
                 option: "origin",
                 problem: format!("{} is not a point", self.origin),
             });

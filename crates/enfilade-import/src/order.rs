@@ -12,10 +12,10 @@ use enfilade_geom::scene::{
     Entity, Fixture, Image, Material, Mesh, Object, Primitive, Scene, SourceNode, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3};
+use enfilade_prepare::GridSteps;
 use serde_json::Value;
 
 use crate::gltf::map_textures;
-use crate::repair::GridSteps;
 
 /// Puts a scene into its canonical order.
 ///
@@ -139,9 +139,9 @@ fn sort_primitive(p: &mut Primitive) {
         }
         first.push(equal[0].1);
     }
-    let mut triangles: Vec<[u32; 3]> = (p.indices.chunks_exact(3))
+    let mut triangles: Vec<[u32; 3]> = (p.triples().iter())
         .map(|t| {
-            let [a, b, c] = [0, 1, 2].map(|k| place[t[k] as usize]);
+            let [a, b, c] = t.map(|i| place[i as usize]);
             [a, b, c].min([b, c, a]).min([c, a, b])
         })
         .collect();

@@ -1,14 +1,13 @@
 //! The report of an import. Every change is recorded here.
 
-use enfilade_geom::{DVec3, shown};
+use enfilade_geom::scene::Scene;
+use enfilade_geom::shown;
+use enfilade_prepare::{BadOption, CleaningOptions, CleaningReport, Finding, RepairReport};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Most distinct notes kept; further ones are only counted.
 const MAX_NOTES: usize = 500;
-
-/// Most example positions kept per finding.
-pub(crate) const MAX_EXAMPLES: usize = 5;
 
 /// Observations and changes of an import.
 #[derive(Clone, Debug, Default)]
@@ -37,7 +36,7 @@ pub struct ImportReport {
     /// The reason why the numbers are probably not meters, and the remedy; `None` without evidence.
     pub unit_doubt: Option<String>,
     /// Changes of the repair, if one was requested.
-    pub repair: Option<crate::RepairReport>,
+    pub repair: Option<RepairReport>,
 }
 
 /// One input file.
@@ -66,36 +65,6 @@ pub struct Note {
     pub n: u64,
 }
 
-/// A count with a few example places.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Finding {
-    /// Number of occurrences.
-    pub n: u64,
-    /// The first few, at most five.
-    pub examples: Vec<Example>,
-}
-
-/// One place in the scene.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Example {
-    /// The object or element.
-    pub name: String,
-    /// Position; in world space unless the finding says otherwise. [Units: wu]
-    pub position: DVec3,
-}
-
-impl Finding {
-    pub(crate) fn add(&mut self, position: DVec3, name: impl FnOnce() -> String) {
-        self.n += 1;
-        if self.examples.len() < MAX_EXAMPLES {
-            self.examples.push(Example {
-                name: name(),
-                position,
-            });
-        }
-    }
-}
-
 impl ImportReport {
     pub(crate) fn note(&mut self, path: &Path, place: impl Into<String>, text: impl Into<String>) {
         let text = text.into();
@@ -116,6 +85,28 @@ impl ImportReport {
             self.n_notes_dropped += 1;
         }
     }
+}
+
+/// Finds defects in a scene and adds those that `import` found while reading it.
+///
+/// Takes as long as [`enfilade_prepare::cleaning_report`], and panics where it does.
+///
+/// # Errors
+///
+/// When an option is out of range.
+pub fn cleaning_report(
+    scene: &Scene,
+    import: Option<&ImportReport>,
+    options: &CleaningOptions,
+) -> Result<CleaningReport, BadOption> {
+    let mut report = enfilade_prepare::cleaning_report(scene, options)?;
+    if let Some(import) = import {
+        report.non_planar_polygons = import.non_planar_polygons.clone();
+        report.concave_polygons = import.concave_polygons.clone();
+        report.crossing_polygons = import.crossing_polygons.clone();
+        report.nonfinite_vertices = import.nonfinite_vertices.clone();
+    }
+    Ok(report)
 }
 
 impl fmt::Display for Note {

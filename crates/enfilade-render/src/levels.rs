@@ -137,8 +137,8 @@ fn joined(p: &Primitive) -> Vec<u32> {
 fn distance(p: &Primitive, coarse: &[u32]) -> f64 {
     let triangles = |indices: &[u32]| -> Vec<Triangle> {
         let corner = |i: u32| DVec3::from_array(p.positions[i as usize].map(f64::from));
-        let triples = indices.chunks_exact(3);
-        triples.map(|t| [t[0], t[1], t[2]].map(corner)).collect()
+        let triples = indices.as_chunks().0.iter();
+        triples.map(|t: &[u32; 3]| t.map(corner)).collect()
     };
     let (fine, coarse) = (triangles(&p.indices), triangles(coarse));
     let far = |from: &[Triangle], to: &[Triangle]| {

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::{DVec2, DVec3, Triangle};
+use enfilade_geom::{DVec2, DVec3, Triangle, triangle_area_normal};
 
 /// Half the height of the window in which floor areas add up to one level. [Units: wu]
 const WINDOW: f64 = 0.1;
@@ -108,10 +108,8 @@ fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
             continue;
         }
         let p = &batch.primitive;
-        for t in p.indices.chunks_exact(3) {
-            let t: Triangle =
-                [0, 1, 2].map(|k| DVec3::from_array(p.positions[t[k] as usize].map(f64::from)));
-            let n = (t[1] - t[0]).cross(t[2] - t[0]);
+        for t in p.triangles() {
+            let n = triangle_area_normal(&t);
             // Surfaces within 45° of level are walkable, whichever way they face: models turn floors upside down.
             if n.y.abs() > 0.7 * n.length() && n.y != 0.0 {
                 // Slopes within 8° count as level.

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use enfilade_cpg::{CellId, PortalKind, World};
-use enfilade_geom::DVec2;
+use enfilade_geom::{DVec2, Sets};
 use force_graph::{ForceGraph, NodeData, SimulationParameters};
 
 use crate::drawing::color;
@@ -218,19 +218,11 @@ fn lay_out(rooms: &[CellId], edges: &BTreeMap<(CellId, CellId), PortalKind>, pla
 /// Edges that are not drawn: ties each part without a doorway to the first part to its nearest room, so that it does
 /// not drift away.
 fn bonds(joined: &[[usize; 2]], places: &[DVec2]) -> Vec<[usize; 2]> {
-    let mut part: Vec<usize> = (0..places.len()).collect();
-    fn root(part: &mut [usize], mut i: usize) -> usize {
-        while part[i] != i {
-            part[i] = part[part[i]];
-            i = part[i];
-        }
-        i
-    }
+    let mut parts = Sets::new(places.len());
     for &[a, b] in joined {
-        let (a, b) = (root(&mut part, a), root(&mut part, b));
-        part[a.max(b)] = a.min(b);
+        parts.join(a as u32, b as u32);
     }
-    let roots: Vec<usize> = (0..places.len()).map(|i| root(&mut part, i)).collect();
+    let roots: Vec<usize> = parts.into_least().iter().map(|&r| r as usize).collect();
     let firsts: BTreeSet<usize> = roots.iter().copied().collect();
     let mut out = Vec::new();
     for &first in firsts.iter().skip(1) {

@@ -43,9 +43,7 @@ impl View<'_> {
         let mut lines: Vec<[[i64; 2]; 2]> = Vec::new();
         let rounded = |p: DVec2| [p.x, p.y].map(|x| (x * 1e3).round() as i64);
         for batch in &self.world.batches {
-            let p = &batch.primitive;
-            for t in p.indices.chunks_exact(3) {
-                let corners = [0, 1, 2].map(|k| point(p.positions[t[k] as usize]));
+            for corners in batch.primitive.triangles() {
                 for (k, &y) in self.heights.iter().enumerate() {
                     let Some((a, b)) = cut(&corners, y) else {
                         continue;

@@ -1,7 +1,7 @@
 //! Structural batches cut into small groups of neighboring triangles.
 
 use enfilade_geom::scene::Primitive;
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, triangle_area_normal};
 
 use crate::point::point;
 
@@ -58,13 +58,11 @@ pub(crate) fn chunks_of(
     size: usize,
     chunks: &mut Vec<Chunk>,
 ) -> Sorted {
-    let mut entries: Vec<Entry> = primitive
-        .indices
-        .chunks_exact(3)
-        .zip(0..)
-        .map(|(t, number)| {
-            let p = [0, 1, 2].map(|k| point(primitive.positions[t[k] as usize]));
-            let normal = (p[1] - p[0]).cross(p[2] - p[0]);
+    let triples = primitive.triples().iter().zip(primitive.triangles());
+    let mut entries: Vec<Entry> = (0..)
+        .zip(triples)
+        .map(|(number, (&corners, p))| {
+            let normal = triangle_area_normal(&p);
             let a = normal.abs();
             let axis = if a.x >= a.y && a.x >= a.z {
                 0
@@ -74,7 +72,7 @@ pub(crate) fn chunks_of(
                 2
             };
             Entry {
-                corners: [t[0], t[1], t[2]],
+                corners,
                 number,
                 center: Aabb::of_points(&p).center(),
                 facing: axis * 2 + u8::from(normal[usize::from(axis)] < 0.0),

@@ -8,7 +8,6 @@ use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Ray, Triangle};
 
 use crate::boxes::{BoxRay, BoxTrees, Boxed, Root};
 use crate::doors::Doors;
-use crate::point::point;
 use crate::seen::DetailId;
 use crate::state::SightState;
 
@@ -158,11 +157,7 @@ impl Shape {
         let mut first = Vec::new();
         for p in &world.detail_meshes[mesh as usize].primitives {
             first.push(triangles.len() as u32);
-            for t in p.indices.chunks_exact(3) {
-                let corner =
-                    |k: usize| transform.transform_point3(point(p.positions[t[k] as usize]));
-                triangles.push([0, 1, 2].map(corner));
-            }
+            triangles.extend(p.placed_triangles(*transform));
         }
         Self {
             bvh: Bvh::build(&triangles),

@@ -76,8 +76,8 @@ pub(crate) fn occluders_of(world: &World, options: &SightOptions, tolerance: f64
             continue;
         }
         let is_two_sided = material.is_some_and(|m| m.double_sided);
-        for t in batch.primitive.indices.chunks_exact(3) {
-            let corners = [0, 1, 2].map(|k| batch.primitive.positions[t[k] as usize]);
+        for t in batch.primitive.triples() {
+            let corners = t.map(|i| batch.primitive.positions[i as usize]);
             for c in &batch.cells {
                 by_cell[c.0 as usize].push(triangles.len() as u32);
             }

@@ -93,13 +93,12 @@ impl Sightlines {
         let mut source = Vec::new();
         let mut by_cell: Vec<Vec<u32>> = vec![Vec::new(); world.graph.cells.len()];
         for (b, batch) in world.batches.iter().enumerate() {
-            let p = &batch.primitive;
-            for (i, t) in p.indices.chunks_exact(3).enumerate() {
+            for (i, t) in (0..).zip(batch.primitive.triangles()) {
                 for c in &batch.cells {
                     by_cell[c.idx()].push(triangles.len() as u32);
                 }
-                triangles.push([0, 1, 2].map(|k| point(p.positions[t[k] as usize])));
-                source.push((b as u32, i as u32));
+                triangles.push(t);
+                source.push((b as u32, i));
             }
         }
         let whole = Bvh::build(&triangles);

@@ -3,6 +3,7 @@
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::ray::hit_triangle;
+use enfilade_geom::scene::Primitive;
 use enfilade_geom::{DVec3, Ray};
 use enfilade_runtime::{Follower, Sight, SightState, Sightlines, Step, View, Viewer};
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -69,12 +70,7 @@ impl Pool {
         let point = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
         let ray = Ray::segment(point(a), point(b));
         let batches = self.world.batches.iter().map(|b| &b.primitive);
-        let triangles = batches.flat_map(|p| {
-            let corner = |&i: &u32| point(p.positions[i as usize]);
-            p.indices
-                .chunks_exact(3)
-                .map(move |t| [corner(&t[0]), corner(&t[1]), corner(&t[2])])
-        });
+        let triangles = batches.flat_map(Primitive::triangles);
         let hits = triangles.filter_map(|t| hit_triangle(&ray, &t));
         hits.map(|h| h.t).min_by(f64::total_cmp)
     }

@@ -49,8 +49,7 @@ fn brute(
         }
     };
     for (batch, b) in (0..).zip(&world.batches) {
-        for (triangle, i) in (0..).zip(b.primitive.indices.chunks_exact(3)) {
-            let t = [0, 1, 2].map(|k| dvec(b.primitive.positions[i[k] as usize]));
+        for (triangle, t) in (0..).zip(b.primitive.triangles()) {
             add(&t, Target::Wall { batch, triangle });
         }
     }

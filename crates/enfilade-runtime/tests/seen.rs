@@ -26,22 +26,15 @@ impl Truth {
     fn new(world: World) -> Self {
         let (mut triangles, mut source): (Vec<Triangle>, _) = (Vec::new(), Vec::new());
         for (b, batch) in world.batches.iter().enumerate() {
-            for t in batch.primitive.indices.chunks_exact(3) {
-                source.push((b as u32, [t[0], t[1], t[2]]));
-                triangles
-                    .push([0, 1, 2].map(|k| to_dvec(batch.primitive.positions[t[k] as usize])));
-            }
+            source.extend(batch.primitive.triples().iter().map(|t| (b as u32, *t)));
+            triangles.extend(batch.primitive.triangles());
         }
         let (mut movable, mut detail_of): (Vec<Triangle>, _) = (Vec::new(), Vec::new());
         for (d, detail) in world.details.iter().enumerate() {
             let m = DMat4::from_cols_array(&detail.transform.map(f64::from));
             for p in &world.detail_meshes[detail.mesh as usize].primitives {
-                for t in p.indices.chunks_exact(3) {
-                    movable.push(
-                        [0, 1, 2].map(|k| m.transform_point3(to_dvec(p.positions[t[k] as usize]))),
-                    );
-                    detail_of.push(d as u32);
-                }
+                movable.extend(p.placed_triangles(m));
+                detail_of.resize(movable.len(), d as u32);
             }
         }
         Self {

@@ -1,7 +1,7 @@
 //! Organic caves: chambers and tunnels as a noisy distance field, meshed by a surface net.
 
 use enfilade_geom::scene::{Mesh, Role};
-use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_geom::{Aabb, DMat4, DVec3, closest_point_on_segment};
 
 use crate::rng::Rng;
 use crate::site::{Generated, Site};
@@ -36,9 +36,7 @@ struct Field {
 
 /// Returns the distance of a point from a segment. [Units: wu]
 pub(crate) fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
-    let along = b - a;
-    let t = ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-    p.distance(a + along * t)
+    p.distance(closest_point_on_segment(p, a, b))
 }
 
 impl Field {

@@ -90,8 +90,8 @@ pub(crate) fn surface_net(
         p.normals
             .push((-gradient(q)).normalize_or(DVec3::Y).as_vec3().to_array());
     }
-    debug_assert!(p.indices.chunks_exact(3).any(|t| {
-        let t = [0, 1, 2].map(|k| positions[t[k] as usize]);
+    debug_assert!(p.triples().iter().any(|t| {
+        let t = t.map(|i| positions[i as usize]);
         newell(&t).dot(-gradient(t[0])) > 0.0
     }));
     p

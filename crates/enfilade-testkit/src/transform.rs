@@ -39,11 +39,7 @@ pub fn shuffled(mut generated: Generated, seed: u64) -> Generated {
         .iter_mut()
         .flat_map(|m| &mut m.primitives)
     {
-        let mut triangles: Vec<[u32; 3]> = p
-            .indices
-            .chunks_exact(3)
-            .map(|t| [t[0], t[1], t[2]])
-            .collect();
+        let mut triangles = p.triples().to_vec();
         rng.shuffle(&mut triangles);
         for t in &mut triangles {
             t.rotate_left(rng.below(3));

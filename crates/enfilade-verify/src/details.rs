@@ -10,7 +10,6 @@ use enfilade_geom::{Aabb, DVec3, Plane, Triangle};
 use rayon::prelude::*;
 
 use crate::locator_cells::plane_of;
-use crate::subject::to_dvec;
 
 /// Distance of possible contact: within 0.1 mm of a plane, plus the move by a transform in `f32`. [Units: wu]
 const NEAR: f64 = 2e-4;
@@ -70,13 +69,8 @@ fn problem(world: &World, detail: &DetailObject, rounding: f64) -> Option<String
 
 pub(crate) fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
     let by = detail.placement();
-    let mut out = Vec::new();
-    for p in &world.detail_meshes[detail.mesh as usize].primitives {
-        let place = |i: u32| by.transform_point3(to_dvec(p.positions[i as usize]));
-        let corners = p.indices.chunks_exact(3);
-        out.extend(corners.map(|t| [place(t[0]), place(t[1]), place(t[2])]));
-    }
-    out
+    let primitives = world.detail_meshes[detail.mesh as usize].primitives.iter();
+    primitives.flat_map(|p| p.placed_triangles(by)).collect()
 }
 
 /// Adds the cells whose leaves the triangle reaches by at least `depth`; if that is negative, leaves near it, too.

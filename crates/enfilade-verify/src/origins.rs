@@ -31,8 +31,7 @@ fn check_vertices(world: &World, out: &mut Vec<String>) {
 fn torn(batch: &Batch) -> Option<[u32; 2]> {
     let p = &batch.primitive;
     let mut source_of = vec![None; p.positions.len()];
-    let triangles = p.indices.chunks_exact(3);
-    for (source, t) in batch.sources.of_triangles().zip(triangles) {
+    for (source, t) in batch.sources.of_triangles().zip(p.triples()) {
         for &v in t {
             let known = source_of[v as usize].get_or_insert(source);
             if *known != source {

@@ -2,8 +2,7 @@
 
 use enfilade_cpg::{PortalId, World};
 use enfilade_geom::poly::{self, Poly};
-use enfilade_geom::ray::closest_point_on_segment;
-use enfilade_geom::{Aabb, DVec3, Plane, Winding};
+use enfilade_geom::{Aabb, DVec3, Plane, Winding, closest_point_on_segment};
 
 use crate::subject::to_dvec;
 

@@ -32,13 +32,7 @@ pub fn tolerance(bounds: &Aabb) -> f64 {
 pub fn structural_triangles(world: &World) -> Vec<(Triangle, u32)> {
     let mut out = Vec::new();
     for (i, batch) in world.batches.iter().enumerate() {
-        let p = &batch.primitive;
-        out.extend(p.indices.chunks_exact(3).map(|t| {
-            (
-                [0, 1, 2].map(|k| to_dvec(p.positions[t[k] as usize])),
-                i as u32,
-            )
-        }));
+        out.extend(batch.primitive.triangles().map(|t| (t, i as u32)));
     }
     out
 }

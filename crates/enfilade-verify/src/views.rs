@@ -11,6 +11,7 @@ use enfilade_geom::{Bvh, DVec3, Ray, Triangle, shown};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::details::triangles_of;
 use crate::options::VerifyOptions;
 use crate::rng::Rng;
 use crate::subject::{Subject, point_in, to_dvec};
@@ -331,14 +332,8 @@ impl<'a> Court<'a> {
         let mut detail_of = Vec::new();
         let mut detail_sizes = Vec::new();
         for (i, detail) in world.details.iter().enumerate() {
-            let transform = detail.placement();
             let before = triangles.len();
-            for p in &world.detail_meshes[detail.mesh as usize].primitives {
-                triangles.extend(p.indices.chunks_exact(3).map(|t| {
-                    [0, 1, 2]
-                        .map(|k| transform.transform_point3(to_dvec(p.positions[t[k] as usize])))
-                }));
-            }
+            triangles.extend(triangles_of(world, detail));
             detail_sizes.push((triangles.len() - before) as u64);
             detail_of.resize(triangles.len(), i as u32);
         }

@@ -3,8 +3,8 @@
 mod houses;
 
 use enfilade_cpg::World;
+use enfilade_geom::DMat4;
 use enfilade_geom::scene::Role;
-use enfilade_geom::{DMat4, DVec3};
 use enfilade_testkit::tamper::{ShownBy, tamperings};
 use enfilade_verify::{
     SourceDetail, VerifyOptions, compare_details, compare_scene, structural_triangles, verify_world,
@@ -83,12 +83,7 @@ fn detail_of(w: &World, i: usize) -> SourceDetail {
     let by = DMat4::from_cols_array(&d.transform.map(f64::from));
     let mut triangles = Vec::new();
     for p in &w.detail_meshes[d.mesh as usize].primitives {
-        let at = |i: u32| {
-            let local = DVec3::from(p.positions[i as usize].map(f64::from));
-            by.transform_point3(local)
-        };
-        let corners = p.indices.chunks_exact(3);
-        triangles.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
+        triangles.extend(p.placed_triangles(by));
     }
     SourceDetail {
         name: d.name.clone(),

@@ -4,7 +4,7 @@
 //! an opening, towards an exit beside the place where it ends. After Wonka and others, *Guided Visibility Sampling*
 //! (SIGGRAPH 2006), section 4; exits of cells take the place of their triangle borders.
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, closest_point_on_segment};
 use rayon::prelude::*;
 
 use crate::bits;
@@ -214,9 +214,7 @@ impl Dirs {
         let mut best = (f64::INFINITY, dir.center);
         for i in 0..n {
             let (a, b) = (winding[i], winding[if i + 1 == n { 0 } else { i + 1 }]);
-            let edge = b - a;
-            let t = ((p - a).dot(edge) / edge.length_squared().max(1e-300)).clamp(0.0, 1.0);
-            let q = a + edge * t;
+            let q = closest_point_on_segment(p, a, b);
             let distance = q.distance_squared(p);
             if distance < best.0 {
                 best = (distance, q);

@@ -117,11 +117,7 @@ fn walls(world: &World) -> Vec<Triangle> {
         material.is_none_or(|m| !m.transparent)
     };
     let batches = world.batches.iter().filter(blocks);
-    let triangles = batches.flat_map(|batch| {
-        let positions = &batch.primitive.positions;
-        let corners = move |t: &[u32]| [0, 1, 2].map(|k| point(positions[t[k] as usize]));
-        batch.primitive.indices.chunks_exact(3).map(corners)
-    });
+    let triangles = batches.flat_map(|batch| batch.primitive.triangles());
     triangles.collect()
 }
 
@@ -175,20 +171,14 @@ fn planes(piece: &[[f64; 4]]) -> Vec<Plane> {
 
 /// Returns all parts in the order of [`PartNumbers`].
 fn all_parts(world: &World) -> Vec<Shape> {
-    let triangles = world.batches.iter().flat_map(|batch| {
-        let positions = &batch.primitive.positions;
-        let corners = move |t: &[u32]| [0, 1, 2].map(|k| point(positions[t[k] as usize]));
-        batch.primitive.indices.chunks_exact(3).map(corners)
-    });
+    let batches = world.batches.iter();
+    let triangles = batches.flat_map(|batch| batch.primitive.triangles());
     let objects = world.details.iter().map(|object| {
-        let to_world = object.placement();
-        let mut triangles = Vec::new();
-        for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-            let at = |i: u32| to_world.transform_point3(point(primitive.positions[i as usize]));
-            let corners = primitive.indices.chunks_exact(3);
-            triangles.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
-        }
-        triangles
+        let primitives = world.detail_meshes[object.mesh as usize].primitives.iter();
+        let placement = object.placement();
+        primitives
+            .flat_map(|p| p.placed_triangles(placement))
+            .collect()
     });
     let triangles = triangles.map(|t| vec![t]);
     triangles.chain(objects).map(Shape::new).collect()
@@ -209,8 +199,4 @@ fn by_cell(world: &World) -> Vec<Vec<u32>> {
         }
     }
     by_cell
-}
-
-fn point(p: [f32; 3]) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
 }

@@ -15,18 +15,12 @@ fn triangles(world: &World) -> Vec<(Triangle, u32)> {
     let numbers = PartNumbers::new(world);
     let mut out = Vec::new();
     for (i, batch) in world.batches.iter().enumerate() {
-        let p = &batch.primitive;
-        for (number, t) in numbers.of_batch(i).zip(p.indices.chunks_exact(3)) {
-            out.push(([0, 1, 2].map(|k| point(p.positions[t[k] as usize])), number));
-        }
+        out.extend(batch.primitive.triangles().zip(numbers.of_batch(i)));
     }
     for (i, object) in (0..).zip(&world.details) {
         let m = DMat4::from_cols_array(&object.transform.map(f64::from));
         for p in &world.detail_meshes[object.mesh as usize].primitives {
-            for t in p.indices.chunks_exact(3) {
-                let at = |k: usize| m.transform_point3(point(p.positions[t[k] as usize]));
-                out.push(([at(0), at(1), at(2)], numbers.of_detail(i)));
-            }
+            out.extend(p.placed_triangles(m).map(|t| (t, numbers.of_detail(i))));
         }
     }
     out

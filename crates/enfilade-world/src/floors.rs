@@ -106,12 +106,7 @@ impl Floors {
     /// one with a radius of 0.2 m.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
-        let triangles = || {
-            world
-                .batches
-                .iter()
-                .flat_map(|b| triangles_of(&b.primitive))
-        };
+        let triangles = || world.batches.iter().flat_map(|b| b.primitive.triangles());
         let bounds = bounds_of(layout, triangles().flatten());
         let squares = squares_of(&bounds, walker.radius / 4.0, triangles());
         let spans = spans(&squares, triangles(), walker.slope);
@@ -318,14 +313,6 @@ impl Floors {
             || self.portal_of(from, direction).is_some_and(may_pass);
         is_open.then_some(to)
     }
-}
-
-fn triangles_of(primitive: &enfilade_geom::scene::Primitive) -> impl Iterator<Item = Triangle> {
-    let corner = |i: u32| {
-        let p = primitive.positions[i as usize];
-        DVec3::from_array(p.map(f64::from))
-    };
-    (primitive.indices.chunks_exact(3)).map(move |t| [corner(t[0]), corner(t[1]), corner(t[2])])
 }
 
 /// Returns a box around all vertices, but not far beyond the rooms: the model may contain a sky.

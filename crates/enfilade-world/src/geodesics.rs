@@ -10,7 +10,6 @@
 //! less exact about round surfaces. `O(n³)` for `n` `Corner`s, once; a query costs a line of sight for each `Corner` of the cell.
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Bvh, DVec3, Triangle, Winding};
 
 use crate::edges::{Corner, corners};
@@ -147,7 +146,7 @@ impl Concave {
             return None;
         }
         let batches = world.batches_of(cell);
-        let mut walls: Vec<Triangle> = batches.flat_map(|b| triangles(&b.primitive)).collect();
+        let mut walls: Vec<Triangle> = batches.flat_map(|b| b.primitive.triangles()).collect();
         let mut corners = corners(layout, cell, &walls, SPACING, off);
         if corners.is_empty() {
             return None;
@@ -345,12 +344,4 @@ fn thin_out(corners: &mut Vec<Corner>) {
         }
         near *= 1.5;
     }
-}
-
-fn triangles(primitive: &Primitive) -> impl Iterator<Item = Triangle> {
-    let corner = |i: u32| {
-        let p = primitive.positions[i as usize];
-        DVec3::from_array(p.map(f64::from))
-    };
-    (primitive.indices.chunks_exact(3)).map(move |t| [corner(t[0]), corner(t[1]), corner(t[2])])
 }

@@ -10,7 +10,7 @@
 //! only if nothing absorbs; absorption is at least a thousandth of the walls.
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::{DVec3, triangle_area_normal};
+use enfilade_geom::triangle_area_normal;
 
 use crate::layout::Layout;
 
@@ -92,10 +92,7 @@ impl Reverb {
         }
         for batch in world.batches.iter().filter(|b| !b.cells.is_empty()) {
             let alpha = absorption(batch.primitive.material).clamp(0.0, 1.0);
-            let corner =
-                |i: &u32| DVec3::from_array(batch.primitive.positions[*i as usize].map(f64::from));
-            for indices in batch.primitive.indices.as_chunks::<3>().0 {
-                let triangle = indices.each_ref().map(corner);
+            for triangle in batch.primitive.triangles() {
                 let normal = triangle_area_normal(&triangle);
                 let area = 0.5 * normal.length();
                 let middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;

@@ -27,9 +27,7 @@ fn rooms(seed: u64) -> (World, Layout, Ways, Geodesics) {
 fn walls(world: &World) -> Vec<Triangle> {
     let mut all = Vec::new();
     for b in &world.batches {
-        let at = |i: u32| DVec3::from_array(b.primitive.positions[i as usize].map(f64::from));
-        let corners = b.primitive.indices.chunks_exact(3);
-        all.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
+        all.extend(b.primitive.triangles());
     }
     all
 }

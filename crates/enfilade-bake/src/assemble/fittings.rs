@@ -371,13 +371,8 @@ fn corners_of(world: &World, detail: &DetailObject) -> Vec<DVec3> {
 /// Returns the triangles in world space, primitive after primitive.
 fn triangles_of(world: &World, detail: &DetailObject) -> Vec<Triangle> {
     let (mesh, transform) = placed(world, detail);
-    let of = |p: &enfilade_geom::scene::Primitive| -> Vec<Triangle> {
-        let corner = |i: u32| {
-            let p = p.positions[i as usize].map(f64::from);
-            transform.transform_point3(DVec3::from(p))
-        };
-        let triangles = p.indices.chunks_exact(3);
-        triangles.map(|t| [t[0], t[1], t[2]].map(corner)).collect()
-    };
-    mesh.primitives.iter().flat_map(of).collect()
+    let primitives = mesh.primitives.iter();
+    primitives
+        .flat_map(|p| p.placed_triangles(transform))
+        .collect()
 }

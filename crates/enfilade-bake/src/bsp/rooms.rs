@@ -63,6 +63,7 @@ struct LeafMerger<'a> {
     /// Areas of those portals.
     areas: Vec<Vec<f64>>,
     of_leaf: &'a [u32],
+    /// Cell that each cell was joined to. Not [`Sets`](enfilade_geom::Sets), as the outdoors always represents its set.
     parent: Vec<u32>,
     version: Vec<u32>,
     outer: u32,

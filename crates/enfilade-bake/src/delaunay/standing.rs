@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Allowance, Bvh, DVec3};
+use enfilade_geom::{Allowance, Bvh, DVec3, Sets};
 use rayon::prelude::*;
 
 use super::cells::{Cells, OUTDOOR_CELL};
@@ -125,19 +125,12 @@ fn hollow_rooms(
     (bvh, min_radius): (&Bvh, f64),
     allowance: &Allowance,
 ) -> BTreeSet<u32> {
-    let mut group: BTreeMap<u32, u32> = room_of_cell.iter().map(|&r| (r, r)).collect();
-    fn root(group: &BTreeMap<u32, u32>, mut r: u32) -> u32 {
-        while group[&r] != r {
-            r = group[&r];
-        }
-        r
-    }
+    let mut sets = Sets::new(room_of_cell.len());
     for ((a, b), _) in patches {
-        let (a, b) = (root(&group, *a), root(&group, *b));
-        group.insert(a.max(b), a.min(b));
+        sets.join(*a, *b);
     }
-    let group_of: BTreeMap<u32, u32> = group.keys().map(|&r| (r, root(&group, r))).collect();
-    let group_at = |t: usize| group_of[&room_of_cell[cells.cell_of_part[t] as usize]];
+    let group_of = sets.into_least();
+    let group_at = |t: usize| group_of[room_of_cell[cells.cell_of_part[t] as usize] as usize];
     let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut radius: BTreeMap<u32, f64> = BTreeMap::new();
     for t in 0..space.middles.len() {
@@ -148,12 +141,12 @@ fn hollow_rooms(
     }
     let share = |tets: &mut Vec<u32>| share_of_backs(space, bvh, tets, allowance);
     let (mut hollow, mut doubtful) = (BTreeSet::new(), Vec::new());
-    let outdoor_group = group_of[&OUTDOOR_CELL];
+    let outdoor_group = group_of[OUTDOOR_CELL as usize];
     let mut outdoors = members.remove(&outdoor_group).unwrap_or_default();
     let trusted = share(&mut outdoors) < 0.1;
-    let mut any_room = group_of
+    let mut any_room = room_of_cell
         .iter()
-        .any(|(&r, &g)| g == outdoor_group && r != OUTDOOR_CELL);
+        .any(|&r| group_of[r as usize] == outdoor_group && r != OUTDOOR_CELL);
     for (g, mut tets) in members {
         let widest = radius[&g];
         let back = share(&mut tets);
@@ -169,10 +162,9 @@ fn hollow_rooms(
     if any_room {
         hollow.extend(doubtful);
     }
-    group_of
-        .into_iter()
-        .filter(|(_, g)| hollow.contains(g))
-        .map(|(r, _)| r)
+    let rooms = room_of_cell.iter().copied();
+    rooms
+        .filter(|&r| hollow.contains(&group_of[r as usize]))
         .collect()
 }
 

@@ -320,12 +320,8 @@ fn triangles_of(world: &World, cell: CellId) -> Vec<(u32, u32, Triangle)> {
     let mut out = Vec::new();
     for (b, batch) in world.batches.iter().enumerate() {
         if batch.cells.binary_search(&cell).is_ok() {
-            let p = &batch.primitive;
-            let at = |i: u32| DVec3::from(p.positions[i as usize].map(f64::from));
-            for (t, corners) in p.indices.chunks_exact(3).enumerate() {
-                let corners = [at(corners[0]), at(corners[1]), at(corners[2])];
-                out.push((b as u32, t as u32, corners));
-            }
+            let triangles = (0..).zip(batch.primitive.triangles());
+            out.extend(triangles.map(|(t, triangle)| (b as u32, t, triangle)));
         }
     }
     out
@@ -469,7 +465,7 @@ impl Parts {
             }
             let mut by_list: BTreeMap<Vec<CellId>, (Vec<u32>, SourceRuns)> = BTreeMap::new();
             let mut sources = batch.sources.of_triangles();
-            for (t, corners) in p.indices.chunks_exact(3).enumerate() {
+            for (t, corners) in p.triples().iter().enumerate() {
                 let sees = sees_of.get(&(b as u32, t as u32));
                 let list = self.relisted(&batch.cells, sees.copied().unwrap_or_default());
                 let (indices, runs) = by_list.entry(list).or_default();
@@ -493,12 +489,8 @@ impl Parts {
             let transform = d.placement();
             let mut touched = Vec::new();
             for p in &out.detail_meshes[d.mesh as usize].primitives {
-                for t in p.indices.chunks_exact(3) {
-                    let corners = [0, 1, 2].map(|k| {
-                        let p = p.positions[t[k] as usize].map(f64::from);
-                        transform.transform_point3(DVec3::from(p))
-                    });
-                    out.graph.locator.cells_touching(&corners, &mut touched);
+                for triangle in p.placed_triangles(transform) {
+                    out.graph.locator.cells_touching(&triangle, &mut touched);
                 }
             }
             let sees = self.ids.map(|id| touched.binary_search(&id).is_ok());

@@ -118,12 +118,9 @@ pub(crate) fn surfaces_of(world: &World, cell: CellId, cost: &CostModel) -> Vec<
     let mut out = Vec::new();
     for batch in world.batches.iter().filter(|b| sees(&b.cells)) {
         let p = &batch.primitive;
-        out.extend(p.indices.chunks_exact(3).map(|t| {
-            let corners = [t[0], t[1], t[2]].map(|i| corner(p, i));
-            Surface {
-                cost: prices.of_triangles(p.material, 1, double_area(corners), 1.0),
-                corners: corners.to_vec(),
-            }
+        out.extend(p.triangles().map(|corners| Surface {
+            cost: prices.of_triangles(p.material, 1, double_area(corners), 1.0),
+            corners: corners.to_vec(),
         }));
     }
     for d in world.details.iter().filter(|d| sees(&d.cells)) {
@@ -154,10 +151,6 @@ pub(crate) fn surfaces_of(world: &World, cell: CellId, cost: &CostModel) -> Vec<
     out
 }
 
-fn corner(p: &Primitive, i: u32) -> DVec3 {
-    DVec3::from(p.positions[i as usize].map(f64::from))
-}
-
 fn double_area([a, b, c]: [DVec3; 3]) -> f64 {
     (b - a).cross(c - a).length()
 }
@@ -178,12 +171,10 @@ impl Prices<'_> {
     }
 
     fn of_primitive(&self, p: &Primitive, scale: f64) -> f64 {
-        let triangles = || p.indices.chunks_exact(3);
         let double = if self.cost.area == 0.0 {
             0.0
         } else {
-            let of_triangle = |t: &[u32]| double_area([t[0], t[1], t[2]].map(|i| corner(p, i)));
-            triangles().map(of_triangle).sum()
+            p.triangles().map(double_area).sum()
         };
         self.of_triangles(p.material, p.indices.len() / 3, double, scale)
     }

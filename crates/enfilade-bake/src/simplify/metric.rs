@@ -25,11 +25,7 @@ pub(super) fn triangles_of(world: &World) -> Vec<Triangle> {
     world
         .batches
         .iter()
-        .flat_map(|b| {
-            b.primitive.indices.chunks_exact(3).map(|t| {
-                [0, 1, 2].map(|k| DVec3::from(b.primitive.positions[t[k] as usize].map(f64::from)))
-            })
-        })
+        .flat_map(|b| b.primitive.triangles())
         .collect()
 }
 

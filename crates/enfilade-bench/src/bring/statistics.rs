@@ -1,8 +1,8 @@
 //! Accuracy of the statistics for modelers: triangles that count as visible from a cell, against those that rays reach.
 
 use enfilade::cpg::{CellId, PartNumbers, SightGraph, VisibleParts, World};
-use enfilade::geom::scene::{Material, Primitive};
-use enfilade::geom::{DMat4, DVec3, Triangle};
+use enfilade::geom::scene::Material;
+use enfilade::geom::{DVec3, Triangle};
 use enfilade::runtime::{Sight, SightState, Sightlines, Target};
 use enfilade::vis::{VisConfig, VisContext, see_all, see_parts};
 use enfilade_testkit::Rng;
@@ -121,7 +121,7 @@ impl Sums {
         let mut all = Vec::new();
         for (i, batch) in world.batches.iter().enumerate() {
             let first = self.numbers.of_batch(i).start as usize;
-            for (k, corners) in corners(&batch.primitive, &DMat4::IDENTITY).enumerate() {
+            for (k, corners) in batch.primitive.triangles().enumerate() {
                 all.push((first + k, first + k, corners));
             }
         }
@@ -129,7 +129,10 @@ impl Sums {
             let part = self.numbers.of_detail(i as u32) as usize;
             let mesh = &world.detail_meshes[object.mesh as usize];
             let to_world = object.placement();
-            let of_object = mesh.primitives.iter().flat_map(|p| corners(p, &to_world));
+            let of_object = mesh
+                .primitives
+                .iter()
+                .flat_map(|p| p.placed_triangles(to_world));
             for (k, corners) in of_object.enumerate() {
                 all.push((part, self.first[i] + k, corners));
             }
@@ -152,15 +155,6 @@ impl Sums {
             }
         }
     }
-}
-
-fn corners(primitive: &Primitive, to_world: &DMat4) -> impl Iterator<Item = Triangle> {
-    let at = |i: u32| {
-        let p = primitive.positions[i as usize].map(f64::from);
-        to_world.transform_point3(DVec3::from_array(p))
-    };
-    let triangles = primitive.indices.chunks_exact(3);
-    triangles.map(move |t| [at(t[0]), at(t[1]), at(t[2])])
 }
 
 struct Rays<'a> {

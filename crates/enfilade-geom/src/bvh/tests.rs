@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::ray::hit_triangle;
+use crate::ray::{hit_triangle, segment_to_triangle_distance};
 
 fn coordinate() -> impl Strategy<Value = f64> {
     // Integers make shared vertices, coplanar triangles and axis-parallel rays common.
@@ -170,8 +170,9 @@ proptest! {
     fn triangles_near_a_segment_are_those_within_the_radius(soup in soup(), a in point(), b in point(), radius in 0.0..2.0f64) {
         let bvh = Bvh::build(&soup);
         let mut found = Vec::new();
-        let _ = bvh.for_each_near_segment(a, b, radius, |i, d| {
-            found.push((i, d));
+        let _ = bvh.for_each_around_segment(a, b, radius, |i, t| {
+            let d = segment_to_triangle_distance(a, b, t);
+            found.extend((d < radius).then_some((i, d)));
             ControlFlow::Continue(())
         });
         found.sort_by_key(|f| f.0);

@@ -504,7 +504,7 @@ fn why_dropped(node: &Node) -> Option<String> {
     if visibility.is_some_and(|v| v.visible == Some(false)) {
         return Some("hidden by KHR_node_visibility".to_owned());
     }
-    crate::roles::drops_subtree(node.name.as_deref().unwrap_or(""))
+    enfilade_prepare::drops_subtree(node.name.as_deref().unwrap_or(""))
 }
 
 fn local_transform(node: &Node) -> Result<DMat4, String> {

@@ -136,9 +136,9 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
         let dim = if look.texture.is_some() { 0.5 } else { 1.0 };
         let color = (Vec3::new(r, g, b) * dim).clamp(Vec3::splat(0.02), Vec3::splat(0.85));
         let corner = |i: u32| Vec3::from(p.positions[i as usize]);
-        let area: f32 = (p.indices.chunks_exact(3))
+        let area: f32 = (p.triples().iter())
             .map(|t| {
-                let [a, b, c] = [t[0], t[1], t[2]].map(corner);
+                let [a, b, c] = t.map(corner);
                 (b - a).cross(c - a).length() * 0.5
             })
             .sum();

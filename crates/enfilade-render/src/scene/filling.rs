@@ -178,10 +178,9 @@ impl Filling<'_> {
         for batch in &self.world.batches {
             let color = self.look(&batch.primitive).base_color;
             let corner = |i: u32| Vec3::from(batch.primitive.positions[i as usize]);
-            let triangles = batch.primitive.indices.chunks_exact(3);
-            let area: f32 = triangles
+            let area: f32 = (batch.primitive.triples().iter())
                 .map(|t| {
-                    let [a, b, c] = [t[0], t[1], t[2]].map(corner);
+                    let [a, b, c] = t.map(corner);
                     (b - a).cross(c - a).length() * 0.5
                 })
                 .sum();

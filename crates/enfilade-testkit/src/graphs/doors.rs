@@ -40,10 +40,8 @@ pub fn with_doors(mut world: World, is_glass: impl Fn(usize) -> bool) -> World {
         let plate = plate(hinge, u, v, normal * (-2.0 * HALF));
         let cells: Vec<CellId> = {
             let mut cells = Vec::new();
-            for t in plate.indices.chunks_exact(3) {
-                let corner = |k: u32| DVec3::from(plate.positions[k as usize].map(f64::from));
-                let corners = [t[0], t[1], t[2]].map(corner);
-                world.graph.locator.cells_touching(&corners, &mut cells);
+            for triangle in plate.triangles() {
+                world.graph.locator.cells_touching(&triangle, &mut cells);
             }
             cells
         };

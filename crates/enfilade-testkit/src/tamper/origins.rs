@@ -133,7 +133,7 @@ fn torn(w: &World, i: usize) -> Option<SourceRuns> {
     let mut first = 0;
     for k in 0..runs.len().checked_sub(1)? {
         first += runs[k][1] as usize;
-        let t: Vec<&[u32]> = batch.primitive.indices.chunks_exact(3).collect();
+        let t = batch.primitive.triples();
         let joins = |a: usize, b: usize| t[a].iter().any(|v| t[b].contains(v));
         if runs[k + 1][1] > 1 && joins(first, first + 1) {
             runs[k][1] += 1;

@@ -1,6 +1,6 @@
 //! Claims about sight: cells, volumes and parts.
 
-use enfilade_cpg::{Batch, CellId, CellSet, PartNumbers, Pvs, VisibleParts, VisibleVolumes, World};
+use enfilade_cpg::{CellId, CellSet, PartNumbers, Pvs, VisibleParts, VisibleVolumes, World};
 use enfilade_geom::{Bvh, DVec3, Plane, Triangle};
 
 use super::{Tampering, pick};
@@ -168,13 +168,8 @@ fn parts_of_pair(w: &mut World, pair: usize, change: impl Fn(&mut Vec<u32>)) -> 
 /// The largest triangle of the second cell of a portal whose middle is seen from the middle of the portal: leaving out what
 /// is not seen is not a lie.
 fn largest_seen(w: &World, portal: usize) -> Option<u32> {
-    let of_batch = |b: &Batch| -> Vec<Triangle> {
-        let p = &b.primitive;
-        let corner = |i: u32| DVec3::from(p.positions[i as usize].map(f64::from));
-        let triangles = p.indices.chunks_exact(3);
-        triangles.map(|t| [t[0], t[1], t[2]].map(corner)).collect()
-    };
-    let all: Vec<Triangle> = w.batches.iter().flat_map(of_batch).collect();
+    let batches = w.batches.iter();
+    let all: Vec<Triangle> = batches.flat_map(|b| b.primitive.triangles()).collect();
     let walls = Bvh::build(&all);
     let portal = &w.graph.portals[portal];
     let piece: Vec<DVec3> = (portal.pieces[0].iter())

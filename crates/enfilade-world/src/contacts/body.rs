@@ -43,16 +43,6 @@ impl Body {
         Aabb::new(center - half, center + half)
     }
 
-    /// Returns the radius of the bounding sphere about its center. [Units: wu]
-    #[must_use]
-    pub fn bounding_radius(&self) -> f64 {
-        match *self {
-            Self::Sphere { radius } => radius,
-            Self::Capsule { half, radius } => half.length() + radius,
-            Self::Box { half, .. } => half.length(),
-        }
-    }
-
     /// Returns the body grown by `margin` on every side; boxes stay boxes.
     pub(super) fn grown(&self, margin: f64) -> Self {
         match *self {

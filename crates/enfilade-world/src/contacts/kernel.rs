@@ -12,7 +12,7 @@
 //! round differently. The method of the parry library (GJK on the difference) was measured and rejected: see
 //! `docs/benchmarks/living.md`. Coordinates are relative to the body's start, so that their rounding is that of the file.
 
-use enfilade_geom::{Aabb, DVec3, Triangle};
+use enfilade_geom::{Aabb, DVec3, Triangle, closest_point_on_segment};
 
 use super::body::BodyCore;
 
@@ -308,7 +308,7 @@ fn nearest(half: DVec3, is_point: bool, center: DVec3, t: &Triangle) -> (DVec3, 
     };
     take(b, nearest_on_triangle(b, t));
     for i in 0..3 {
-        take(nearest_on_segment(t[i], a, b), t[i]);
+        take(closest_point_on_segment(t[i], a, b), t[i]);
         if let Some((p, q)) = common_perpendicular(a, b, t[i], t[(i + 1) % 3]) {
             take(p, q);
         }
@@ -330,14 +330,7 @@ fn common_perpendicular(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Option<(DVec3
     is_in.then(|| (a + u * s, c + v * r))
 }
 
-fn nearest_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
-    let along = b - a;
-    let share = along.dot(p - a) / along.length_squared();
-    // For a segment of zero length the factor is NaN.
-    a + along * if share > 0.0 { share.min(1.0) } else { 0.0 }
-}
-
-/// Ericson, section 5.1.5: by the region of the triangle's vertices, edges and face that contains the point.
+/// Ericson, section 5.1.5, for many calls: by the region of the triangle's vertices, edges and face that contains the point.
 fn nearest_on_triangle(p: DVec3, [a, b, c]: &Triangle) -> DVec3 {
     let (ab, ac, ap) = (*b - *a, *c - *a, p - *a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -379,7 +372,7 @@ fn nearest_on_triangle(p: DVec3, [a, b, c]: &Triangle) -> DVec3 {
 fn nearest_on_sliver(p: DVec3, t: &Triangle) -> DVec3 {
     let mut best = t[0];
     for i in 0..3 {
-        let q = nearest_on_segment(p, t[i], t[(i + 1) % 3]);
+        let q = closest_point_on_segment(p, t[i], t[(i + 1) % 3]);
         if q.distance_squared(p) < best.distance_squared(p) {
             best = q;
         }

@@ -6,7 +6,6 @@
 //! the tree of each: 76 bytes and a share of a node.
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, BoxTree, Bvh, DMat4, DVec3, Triangle};
 use enfilade_runtime::{DetailId, Sight};
 
@@ -90,7 +89,7 @@ impl Contacts {
         let mut surfaces: Vec<Vec<TriangleOf>> = vec![Vec::new(); n_cells];
         for (batch, b) in (0..).zip(&world.batches) {
             for cell in &b.cells {
-                for (triangle, t) in (0..).zip(triangles_of(&b.primitive, &DMat4::IDENTITY)) {
+                for (triangle, t) in (0..).zip(b.primitive.placed_triangles(DMat4::IDENTITY)) {
                     triangles[cell.idx()].push(t);
                     surfaces[cell.idx()].push(TriangleOf::Wall { batch, triangle });
                 }
@@ -232,7 +231,7 @@ impl MeshWalls {
         let mut first = Vec::new();
         for primitive in &world.detail_meshes[mesh].primitives {
             first.push(triangles.len() as u32);
-            triangles.extend(triangles_of(primitive, place));
+            triangles.extend(primitive.placed_triangles(*place));
         }
         let bvh = Bvh::build(&triangles);
         Self { bvh, first }
@@ -243,13 +242,4 @@ impl MeshWalls {
         let primitive = self.first.partition_point(|&f| f <= triangle) - 1;
         (primitive as u32, triangle - self.first[primitive])
     }
-}
-
-fn triangles_of(primitive: &Primitive, place: &DMat4) -> impl Iterator<Item = Triangle> {
-    primitive.indices.chunks_exact(3).map(move |t| {
-        [t[0], t[1], t[2]].map(|i| {
-            let p = primitive.positions[i as usize].map(f64::from);
-            place.transform_point3(DVec3::from_array(p))
-        })
-    })
 }

@@ -90,9 +90,9 @@ fn part_mesh(mesh: &Mesh, parts: &[u32], part: u32) -> Mesh {
         let n = p.indices.len() / 3;
         let of = &parts[first..first + n];
         first += n;
-        let indices: Vec<u32> = (p.indices.chunks_exact(3).zip(of))
+        let indices: Vec<u32> = (p.triples().iter().zip(of))
             .filter(|(_, of)| **of == part)
-            .flat_map(|(t, _)| t.iter().copied())
+            .flat_map(|(t, _)| *t)
             .collect();
         if !indices.is_empty() {
             primitives.push(subset_of(p, &indices));

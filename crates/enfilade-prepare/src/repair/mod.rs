@@ -20,9 +20,9 @@ use std::fmt;
 
 use enfilade_geom::scene::Scene;
 
-use crate::ImportError;
+use crate::BadOption;
 pub(crate) use fill::Hole;
-pub(crate) use quantized::{GridSteps, weld_quantized};
+pub use quantized::{GridSteps, weld_quantized};
 use surface::Surface;
 
 /// Largest allowed diagonal of holes to fill. [Units: wu]
@@ -150,14 +150,14 @@ const MAX_PASSES: usize = 16;
 /// # Panics
 ///
 /// When the scene breaks its own promises (an index out of range).
-pub fn repair(scene: &mut Scene, options: &RepairOptions) -> Result<RepairReport, ImportError> {
+pub fn repair(scene: &mut Scene, options: &RepairOptions) -> Result<RepairReport, BadOption> {
     for (option, x, low, high) in [
         ("repair", options.weld, 1e-6, 0.1),
         ("repair_holes", options.hole, 0.0, LARGEST_HOLE),
     ] {
         if !(low..=high).contains(&x) {
             let problem = format!("{x} m is not between {low} and {high}");
-            return Err(ImportError::BadOption { option, problem });
+            return Err(BadOption { option, problem });
         }
     }
     let mut report = RepairReport::default();

@@ -3,11 +3,10 @@
 //! Vertices closer than the welding distance count as one. Edges are sorted, not hashed, and every search in space
 //! has a budget, so that a million triangles take seconds.
 
+use crate::finding::{Example, Finding};
 use crate::repair::holes_of;
-use crate::report::Finding;
 use crate::shells::Shells;
-use crate::{ImportError, ImportReport};
-use crate::{crossing, tjunction};
+use crate::{BadOption, crossing, tjunction};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene, TriangleSource};
 use enfilade_geom::{DVec3, Triangle, shown, triangle_area_normal};
 use std::collections::{HashMap, HashSet};
@@ -164,7 +163,7 @@ impl fmt::Display for CleaningReport {
     }
 }
 
-/// Finds defects in a scene and adds those that `import` found while reading it.
+/// Finds defects in a scene; those that only an importer sees are left empty.
 ///
 /// Time: `n log n` for `n` triangles; memory: about 150 bytes per triangle.
 ///
@@ -177,9 +176,8 @@ impl fmt::Display for CleaningReport {
 /// When the scene breaks its own promises (an index out of range).
 pub fn cleaning_report(
     scene: &Scene,
-    import: Option<&ImportReport>,
     options: &CleaningOptions,
-) -> Result<CleaningReport, ImportError> {
+) -> Result<CleaningReport, BadOption> {
     let is_length = |x: f64, least: f64| x.is_finite() && (least..=1.0).contains(&x);
     for (option, x, least) in [
         ("weld", options.weld, 1e-9),
@@ -187,16 +185,10 @@ pub fn cleaning_report(
     ] {
         if !is_length(x, least) {
             let problem = format!("{x} m is not between {least} and 1");
-            return Err(ImportError::BadOption { option, problem });
+            return Err(BadOption { option, problem });
         }
     }
     let mut report = CleaningReport::default();
-    if let Some(import) = import {
-        report.non_planar_polygons = import.non_planar_polygons.clone();
-        report.concave_polygons = import.concave_polygons.clone();
-        report.crossing_polygons = import.crossing_polygons.clone();
-        report.nonfinite_vertices = import.nonfinite_vertices.clone();
-    }
     let chosen: Vec<usize> = (0..scene.objects.len())
         .filter(|&i| options.has_detail || scene.objects[i].role == Role::Structural)
         .collect();
@@ -250,8 +242,7 @@ impl Soup {
             {
                 let points = world_points(object, primitive);
                 let welded: Vec<u32> = points.iter().map(|&x| welder.weld(x)).collect();
-                for (t, corners) in primitive.indices.chunks_exact(3).enumerate() {
-                    let corners = [corners[0], corners[1], corners[2]];
+                for (t, corners) in primitive.triples().iter().enumerate() {
                     // Points that are not finite cannot be welded.
                     if corners.iter().any(|&i| !points[i as usize].is_finite()) {
                         continue;
@@ -472,7 +463,7 @@ fn find_odd_edges(
         report
             .t_junctions
             .examples
-            .push(crate::Example { name, position: p });
+            .push(Example { name, position: p });
     }
 }
 

@@ -1,5 +1,6 @@
 //! The cleaning report on surfaces with known defects. Covers S5.
 
+#[path = "../../enfilade-import/tests/common/mod.rs"]
 mod common;
 
 use common::{box_primitive, scene_of, v};

@@ -76,7 +76,7 @@ struct Shape {
 ///
 /// Leaves scenes of fewer than three structural objects unchanged: there is nothing to compare with. O(t log t)
 /// for t structural triangles, and O(log t) per small object.
-pub(crate) fn judge(scene: &mut Scene) {
+pub fn judge(scene: &mut Scene) {
     let n_open = scene.objects.iter().filter(|o| is_open(o)).count();
     let n_structural = scene
         .objects

@@ -71,11 +71,10 @@ impl Surface {
                 };
                 let points = vertices.positions.iter().map(&mut point).collect();
                 let part = surface.parts.len() as u32;
-                let faces = primitive.indices.chunks_exact(3);
-                surface.faces.extend(faces.map(|t| Face {
-                    part,
-                    corners: [t[0], t[1], t[2]],
-                }));
+                let faces = primitive.triples().iter();
+                surface
+                    .faces
+                    .extend(faces.map(|&corners| Face { part, corners }));
                 surface.parts.push(Part {
                     object: o as u32,
                     vertices,

@@ -34,23 +34,25 @@ impl Default for RoleRules {
 }
 
 /// Properties of an object that decide its role.
-pub(crate) struct Facts<'n> {
+pub struct RoleFacts<'n> {
     /// Names of the node and of the mesh.
-    pub(crate) names: [&'n str; 2],
+    pub names: [&'n str; 2],
     /// Names of ancestors, nearest first.
-    pub(crate) ancestors: &'n [&'n str],
+    pub ancestors: &'n [&'n str],
     /// Name of each primitive's material.
-    pub(crate) materials: &'n [&'n str],
+    pub materials: &'n [&'n str],
     /// All of it is see-through.
-    pub(crate) is_see_through: bool,
+    pub is_see_through: bool,
     /// The reason why it moves.
-    pub(crate) moves: Option<&'static str>,
-    pub(crate) is_detail_file: bool,
+    pub moves: Option<&'static str>,
+    /// Its file was given as one of detail.
+    pub is_detail_file: bool,
 }
 
 /// The role of an object, or its removal.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Verdict {
+pub enum RoleVerdict {
+    /// Kept with this role, for this reason.
     Keep(Role, String),
     /// Left out, as a helper of some engine; with the reason.
     Ignore(String),
@@ -108,9 +110,8 @@ const IFC_VOID: [&str; 4] = [
     "IfcVirtualElement",
 ];
 
-/// The classes that decide a role, for the tests of their writers.
-#[cfg(test)]
-pub(crate) fn ifc_classes() -> impl Iterator<Item = &'static str> {
+/// Returns the IFC classes that decide a role.
+pub fn ifc_classes() -> impl Iterator<Item = &'static str> {
     IFC_DETAIL.into_iter().chain(IFC_VOID)
 }
 
@@ -158,7 +159,7 @@ const CLEAR_MATERIAL_WORDS: [&str; 8] = [
 ];
 
 /// Returns the reason why a node is dropped with its descendants, if its name implies it.
-pub(crate) fn drops_subtree(name: &str) -> Option<String> {
+pub fn drops_subtree(name: &str) -> Option<String> {
     if ifc_class(name).is_some() {
         return None;
     }
@@ -167,7 +168,7 @@ pub(crate) fn drops_subtree(name: &str) -> Option<String> {
 
 impl RoleRules {
     /// Returns `true` if a material of this name lets light through, whatever its settings.
-    pub(crate) fn is_clear_material(&self, name: &str) -> bool {
+    pub fn is_clear_material(&self, name: &str) -> bool {
         !self.is_manual
             && words(name)
                 .iter()
@@ -175,7 +176,7 @@ impl RoleRules {
     }
 
     /// Returns the role that the caller's rules give an object of this name, before the format's own.
-    pub(crate) fn forced(&self, name: &str) -> Option<(Role, String)> {
+    pub fn forced(&self, name: &str) -> Option<(Role, String)> {
         let fits = |globs: &[String]| globs.iter().find(|g| is_match(g, name)).cloned();
         let structural =
             fits(&self.structural).map(|g| (Role::Structural, format!("rule: structural '{g}'")));
@@ -184,9 +185,9 @@ impl RoleRules {
     }
 
     /// Returns the object's role; the first rule that matches decides.
-    pub(crate) fn judge(&self, facts: &Facts<'_>) -> Verdict {
-        let structural = |reason: String| Verdict::Keep(Role::Structural, reason);
-        let detail = |reason: String| Verdict::Keep(Role::Detail, reason);
+    pub fn judge(&self, facts: &RoleFacts<'_>) -> RoleVerdict {
+        let structural = |reason: String| RoleVerdict::Keep(Role::Structural, reason);
+        let detail = |reason: String| RoleVerdict::Keep(Role::Detail, reason);
         if let Some(glob) = matching(&self.structural, facts) {
             return structural(format!("rule: structural '{glob}'"));
         }
@@ -227,15 +228,15 @@ impl RoleRules {
     }
 }
 
-fn judge_ifc(name: &str) -> Option<Verdict> {
+fn judge_ifc(name: &str) -> Option<RoleVerdict> {
     let class = ifc_class(name)?;
     let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
     Some(if starts(&IFC_VOID) {
-        Verdict::Ignore(format!("{class} has no physical matter"))
+        RoleVerdict::Ignore(format!("{class} has no physical matter"))
     } else if starts(&IFC_DETAIL) {
-        Verdict::Keep(Role::Detail, format!("IFC class {class}"))
+        RoleVerdict::Keep(Role::Detail, format!("IFC class {class}"))
     } else {
-        Verdict::Keep(Role::Structural, format!("IFC class {class}"))
+        RoleVerdict::Keep(Role::Structural, format!("IFC class {class}"))
     })
 }
 
@@ -248,19 +249,19 @@ fn ifc_class(name: &str) -> Option<&str> {
         .then_some(class)
 }
 
-fn judge_suffix(name: &str) -> Option<Verdict> {
+fn judge_suffix(name: &str) -> Option<RoleVerdict> {
     if let Some(prefix) = HULL_PREFIXES.iter().find(|p| name.starts_with(**p)) {
-        return Some(Verdict::Ignore(format!(
+        return Some(RoleVerdict::Ignore(format!(
             "name starts with {prefix}: a collision hull"
         )));
     }
     match suffix(name)? {
-        (ending, Suffix::Helper) => Some(Verdict::Ignore(format!("name ends in -{ending}"))),
-        (ending, Suffix::Moves) => Some(Verdict::Keep(
+        (ending, Suffix::Helper) => Some(RoleVerdict::Ignore(format!("name ends in -{ending}"))),
+        (ending, Suffix::Moves) => Some(RoleVerdict::Keep(
             Role::Detail,
             format!("moves: name ends in -{ending}"),
         )),
-        (ending, Suffix::Occluder) => Some(Verdict::Keep(
+        (ending, Suffix::Occluder) => Some(RoleVerdict::Keep(
             Role::Structural,
             format!("name ends in -{ending}"),
         )),
@@ -339,7 +340,7 @@ fn words(name: &str) -> Vec<String> {
 }
 
 /// Returns the first glob that matches the object's names, its groups' names or all of its materials.
-fn matching<'g>(globs: &'g [String], facts: &Facts<'_>) -> Option<&'g str> {
+fn matching<'g>(globs: &'g [String], facts: &RoleFacts<'_>) -> Option<&'g str> {
     globs.iter().map(String::as_str).find(|glob| {
         facts
             .names
@@ -358,12 +359,16 @@ fn matching<'g>(globs: &'g [String], facts: &Facts<'_>) -> Option<&'g str> {
 mod tests {
     use super::*;
 
-    fn judge(name: &str) -> Verdict {
+    fn judge(name: &str) -> RoleVerdict {
         judge_with(&RoleRules::default(), name, |_| {})
     }
 
-    fn judge_with(rules: &RoleRules, name: &str, change: impl Fn(&mut Facts<'_>)) -> Verdict {
-        let mut facts = Facts {
+    fn judge_with(
+        rules: &RoleRules,
+        name: &str,
+        change: impl Fn(&mut RoleFacts<'_>),
+    ) -> RoleVerdict {
+        let mut facts = RoleFacts {
             names: [name, ""],
             ancestors: &[],
             materials: &["Plaster"],
@@ -377,8 +382,8 @@ mod tests {
 
     fn role(name: &str) -> Option<Role> {
         match judge(name) {
-            Verdict::Keep(role, _) => Some(role),
-            Verdict::Ignore(_) => None,
+            RoleVerdict::Keep(role, _) => Some(role),
+            RoleVerdict::Ignore(_) => None,
         }
     }
 
@@ -459,8 +464,8 @@ mod tests {
             ..RoleRules::default()
         };
         let reason = |verdict| match verdict {
-            Verdict::Keep(role, reason) => (role, reason),
-            Verdict::Ignore(reason) => panic!("{reason}"),
+            RoleVerdict::Keep(role, reason) => (role, reason),
+            RoleVerdict::Ignore(reason) => panic!("{reason}"),
         };
         let of = |name: &str| reason(judge_with(&rules, name, |_| {})).0;
         assert_eq!(of("wall KEEP"), Role::Structural);

@@ -3,7 +3,7 @@
 //! A crack in a surface leaves every edge on its rim with one triangle only. So both the edges and the points to
 //! examine are those of open edges, and a closed mesh costs nothing.
 
-use crate::report::MAX_EXAMPLES;
+use crate::finding::MAX_EXAMPLES;
 use enfilade_geom::DVec3;
 use std::collections::{HashMap, HashSet};
 

@@ -12,7 +12,7 @@ use super::surface::Surface;
 
 /// Grid width that positions were rounded to, for each primitive of each quantized mesh; 0 if not rounded. [Units:
 /// those of the mesh]
-pub(crate) type GridSteps = HashMap<u32, Vec<f32>>;
+pub type GridSteps = HashMap<u32, Vec<f32>>;
 
 /// Widest grid that counts as rounding: no tool rounds walls by the size of an opening. [Units: wu]
 const WIDEST_STEP: f64 = 0.05;
@@ -26,7 +26,7 @@ const ALMOST: f64 = 0.99;
 /// The finer grid decides the position; vertices of one primitive never become one, as they differ on their grid.
 /// Changed objects get a mesh of their own in world space. `n log n` for `n` vertices; does nothing without a
 /// quantized mesh.
-pub(crate) fn weld_quantized(scene: &mut Scene, steps: &GridSteps) -> u64 {
+pub fn weld_quantized(scene: &mut Scene, steps: &GridSteps) -> u64 {
     if steps.is_empty() || !scene.solids.is_empty() {
         return 0;
     }

@@ -1,5 +1,6 @@
 //! Repairs of surfaces with known defects. Covers S5.
 
+#[path = "../../enfilade-import/tests/common/mod.rs"]
 mod common;
 
 use std::collections::HashMap;
@@ -8,7 +9,7 @@ use common::{box_primitive, scene_of, world};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene};
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Plane, Triangle};
 use enfilade_import::{
-    CleaningOptions, ImportError, ImportOptions, RepairOptions, RepairReport, cleaning_report,
+    BadOption, CleaningOptions, ImportOptions, RepairOptions, RepairReport, cleaning_report,
     decode_obj, export_glb, repair,
 };
 use enfilade_testkit::oracle::{n_open_edges, object_triangles, signed_volume};
@@ -42,9 +43,7 @@ fn fine_box(n: u32) -> Primitive {
     let mut out = Primitive::default();
     let mut number = HashMap::new();
     let coarse = box_primitive([2.0, 3.0, 4.0]);
-    for t in coarse.indices.chunks_exact(3) {
-        let [a, b, c] =
-            [0, 1, 2].map(|k| DVec3::from_array(coarse.positions[t[k] as usize].map(f64::from)));
+    for [a, b, c] in coarse.triangles() {
         let mut at = |i: u32, j: u32| {
             // Each vertex in whole numbers of steps, so that neighbors agree to the bit.
             let p = (a * f64::from(n - i - j) + b * f64::from(i) + c * f64::from(j)) / f64::from(n);
@@ -441,10 +440,7 @@ fn brushes_are_left_alone_and_options_are_checked() {
         (1e-3, 11.0),
     ] {
         let error = repair(&mut scene, &RepairOptions { weld, hole });
-        assert!(
-            matches!(error, Err(ImportError::BadOption { .. })),
-            "{weld} {hole}"
-        );
+        assert!(matches!(error, Err(BadOption { .. })), "{weld} {hole}");
     }
 }
 
@@ -548,7 +544,7 @@ proptest! {
         let (one, _) = repaired(&spoilt, &RepairOptions::default());
         let mut other = spoilt.clone();
         let indices = &mut other.meshes[0].primitives[0].indices;
-        let mut triangles: Vec<[u32; 3]> = indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let mut triangles: Vec<[u32; 3]> = indices.as_chunks().0.to_vec();
         Rng::new(seed).shuffle(&mut triangles);
         *indices = triangles.into_iter().flatten().collect();
         let (other, _) = repaired(&other, &RepairOptions::default());
