@@ -4,7 +4,7 @@
 //! has a budget, so that a million triangles take seconds.
 
 use crate::repair::holes_of;
-use crate::report::Finding;
+use crate::report::{Finding, MAX_EXAMPLES};
 use crate::shells::Shells;
 use crate::{ImportError, ImportReport};
 use crate::{crossing, tjunction};
@@ -462,7 +462,7 @@ fn find_odd_edges(
         }
     }
     find_odd_shells(report, scene, soup, &mut shells);
-    let found = tjunction::find(&soup.points, &open, options.t_junction);
+    let found = tjunction::find(&soup.points, &open, options.t_junction, MAX_EXAMPLES);
     report.is_complete = found.is_complete;
     report.t_junctions.n = found.n;
     for point in found.examples {

@@ -48,6 +48,7 @@ mod roles;
 mod shells;
 mod soup;
 mod stl;
+mod textures;
 mod tjunction;
 
 pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};

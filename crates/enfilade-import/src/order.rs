@@ -14,8 +14,8 @@ use enfilade_geom::scene::{
 use enfilade_geom::{ConvexSolid, DMat4, DVec3};
 use serde_json::Value;
 
-use crate::gltf::map_textures;
 use crate::repair::GridSteps;
+use crate::textures::map_textures;
 
 /// Puts a scene into its canonical order.
 ///
