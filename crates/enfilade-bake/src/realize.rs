@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use enfilade_cpg::{Provenance, Statistics, World};
+use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
-use enfilade_geom::{DVec3, Triangle};
 
 use crate::assemble::{Cut, assemble};
 use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex_within};
@@ -26,15 +26,8 @@ pub(crate) fn realize(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin(Stage::Complex)?;
-    // Exact, independent of the candidates that the method fitted there.
-    let to_scene = |p: DVec3| structure.frame.to_scene(p);
-    let missing: Vec<Triangle> = structure
-        .missing(config)
-        .into_iter()
-        .map(|t| t.map(to_scene))
-        .collect();
     let structure = structure.into_scene();
-    let hole = config.smallest_hole.resolved(structure.misfit);
+    let hole = structure.hole;
     if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
         proposal.notes.push(format!(
             "triangles that should meet do not: closing gaps up to {:.0} mm instead of {:.0} (--smallest-hole)",
@@ -52,7 +45,8 @@ pub(crate) fn realize(
     let input = ComplexInput {
         triangles: &structure.triangles,
         candidates: &windings,
-        missing: &missing,
+        // Exact, independent of the candidates that the method fitted there.
+        missing: &structure.missing,
         bounds: proposal.bounds,
         gap: hole.gap(),
         has_seals: hole.has_seals(),

@@ -15,9 +15,10 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3};
 use rayon::prelude::*;
 
+use crate::MergeSettings;
 use crate::complex::poly;
 use crate::complex::region::Shape;
-use crate::structure::{MergeSettings, Mergeable, Pair, join_rooms};
+use crate::structure::{Mergeable, Pair, join_rooms};
 
 use super::cells::{self, LeafCells, NO_CELL};
 use super::lattice::{Lattice, NONE};

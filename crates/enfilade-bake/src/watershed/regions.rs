@@ -28,7 +28,8 @@ use rayon::prelude::*;
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::{Faces, group_faces, is_in};
 use super::sections::section_ratio;
-use crate::structure::{MergeSettings, Mergeable, OUTDOORS, Opening, Pair, join_rooms};
+use crate::MergeSettings;
+use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms};
 
 /// Rooms as unions of basins.
 #[derive(Clone, Debug)]
