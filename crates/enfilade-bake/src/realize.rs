@@ -62,10 +62,7 @@ pub(crate) fn realize(
     context.begin(Stage::Geometry)?;
     let leaks = partition.leaks.clone();
     let cut = Cut {
-        scene: structure.scene,
-        sources: &structure.sources,
-        triangles: &structure.triangles,
-        bvh: &structure.bvh,
+        structure,
         partition,
         candidates: &proposal.candidates,
         outward,
@@ -136,11 +133,14 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
 
 /// Assigns the geometry and records the provenance of the world.
 fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
-    let n_detail = cut.scene.triangle_sources(Role::Detail).count();
+    let n_detail = cut.structure.scene.triangle_sources(Role::Detail).count();
     let seals = &cut.partition.seals;
     let common = [
-        ("input_triangles", (cut.sources.len() + n_detail) as f64),
-        ("structural_triangles", cut.sources.len() as f64),
+        (
+            "input_triangles",
+            (cut.structure.sources.len() + n_detail) as f64,
+        ),
+        ("structural_triangles", cut.structure.sources.len() as f64),
         ("leaks", cut.partition.leaks.len() as f64),
         ("seals", seals.len() as f64),
         ("seal_area", seals.iter().map(|s| s.outline.area()).sum()),
@@ -149,7 +149,7 @@ fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
     let provenance = Provenance {
         generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
         method: method.name().to_owned(),
-        input_hash: input_hash(cut.triangles, &proposal.settings),
+        input_hash: input_hash(&cut.structure.triangles, &proposal.settings),
         settings: proposal.settings.clone(),
     };
     let statistics = Statistics {
