@@ -10,11 +10,11 @@ use enfilade_geom::{Aabb, DMat4};
 
 use crate::Numbers;
 
-const METHODS: [Method; 4] = [
-    Method::Auto,
-    Method::Watershed,
-    Method::Bsp,
-    Method::Delaunay,
+const METHODS: [Option<Method>; 4] = [
+    None,
+    Some(Method::Watershed),
+    Some(Method::Bsp),
+    Some(Method::Delaunay),
 ];
 
 /// Most triangles.
@@ -37,7 +37,8 @@ pub fn bake(data: &[u8]) {
             time: Some(Duration::from_secs(4)),
             ..Budget::default()
         },
-        ..BakeConfig::of(METHODS[usize::from(kind & 3)])
+        method: METHODS[usize::from(kind & 3)],
+        ..BakeConfig::default()
     };
     let baked = match bake_scene(&scene, &config, &BakeContext::default()) {
         Ok(baked) => baked,

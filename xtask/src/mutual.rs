@@ -1,19 +1,19 @@
-//! Files of a crate that import each other: neither can be read, moved or tested without the other.
+//! Circles of imports among the files and folders of a crate: no member can be read, moved or tested without the others.
 //!
 //! Considers paths that begin with `crate`, `super`, `self` or a child module, in `use` and elsewhere. A re-export
-//! (`pub use`) is followed to its source, and is not an import. Tests are exempt.
+//! (`pub use`) is followed to its source, and is not an import. Tests are exempt. A folder imports all that its files
+//! import, and belongs together with the file of the same name; so circles of files are among those of folders.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most re-exports followed for a name.
 const MAX_HOPS: usize = 8;
 
-/// Returns a line for each pair in `sources` (path in the repository, text) that imports each other. O(length of all
-/// files).
+/// Returns a line for each circle in `sources` (path in the repository, text). About O(length of all files).
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
-    let found = pairs(sources).into_iter();
+    let found = circles(sources).into_iter();
     found
-        .map(|(a, b)| format!("{a} and {b} import each other; move what both need to a third file"))
+        .map(|imports| format!("{} form a circle; move what they share", imports.join(", ")))
         .collect()
 }
 
@@ -29,30 +29,66 @@ struct File {
 /// The file of each module.
 type Modules<'a> = BTreeMap<&'a [String], &'a str>;
 
-fn pairs(sources: &BTreeMap<String, String>) -> BTreeSet<(String, String)> {
+/// Imports between the entries of a folder, each with two files that show it. The empty entry is the folder's own file.
+type Graph<'a> = BTreeMap<[&'a str; 2], [&'a str; 2]>;
+
+/// Returns the imports within each circle, as `file → file`.
+fn circles(sources: &BTreeMap<String, String>) -> Vec<Vec<String>> {
     let mut crates: BTreeMap<&str, BTreeMap<&str, File>> = BTreeMap::new();
     for (path, text) in sources {
         if let Some((name, file)) = read(path, text) {
             crates.entry(name).or_default().insert(path, file);
         }
     }
-    let mut out = BTreeSet::new();
+    let mut out = Vec::new();
     for files in crates.values() {
         // If a folder holds a library and a program, the root is the program's: it comes last.
         let modules: Modules<'_> = files.iter().map(|(p, f)| (&f.module[..], *p)).collect();
-        let mut edges = BTreeSet::new();
+        let mut folders: BTreeMap<&[String], Graph<'_>> = BTreeMap::new();
         for (&path, file) in files {
-            let targets = file.imports.iter();
-            let targets =
-                targets.filter_map(|i| target(files, &modules, &file.module, i, MAX_HOPS));
-            edges.extend(targets.filter(|&t| t != path).map(|t| (path, t)));
+            let from = &file.module;
+            for import in &file.imports {
+                let Some(to) = target(files, &modules, from, import, MAX_HOPS) else {
+                    continue;
+                };
+                let modules = [from, &files[to].module];
+                let n = from
+                    .iter()
+                    .zip(modules[1])
+                    .take_while(|(a, b)| a == b)
+                    .count();
+                let entries = modules.map(|m| m.get(n).map_or("", String::as_str));
+                if entries[0] != entries[1] {
+                    let graph = folders.entry(&from[..n]).or_default();
+                    graph.entry(entries).or_insert([path, to]);
+                }
+            }
         }
-        let mutual = edges
-            .iter()
-            .filter(|&&(a, b)| a < b && edges.contains(&(b, a)));
-        out.extend(mutual.map(|&(a, b)| (a.to_owned(), b.to_owned())));
+        out.extend(folders.values().flat_map(circles_of));
     }
     out
+}
+
+/// Returns the imports within each strongly connected component of more than one entry.
+fn circles_of(graph: &Graph<'_>) -> Vec<Vec<String>> {
+    let reached_from = |from| {
+        let (mut reached, mut stack) = (BTreeSet::new(), vec![from]);
+        while let Some(at) = stack.pop() {
+            let next = graph.range([at, ""]..).take_while(|(k, _)| k[0] == at);
+            stack.extend(next.map(|(k, _)| k[1]).filter(|&to| reached.insert(to)));
+        }
+        reached
+    };
+    let entries: BTreeSet<&str> = graph.keys().map(|k| k[0]).collect();
+    let reached: BTreeMap<_, _> = entries.into_iter().map(|e| (e, reached_from(e))).collect();
+    let leads = |from: &str, to: &str| reached.get(from).is_some_and(|r| r.contains(to));
+    // An import lies on a circle if its end leads back to its start. The first member stands for all.
+    let mut by_circle: BTreeMap<_, Vec<String>> = BTreeMap::new();
+    for ([a, b], files) in graph.iter().filter(|([a, b], _)| leads(b, a)) {
+        let first = reached[a].iter().find(|m| leads(m, b));
+        by_circle.entry(first).or_default().push(files.join(" → "));
+    }
+    by_circle.into_values().collect()
 }
 
 /// Returns the crate's name and the file's contents; `None` for tests and files that are not sources of a crate.
@@ -223,9 +259,12 @@ fn target<'a>(
 mod tests {
     use super::*;
 
-    fn found(files: &[(&str, &str)]) -> Vec<(String, String)> {
+    fn found(files: &[(&str, &str)]) -> Vec<Vec<String>> {
         let of = |(path, text): &(&str, &str)| (format!("crates/x/src/{path}"), (*text).to_owned());
-        pairs(&files.iter().map(of).collect()).into_iter().collect()
+        let mut found = circles(&files.iter().map(of).collect());
+        let strings = found.iter_mut().flatten();
+        strings.for_each(|i| *i = i.replace("crates/x/src/", ""));
+        found
     }
 
     #[test]
@@ -239,16 +278,15 @@ mod tests {
             ("use crate::T;\n", "use super::a;\n"),
         ] {
             let lib = "mod a;\nmod b;\npub use b::T;\n";
-            let pair = (
-                "crates/x/src/a.rs".to_owned(),
-                "crates/x/src/b.rs".to_owned(),
+            assert_eq!(
+                found(&[("lib.rs", lib), ("a.rs", a), ("b.rs", b)]),
+                [["a.rs → b.rs", "b.rs → a.rs"]]
             );
-            assert_eq!(found(&[("lib.rs", lib), ("a.rs", a), ("b.rs", b)]), [pair]);
         }
     }
 
     #[test]
-    fn one_way_front_doors_and_tests_are_no_pairs() {
+    fn one_way_front_doors_and_tests_are_no_circles() {
         let lib = ("lib.rs", "mod a;\nmod b;\npub use a::f;\n");
         let b = (
             "b.rs",
@@ -259,12 +297,40 @@ mod tests {
     }
 
     #[test]
-    fn parents_and_children_are_pairs_too() {
+    fn parents_and_children_are_circles_too() {
         let parent = ("a/mod.rs", "mod c;\nuse c::f;\n");
-        let pair = ["crates/x/src/a/c.rs", "crates/x/src/a/mod.rs"].map(str::to_owned);
         assert_eq!(
             found(&[parent, ("a/c.rs", "use super::T;\n")]),
-            [pair.into()]
+            [["a/mod.rs → a/c.rs", "a/c.rs → a/mod.rs"]]
         );
+    }
+
+    #[test]
+    fn longer_circles_are_found_and_what_only_leads_there_is_not_in_them() {
+        let files = [
+            ("lib.rs", ""),
+            ("a.rs", "use crate::b::T;\n"),
+            ("b.rs", "use crate::c::T;\nuse crate::e::T;\n"),
+            ("c.rs", "use crate::a::T;\n"),
+            ("d.rs", "use crate::a::T;\n"),
+            ("e.rs", ""),
+        ];
+        let circle = ["a.rs → b.rs", "b.rs → c.rs", "c.rs → a.rs"];
+        assert_eq!(found(&files), [circle]);
+        assert!(found(&files[..3]).is_empty());
+    }
+
+    #[test]
+    fn folders_form_circles_even_if_their_files_do_not() {
+        let files = [
+            ("lib.rs", ""),
+            ("a/mod.rs", ""),
+            ("a/p.rs", "use crate::b::T;\n"),
+            ("a/q.rs", ""),
+            ("b.rs", "mod r;\n"),
+            ("b/r.rs", "use crate::a::q::T;\n"),
+        ];
+        assert_eq!(found(&files), [["a/p.rs → b.rs", "b/r.rs → a/q.rs"]]);
+        assert!(found(&files[..5]).is_empty());
     }
 }

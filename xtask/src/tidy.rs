@@ -1,4 +1,4 @@
-//! Checks beyond lints: dependencies between crates, files that import each other, lengths of files and functions,
+//! Checks beyond lints: dependencies between crates, circles of imports, lengths of files and functions,
 //! names of types, wording of comments, forbidden strings, links.
 //!
 //! The table here is the "may not" column of ARCHITECTURE.md; change both together.

@@ -13,20 +13,17 @@ use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, Portal, PortalId, PortalKind,
     Provenance, SourceRuns, Statistics, World,
 };
-use enfilade_geom::scene::{Mesh, Primitive, Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Allowance, Bvh, DMat3, DVec3, Plane, Ray, Triangle, Winding};
+use enfilade_geom::scene::{Mesh, Primitive, Role, Scene};
+use enfilade_geom::{Aabb, Allowance, DMat3, DVec3, Plane, Ray, Winding};
 use rayon::prelude::*;
 
 use crate::complex::{Partition, PartitionPortal};
 use crate::layout::{Layout, layout_of};
-use crate::structure::Candidate;
+use crate::structure::{Candidate, SceneStructure};
 
 /// A scene divided into cells: input of the last stage, which all builders share.
 pub(crate) struct Cut<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) sources: &'a [TriangleSource],
-    pub(crate) triangles: &'a [Triangle],
-    pub(crate) bvh: &'a Bvh,
+    pub(crate) structure: SceneStructure<'a>,
     pub(crate) partition: Partition,
     pub(crate) candidates: &'a [Candidate],
     /// Distance by which outlines grow, so that rounding never cuts into an opening. [Units: wu]
@@ -46,9 +43,7 @@ struct Judged {
 }
 
 pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
-    let Cut {
-        scene, partition, ..
-    } = cut;
+    let (scene, partition) = (cut.structure.scene, &cut.partition);
     let mut cells: Vec<Cell> = (0..partition.label_of_cell.len())
         .map(|i| {
             let outdoor = partition.outside == Some(i as u32);
@@ -109,7 +104,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         about: scene.about.clone(),
         pvs: None,
     };
-    fittings::fit(&mut world, cut.bvh, cut.allowance);
+    fittings::fit(&mut world, &cut.structure.bvh, cut.allowance);
     world
 }
 
@@ -302,7 +297,8 @@ fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
             direction: -DVec3::Y,
             t_max: 100.0,
         };
-        cut.bvh
+        cut.structure
+            .bvh
             .closest_hit(&ray, |_| false)
             .map_or(f64::INFINITY, |h| h.t - 0.05)
     };
@@ -318,10 +314,10 @@ struct BatchBuilder {
 }
 
 fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
-    let scene = cut.scene;
+    let scene = cut.structure.scene;
     let mut builders: BTreeMap<(Vec<u32>, Option<u32>, Layout), BatchBuilder> = BTreeMap::new();
     let mut normal_matrix: Option<(u32, DMat3)> = None;
-    for (t, source) in cut.sources.iter().enumerate() {
+    for (t, source) in cut.structure.sources.iter().enumerate() {
         let seen_from = cut.partition.triangle_cells.both(t);
         for &c in &seen_from {
             cells[c as usize].n_triangles += 1;
@@ -343,7 +339,7 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         let to = &mut builder.primitive;
         to.material = from.material;
         to.uvs.resize(from.uvs.len(), Vec::new());
-        for (corner, position) in cut.triangles[t].iter().enumerate() {
+        for (corner, position) in cut.structure.triangles[t].iter().enumerate() {
             let v = from.indices[source.triangle as usize * 3 + corner];
             let key = (source.object, source.primitive, v);
             let index = *builder.vertices.entry(key).or_insert_with(|| {

@@ -7,7 +7,9 @@ use enfilade_geom::scene::Scene;
 
 use crate::bound::keep_costs;
 use crate::budget::n_structural;
+use crate::delaunay::Session;
 use crate::realize::realize;
+use crate::structure::Structure;
 use crate::vessel::is_vessel;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, bsp, delaunay, watershed};
 
@@ -26,10 +28,10 @@ pub fn bake(
 ) -> Result<BakeOutput, BakeError> {
     config.costs.cost.check(&scene.materials)?;
     let context = &context.within(&config.budget, n_structural(scene));
-    let (method, reason) = config.method.choose(scene);
+    let (method, reason) = Method::choose(config.method, scene);
     let mut baked = bake_by(method, &reason, scene, config, context)?;
     let finds_little = method == Method::Watershed && baked.n_indoors() <= 1;
-    if config.method == Method::Auto && finds_little && is_vessel(scene) {
+    if config.method.is_none() && finds_little && is_vessel(scene) {
         let n = ["no cell", "one cell"][baked.n_indoors()];
         let reason = format!(
             "the surface is curved and closed except at its ends, and the watershed finds {n} in it; the Delaunay \
@@ -51,6 +53,26 @@ pub fn bake(
     Ok(baked)
 }
 
+/// Makes a world of the rooms that remain after the first `n_steps` of a session's decimation.
+///
+/// # Errors
+/// If the caller cancels.
+pub fn bake_session(
+    scene: &Scene,
+    session: &Session,
+    n_steps: usize,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<BakeOutput, BakeError> {
+    let context = &context.within(&config.budget, n_structural(scene));
+    let method = Method::Delaunay;
+    let structure = Structure::of(scene, method, config, context.allowance())?;
+    let proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
+    let mut baked = realize(structure, method, proposal, config, context)?;
+    keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
+    Ok(baked)
+}
+
 /// Bakes with one method.
 fn bake_by(
     method: Method,
@@ -60,11 +82,11 @@ fn bake_by(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin_method(method, reason)?;
-    let structure = method.structure_of(scene, context.allowance())?;
+    let structure = Structure::of(scene, method, config, context.allowance())?;
     let proposal = match method {
         Method::Bsp => bsp::propose(&structure, config, context)?,
         Method::Delaunay => delaunay::propose(&structure, config, context)?,
-        Method::Watershed | Method::Auto => watershed::propose(&structure, config, context)?,
+        Method::Watershed => watershed::propose(&structure, config, context)?,
     };
     realize(structure, method, proposal, config, context)
 }

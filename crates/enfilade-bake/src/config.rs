@@ -1,21 +1,28 @@
 //! Settings of a bake, and the resolved form that the stages use.
 
+mod bsp;
+mod delaunay;
+mod merge;
+
 use std::collections::BTreeMap;
 
 use enfilade_geom::Aabb;
 
-use crate::bsp::BspConfig;
-use crate::delaunay::DelaunayConfig;
 use crate::simplify::SimplifySettings;
-use crate::structure::MergeSettings;
 use crate::voxel::Grid;
 use crate::{BakeError, Budget, Method};
+
+pub use bsp::{BspConfig, Guide, Heuristic, Rooms};
+pub use delaunay::{Choices, DelaunayConfig, Weight};
+pub use merge::MergeSettings;
 
 /// Settings of a bake. The defaults are meant for every scene; none is tuned to one.
 #[derive(Clone, Debug)]
 pub struct BakeConfig {
-    /// The method that finds cells.
-    pub method: Method,
+    /// The method that finds cells; `None` chooses it: BSP if all structure is made of brushes, else the watershed.
+    /// Delaunay if the watershed finds at most one cell in a vessel: a curved surface, closed except at its ends, that
+    /// may branch.
+    pub method: Option<Method>,
     /// Width of the narrowest opening that must be found: six voxels. [Units: wu] [Limit: above 0]
     pub min_opening: f64,
     /// Width below which openings are closed by seals. [Units: wu]
@@ -43,7 +50,7 @@ pub struct BakeConfig {
 impl Default for BakeConfig {
     fn default() -> Self {
         Self {
-            method: Method::Auto,
+            method: None,
             min_opening: 0.6,
             smallest_hole: SmallestHole::default(),
             merge: MergeSettings::default(),
@@ -147,7 +154,7 @@ impl BakeConfig {
     #[must_use]
     pub fn of(method: Method) -> Self {
         Self {
-            method,
+            method: Some(method),
             ..Self::default()
         }
     }

@@ -13,7 +13,7 @@ const BYTES_A_TRIANGLE: f64 = 5e3;
 
 /// Receives the progress of a bake.
 pub trait Progress: Sync {
-    /// Called when a method begins; [`Method::Auto`] may use a second one after the first.
+    /// Called when a method begins; a bake that chooses it may use a second one after the first.
     fn method(&self, _method: Method, _reason: &str) {}
 
     /// Called when a stage begins.

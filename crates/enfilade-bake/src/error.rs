@@ -107,10 +107,38 @@ pub enum BakeError {
     Material(#[from] crate::simplify::UnknownMaterial),
     /// The scene has no tetrahedra.
     #[error(transparent)]
-    Tetrahedra(#[from] crate::delaunay::DelaunayError),
+    Tetrahedra(#[from] DelaunayError),
     /// The caller canceled the bake.
     #[error("cancelled")]
     Cancelled,
+}
+
+/// Errors of [`tetrahedralize`](crate::delaunay::tetrahedralize).
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DelaunayError {
+    /// A coordinate is not finite, or too large or too small for exact products.
+    #[error(
+        "point {index} has the coordinate {value}; coordinates must be 0 or between 1e-40 and 1e50"
+    )]
+    Coordinate {
+        /// Index of the point.
+        index: usize,
+        /// The coordinate.
+        value: f64,
+    },
+    /// All points lie in one plane, or there are fewer than four.
+    #[error("all {n_points} points lie in one plane, so there is no volume to divide")]
+    Flat {
+        /// Number of points.
+        n_points: usize,
+    },
+    /// More points than indices.
+    #[error("{n_points} points are more than the 100 million that indices of 32 bits allow")]
+    TooMany {
+        /// Number of points.
+        n_points: usize,
+    },
 }
 
 /// Formats an amount of memory; omits the digits of absurd numbers.

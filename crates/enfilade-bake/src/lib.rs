@@ -38,12 +38,11 @@ mod vessel;
 pub use enfilade_voxel as voxel;
 pub mod watershed;
 
-pub use bake::bake;
+pub use bake::{bake, bake_session};
 pub use budget::Budget;
-pub use config::{BakeConfig, SmallestHole};
+pub use config::{BakeConfig, MergeSettings, SmallestHole};
 pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;
 pub use method::Method;
 pub use output::{BakeOutput, Resolution};
 pub use stage::Stage;
-pub use structure::MergeSettings;

@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use enfilade_cpg::{Provenance, Statistics, World};
+use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
-use enfilade_geom::{DVec3, Triangle};
 
 use crate::assemble::{Cut, assemble};
 use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex_within};
@@ -26,15 +26,8 @@ pub(crate) fn realize(
     context: &BakeContext<'_>,
 ) -> Result<BakeOutput, BakeError> {
     context.begin(Stage::Complex)?;
-    // Exact, independent of the candidates that the method fitted there.
-    let to_scene = |p: DVec3| structure.frame.to_scene(p);
-    let missing: Vec<Triangle> = structure
-        .missing(config)
-        .into_iter()
-        .map(|t| t.map(to_scene))
-        .collect();
     let structure = structure.into_scene();
-    let hole = config.smallest_hole.resolved(structure.misfit);
+    let hole = structure.hole;
     if config.smallest_hole == SmallestHole::Auto && hole.gap() > SmallestHole::LEAST {
         proposal.notes.push(format!(
             "triangles that should meet do not: closing gaps up to {:.0} mm instead of {:.0} (--smallest-hole)",
@@ -52,7 +45,8 @@ pub(crate) fn realize(
     let input = ComplexInput {
         triangles: &structure.triangles,
         candidates: &windings,
-        missing: &missing,
+        // Exact, independent of the candidates that the method fitted there.
+        missing: &structure.missing,
         bounds: proposal.bounds,
         gap: hole.gap(),
         has_seals: hole.has_seals(),
@@ -68,10 +62,7 @@ pub(crate) fn realize(
     context.begin(Stage::Geometry)?;
     let leaks = partition.leaks.clone();
     let cut = Cut {
-        scene: structure.scene,
-        sources: &structure.sources,
-        triangles: &structure.triangles,
-        bvh: &structure.bvh,
+        structure,
         partition,
         candidates: &proposal.candidates,
         outward,
@@ -142,11 +133,14 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
 
 /// Assigns the geometry and records the provenance of the world.
 fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
-    let n_detail = cut.scene.triangle_sources(Role::Detail).count();
+    let n_detail = cut.structure.scene.triangle_sources(Role::Detail).count();
     let seals = &cut.partition.seals;
     let common = [
-        ("input_triangles", (cut.sources.len() + n_detail) as f64),
-        ("structural_triangles", cut.sources.len() as f64),
+        (
+            "input_triangles",
+            (cut.structure.sources.len() + n_detail) as f64,
+        ),
+        ("structural_triangles", cut.structure.sources.len() as f64),
         ("leaks", cut.partition.leaks.len() as f64),
         ("seals", seals.len() as f64),
         ("seal_area", seals.iter().map(|s| s.outline.area()).sum()),
@@ -155,7 +149,7 @@ fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
     let provenance = Provenance {
         generator: concat!("enfilade ", env!("CARGO_PKG_VERSION")).to_owned(),
         method: method.name().to_owned(),
-        input_hash: input_hash(cut.triangles, &proposal.settings),
+        input_hash: input_hash(&cut.structure.triangles, &proposal.settings),
         settings: proposal.settings.clone(),
     };
     let statistics = Statistics {

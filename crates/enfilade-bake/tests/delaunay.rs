@@ -1,8 +1,8 @@
 //! The thesis's cases through the Delaunay builder: with the default stop, the remaining portals are
 //! exactly the separations of the rooms.
 
-use enfilade_bake::delaunay::{JOINED, Session, bake_session};
-use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
+use enfilade_bake::delaunay::{JOINED, Session};
+use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake, bake_session};
 use enfilade_cpg::{PortalKind, World};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::mixed::{pitched_roof_attic, room_within_room, stair_hall, two_rooms_crack};

@@ -7,8 +7,8 @@ use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::delaunay::{JOINED, Session, Step, bake_session};
-use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Method, Silent};
+use enfilade::bake::delaunay::{JOINED, Session, Step};
+use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Method, Silent, bake_session};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         choices.write("-o", Format::World, path)?;
     }
     let mut settings = settings::resolve(&args.options)?;
-    settings.config.method = Method::Delaunay;
+    settings.config.method = Some(Method::Delaunay);
     let imported = import_scene(&args.inputs, &args.options.detail, &settings.import)?;
     outputs.read(&imported.report.references)?;
     choices.read(&imported.report.references)?;

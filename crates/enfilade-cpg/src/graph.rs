@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
-use crate::{CellId, Fitting, Locator, PortalId, Pvs, SourceRuns};
+use crate::{CellId, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns};
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -121,6 +121,23 @@ pub struct World {
     pub about: About,
     /// Cells visible from each cell, if computed. Changes of cells or portals drop it.
     pub pvs: Option<Pvs>,
+}
+
+impl PartNumbers {
+    /// Numbers a world's parts. O(batches). A file has fewer than 2³² of them.
+    #[must_use]
+    pub fn new(world: &World) -> Self {
+        let mut first = vec![0];
+        let mut n = 0_u32;
+        for batch in &world.batches {
+            n = n.saturating_add((batch.primitive.indices.len() / 3) as u32);
+            first.push(n);
+        }
+        Self {
+            first,
+            n_details: world.details.len() as u32,
+        }
+    }
 }
 
 /// Structural triangles of one material that exactly the same cells see.

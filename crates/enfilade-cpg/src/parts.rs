@@ -6,32 +6,15 @@
 //!
 //! There is one row for each pair, in the order of [`Pvs::pairs`](crate::Pvs::pairs).
 
-use crate::World;
-
 /// Numbering of a world's parts: the triangles of all batches in order, then the detail objects.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PartNumbers {
     /// For each batch the number of its first triangle, then the number of all triangles.
-    first: Vec<u32>,
-    n_details: u32,
+    pub(crate) first: Vec<u32>,
+    pub(crate) n_details: u32,
 }
 
 impl PartNumbers {
-    /// Numbers a world's parts. O(batches). A file has fewer than 2³² of them.
-    #[must_use]
-    pub fn new(world: &World) -> Self {
-        let mut first = vec![0];
-        let mut n = 0_u32;
-        for batch in &world.batches {
-            n = n.saturating_add((batch.primitive.indices.len() / 3) as u32);
-            first.push(n);
-        }
-        Self {
-            first,
-            n_details: world.details.len() as u32,
-        }
-    }
-
     /// Returns the numbers of a batch's triangles.
     ///
     /// # Panics

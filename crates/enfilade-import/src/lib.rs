@@ -41,6 +41,7 @@ mod pvs_text;
 mod report;
 mod soup;
 mod stl;
+mod textures;
 
 pub use enfilade_prepare::{
     BadOption, CleaningOptions, CleaningReport, Example, Finding, Glob, GlobState, RepairOptions,

@@ -15,7 +15,7 @@ use enfilade_geom::{ConvexSolid, DMat4, DVec3};
 use enfilade_prepare::GridSteps;
 use serde_json::Value;
 
-use crate::gltf::map_textures;
+use crate::textures::map_textures;
 
 /// Puts a scene into its canonical order.
 ///

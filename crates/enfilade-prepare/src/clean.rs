@@ -3,7 +3,7 @@
 //! Vertices closer than the welding distance count as one. Edges are sorted, not hashed, and every search in space
 //! has a budget, so that a million triangles take seconds.
 
-use crate::finding::{Example, Finding};
+use crate::finding::{Example, Finding, MAX_EXAMPLES};
 use crate::repair::holes_of;
 use crate::shells::Shells;
 use crate::{BadOption, crossing, tjunction};
@@ -453,7 +453,7 @@ fn find_odd_edges(
         }
     }
     find_odd_shells(report, scene, soup, &mut shells);
-    let found = tjunction::find(&soup.points, &open, options.t_junction);
+    let found = tjunction::find(&soup.points, &open, options.t_junction, MAX_EXAMPLES);
     report.is_complete = found.is_complete;
     report.t_junctions.n = found.n;
     for point in found.examples {

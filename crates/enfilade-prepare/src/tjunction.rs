@@ -3,7 +3,6 @@
 //! A crack in a surface leaves every edge on its rim with one triangle only. So both the edges and the points to
 //! examine are those of open edges, and a closed mesh costs nothing.
 
-use crate::finding::MAX_EXAMPLES;
 use enfilade_geom::DVec3;
 use std::collections::{HashMap, HashSet};
 
@@ -14,13 +13,13 @@ const BUDGET: u64 = 100_000_000;
 
 pub(crate) struct Found {
     pub(crate) n: u64,
-    /// Numbers of the first few points.
+    /// Numbers of the first points.
     pub(crate) examples: Vec<u32>,
     pub(crate) is_complete: bool,
 }
 
-/// Counts points that lie within `distance` of the inside of an edge they do not end.
-pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found {
+/// Counts points that lie within `distance` of the inside of an edge they do not end; returns up to `n_examples`.
+pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64, n_examples: usize) -> Found {
     let mut found = Found {
         n: 0,
         examples: Vec::new(),
@@ -30,7 +29,7 @@ pub(crate) fn find(points: &[DVec3], open: &[[u32; 2]], distance: f64) -> Found 
     found.is_complete = for_each(points, open, distance, |_, i, _| {
         if counted.insert(i) {
             found.n += 1;
-            if found.examples.len() < MAX_EXAMPLES {
+            if found.examples.len() < n_examples {
                 found.examples.push(i);
             }
         }
@@ -168,7 +167,7 @@ mod tests {
             let open: Vec<[u32; 2]> = (1..n).map(|i| [i / 2, i]).collect();
             // Differs from all distances in the lattice.
             let distance = 1e-4 * scale;
-            let found = find(&points, &open, distance);
+            let found = find(&points, &open, distance, 5);
             prop_assert!(found.is_complete);
             prop_assert_eq!(found.n, brute_force(&points, &open, distance));
         }

@@ -41,10 +41,10 @@ pub(super) fn batches(cut: &Cut<'_>) -> Vec<Batch> {
 fn material_near(cut: &Cut<'_>, seal: &Seal) -> Option<u32> {
     let n = seal.outline.points.len();
     let middle = seal.outline.points.iter().sum::<DVec3>() / n as f64;
-    let nearest = cut.bvh.nearest(middle, f64::INFINITY)?;
-    let source = cut.sources[nearest.triangle as usize];
-    let mesh = cut.scene.objects[source.object as usize].mesh;
-    cut.scene.meshes[mesh as usize].primitives[source.primitive as usize].material
+    let nearest = cut.structure.bvh.nearest(middle, f64::INFINITY)?;
+    let source = cut.structure.sources[nearest.triangle as usize];
+    let mesh = cut.structure.scene.objects[source.object as usize].mesh;
+    cut.structure.scene.meshes[mesh as usize].primitives[source.primitive as usize].material
 }
 
 /// Largest growth of a seal at a sharp vertex, as a multiple of its growth elsewhere.

@@ -12,8 +12,8 @@
 use enfilade_geom::Aabb;
 use rayon::prelude::*;
 
+use crate::MergeSettings;
 use crate::complex::poly::{self, Poly, Sides};
-use crate::structure::MergeSettings;
 
 use super::leaves::Bsp;
 use super::portals::{LeafPortal, leaf_portals};

@@ -3,11 +3,12 @@
 use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Purse};
 use rayon::prelude::*;
 
-use super::guide::Guide;
+use crate::config::{Guide, Heuristic};
+
 use super::input::BspInput;
 use super::leaves::Bsp;
 use super::tolerance::Tolerance;
-use super::tree::{self, Content, Heuristic, Tree};
+use super::tree::{self, Content, Tree};
 use super::{inside, leak, portals, shape, surfaces};
 
 /// Cost of finding if a leaf is matter, in units of [`Allowance`](enfilade_geom::Allowance).

@@ -2,18 +2,7 @@
 
 use enfilade_geom::{Aabb, DVec3, Plane};
 
-/// Planes that cut space before any surface's (Lefebvre & Hornus 2003, notes after §3.0.2).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Guide {
-    /// Edge of a regular grid. [Units: wu] [Limit: above 0]
-    pub grid: Option<f64>,
-    /// Distance between planes of a tetrahedral grid, which has four families. [Units: wu] [Limit: above 0]
-    pub tetrahedra: Option<f64>,
-    /// Single planes.
-    pub planes: Vec<Plane>,
-    /// Boxes whose sides give planes. [Units: wu]
-    pub boxes: Vec<Aabb>,
-}
+use crate::config::Guide;
 
 /// Most planes of one family of a grid; finer grids are coarsened to this.
 const MAX_FAMILY: f64 = 256.0;

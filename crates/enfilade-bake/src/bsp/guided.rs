@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{Aabb, BoxTree, Purse, Sets};
 
+use crate::config::{Guide, Heuristic};
+
 use super::cells::{self, LeafCells, NO_CELL};
-use super::guide::Guide;
 use super::input::BspInput;
 use super::leaves::Bsp;
 use super::separator::{self, Separator};
-use super::tree::Heuristic;
 
 /// Share of a rim in its two main planes from which on they count as walls: that of a hexagon. A rectangle has half or
 /// more, an octagon a quarter.

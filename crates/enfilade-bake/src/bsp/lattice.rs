@@ -4,7 +4,8 @@ use std::sync::OnceLock;
 
 use enfilade_geom::DVec3;
 
-use crate::structure::{MergeSettings, connected_count, rim_share};
+use crate::MergeSettings;
+use crate::structure::{connected_count, rim_share};
 
 use super::leaves::Bsp;
 use super::separator::Separator;

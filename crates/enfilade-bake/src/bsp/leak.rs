@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{ConvexSolid, DVec3, Purse};
 
-use super::guide::Guide;
+use crate::config::{Guide, Heuristic};
+
 use super::input::BspInput;
 use super::leak_path::LeakPath;
 use super::leaves::Bsp;
 use super::tree::Content;
-use super::tree::Heuristic;
 
 pub(super) struct Reached {
     pub(super) is_reached: Vec<bool>,

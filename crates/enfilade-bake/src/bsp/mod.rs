@@ -27,7 +27,6 @@
 mod arrange;
 mod build;
 mod cells;
-mod config;
 mod grouping;
 mod guide;
 mod guided;
@@ -46,15 +45,13 @@ mod surfaces;
 mod tolerance;
 mod tree;
 
-pub use config::{BspConfig, Rooms};
+pub use crate::config::{BspConfig, Guide, Heuristic, Rooms};
 pub use grouping::Grouping;
-pub use guide::Guide;
 pub use input::BspInput;
 pub use leak::find_leak;
 pub use leak_path::LeakPath;
 pub use leaves::{Bsp, BspCounts};
 pub(crate) use propose::propose;
-pub use tree::Heuristic;
 
 #[cfg(test)]
 mod tests;

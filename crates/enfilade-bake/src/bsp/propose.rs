@@ -7,12 +7,12 @@ use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Purse, Winding};
 
 use crate::complex::region::Shape;
 use crate::complex::{LabelSettings, Vote};
+use crate::config::{BspConfig, Rooms};
 use crate::proposal::Proposal;
 use crate::structure::{Candidate, OUTDOORS, Structure};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 use super::cells::{self, LeafCells, NO_CELL};
-use super::config::{BspConfig, Rooms};
 use super::input::input_of;
 use super::inside::Soup;
 use super::leaves::Bsp;
@@ -114,7 +114,7 @@ impl Parted {
         }
         let settings = &config.merge;
         let mut closures = structure.blockers(&Bvh::build(&structure.walls));
-        closures.extend(structure.missing(config));
+        closures.extend(&structure.missing);
         arrange::refine(bsp, settings);
         let shapes = shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse);
         let evidence = Evidence {

@@ -15,9 +15,10 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3};
 use rayon::prelude::*;
 
+use crate::MergeSettings;
 use crate::complex::poly;
 use crate::complex::region::Shape;
-use crate::structure::{MergeSettings, Mergeable, Pair, join_rooms};
+use crate::structure::{Mergeable, Pair, join_rooms, lies_in_slab};
 
 use super::cells::{self, LeafCells, NO_CELL};
 use super::lattice::{Lattice, NONE};
@@ -309,7 +310,7 @@ impl LeafMerger<'_> {
     fn lies_in_slab(&self, s: u32) -> bool {
         let plane = &self.bsp.tree.planes[self.separators[s as usize].plane as usize];
         let height = -plane.d * plane.normal.y;
-        plane.normal.y.abs() > 0.9 && self.evidence.slabs.iter().any(|h| (h - height).abs() < 0.2)
+        lies_in_slab(plane.normal, height, self.evidence.slabs)
     }
 
     fn measure(

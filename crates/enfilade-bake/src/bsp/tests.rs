@@ -466,7 +466,7 @@ fn a_doorway_that_the_tree_cuts_by_its_jambs_is_found_all_the_same() {
         })
     };
     assert_eq!(faces(&bsp), [false; 2], "the guide hides them");
-    arrange::refine(&mut bsp, &crate::structure::MergeSettings::default());
+    arrange::refine(&mut bsp, &crate::MergeSettings::default());
     assert_eq!(faces(&bsp), [true; 2]);
 }
 

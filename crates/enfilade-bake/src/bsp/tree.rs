@@ -4,23 +4,9 @@ use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 use rayon::prelude::*;
 
 use crate::complex::poly::{self, Poly, Sides};
+use crate::config::{Guide, Heuristic};
 
-use super::guide::Guide;
 use super::tolerance::Tolerance;
-
-/// The rule that chooses the plane to cut a region.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Heuristic {
-    /// Few cuts and a balanced tree, judged by a sample of surfaces: fewest cuts in all.
-    #[default]
-    Default,
-    /// The plane that cuts fewest surfaces (Lefebvre & Hornus 2003); quadratic.
-    MinCut,
-    /// The plane with most surface in it.
-    MaxArea,
-    /// The plane most orthogonal to the surfaces that it cuts; quadratic.
-    MaxOrtho,
-}
 
 /// A convex piece of a surface.
 #[derive(Clone, Debug)]

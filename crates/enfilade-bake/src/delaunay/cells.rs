@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{Aabb, DVec3, Sets};
 
-use super::branches::Branches;
+use super::labels::Branches;
 use super::space::Space;
 
 /// Two cells are one bulge if the lesser ball of the two is at most this many times the ball that passes between them.

@@ -28,6 +28,7 @@ use std::f64::consts::PI;
 use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::cells::{CellPortal, Cells};
+use crate::config::{Choices, Weight};
 
 /// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
 /// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
@@ -46,18 +47,6 @@ pub const JOINED: f64 = -2.0;
 /// Least value of radii and areas in weights, so that no ratio is infinite. [Units: wu, wu²]
 const TINY: f64 = 1e-9;
 
-/// The measure of a portal's quality.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Weight {
-    /// Gjørup's ratio of areas.
-    Aspect,
-    /// Gjørup's ratio corrected by size; depends on the unit.
-    SizeCorrected,
-    /// Ratio of radii, at a pinch or at the mouth of a branch; above 1.
-    #[default]
-    ScaleFree,
-}
-
 /// One step: two cells are merged under the lesser id.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
@@ -71,18 +60,6 @@ pub struct Step {
     pub is_mouth: bool,
     /// Center of that portal; if it was merged from several, of the widest of them. [Units: wu]
     pub position: DVec3,
-}
-
-/// Decisions of the user, by places as in [`Step::position`]. A choice concerns the portal between initial cells whose
-/// center is there, and later whatever that has become part of. If there is none, because the scene was repaired or has
-/// other points, it concerns the nearest portal that decimation removes without choices.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Choices {
-    /// Portals here stay, whatever their weight. [Units: wu]
-    pub keep: Vec<DVec3>,
-    /// Portals here are removed once no other portal goes by itself: the rooms present then are merged, however many
-    /// steps the user took to see the portal. [Units: wu]
-    pub join: Vec<DVec3>,
 }
 
 impl Choices {

@@ -16,7 +16,8 @@ use enfilade_geom::{Allowance, DVec3};
 
 use super::order::insertion_order;
 use super::predicate::{LARGEST, LEAST, Predicates};
-use super::tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron, walk};
+use super::tetrahedra::{Delaunay, INFINITE, Tetrahedron, walk};
+use crate::error::DelaunayError;
 
 /// Most points: seven tetrahedra per point, with four facets each, must fit in 32 bits with room to spare.
 const MOST_POINTS: usize = 100_000_000;

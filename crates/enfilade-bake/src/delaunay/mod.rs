@@ -10,7 +10,7 @@
 //! | tetrahedra cut by polygons, and openings between them | `cut`, `openings` | §4.2.1, §4.2.2 |
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | merging of parts of the air between which nothing narrows | `cells` | ours |
-//! | tubes that leave a room without a pinch | `branches` | ours, after Matheron 1975 |
+//! | tubes that leave a room without a pinch | `branches`; `labels`: the result | ours, after Matheron 1975 |
 //! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | remaining rooms, and matter | `standing` | ours |
 //! | candidates and votes | `rooms` | ours |
@@ -20,10 +20,10 @@
 mod balls;
 mod branches;
 mod cells;
-mod config;
 mod cut;
 mod decimate;
 mod insert;
+mod labels;
 mod limits;
 mod openings;
 mod order;
@@ -41,12 +41,12 @@ mod space_tests;
 #[cfg(test)]
 mod tests;
 
+pub use crate::config::{Choices, DelaunayConfig, Weight};
+pub use crate::error::DelaunayError;
 pub use cells::{CellPortal, Cells, OUTDOOR_CELL, flow_together};
-pub use config::DelaunayConfig;
-pub use decimate::{Choices, Decimation, JOINED, Step, Weight, decimate, default_stop};
+pub use decimate::{Decimation, JOINED, Step, decimate, default_stop};
 pub use insert::tetrahedralize;
-pub use propose::bake_session;
-pub(crate) use propose::propose;
+pub(crate) use propose::{propose, propose_of};
 pub use session::Session;
 pub use space::{LEAST_BALL, Link, Space, divide};
-pub use tetrahedra::{Delaunay, DelaunayError, INFINITE, Tetrahedron};
+pub use tetrahedra::{Delaunay, INFINITE, Tetrahedron};

@@ -1,20 +1,16 @@
 //! The flow of the Delaunay builder: structure → tetrahedra → cells → rooms → candidate portals and votes.
 
 use enfilade_geom::Aabb;
-use enfilade_geom::scene::Scene;
 
-use super::config::DelaunayConfig;
 use super::decimate::default_stop;
 use super::rooms::find_rooms;
 use super::session::Session;
 use super::space::box_points;
-use crate::bound::keep_costs;
-use crate::budget::n_structural;
 use crate::complex::{LabelSettings, Vote};
+use crate::config::DelaunayConfig;
 use crate::proposal::Proposal;
-use crate::realize::realize;
 use crate::structure::{OUTDOORS, Structure};
-use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Resolution, Stage};
+use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
 /// Width of the air around the scene that the cell complex covers. [Units: wu]
 const AROUND: f64 = 1.0;
@@ -54,26 +50,11 @@ pub(crate) fn propose(
     )
 }
 
-/// Makes a world of the rooms that remain after the first `n_steps` of a session's decimation.
+/// Proposes the rooms that remain after the first `n_steps` of a session's decimation.
 ///
 /// # Errors
 /// If the caller cancels.
-pub fn bake_session(
-    scene: &Scene,
-    session: &Session,
-    n_steps: usize,
-    config: &BakeConfig,
-    context: &BakeContext<'_>,
-) -> Result<BakeOutput, BakeError> {
-    let context = &context.within(&config.budget, n_structural(scene));
-    let structure = Method::Delaunay.structure_of(scene, context.allowance())?;
-    let proposal = propose_of(&structure, session, n_steps, config, context)?;
-    let mut baked = realize(structure, Method::Delaunay, proposal, config, context)?;
-    keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
-    Ok(baked)
-}
-
-fn propose_of(
+pub(crate) fn propose_of(
     structure: &Structure<'_>,
     session: &Session,
     n_steps: usize,

@@ -19,7 +19,8 @@ use rayon::prelude::*;
 use super::balls::{ENTERS, circle, circumsphere};
 use super::insert::Growing;
 use super::limits::Limits;
-use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
+use super::tetrahedra::{Delaunay, INFINITE};
+use crate::error::DelaunayError;
 
 /// Least distance between points added in one round, as a share of the ball's radius.
 const APART: f64 = 0.4;

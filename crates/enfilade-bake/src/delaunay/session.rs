@@ -5,11 +5,12 @@ use enfilade_geom::{Allowance, Bvh, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
-use super::decimate::{Choices, Decimation, Weight, decimate, default_stop};
+use super::decimate::{Decimation, decimate, default_stop};
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
 use super::standing::count_rooms;
 use crate::budget::n_structural;
+use crate::config::{Choices, Weight};
 use crate::structure::{Structure, in_own_order};
 use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
 
@@ -42,8 +43,9 @@ impl Session {
         context: &BakeContext<'_>,
     ) -> Result<Self, BakeError> {
         let context = &context.within(&config.budget, n_structural(scene));
-        context.begin_method(Method::Delaunay, "as requested")?;
-        let structure = Method::Delaunay.structure_of(scene, context.allowance())?;
+        let method = Method::Delaunay;
+        context.begin_method(method, "as requested")?;
+        let structure = Structure::of(scene, method, config, context.allowance())?;
         let session = Self::of(&structure, config, context)?;
         context.check()?;
         Ok(session)
@@ -60,7 +62,7 @@ impl Session {
         let walls = in_own_order(&structure.walls);
         let bvh = Bvh::build(&walls);
         let closures = in_own_order(&structure.blockers(&bvh));
-        let shut = [closures.clone(), in_own_order(&structure.missing(config))].concat();
+        let shut = [closures.clone(), in_own_order(&structure.missing)].concat();
         let space = divide_within(
             &walls,
             &shut,
@@ -94,14 +96,14 @@ impl Session {
             bvh,
             closures,
             stairs: Bvh::build(&structure.stairs),
-            hole: structure.hole(config),
+            hole: structure.hole.gap(),
         };
         session.decimate_within(config, context.allowance());
         Ok(session)
     }
 
     /// Returns the number of rooms left after the first `n_steps`, which is the number of cells indoors that
-    /// [`bake_session`](super::bake_session) makes of them, and the number of other cells: crevices, and interiors of
+    /// [`bake_session`](crate::bake_session) makes of them, and the number of other cells: crevices, and interiors of
     /// walls, which are dropped.
     ///
     /// `O(n log n)` in the parts of the space; a fraction of a second.

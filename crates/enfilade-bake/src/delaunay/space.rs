@@ -22,8 +22,9 @@ use super::cut::{CutTolerance, Knife, Part, TetrahedraCut};
 use super::limits::Limits;
 use super::openings::Outline;
 use super::refine::refined;
-use super::tetrahedra::{Delaunay, DelaunayError, INFINITE};
+use super::tetrahedra::{Delaunay, INFINITE};
 use crate::complex::poly::{area, area_normal, width};
+use crate::error::DelaunayError;
 
 /// Most points added to surfaces.
 const MAX_POINTS: usize = 300_000;

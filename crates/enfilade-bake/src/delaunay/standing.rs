@@ -7,10 +7,8 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, OUTDOOR_CELL};
 use super::space::{Space, connected};
-use crate::structure::{count_backs, is_crevice};
+use crate::structure::{BACKS, POINTS, count_backs, is_crevice};
 
-/// Points of a region from which rays test if it is a room.
-const POINTS: usize = 32;
 /// The rooms that decimation left, and the cells that are not rooms.
 pub(super) struct Standing {
     /// Room of each cell; the void belongs to the outdoors.
@@ -102,7 +100,7 @@ fn void_joined(
     let void: BTreeSet<u32> = members
         .into_par_iter()
         .filter_map(|(room, mut tets)| {
-            (share_of_backs(space, bvh, &mut tets, allowance) > 0.6).then_some(room)
+            (share_of_backs(space, bvh, &mut tets, allowance) > BACKS).then_some(room)
         })
         .collect();
     let room = |&r: &u32| {
@@ -116,7 +114,7 @@ fn void_joined(
 }
 
 /// Returns the rooms that are not rooms but interiors of walls and solids: nothing can enter them, and they see the
-/// backs of surfaces. The rule is the watershed's (`structure/backs.rs`).
+/// backs of surfaces. Crevices are those of the watershed, too (`structure/backs.rs`).
 fn hollow_rooms(
     space: &Space,
     cells: &Cells,

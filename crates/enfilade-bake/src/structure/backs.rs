@@ -4,6 +4,8 @@ use enfilade_geom::{Allowance, Bvh, DVec3, Ray};
 
 /// A space that fits no ball of this radius is matter if most rays hit back faces. [Units: wu]
 const NARROW: f64 = 0.5;
+/// Sample points in a space, from which rays tell if it is a room.
+pub(crate) const POINTS: usize = 32;
 /// Inside matter, more than this share of the rays that hit anything hit a back face first.
 pub(crate) const BACKS: f64 = 0.6;
 

@@ -24,12 +24,14 @@ mod rims;
 mod slabs;
 mod stairs;
 
-pub(crate) use backs::{BACKS, count_backs, is_crevice, is_inside, rays_from};
+pub(crate) use backs::{BACKS, POINTS, count_backs, is_crevice, is_inside, rays_from};
 pub(crate) use blockers::{MAX_THICKNESS, plates, thin_direction};
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
 pub(crate) use lattice::{connected_count, rim_share};
-pub(crate) use of::{OUTDOORS, Stairs, Structure, bounds_of, in_own_order, structural_triangles};
-pub use pinch::MergeSettings;
+pub(crate) use of::{
+    OUTDOORS, SceneStructure, Structure, bounds_of, in_own_order, structural_triangles,
+};
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};
 pub(crate) use rims::{RimVertex, Rims};
+pub(crate) use slabs::lies_in_slab;

@@ -9,7 +9,7 @@ use super::misfit::misfit;
 use super::rims::Rims;
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
-use crate::{BakeConfig, BakeError};
+use crate::{BakeConfig, BakeError, Method, SmallestHole};
 
 /// Label of the space around the building.
 pub(crate) const OUTDOORS: u32 = 1;
@@ -17,18 +17,9 @@ pub(crate) const OUTDOORS: u32 = 1;
 /// Cost of sorting a triangle, in units of [`Allowance`].
 const WORK_A_TRIANGLE: u64 = 20;
 
-/// How stairs are treated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stairs {
-    /// Stairs stand in rooms and bound none.
-    Apart,
-    /// All structure bounds rooms: the class of a brush marks detail.
-    AreWalls,
-}
-
 /// The structure of a scene.
 ///
-/// `walls`, `rims`, `stairs` and `bvh` are in frame coordinates, all else in scene coordinates.
+/// `walls`, `stairs`, `bvh`, `rims` and `missing` are in frame coordinates, all else in scene coordinates.
 pub(crate) struct Structure<'a> {
     pub(crate) scene: &'a Scene,
     /// Source of each triangle.
@@ -46,14 +37,31 @@ pub(crate) struct Structure<'a> {
     pub(crate) bvh: Bvh,
     /// Edges where walls end.
     pub(crate) rims: Rims,
-    /// How far triangles that should meet miss each other. [Units: wu]
-    pub(crate) misfit: f64,
+    /// Triangles missing in walls, each as large as an opening of the least width. The hole is not a doorway.
+    pub(crate) missing: Vec<Triangle>,
+    /// The smallest hole of this model, never [`SmallestHole::Auto`].
+    pub(crate) hole: SmallestHole,
     /// Shared budget of all that works on the structure.
     pub(crate) allowance: &'a Allowance,
 }
 
+/// The structure of a scene in scene coordinates, from which a proposal is realized.
+pub(crate) struct SceneStructure<'a> {
+    pub(crate) scene: &'a Scene,
+    /// Source of each triangle.
+    pub(crate) sources: Vec<TriangleSource>,
+    /// All structural triangles that have an area.
+    pub(crate) triangles: Vec<Triangle>,
+    /// Indexes all structural triangles.
+    pub(crate) bvh: Bvh,
+    /// Triangles missing in walls.
+    pub(crate) missing: Vec<Triangle>,
+    /// The smallest hole of this model, never [`SmallestHole::Auto`].
+    pub(crate) hole: SmallestHole,
+}
+
 impl<'a> Structure<'a> {
-    /// Sorts the structure of a scene. `frame` chooses the axes from the structural triangles.
+    /// Sorts the structure of a scene for a method.
     ///
     /// `O(n log n)` in triangles.
     ///
@@ -61,8 +69,8 @@ impl<'a> Structure<'a> {
     /// If nothing is structural.
     pub(crate) fn of(
         scene: &'a Scene,
-        frame: impl FnOnce(&[Triangle]) -> Frame,
-        stairs: Stairs,
+        method: Method,
+        config: &BakeConfig,
         allowance: &'a Allowance,
     ) -> Result<Self, BakeError> {
         let (sources, triangles) = structural_triangles(scene);
@@ -72,11 +80,17 @@ impl<'a> Structure<'a> {
                 n_objects: scene.objects.len(),
             });
         }
-        let frame = frame(&triangles);
+        let frame = match method {
+            // Voxels follow the walls, however the building is turned.
+            Method::Watershed => Frame::of(&triangles),
+            Method::Bsp | Method::Delaunay => Frame::SCENE,
+        };
         let framed = frame.triangles_to_grid(&triangles);
-        let mut is_stair = match stairs {
-            Stairs::Apart => find_stairs(&sources, &framed),
-            Stairs::AreWalls => vec![false; framed.len()],
+        // Stairs stand in rooms and bound none. The class of a brush marks detail, so all other brushes bound rooms.
+        let mut is_stair = if method == Method::Bsp && !scene.solids.is_empty() {
+            vec![false; framed.len()]
+        } else {
+            find_stairs(&sources, &framed)
         };
         // If everything is stairs, there are no rooms for them to stand in.
         if is_stair.iter().all(|&s| s) {
@@ -90,9 +104,12 @@ impl<'a> Structure<'a> {
         let wall_numbers = numbers(false);
         let walls: Vec<Triangle> = at(&wall_numbers);
         let bvh = Bvh::build(&framed);
+        let rims = Rims::of(&walls);
+        let misfit = misfit(&framed, &bvh, allowance);
         Ok(Self {
-            misfit: misfit(&framed, &bvh, allowance),
-            rims: Rims::of(&walls),
+            missing: rims.missing_triangles(config.min_opening.powi(2)),
+            hole: config.smallest_hole.resolved(misfit),
+            rims,
             walls,
             stairs: at(&numbers(true)),
             bvh,
@@ -110,11 +127,6 @@ impl<'a> Structure<'a> {
         bounds_of(&self.walls).union(bounds_of(&self.stairs))
     }
 
-    /// Returns the smallest hole of this model. [Units: wu]
-    pub(crate) fn hole(&self, config: &BakeConfig) -> f64 {
-        config.smallest_hole.resolved(self.misfit).gap()
-    }
-
     /// Returns the heights at which storeys end, ascending. [Units: wu]
     pub(crate) fn slabs(&self) -> Vec<f64> {
         slab_heights(&self.walls)
@@ -130,27 +142,23 @@ impl<'a> Structure<'a> {
         without_open_leaves(framed.collect(), surfaces).concat()
     }
 
-    /// Returns triangles missing in walls, each as large as an opening of the least width. The hole is not a doorway.
-    pub(crate) fn missing(&self, config: &BakeConfig) -> Vec<Triangle> {
-        self.rims.missing_triangles(config.min_opening.powi(2))
-    }
-
-    /// Drops the data in frame coordinates, once the builder's results are back in scene coordinates.
-    pub(crate) fn into_scene(self) -> Self {
+    /// Drops what only builders need, once their results are back in scene coordinates.
+    pub(crate) fn into_scene(self) -> SceneStructure<'a> {
+        let to_scene = |p: DVec3| self.frame.to_scene(p);
+        let missing = self.missing.iter().map(|t| t.map(to_scene)).collect();
         let bvh = if self.frame.is_scene() {
             self.bvh
         } else {
             drop(self.bvh);
             Bvh::build(&self.triangles)
         };
-        Self {
-            frame: Frame::SCENE,
-            walls: Vec::new(),
-            rims: Rims::default(),
-            wall_numbers: Vec::new(),
-            stairs: Vec::new(),
+        SceneStructure {
+            scene: self.scene,
+            sources: self.sources,
+            triangles: self.triangles,
             bvh,
-            ..self
+            missing,
+            hole: self.hole,
         }
     }
 }

@@ -28,10 +28,8 @@ use rayon::prelude::*;
 use crate::voxel::{Grid, Labels};
 
 use super::regions::Regions;
-use crate::structure::{BACKS, OUTDOORS, is_crevice, rays_from};
+use crate::structure::{BACKS, OUTDOORS, POINTS, is_crevice, rays_from};
 
-/// Sample points in each region.
-const POINTS: usize = 32;
 /// Least share of the rays from inside matter that leave it: all but those that slip through a crack or
 /// along an edge.
 const LEAVING: f64 = 0.9;

@@ -27,7 +27,8 @@ use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
 use super::regions::Regions;
 use super::sections::section_ratio;
-use crate::structure::{MergeSettings, OUTDOORS};
+use crate::MergeSettings;
+use crate::structure::OUTDOORS;
 
 /// A limb opens to areas at least this many times as thick: its section is at most half of theirs.
 const THICKER: f64 = 2.0;

@@ -92,7 +92,7 @@ pub(crate) fn propose(
         &regions,
         (&closures, &lids),
         &structure.walls,
-        [config.merge.closed_share, structure.hole(config)],
+        [config.merge.closed_share, structure.hole.gap()],
         allowance,
     );
     drop((closures, lids));
@@ -177,7 +177,7 @@ impl Solid {
         // Lids and caps replace missing roofs, floors and ends of tubes.
         let lids = find_lids(grid, &occupied, allowance);
         let mut caps = rim_caps(&structure.rims, config.min_opening.powi(2));
-        caps.extend(structure.missing(config));
+        caps.extend(&structure.missing);
         let mut shut = voxelize(grid, &caps, allowance);
         shut.union_with(&closures);
         for voxels in lids.lids.iter().chain(&lids.floors) {

@@ -28,7 +28,8 @@ use rayon::prelude::*;
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::{Faces, group_faces, is_in};
 use super::sections::section_ratio;
-use crate::structure::{MergeSettings, Mergeable, OUTDOORS, Opening, Pair, join_rooms};
+use crate::MergeSettings;
+use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms, lies_in_slab};
 
 /// Rooms as unions of basins.
 #[derive(Clone, Debug)]
@@ -99,12 +100,7 @@ struct BasinMerger<'a> {
 
 impl BasinMerger<'_> {
     fn lies_in_slab(&self, opening: &Opening) -> bool {
-        opening.plane.normal.y.abs() > 0.9
-            && self
-                .flooded
-                .slabs
-                .iter()
-                .any(|h| (h - opening.center.y).abs() < 0.2)
+        lies_in_slab(opening.plane.normal, opening.center.y, self.flooded.slabs)
     }
 
     /// Joins cells too narrow to be a room to the neighbor with which they share the largest open front.

@@ -5,7 +5,8 @@ use enfilade_geom::DVec3;
 
 use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
-use crate::structure::{MergeSettings, OUTDOORS, Opening, connected_count, rim_share};
+use crate::MergeSettings;
+use crate::structure::{OUTDOORS, Opening, connected_count, rim_share};
 use crate::voxel::{Grid, Labels};
 
 /// Least share of a front that leaves hold if it stands between them.

@@ -323,7 +323,7 @@ impl Resolved {
     pub(crate) fn config_for(&self, scene: &Scene) -> BakeConfig {
         let mut config = self.config.clone();
         let is_of_brushes =
-            !scene.solids.is_empty() && matches!(config.method, Method::Auto | Method::Bsp);
+            !scene.solids.is_empty() && config.method.is_none_or(|m| m == Method::Bsp);
         if self.merges_brushes_only && !is_of_brushes {
             config.costs.min_cost = 0.0;
         }
@@ -390,10 +390,10 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
         }
     }
     config.method = match options.method {
-        MethodName::Auto => Method::Auto,
-        MethodName::Watershed => Method::Watershed,
-        MethodName::Bsp => Method::Bsp,
-        MethodName::Delaunay => Method::Delaunay,
+        MethodName::Auto => None,
+        MethodName::Watershed => Some(Method::Watershed),
+        MethodName::Bsp => Some(Method::Bsp),
+        MethodName::Delaunay => Some(Method::Delaunay),
     };
     config.budget = enfilade::bake::Budget {
         memory: options.max_memory,

@@ -3,6 +3,7 @@
 use super::accessor::Document;
 use super::json::TextureDef;
 use crate::builder::Builder;
+use crate::textures::map_textures;
 use crate::{ImportError, files};
 use enfilade_geom::scene::{Image, Material, Texture};
 use serde_json::Value;
@@ -113,32 +114,6 @@ fn source_of(def: &TextureDef) -> Option<u32> {
         u32::try_from(source["source"].as_u64()?).ok()
     };
     def.source.or_else(extended)
-}
-
-/// Changes the index of every texture reference: an object under a key that ends in `Texture`, anywhere in the
-/// material except its `extras`. `number` returns the new index for a key and an old index.
-pub(crate) fn map_textures(
-    value: &mut Value,
-    number: &mut dyn FnMut(&str, &Value) -> Result<Value, String>,
-) -> Result<(), String> {
-    // serde_json bounds the nesting of its output, and so this recursion.
-    match value {
-        Value::Array(items) => items
-            .iter_mut()
-            .try_for_each(|item| map_textures(item, number)),
-        Value::Object(fields) => {
-            for (key, inner) in fields.iter_mut().filter(|(key, _)| *key != "extras") {
-                if key.ends_with("Texture")
-                    && let Some(index) = inner.get_mut("index")
-                {
-                    *index = number(key, index)?;
-                }
-                map_textures(inner, number)?;
-            }
-            Ok(())
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Reads a picture's bytes; `None`, with a note, for a missing file.

@@ -19,7 +19,7 @@ use accessor::Document;
 use enfilade_geom::scene::Mesh;
 use enfilade_geom::{DMat4, DVec3};
 use json::{Node, Root};
-pub(crate) use look::{map_textures, read_picture_file};
+pub(crate) use look::read_picture_file;
 use std::borrow::Cow;
 use std::collections::HashMap;
 

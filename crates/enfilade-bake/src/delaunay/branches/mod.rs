@@ -25,12 +25,10 @@
 //! | `rule` | the kind of a limb or an arm with such facts: all bounds, and nothing else |
 //! | `flare` | the start of a limb within its mouth |
 //! | `forks`, `arms`, `separate` | meetings of tubes of one width, and their separation |
-//! | `labels` | the result for the rest of the builder |
 
 mod arms;
 mod flare;
 mod forks;
-mod labels;
 mod measure;
 mod regions;
 mod rule;
@@ -40,9 +38,9 @@ use std::collections::BTreeSet;
 
 use enfilade_geom::{Allowance, Bvh, Triangle};
 
+use super::labels::Branches;
 use super::space::Space;
 use arms::Walls;
-pub(super) use labels::Branches;
 use regions::{NONE, TubeRegions};
 use rule::{LimbKind, classify};
 

@@ -10,8 +10,8 @@ use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::super::balls::circumsphere;
 use super::super::cells::OUTDOOR_CELL;
+use super::super::labels::{BranchMouth, Branches};
 use super::super::space::Space;
-use super::labels::{BranchMouth, Branches};
 use super::rule::NARROWS;
 
 /// Marks the absence of a region.

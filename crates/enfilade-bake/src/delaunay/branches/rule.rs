@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use super::labels::BranchMouth;
+use super::super::labels::BranchMouth;
 
 /// Least ratio of the trunk's largest ball near the mouth to the branch's largest ball well inside. Tubes of nearly one
 /// width continue each other. A higher value gives fewer branches.

@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use enfilade_geom::Sets;
 
+use super::super::labels::BranchMouth;
 use super::arms::Walls;
 use super::forks::{Fork, reach};
-use super::labels::BranchMouth;
 use super::regions::TubeRegions;
 use super::rule::{ARM_WEIGHS, Arm};
 

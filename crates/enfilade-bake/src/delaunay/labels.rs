@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::super::space::Space;
+use super::space::Space;
 
 /// The parts that lie in branches.
-pub(in super::super) struct Branches {
+pub(super) struct Branches {
     /// Branch of each part; 0 for none.
-    pub(in super::super) label_of_part: Vec<u32>,
+    pub(super) label_of_part: Vec<u32>,
     /// Mouth of each branch, from label 1 on.
     pub(super) mouths: Vec<BranchMouth>,
 }
@@ -24,7 +24,7 @@ pub(super) struct BranchMouth {
 
 impl Branches {
     /// Returns branches of which no part has any.
-    pub(in super::super) fn none(n_parts: usize) -> Self {
+    pub(super) fn none(n_parts: usize) -> Self {
         Self {
             label_of_part: vec![0; n_parts],
             mouths: Vec::new(),
@@ -32,12 +32,8 @@ impl Branches {
     }
 
     /// Drops each label whose share of a cell is less than one ball: that share takes the label of most of the cell.
-    /// Cells are those of [`flow_together`](super::super::cells::flow_together).
-    pub(in super::super) fn without_leftovers(
-        mut self,
-        space: &Space,
-        cell_of_part: &[u32],
-    ) -> Self {
+    /// Cells are those of [`flow_together`](super::cells::flow_together).
+    pub(super) fn without_leftovers(mut self, space: &Space, cell_of_part: &[u32]) -> Self {
         let mut shares: BTreeMap<(u32, u32), (f64, f64)> = BTreeMap::new();
         for (t, (&cell, &label)) in cell_of_part.iter().zip(&self.label_of_part).enumerate() {
             let (volume, radius) = shares.entry((cell, label)).or_default();
@@ -60,13 +56,13 @@ impl Branches {
         self
     }
 
-    pub(in super::super) fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.mouths.is_empty()
     }
 
     /// Returns the weight of an opening between two parts as a mouth, by their labels: the narrower branch ends there.
     /// 0 within a branch, and away from branches.
-    pub(in super::super) fn weight(&self, [a, b]: [u32; 2]) -> f64 {
+    pub(super) fn weight(&self, [a, b]: [u32; 2]) -> f64 {
         if a == b {
             return 0.0;
         }
@@ -80,7 +76,7 @@ impl Branches {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::space::divide;
+    use super::super::space::divide;
     use super::*;
     use crate::structure::structural_triangles;
     use enfilade_geom::{Bvh, DVec3};
