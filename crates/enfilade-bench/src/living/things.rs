@@ -11,7 +11,7 @@ use enfilade::world::{
     Flood, Layout, PartId, Place, Pose, Posted, Shape, Space, SpaceViewer, Things, Tie,
 };
 use enfilade::{CellId, PortalId, World};
-use enfilade_cli::cameras::walk;
+use enfilade_render::walk;
 use enfilade_testkit::{GridParams, Rng, dirkse_maze, room_grid};
 
 use crate::rows::Figure;
