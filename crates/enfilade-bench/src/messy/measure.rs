@@ -9,7 +9,7 @@ use anyhow::{Context, bail};
 use serde_json::Value;
 
 use crate::process::{add_scene_files, bake_command, binary};
-use crate::score::{V3, center_and_area, dot, inspect, locate, score_world, sub, unit, vec3};
+use crate::score::{V3, center_and_area, dot, inspect, list, locate, score_world, sub, unit, vec3};
 
 /// The figures of a bake.
 #[derive(Clone)]
@@ -91,10 +91,6 @@ pub(super) fn measure(
         },
         unsaid: unsaid(&graph, &said),
     })
-}
-
-fn list(v: &Value) -> &[Value] {
-    v.as_array().map_or(&[], Vec::as_slice)
 }
 
 /// Counts the points in indoor cells that are not rooms: a box taken for furniture stands in a room's air.
