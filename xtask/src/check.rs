@@ -7,8 +7,8 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 
 use crate::{
-    GATE, add_scene_files, apt, cargo, dependencies, features, floors, output_of, root, run_to_end,
-    scenes, score, target_dir, tidy,
+    GATE, add_scene_files, apt, cargo, dependencies, features, output_of, root, run_to_end, scenes,
+    target_dir, tidy,
 };
 
 /// Segments and rays tested on each scene; the full 10⁷ are run by hand.
@@ -162,7 +162,7 @@ fn validate(world: &Path) -> anyhow::Result<()> {
         .env("NODE_PATH", node_path())
         .arg("scripts/validate_gltf.mjs")
         .arg(world);
-    let said = output_of(&mut node, None)?;
+    let said = output_of(&mut node)?;
     print!(
         "{}",
         said.lines()
@@ -182,7 +182,7 @@ fn verify(world: &Path, scene: Option<&Path>) -> anyhow::Result<()> {
         command.args(["--sight", SIGHT_VIEWS]);
         add_scene_files(&mut command, scene, Some("--source"));
     }
-    print!("{}", output_of(&mut command, None)?);
+    print!("{}", output_of(&mut command)?);
     Ok(())
 }
 
@@ -205,7 +205,7 @@ fn demo() -> anyhow::Result<()> {
     // Files of an earlier version would be in the way.
     let _ = std::fs::remove_dir_all(&dir);
     let mut demo = Command::new(GATE.binary("enfilade"));
-    print!("{}", output_of(demo.arg("demo").arg("-o").arg(&dir), None)?);
+    print!("{}", output_of(demo.arg("demo").arg("-o").arg(&dir))?);
     let world = dir.join("world.glb");
     validate(&world)?;
     verify(&world, None)
@@ -224,10 +224,7 @@ fn world_of(name: &str) -> PathBuf {
 fn check_scene(scene: &Path, name: &str) -> anyhow::Result<()> {
     let world = world_of(name);
     std::fs::create_dir_all(target_dir().join("scenes"))?;
-    print!(
-        "{}",
-        output_of(&mut GATE.bake_command(scene, &world), None)?
-    );
+    print!("{}", output_of(&mut GATE.bake_command(scene, &world))?);
     validate(&world)?;
     verify(&world, Some(scene))?;
     check_order(scene, name, &world)
@@ -241,9 +238,9 @@ fn check_order(scene: &Path, name: &str, world: &Path) -> anyhow::Result<()> {
         .arg(scene)
         .args(["--shuffle", "1", "-o"])
         .arg(&folder);
-    output_of(&mut generate, None)?;
+    output_of(&mut generate)?;
     let other = folder.join("world.glb");
-    output_of(&mut GATE.bake_command(&folder, &other), None)?;
+    output_of(&mut GATE.bake_command(&folder, &other))?;
     if std::fs::read(world)? != std::fs::read(&other)? {
         bail!(
             "{} and {}, of the same scene in another order, differ",
@@ -256,13 +253,15 @@ fn check_order(scene: &Path, name: &str, world: &Path) -> anyhow::Result<()> {
 
 /// Scores the freshly baked worlds; fails if a figure lies below its floor.
 fn check_scores(scenes: &[PathBuf]) -> anyhow::Result<()> {
-    let mut rows = Vec::new();
-    for scene in scenes.iter().filter(|s| s.join("truth.json").is_file()) {
-        let world = world_of(&name_of(scene));
-        let graph = score::inspect(GATE, &world)?;
-        let row = score::score_world(GATE, scene, &world, &graph);
-        rows.push(row.with_context(|| scene.display().to_string())?);
+    let mut known = scenes
+        .iter()
+        .filter(|s| s.join("truth.json").is_file())
+        .peekable();
+    if known.peek().is_some() {
+        let mut score = Command::new(GATE.binary("enfilade-bench"));
+        score.arg("score").args(known);
+        score.arg("--baked").arg(target_dir().join("scenes"));
+        print!("{}", output_of(&mut score)?);
     }
-    score::print(&rows);
-    floors::check(&rows)
+    Ok(())
 }

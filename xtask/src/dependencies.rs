@@ -23,7 +23,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
         "--locked",
         "--all-features",
     ]);
-    let packages = packages(&serde_json::from_str(&output_of(&mut { metadata }, None)?)?);
+    let packages = packages(&serde_json::from_str(&output_of(&mut { metadata })?)?);
     let problems = rules.problems(&packages);
     if !problems.is_empty() {
         bail!("{}", problems.join("\n"));

@@ -17,12 +17,12 @@ pub(crate) fn run() -> anyhow::Result<()> {
     let page = std::fs::read_to_string(&page).with_context(|| page.display().to_string())?;
     let listed = listed(&page);
     let mut covered: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    let files = output_of(
-        Command::new("git")
-            .current_dir(root())
-            .args(["ls-files", "--", "crates/*.rs"]),
-        None,
-    )?;
+    let files =
+        output_of(
+            Command::new("git")
+                .current_dir(root())
+                .args(["ls-files", "--", "crates/*.rs"]),
+        )?;
     for file in files.lines() {
         let Ok(text) = std::fs::read_to_string(root().join(file)) else {
             continue;

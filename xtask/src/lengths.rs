@@ -1,4 +1,4 @@
-//! Limits on the length of files and functions.
+//! Limits on the length of files and functions, and on blocks within blocks.
 //!
 //! Test functions are exempt, and files of tests may be longer: a list of cases is read one by one.
 
@@ -10,9 +10,11 @@ const MAX_FILE: usize = 600;
 const MAX_TEST_FILE: usize = 800;
 /// Most lines of a function, from `fn` to its closing brace.
 const MAX_FUNCTION: usize = 100;
+/// Most blocks of a function within each other, its body included.
+const MAX_NESTED: usize = 6;
 
-/// Returns a line for each file and function in `sources` (path in the repository, text) that is too long. O(length
-/// of all files).
+/// Returns a line for each file and function in `sources` (path in the repository, text) that is too long, and each
+/// function that is nested too deep. O(length of all files).
 pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
     let line = |((file, function), n): ((&str, &str), usize)| {
         let (place, limit) = match function {
@@ -21,7 +23,14 @@ pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
         };
         format!("{place}: {n} lines, more than {limit}; split it by the questions it answers")
     };
-    too_long(sources).into_iter().map(line).collect()
+    let deep = too_deep(sources).into_iter().map(|(file, name, n)| {
+        format!("{file}: {name}: {n} blocks within each other, more than {MAX_NESTED}; name what the inner ones do")
+    });
+    too_long(sources)
+        .into_iter()
+        .map(line)
+        .chain(deep)
+        .collect()
 }
 
 /// Lines by file and function; the function is empty if the file itself is too long.
@@ -37,12 +46,33 @@ fn too_long(sources: &BTreeMap<String, String>) -> Lengths<'_> {
         if is_test(file) {
             continue;
         }
-        // Unit tests stand at the end of the file.
-        let end = text.find("\n#[cfg(test)]\nmod tests {");
-        for (name, n) in functions(&text[..end.unwrap_or(text.len())]) {
+        for (name, body) in functions(text) {
+            let n = body.matches('\n').count() + 1;
             if n > MAX_FUNCTION {
                 let longest = out.entry((file.as_str(), name)).or_insert(n);
                 *longest = n.max(*longest);
+            }
+        }
+    }
+    out
+}
+
+/// Returns file, name and depth of functions that are nested too deep.
+fn too_deep(sources: &BTreeMap<String, String>) -> Vec<(&str, &str, usize)> {
+    let mut out = Vec::new();
+    for (file, text) in sources.iter().filter(|(file, _)| !is_test(file)) {
+        for (name, body) in functions(text) {
+            let (mut depth, mut deepest) = (0_usize, 0);
+            for c in body.chars() {
+                match c {
+                    '{' => depth += 1,
+                    '}' => depth = depth.saturating_sub(1),
+                    _ => {}
+                }
+                deepest = deepest.max(depth);
+            }
+            if deepest > MAX_NESTED {
+                out.push((file.as_str(), name, deepest));
             }
         }
     }
@@ -61,9 +91,11 @@ fn is_test(file: &str) -> bool {
     file.contains("/tests/") || file.ends_with("tests.rs")
 }
 
-/// Returns the names of functions with bodies, and their lines from `fn` to the closing brace.
-fn functions(text: &str) -> Vec<(&str, usize)> {
-    let code = without_literals(text);
+/// Returns the names of functions with bodies, and their code from `fn` to the closing brace. Unit tests, which stand
+/// at the end of a file, are left out.
+fn functions(text: &str) -> Vec<(&str, String)> {
+    let end = text.find("\n#[cfg(test)]\nmod tests {");
+    let code = without_literals(&text[..end.unwrap_or(text.len())]);
     let mut out = Vec::new();
     for (at, _) in code.match_indices("fn ") {
         if code[..at].ends_with(is_word) {
@@ -72,9 +104,8 @@ fn functions(text: &str) -> Vec<(&str, usize)> {
         let name = &text[at + 3..];
         let name = &name[..name.find(|c| !is_word(c)).unwrap_or(name.len())];
         // The type of a function pointer and a macro's variable have no name here, a trait's declaration no body.
-        let n = body_end(&code[at..]).map(|end| code[at..at + end].matches('\n').count() + 1);
-        if let Some(n) = n.filter(|_| !name.is_empty()) {
-            out.push((name, n));
+        if let Some(end) = body_end(&code[at..]).filter(|_| !name.is_empty()) {
+            out.push((name, code[at..=at + end].to_owned()));
         }
     }
     out
@@ -241,14 +272,36 @@ mod tests {
             "pub const fn f<'a>(n: [u8; {{ 3 }}]) -> u8 {{\n{}\n",
             body.join("\n")
         );
-        assert_eq!(functions(&text), [("f", 9), ("inner", 1)]);
+        let lengths = functions(&text)
+            .into_iter()
+            .map(|(name, code)| (name, code.lines().count()));
+        assert!(lengths.eq([("f", 9), ("inner", 1)]));
     }
 
     #[test]
     fn what_has_no_body_is_no_function() {
         let text = "trait T {\n    fn declared(&self) -> [u8; 3];\n}\ntype F = fn (u8);\n\
                     // fn said() {}\nstatic S: &str = \"fn quoted() {}\";\nstruct Gfn {}\n";
-        assert_eq!(functions(text), []);
+        assert!(functions(text).is_empty());
+    }
+
+    #[test]
+    fn a_function_that_is_nested_too_deep_is_found_outside_tests() {
+        let nested = |n: usize| {
+            format!(
+                "fn f(_: [u8; {{ 1 }}]) {}\n",
+                "{".repeat(n) + &"}".repeat(n)
+            )
+        };
+        let tests = format!("\n#[cfg(test)]\nmod tests {{\n{}}}\n", nested(9));
+        let files = sources(&[
+            ("a.rs", nested(MAX_NESTED) + &tests),
+            ("b.rs", nested(MAX_NESTED + 1)),
+            ("c/tests.rs", nested(9)),
+        ]);
+        assert_eq!(too_deep(&files), [("b.rs", "f", MAX_NESTED + 1)]);
+        let said = problems(&files);
+        assert!(said[0].starts_with("b.rs: f: 7 blocks within each other, more than 6;"));
     }
 
     #[test]

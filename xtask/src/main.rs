@@ -1,20 +1,15 @@
 //! The project's chores: `cargo xtask test | tidy | score | bench`.
 //!
-//! `test` decides whether a change may land; `score` and `bench` print the tables of `docs/benchmarks/`.
+//! `test` decides whether a change may land; `score` and `bench` start `enfilade-bench`, which prints tables.
 
 mod apt;
-mod bench;
 mod check;
 mod dependencies;
 mod features;
-mod floors;
 mod lengths;
-mod messy;
 mod mutual;
 mod names;
-mod score;
 mod tidy;
-mod trust;
 mod words;
 
 use std::path::{Path, PathBuf};
@@ -25,32 +20,22 @@ use anyhow::{Context, bail};
 const USAGE: &str = "\
 usage: cargo xtask test
        cargo xtask tidy
-       cargo xtask score [--write] [--scenes DIR] [SCENE_DIR...]
+       cargo xtask score [OPTION...] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
-       cargo xtask bench messy [--json] [--rows ROW,...] [--scenes SCENE,...] [--rays N]
-       cargo xtask bench trust [--json] [--rows ROW,...] [--scenes SCENE,...] [--count N] [--from I]
        cargo xtask bench NAME [--json] [OPTION...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
   tidy    the checks of these that need no build: dependencies between crates, lengths, wording, links,
           licenses and versions of dependencies, features that tests name
-  score   rooms and doors found, compared with those that architects modeled
-  bench   growth of time and memory with the size of an office tower; with --peers, the voxel
-          kernels beside other implementations too (scripts/bench_kernels.py);
-          messy: robustness of rooms and doors against disturbed models, a row per figure; --rows
-          (moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign) and --scenes
-          select by beginnings of names;
-          trust: hostile and huge input, a row per figure; --rows (bound, case, commands, estimate, gate, habits, large,
-          mutated, nasty, order, tampered, tight) selects; --count and --from select the damaged files of `mutated` and
-          the shuffles of `order`, --scenes its scenes;
-          any other NAME (bring, bsp, builders, simplify, see, facade, tight, maze, walkthrough, los): a table of
-          docs/benchmarks/; `cargo xtask bench --help` lists them, `bench NAME --help` their options
+  score   rooms and doors found, compared with those that architects modeled; --help tells the options
+  bench   a table of docs/benchmarks/: `cargo xtask bench --help` lists them, `bench NAME --help` their options;
+          without NAME, growth of time and memory with the size of an office tower
 
---write writes the table to docs/benchmarks/. Real scenes (folders with a scene.glb) are searched in
-$ENFILADE_SCENES, then in ../shared/scenes.";
+Real scenes (folders with a scene.glb) are searched in $ENFILADE_SCENES, then in ../shared/scenes.";
 
 fn main() -> ExitCode {
-    let Some(task) = Task::parse(std::env::args().skip(1)) else {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let Some(task) = Task::parse(&args) else {
         eprintln!("{USAGE}");
         return ExitCode::from(2);
     };
@@ -59,13 +44,7 @@ fn main() -> ExitCode {
         Task::Tidy => tidy::run()
             .and_then(|()| dependencies::run())
             .and_then(|()| features::run()),
-        Task::Score { is_written, dirs } => {
-            score::run(RELEASE, &dirs, is_written).and_then(|rows| floors::check(&rows))
-        }
-        Task::Messy(options) => messy::run(&options),
-        Task::Trust(options) => trust::run(&options),
-        Task::Bench { is_written, peers } => bench::run(peers.as_deref(), is_written),
-        Task::Measure(args) => return bench::measure(&args),
+        Task::Bench(args) => return bench(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -77,89 +56,57 @@ fn main() -> ExitCode {
 }
 
 /// A parsed task.
+#[derive(Debug, PartialEq)]
 enum Task {
     Test,
     Tidy,
-    Score {
-        is_written: bool,
-        dirs: Vec<PathBuf>,
-    },
-    Bench {
-        is_written: bool,
-        peers: Option<PathBuf>,
-    },
-    Messy(messy::Options),
-    Trust(trust::TrustOptions),
     /// Arguments of `enfilade-bench`.
-    Measure(Vec<String>),
+    Bench(Vec<String>),
 }
 
 impl Task {
     /// Returns `None` for invalid arguments.
-    fn parse(mut args: impl Iterator<Item = String>) -> Option<Self> {
-        let name = args.next()?;
-        let (mut is_written, mut dirs, mut peers) = (false, Vec::new(), None);
-        let mut messy: Option<messy::Options> = None;
-        while let Some(arg) = args.next() {
-            if name == "bench" && arg == "trust" && messy.is_none() {
-                return Self::trust(args);
+    fn parse(args: &[String]) -> Option<Self> {
+        let (name, rest) = args.split_first()?;
+        match (name.as_str(), rest.first().map(String::as_str)) {
+            ("test", None) => Some(Self::Test),
+            ("tidy", None) => Some(Self::Tidy),
+            ("score", _) => Some(Self::Bench(args.to_vec())),
+            ("bench", None | Some("--write" | "--peers")) => {
+                Some(Self::Bench([&["growth".to_owned()], rest].concat()))
             }
-            let is_name = arg != "messy" && !arg.starts_with('-');
-            let asks_help = ["--help", "-h"].contains(&arg.as_str());
-            if name == "bench" && messy.is_none() && (is_name || asks_help) {
-                // Options of growth and kernels must not precede the name.
-                let is_first = !is_written && peers.is_none();
-                return is_first.then(|| Self::Measure([arg].into_iter().chain(args).collect()));
-            }
-            match (name.as_str(), arg.as_str()) {
-                ("bench", "messy") => messy = Some(messy::Options::default()),
-                ("bench", option) if messy.is_some() => {
-                    let options = messy.as_mut()?;
-                    let names = |list: String| list.split(',').map(str::to_owned).collect();
-                    match option {
-                        "--json" => options.is_json = true,
-                        "--rows" => options.rows = names(args.next()?),
-                        "--scenes" => options.scenes = names(args.next()?),
-                        "--rays" => options.rays = Some(args.next()?.parse().ok()?),
-                        _ => return None,
-                    }
-                }
-                ("score" | "bench", "--write") => is_written = true,
-                ("score", "--scenes") => dirs.extend(scenes_in(Path::new(&args.next()?))),
-                ("bench", "--peers") => peers = Some(PathBuf::from(args.next()?)),
-                ("score", dir) if !dir.starts_with('-') => dirs.push(PathBuf::from(dir)),
-                _ => return None,
-            }
-        }
-        match name.as_str() {
-            "test" => Some(Self::Test),
-            "tidy" => Some(Self::Tidy),
-            "score" => Some(Self::Score { is_written, dirs }),
-            "bench" if messy.is_some() => messy.map(Self::Messy),
-            "bench" => Some(Self::Bench { is_written, peers }),
+            ("bench", _) => Some(Self::Bench(rest.to_vec())),
             _ => None,
         }
     }
 }
 
-impl Task {
-    fn trust(mut args: impl Iterator<Item = String>) -> Option<Self> {
-        let mut options = trust::TrustOptions::default();
-        let (mut from, mut n) = (0, None);
-        while let Some(arg) = args.next() {
-            match arg.as_str() {
-                "--json" => options.is_json = true,
-                "--rows" => options.rows = args.next()?.split(',').map(str::to_owned).collect(),
-                "--scenes" => options.scenes = args.next()?.split(',').map(str::to_owned).collect(),
-                "--count" => n = Some(args.next()?.parse().ok()?),
-                "--from" => from = args.next()?.parse().ok()?,
-                _ => return None,
-            }
-        }
-        options.runs = trust::runs(from, n);
-        options.shuffles = trust::shuffles(from, n);
-        Some(Self::Trust(options))
-    }
+/// Builds the benchmarks and what they start, and runs them; returns their exit code.
+fn bench(args: &[String]) -> ExitCode {
+    let packages = [
+        "enfilade-bench",
+        "enfilade-cli",
+        "enfilade-testkit",
+        "enfilade-voxel",
+    ];
+    let run = || {
+        let mut build = RELEASE.cargo(
+            "build",
+            &["--bins", "--example=generate", "--example=kernel_bench"],
+        );
+        run_to_end(build.args(packages.iter().flat_map(|package| ["-p", package])))?;
+        let status = Command::new(RELEASE.binary("enfilade-bench"))
+            .args(args)
+            .status()?;
+        anyhow::Ok(u8::try_from(status.code().unwrap_or(1)).unwrap_or(1))
+    };
+    run().map_or_else(
+        |error| {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        },
+        ExitCode::from,
+    )
 }
 
 /// Returns the workspace's root: that of the checkout in which `cargo xtask` was called, even if the binary was built
@@ -218,25 +165,12 @@ fn add_scene_files(command: &mut Command, scene: &Path, name: Option<&str>) {
     }
 }
 
-/// Returns the folder of real scenes, if there is one.
-fn scenes_dir() -> Option<PathBuf> {
-    let dir = std::env::var_os("ENFILADE_SCENES")
-        .map_or_else(|| root().join("../shared/scenes"), PathBuf::from);
-    dir.is_dir().then_some(dir)
-}
-
 /// Returns the real scenes, by name.
 fn scenes() -> Vec<PathBuf> {
-    scenes_dir().map_or_else(Vec::new, |dir| scenes_in(&dir))
-}
-
-/// Returns the folders with a `scene.glb` in `dir`, by name.
-fn scenes_in(dir: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(dir) else {
-        return Vec::new();
-    };
+    let dir = std::env::var_os("ENFILADE_SCENES")
+        .map_or_else(|| root().join("../shared/scenes"), PathBuf::from);
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten();
     let mut found: Vec<PathBuf> = entries
-        .flatten()
         .map(|e| e.path())
         .filter(|p| p.join("scene.glb").is_file())
         .collect();
@@ -262,42 +196,11 @@ fn run_to_end(command: &mut Command) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes `text` between the two marks of a page of `docs/benchmarks/`; text around it stays.
-fn write_between_marks(page: &str, text: &str) -> anyhow::Result<()> {
-    const BEGIN: &str = "<!-- written by `cargo xtask";
-    const END: &str = "<!-- end -->";
-    let path = root().join("docs/benchmarks").join(page);
-    let old = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-    let marks = || {
-        let begin = old.find(BEGIN)?;
-        let begin = begin + old[begin..].find('\n')? + 1;
-        Some((begin, begin + old[begin..].find(END)?))
-    };
-    let (begin, end) = marks().with_context(|| format!("{page} has lost its marks"))?;
-    let new = format!("{}\n{}\n\n{}", &old[..begin], text.trim_end(), &old[end..]);
-    std::fs::write(&path, new).with_context(|| path.display().to_string())
-}
-
 /// Returns the standard output of a command that must succeed; an error contains its standard error.
-fn output_of(command: &mut Command, input: Option<&str>) -> anyhow::Result<String> {
-    use std::io::Write as _;
-    use std::process::Stdio;
-    command.stdin(if input.is_some() {
-        Stdio::piped()
-    } else {
-        Stdio::null()
-    });
-    let mut child = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
+fn output_of(command: &mut Command) -> anyhow::Result<String> {
+    let done = command
+        .output()
         .with_context(|| format!("cannot start {command:?}"))?;
-    if let (Some(text), Some(mut stdin)) = (input, child.stdin.take()) {
-        let text = text.to_owned();
-        // In its own thread: the child may fill its output before it has read all input.
-        std::thread::spawn(move || stdin.write_all(text.as_bytes()));
-    }
-    let done = child.wait_with_output()?;
     if !done.status.success() {
         // `verify` and the validator print their reports to standard output.
         bail!(
@@ -315,31 +218,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messy_has_options_of_its_own() {
-        let parse = |line: &str| Task::parse(line.split(' ').map(str::to_owned));
-        let Some(Task::Messy(options)) =
-            parse("bench messy --json --rows moved,fault --scenes house --rays 100")
-        else {
-            panic!("not understood");
-        };
-        assert!(options.is_json);
-        assert_eq!(options.rows, ["moved", "fault"]);
-        assert_eq!(options.scenes, ["house"]);
-        assert_eq!(options.rays, Some(100));
-        assert!(matches!(parse("bench --write"), Some(Task::Bench { .. })));
-        assert!(parse("bench messy --write").is_none());
-        assert!(parse("bench --json").is_none());
-        assert!(parse("score messy --json").is_none());
-    }
-
-    #[test]
-    fn other_benches_get_their_arguments_as_they_are() {
-        let parse = |line: &str| Task::parse(line.split(' ').map(str::to_owned));
-        let Some(Task::Measure(args)) = parse("bench see a.glb --rooms 100 --json") else {
-            panic!("not understood");
-        };
-        assert_eq!(args, ["see", "a.glb", "--rooms", "100", "--json"]);
-        assert!(matches!(parse("bench --help"), Some(Task::Measure(_))));
-        assert!(parse("bench --write see").is_none());
+    fn benches_get_their_arguments_as_they_are_and_growth_has_no_name() {
+        let parse =
+            |line: &str| Task::parse(&line.split(' ').map(str::to_owned).collect::<Vec<_>>());
+        for (line, expected) in [
+            (
+                "bench see a.glb --rooms 100 --json",
+                "see a.glb --rooms 100 --json",
+            ),
+            (
+                "bench messy --json --rows moved,fault",
+                "messy --json --rows moved,fault",
+            ),
+            ("bench --help", "--help"),
+            ("bench --write", "growth --write"),
+            ("bench --peers scripts", "growth --peers scripts"),
+            ("bench", "growth"),
+            ("score --write house", "score --write house"),
+        ] {
+            let args = expected.split(' ').map(str::to_owned).collect();
+            assert_eq!(parse(line), Some(Task::Bench(args)), "{line}");
+        }
+        assert_eq!(parse("test"), Some(Task::Test));
+        assert_eq!(parse("test --json"), None);
+        assert_eq!(parse("nothing"), None);
     }
 }

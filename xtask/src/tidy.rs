@@ -181,19 +181,18 @@ const FACADE_ALWAYS: [&str; 3] = ["enfilade-geom", "enfilade-cpg", "enfilade-run
 
 /// Finds all problems, and fails with one line for each.
 pub(crate) fn run() -> anyhow::Result<()> {
-    let listed = output_of(
-        Command::new("git").current_dir(root()).args([
-            "ls-files",
-            "--cached",
-            "--others",
-            "--exclude-standard",
-        ]),
-        None,
-    )?;
-    let said = output_of(
-        &mut cargo(&["metadata", "--format-version", "1", "--no-deps"]),
-        None,
-    )?;
+    let listed = output_of(Command::new("git").current_dir(root()).args([
+        "ls-files",
+        "--cached",
+        "--others",
+        "--exclude-standard",
+    ]))?;
+    let said = output_of(&mut cargo(&[
+        "metadata",
+        "--format-version",
+        "1",
+        "--no-deps",
+    ]))?;
     let mut problems = dependency_problems(&serde_json::from_str(&said)?);
     let mut n_files = 0;
     let mut sources = BTreeMap::new();

@@ -1,17 +1,26 @@
 //! The experiments behind `docs/benchmarks/`: run by `cargo xtask bench NAME`, printed as Markdown tables or as lines
 //! of JSON.
 
+// A program that prints tables, which the workspace's lints forbid.
+#![allow(clippy::print_stdout)]
+
 mod bring;
 mod bsp;
 mod builders;
 mod facade;
+mod floors;
+mod growth;
 mod living;
 mod measure;
+mod messy;
+mod process;
 mod rows;
+mod score;
 mod sight;
 mod subject;
 mod table;
 mod tampered;
+mod trust;
 mod walkthrough;
 
 use std::path::PathBuf;
@@ -23,10 +32,15 @@ use enfilade::runtime::SightOptions;
 use bsp::{bench_bsp, bench_simplify};
 use builders::bench_builders;
 use facade::bench_facade;
-use rows::bench_rows;
+use growth::bench_growth;
+use messy::{Messy, bench_messy};
+use process::scenes_in;
+use rows::{Chosen, bench_rows};
+use score::bench_score;
 use sight::{bench_los, bench_maze, bench_see, bench_tight};
 use table::Table;
 use tampered::bench_tampered;
+use trust::{Trust, bench_trust};
 use walkthrough::Walkthrough;
 
 /// Measure, and print the tables of the documentation.
@@ -43,24 +57,39 @@ struct Cli {
 #[derive(clap::Subcommand)]
 enum What {
     /// Value of worlds to programs and modelers: a row per figure, with the value that it must reach.
-    Bring {
-        /// Only rows whose names begin with one of these.
-        #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
-        rows: Vec<String>,
-        /// Only scenes whose names begin with one of these. Scenes are folders of $ENFILADE_SCENES, or of
-        /// ../shared/scenes.
-        #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
-        scenes: Vec<String>,
-    },
+    Bring(Chosen),
     /// Things, paths, sound, contacts and moving rooms: a row per figure, with the value that it must reach.
-    Living {
-        /// Only rows whose names begin with one of these.
-        #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
-        rows: Vec<String>,
-        /// Only scenes whose names begin with one of these.
-        #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
-        scenes: Vec<String>,
+    Living(Chosen),
+    /// Rooms, doors and windows found, compared with those that architects modeled; fails below the floors.
+    Score {
+        /// Folders with `scene.glb` and `truth.json`; all real scenes if there are none.
+        dirs: Vec<PathBuf>,
+        /// All scenes in this folder.
+        #[arg(long = "scenes", value_name = "DIR")]
+        folders: Vec<PathBuf>,
+        /// Worlds baked before, each named as its scene.
+        #[arg(long, value_name = "DIR")]
+        baked: Option<PathBuf>,
+        /// Write the table to docs/benchmarks/rooms.md.
+        #[arg(long)]
+        write: bool,
     },
+    /// Growth of time and memory of a bake with the size of an office tower.
+    Growth {
+        /// The voxel kernels beside other implementations too, with inputs from these scripts
+        /// (scripts/bench_kernels.py).
+        #[arg(long, value_name = "DIR")]
+        peers: Option<PathBuf>,
+        /// Write the table to docs/benchmarks/growth.md.
+        #[arg(long)]
+        write: bool,
+    },
+    /// Robustness of rooms and doors against disturbed models: a row per figure, with the value that it must reach.
+    /// Rows: moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign.
+    Messy(Messy),
+    /// Hostile and huge input: a row per figure, with the value that it must reach. Rows: bound, case, commands,
+    /// estimate, gate, habits, large, mutated, nasty, order, tampered, tight.
+    Trust(Trust),
     /// Tampered worlds, those of a generated house included: at how many of three places the defaults find each kind.
     /// Prints lines of JSON, the input of `bench trust`.
     Tampered {
@@ -164,9 +193,22 @@ enum What {
 fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
-        What::Bring { rows, scenes } => return bench_rows(&bring::ROWS, args.json, rows, scenes),
+        What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
+        What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
+        What::Messy(options) => return bench_messy(options, args.json),
+        What::Trust(options) => return bench_trust(options, args.json),
         What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),
-        What::Living { rows, scenes } => return bench_rows(living::ROWS, args.json, rows, scenes),
+        What::Score {
+            dirs,
+            folders,
+            baked,
+            write,
+        } => {
+            let found = folders.iter().flat_map(|folder| scenes_in(folder));
+            let dirs: Vec<PathBuf> = dirs.iter().cloned().chain(found).collect();
+            bench_score(&mut table, &dirs, baked.as_deref(), *write)?;
+        }
+        What::Growth { peers, write } => bench_growth(&mut table, peers.as_deref(), *write)?,
         What::Bsp {
             scenes,
             heuristics,

@@ -9,8 +9,8 @@ use enfilade::runtime::{
     Narrowing, SeeOptions, Sight, SightOptions, SightState, Sightlines, View, Viewer,
 };
 use enfilade_cli::answers::Answers;
-use enfilade_cli::cameras::walk;
 use enfilade_cli::world::read_world;
+use enfilade_render::walk;
 use enfilade_testkit::{Rng, courtyard};
 use enfilade_verify::{ViewOptions, ViewReport, verify_views};
 

@@ -38,6 +38,11 @@ impl Table {
         }
     }
 
+    /// Prints lines.
+    pub(crate) fn push_text(&mut self, text: &str) {
+        text.lines().for_each(|line| self.push(line.to_owned()));
+    }
+
     /// # Errors
     ///
     /// The first failure to print.

@@ -11,10 +11,11 @@ use enfilade::cpg::{CellId, DetailObject, World};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::{Mesh, Primitive};
 use enfilade::runtime::Sight;
-use enfilade_cli::cameras::{FOV, walk_cameras};
 use enfilade_cli::values::size;
 use enfilade_cli::world::read_world;
-use enfilade_render::{AdapterChoice, Camera, Culling, Frame, Paint, Sparing, Studio, Style};
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, FOV, Frame, Paint, Sparing, Studio, Style, walk_cameras,
+};
 use enfilade_testkit::{TowerParams, clinic, office_tower};
 
 use crate::table::Table;

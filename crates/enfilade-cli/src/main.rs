@@ -6,7 +6,6 @@
 //!
 //! Exit code 0: done; 1: failed, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
-mod auralize;
 mod bake;
 mod decimate;
 mod demo;

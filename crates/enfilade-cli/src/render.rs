@@ -8,8 +8,8 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Mark, Paint, Picture, Projection, Shape, Sparing,
-    Studio, Style,
+    AdapterChoice, Camera, Culling, FOV, Frame, Mark, Paint, Picture, Projection, Shape, Sparing,
+    Studio, Style, good_camera, walk_cameras,
 };
 use serde_json::json;
 
@@ -17,7 +17,7 @@ use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json};
-use enfilade_cli::cameras::{FOV, good_camera, path_text, read_path, walk_cameras};
+use enfilade_cli::cameras::{path_text, read_path};
 use enfilade_cli::input::name_of;
 use enfilade_cli::values::{door, point, size};
 use enfilade_cli::world::read_world;

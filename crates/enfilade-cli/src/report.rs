@@ -9,7 +9,9 @@ use enfilade::cpg::{CellId, Pvs, SightGraph, World};
 use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};
 use enfilade::vis::{VisConfig, VisContext, see_all};
-use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, RenderError, Studio, Style};
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, FOV, Gpu, RenderError, Studio, Style, good_camera, walk_cameras,
+};
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
@@ -18,7 +20,6 @@ use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
 use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
 use crate::screen::{Warned, print_json};
-use enfilade_cli::cameras::{FOV, good_camera, walk_cameras};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 

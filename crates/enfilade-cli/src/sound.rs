@@ -8,11 +8,10 @@ use enfilade::cpg::{PortalId, World};
 use enfilade::geom::{Allowance, DVec3};
 use enfilade::runtime::{Sight, SightState};
 use enfilade::world::{
-    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, Reverb, Transmission, absorption_of_name,
-    at_ears,
+    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Layout, Listener,
+    Reverb, Transmission, absorption_of_name, at_ears, test_sound,
 };
 
-use crate::auralize::{BLOCK, Block, Renderer, test_sound};
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, write_streamed};
@@ -97,17 +96,17 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     let walk = HeardWalk {
         points: &points,
         n_blocks: n_blocks(seconds, rate),
-        seconds_of_block: BLOCK as f64 / f64::from(rate),
+        seconds_of_block: AUDIO_BLOCK as f64 / f64::from(rate),
         source: exact(args.source),
     };
     let rows = match &args.output {
         None => walk.hear(args, &world, &allowance, |_| Ok(()))?,
         Some(path) => {
             let mut rows = Vec::new();
-            let mut renderer = Renderer::new(&source, rate);
+            let mut renderer = Auralizer::new(&source, rate);
             write_streamed(path, |out| {
                 let mut out = BufWriter::with_capacity(1 << 16, out);
-                out.write_all(&wav_head(walk.n_blocks * BLOCK, rate))?;
+                out.write_all(&wav_head(walk.n_blocks * AUDIO_BLOCK, rate))?;
                 rows = walk.hear(args, &world, &allowance, |block| {
                     for sample in renderer.render(block).iter().flatten() {
                         out.write_all(&((sample * 32767.0).round() as i16).to_le_bytes())?;
@@ -144,7 +143,7 @@ impl HeardWalk<'_> {
         args: &Sound,
         world: &World,
         allowance: &Allowance,
-        mut each: impl FnMut(&Block) -> anyhow::Result<()>,
+        mut each: impl FnMut(&AudioBlock) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<HeardLine>> {
         let layout = Layout::new(world);
         let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
@@ -160,7 +159,7 @@ impl HeardWalk<'_> {
         let mut fields = DiffuseFields::new();
         fields.solve(&reverb, source_cell, |p| acoustics.transmitted(&state, p));
         let (mut ears, mut rows) = (Listener::new(), Vec::new());
-        let mut before: Option<Block> = None;
+        let mut before: Option<AudioBlock> = None;
         let mut is_row_due = 0.0;
         for k in 0..self.n_blocks {
             if !allowance.spend(WORK_A_BLOCK) {
@@ -180,10 +179,10 @@ impl HeardWalk<'_> {
             let heard = ears.hear(&acoustics, &layout, 0, source_cell, source);
             let (toward, gain) = heard.map_or((DVec3::ZERO, 0.0), |h| (h.direction, h.gain));
             let (room, rt60) = (fields.gain(cell), fields.rt60(cell));
-            let follow = |of: fn(&Block) -> f64, now| {
+            let follow = |of: fn(&AudioBlock) -> f64, now| {
                 follow(before.as_ref().map(of), now, self.seconds_of_block)
             };
-            let block = Block {
+            let block = AudioBlock {
                 length: heard.map_or(0.0, |h| h.length),
                 ears: at_ears(toward, ahead, DVec3::Y).map(|(g, late)| (g * gain, late)),
                 room: follow(|b| b.room, room),
@@ -239,7 +238,7 @@ fn path(listener: &[[f32; 3]]) -> anyhow::Result<(Vec<DVec3>, f64)> {
 }
 
 fn n_blocks(seconds: f64, rate: u32) -> usize {
-    (seconds * f64::from(rate) / BLOCK as f64).ceil() as usize
+    (seconds * f64::from(rate) / AUDIO_BLOCK as f64).ceil() as usize
 }
 
 /// The position of the walker after a length, and the direction of view: ahead, or towards the source if standing.
@@ -277,7 +276,7 @@ fn read_wav(path: &Path, seconds: f64) -> anyhow::Result<(u32, Vec<f32>)> {
     }
     let channels = usize::from(spec.channels.max(1));
     // One more, to interpolate after the last sample.
-    let n = n_blocks(seconds, spec.sample_rate) * BLOCK + 1;
+    let n = n_blocks(seconds, spec.sample_rate) * AUDIO_BLOCK + 1;
     let most = n.min(MOST_SAMPLES + 1);
     let samples: Result<Vec<f32>, _> = match spec.sample_format {
         hound::SampleFormat::Float => {

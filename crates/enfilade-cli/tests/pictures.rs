@@ -96,7 +96,7 @@ fn counts_are_those_of_the_picture() {
         // Pictures are drawn at twice their size and halved: four pixels for each.
         let size = [320, 180];
         let camera = Camera {
-            fov_y: enfilade_cli::cameras::FOV,
+            fov_y: enfilade_render::FOV,
             ..Camera::looking_at(eye, look)
         };
         let view = camera.view(size[0] as f32 / size[1] as f32).unwrap();
@@ -147,8 +147,8 @@ fn overdraw_has_a_scale() {
 
 #[test]
 fn a_photographer_stands_in_a_corner_and_sees_far() {
-    use enfilade_cli::cameras::{EYE_HEIGHT, good_camera};
     use enfilade_render::{AdapterChoice, Gpu, Studio};
+    use enfilade_render::{EYE_HEIGHT, good_camera};
     let world = room_grid(&GridParams::offices(24, 1));
     let gpu = || Gpu::open(&AdapterChoice::Software).unwrap();
     let mut studio = Studio::new(gpu(), &world).unwrap();

@@ -98,25 +98,20 @@ impl Locator {
                 d,
             };
             let (front, back) = polygon.split(&plane, TOUCH);
-            match (front, back) {
-                // In the plane: visit both sides.
-                (None, None) => {
-                    stack.push((node.children[0], polygon.clone()));
-                    stack.push((node.children[1], polygon));
-                }
-                (front, back) => {
-                    let touches = polygon
-                        .points
-                        .iter()
-                        .any(|&p| plane.signed_distance(p).abs() <= TOUCH);
-                    for (child, part) in node.children.into_iter().zip([front, back]) {
-                        match part {
-                            Some(part) => stack.push((child, part)),
-                            // The polygon ends at the plane: only an edge or vertex of it touches the space behind.
-                            None if touches => stack.push((child, on_plane(&polygon, &plane))),
-                            None => {}
-                        }
-                    }
+            // In the plane: visit both sides.
+            if front.is_none() && back.is_none() {
+                stack.push((node.children[0], polygon.clone()));
+                stack.push((node.children[1], polygon));
+                continue;
+            }
+            let mut points = polygon.points.iter();
+            let touches = points.any(|&p| plane.signed_distance(p).abs() <= TOUCH);
+            for (child, part) in node.children.into_iter().zip([front, back]) {
+                match part {
+                    Some(part) => stack.push((child, part)),
+                    // The polygon ends at the plane: only an edge or vertex of it touches the space behind.
+                    None if touches => stack.push((child, on_plane(&polygon, &plane))),
+                    None => {}
                 }
             }
         }

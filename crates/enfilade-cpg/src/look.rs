@@ -133,6 +133,19 @@ pub(crate) fn add_extensions(used: &mut BTreeSet<String>, text: &str) {
     }
 }
 
+/// Returns the number of texture coordinate sets that a texture of a material reads.
+fn n_sets_of_texture(texture: &Value) -> u64 {
+    let transformed = texture
+        .get("extensions")
+        .and_then(|e| e.get("KHR_texture_transform"))
+        .and_then(|t| t.get("texCoord"));
+    // A renderer without the transform reads the texture's own set.
+    let own = texture.get("texCoord").and_then(Value::as_u64).unwrap_or(0);
+    let sets = transformed.and_then(Value::as_u64).into_iter().chain([own]);
+    let read = sets.filter(|&set| set < MAX_TEXCOORD_SETS);
+    read.map(|set| set + 1).max().unwrap_or(0)
+}
+
 /// Returns the number of texture coordinate sets that a material reads; 0 without a texture.
 ///
 /// Ignores sets beyond the eighth: no renderer has as many, and a damaged number must not make the writer fill
@@ -146,18 +159,7 @@ pub(crate) fn n_texcoord_sets(text: &str) -> usize {
                         continue;
                     }
                     if key.ends_with("Texture") && inner.get("index").is_some() {
-                        let transformed = inner
-                            .get("extensions")
-                            .and_then(|e| e.get("KHR_texture_transform"))
-                            .and_then(|t| t.get("texCoord"));
-                        // A renderer without the transform reads the texture's own set.
-                        let own = inner.get("texCoord").and_then(Value::as_u64).unwrap_or(0);
-                        let other = transformed.and_then(Value::as_u64);
-                        for set in [Some(own), other].into_iter().flatten() {
-                            if set < MAX_TEXCOORD_SETS {
-                                *most = (*most).max(set + 1);
-                            }
-                        }
+                        *most = (*most).max(n_sets_of_texture(inner));
                     }
                     visit(most, inner);
                 }

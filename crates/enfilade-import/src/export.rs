@@ -339,15 +339,13 @@ impl Writer {
             let image = texture.image.map(|i| i as usize);
             if let Some(number) = image.and_then(|i| image_numbers[i]) {
                 let mime = image.map_or("", |i| &scene.images[i].mime);
-                match image_extension(mime) {
-                    Some("") | None => {
-                        def.insert("source".into(), number.into());
-                    }
-                    Some(extension) => {
-                        let source = json!({ extension: { "source": number } });
-                        def.insert("extensions".into(), source);
-                        self.extensions.insert(extension.into());
-                    }
+                let extension = image_extension(mime).unwrap_or_default();
+                if extension.is_empty() {
+                    def.insert("source".into(), number.into());
+                } else {
+                    let source = json!({ extension: { "source": number } });
+                    def.insert("extensions".into(), source);
+                    self.extensions.insert(extension.into());
                 }
             }
             if !texture.sampler.is_empty()

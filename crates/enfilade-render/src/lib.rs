@@ -29,6 +29,7 @@ mod scale;
 mod scene;
 mod shadings;
 mod studio;
+mod viewpoints;
 
 pub use camera::{Camera, Projection};
 pub use frame::{Frame, Paint, Style};
@@ -42,3 +43,4 @@ pub use queries::QueryCounts;
 pub use renderer::{Renderer, Stage};
 pub use scene::{GpuWorld, cell_color};
 pub use studio::{Culling, Studio, Target};
+pub use viewpoints::{EYE_HEIGHT, FOV, good_camera, portal_looked_at, walk, walk_cameras};

@@ -75,6 +75,18 @@ impl GridParams {
         }
     }
 }
+/// Returns a room with a window in each wall, 3 to 6 m, times `size`.
+#[must_use]
+pub fn cabin(seed: u64, size: f32, furniture: usize) -> World {
+    let world = room_grid(&GridParams {
+        size: [1, 1, 1],
+        windows: 1.0,
+        furniture,
+        ..GridParams::offices(1, seed)
+    });
+    scaled_world(world, size)
+}
+
 /// Rooms on a grid, with random doorways, windows, holes in floors, concave rooms and furniture.
 ///
 /// # Panics

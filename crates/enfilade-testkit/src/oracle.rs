@@ -2,8 +2,12 @@
 
 use std::collections::HashMap;
 
+use enfilade_geom::ray::segment_to_triangle_distance;
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{
+    Aabb, DMat3, DQuat, DVec3, Plane, Triangle, Winding, closest_point_on_triangle,
+    triangle_area_normal,
+};
 
 /// Returns the world triangles of all structural objects.
 #[must_use]
@@ -221,6 +225,57 @@ impl FloodGrid {
         let label = self.labels[(z * self.n[1] + y) * self.n[0] + x];
         (label != SOLID).then_some(label)
     }
+}
+
+/// Returns `true` if a box, rotated by `turn` and then moved to `at`, meets a convex polygon: a part of it lies between
+/// the box's sides.
+#[must_use]
+pub fn box_meets(half: DVec3, turn: DQuat, at: DVec3, polygon: &[DVec3]) -> bool {
+    let mut left = Some(Winding::new(polygon.to_vec()));
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        for side in [axis, -axis] {
+            let plane = Plane::through(at + turn * (side * half), -(turn * side));
+            left = left.and_then(|w| w.clipped(&plane, 0.0));
+        }
+    }
+    left.is_some()
+}
+
+/// Returns `true` if a ball meets a convex polygon, by its triangles.
+#[must_use]
+pub fn ball_meets(radius: f64, center: DVec3, polygon: &[DVec3]) -> bool {
+    (2..polygon.len()).any(|i| {
+        let triangle = [polygon[0], polygon[i - 1], polygon[i]];
+        center.distance(closest_point_on_triangle(center, &triangle)) <= radius
+    })
+}
+
+/// Returns the distance of a triangle from a box, rotated by `turn` and then moved to `at`; 0 if they touch.
+#[must_use]
+pub fn box_to_triangle_distance(half: DVec3, turn: DQuat, at: DVec3, t: &Triangle) -> f64 {
+    // In the box's own axes.
+    let turn = DMat3::from_quat(turn).transpose();
+    let t = t.map(|p| turn * (p - at));
+    let own = Aabb::new(-half, half);
+    if t.iter().any(|p| own.contains(*p)) {
+        return 0.0;
+    }
+    let corners = own.corners();
+    let mut least = f64::INFINITY;
+    for i in 0..8 {
+        for k in [1, 2, 4] {
+            if i & k == 0 {
+                let d = segment_to_triangle_distance(corners[i], corners[i | k], &t);
+                least = least.min(d);
+            }
+        }
+    }
+    for face in own.triangles() {
+        for i in 0..3 {
+            least = least.min(segment_to_triangle_distance(t[i], t[(i + 1) % 3], &face));
+        }
+    }
+    least
 }
 
 /// Returns `true` if a triangle meets a cube, so that none of the 13 candidate axes separates them.

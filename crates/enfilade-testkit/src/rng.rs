@@ -4,6 +4,8 @@
 //! Scenes must be equal on every machine and for every version of any dependency, so the generator is
 //! implemented here.
 
+use enfilade_geom::{Aabb, DQuat, DVec3};
+
 /// A reproducible random generator.
 #[derive(Clone, Debug)]
 pub struct Rng {
@@ -56,6 +58,17 @@ impl Rng {
     /// Returns `true` with probability `p`.
     pub fn chance(&mut self, p: f64) -> bool {
         self.unit() < p
+    }
+
+    /// Returns any rotation.
+    pub fn turn(&mut self) -> DQuat {
+        let mut one = || self.range(-1.0, 1.0);
+        DQuat::from_xyzw(one(), one(), one(), one()).normalize()
+    }
+
+    /// Returns a point in a box.
+    pub fn point_in(&mut self, b: &Aabb) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|k| self.range(b.min[k], b.max[k])))
     }
 
     /// Shuffles `items` (Fisher and Yates).

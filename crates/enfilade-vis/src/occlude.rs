@@ -259,29 +259,7 @@ impl Search<'_> {
             let sheet = spread(hits.len()).find_map(|i| sheets.grown(hits[i].1, beam, &hull, line));
             beams[at].what = match sheet {
                 Some(sheet) => Part::Sheet(sheet),
-                None => {
-                    let end = usize::from(size(&beams[at].ends[1]) > size(&beams[at].ends[0]));
-                    let mut next = [None, None];
-                    for (half, points) in next.iter_mut().zip(halves(&beams[at].ends[end])) {
-                        // A polygon as thin as rounding leaves an empty half, through which nothing leads.
-                        let is_empty = points.is_empty();
-                        if !is_empty && size(&points) < 1e3 * apart {
-                            return Err(Verdict::Unknown);
-                        }
-                        let mut ends = beams[at].ends.clone();
-                        ends[end] = points;
-                        *half = Some(beams.len());
-                        beams.push(Beam {
-                            ends,
-                            what: if is_empty {
-                                Part::Sheet(Vec::new())
-                            } else {
-                                Part::Open
-                            },
-                        });
-                    }
-                    Part::Halves(end, next)
-                }
+                None => divide(&mut beams, at, 1e3 * apart)?,
             };
             at += 1;
         }
@@ -307,6 +285,27 @@ impl Search<'_> {
             chain,
         })
     }
+}
+
+/// Adds the halves of a beam, cut across its larger end; an error if one would be smaller than `least`.
+fn divide(beams: &mut Vec<Beam>, at: usize, least: f64) -> Result<Part, Verdict> {
+    let end = usize::from(size(&beams[at].ends[1]) > size(&beams[at].ends[0]));
+    let mut next = [None, None];
+    for (half, points) in next.iter_mut().zip(halves(&beams[at].ends[end])) {
+        // A polygon as thin as rounding leaves an empty half, through which nothing leads.
+        let what = if points.is_empty() {
+            Part::Sheet(Vec::new())
+        } else if size(&points) < least {
+            return Err(Verdict::Unknown);
+        } else {
+            Part::Open
+        };
+        let mut ends = beams[at].ends.clone();
+        ends[end] = points;
+        *half = Some(beams.len());
+        beams.push(Beam { ends, what });
+    }
+    Ok(Part::Halves(end, next))
 }
 
 /// Returns up to [`MAX_SEEDS`] of `n` places, from both ends inwards.

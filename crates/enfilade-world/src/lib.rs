@@ -11,6 +11,7 @@
 
 mod actors;
 mod all_pairs;
+mod auralize;
 mod blocks;
 mod columns;
 mod contacts;
@@ -44,6 +45,7 @@ pub use actors::{
     ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
     WayPoint,
 };
+pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
 pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
 pub use ears::at_ears;
 pub use edges::Corner;

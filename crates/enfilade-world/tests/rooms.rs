@@ -5,26 +5,11 @@ use std::collections::HashSet;
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Bvh, DQuat, DVec3, Ray, Triangle};
 use enfilade_runtime::{ChunkId, DetailId, Sight, View};
-use enfilade_testkit::{GridParams, Rng, room_grid, scaled_world};
+use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 use enfilade_world::{PartId, Place, Pose, Space, SpaceError, SpaceViewer};
 
 fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
-}
-
-/// A cabin: one room with a window in each wall and furniture, about 5 × 3 × 5 m, times `size`.
-fn cabin(seed: u64, size: f32) -> World {
-    furnished_cabin(seed, size, 2)
-}
-
-fn furnished_cabin(seed: u64, size: f32, furniture: usize) -> World {
-    let world = room_grid(&GridParams {
-        size: [1, 1, 1],
-        windows: 1.0,
-        furniture,
-        ..GridParams::offices(1, seed)
-    });
-    scaled_world(world, size)
 }
 
 fn offices(seed: u64) -> World {
@@ -169,7 +154,7 @@ fn nested(depth: usize) -> Vec<World> {
     let size = |k: usize| 1.6_f32.powi((depth - k) as i32);
     // Furniture would stand in the way of the next.
     (0..=depth)
-        .map(|k| furnished_cabin(7, size(k), if k == depth { 2 } else { 0 }))
+        .map(|k| cabin(7, size(k), if k == depth { 2 } else { 0 }))
         .collect()
 }
 
@@ -211,7 +196,7 @@ fn ray_hits_are_seen_through_sixteen_nested_rooms() {
 #[test]
 fn ray_hits_are_seen_between_adjacent_rooms() {
     let root = offices(3);
-    let cabins: Vec<World> = (0..4).map(|k| cabin(k, 1.0)).collect();
+    let cabins: Vec<World> = (0..4).map(|k| cabin(k, 1.0, 2)).collect();
     let mut worlds = vec![&root];
     worlds.extend(&cabins);
     let mut space = Space::new(&root).unwrap();
@@ -285,7 +270,7 @@ fn a_point_is_in_the_innermost_room_that_holds_it() {
 
 #[test]
 fn a_room_far_away_is_as_exact_as_a_near_one() {
-    let worlds = [offices(5), cabin(5, 1.0), cabin(6, 0.3)];
+    let worlds = [offices(5), cabin(5, 1.0, 2), cabin(6, 0.3, 2)];
     let mut space = Space::new(&worlds[0]).unwrap();
     let far = DVec3::new(10_000.0, 3.0, -7_000.0);
     let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.9, 0.1).normalize(), 1.234);
@@ -315,7 +300,7 @@ fn a_room_far_away_is_as_exact_as_a_near_one() {
 #[test]
 fn doors_lead_to_their_surroundings_and_meet_on_contact() {
     let root = offices(3);
-    let [a, b] = [cabin(1, 1.0), cabin(1, 1.0)];
+    let [a, b] = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
     let mut space = Space::new(&root).unwrap();
     let far = DVec3::new(100.0, 0.0, 0.0);
     let pose = Pose::from_translation(far);
@@ -352,7 +337,7 @@ fn invalid_motions_are_refused_and_change_nothing() {
     let root = offices(3);
     let mut space = Space::new(&root).unwrap();
     let part = space
-        .add_part(&cabin(1, 1.0), PartId::ROOT, Pose::IDENTITY)
+        .add_part(&cabin(1, 1.0, 2), PartId::ROOT, Pose::IDENTITY)
         .unwrap();
     let broken = Pose::from_translation(DVec3::NAN);
     let stretched = Pose {
@@ -378,7 +363,7 @@ fn invalid_motions_are_refused_and_change_nothing() {
 fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
     // Beyond a world without outdoors there is nothing.
     let root = room_grid(&GridParams::two_rooms());
-    let [a, b] = [cabin(1, 1.0), cabin(1, 1.0)];
+    let [a, b] = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
     let mut space = Space::new(&root).unwrap();
     let far = Pose::from_translation(DVec3::new(100.0, 0.0, 0.0));
     let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, far).unwrap());
@@ -402,12 +387,14 @@ fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
 
 #[test]
 fn things_beside_a_moving_room_are_found_in_their_new_cells() {
-    let root = furnished_cabin(2, 30.0, 0);
+    let root = cabin(2, 30.0, 0);
     let mut space = Space::new(&root).unwrap();
     let away = Pose::from_translation(DVec3::X * -500.0);
-    let ship = space.add_part(&cabin(1, 1.0), PartId::ROOT, away).unwrap();
+    let ship = space
+        .add_part(&cabin(1, 1.0, 2), PartId::ROOT, away)
+        .unwrap();
     let beside = Pose::from_translation(DVec3::X * 8.0);
-    let boat = space.add_part(&cabin(1, 0.5), ship, beside).unwrap();
+    let boat = space.add_part(&cabin(1, 0.5, 2), ship, beside).unwrap();
     let hall = |cell| Place {
         part: PartId::ROOT,
         cell,

@@ -2,16 +2,8 @@
 
 use enfilade_cpg::World;
 use enfilade_geom::{DQuat, DVec3};
-use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 use enfilade_world::{PartId, Passing, Pose, Space};
-
-fn cabin() -> World {
-    room_grid(&GridParams {
-        size: [1, 1, 1],
-        windows: 1.0,
-        ..GridParams::offices(1, 1)
-    })
-}
 
 /// Passages by straight lines between a number of poses on the way.
 fn by_steps(
@@ -52,7 +44,7 @@ fn by_steps(
 
 #[test]
 fn no_passing_is_missed() {
-    let world = cabin();
+    let world = cabin(1, 1.0, 4);
     let root = room_grid(&GridParams::two_rooms());
     let mut space = Space::new(&root).unwrap();
     let part = space
@@ -98,7 +90,7 @@ fn no_passing_is_missed() {
 #[test]
 fn an_arc_is_not_its_chord() {
     // A window swings about a far hinge: the straight line between its ends passes the point by.
-    let world = cabin();
+    let world = cabin(1, 1.0, 4);
     let root = room_grid(&GridParams::two_rooms());
     let mut space = Space::new(&root).unwrap();
     let part = space
@@ -123,7 +115,7 @@ fn an_arc_is_not_its_chord() {
 
 #[test]
 fn a_point_may_go_out_and_come_in_in_one_motion() {
-    let world = cabin();
+    let world = cabin(1, 1.0, 4);
     let root = room_grid(&GridParams::two_rooms());
     let mut space = Space::new(&root).unwrap();
     let part = space

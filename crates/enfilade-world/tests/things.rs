@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::{Aabb, DQuat, DVec3, Plane, Sets, Winding, closest_point_on_triangle};
+use enfilade_geom::{Aabb, DVec3, Sets};
 use enfilade_runtime::{SightState, Sightlines, View};
-use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_testkit::oracle::{ball_meets, box_meets};
+use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 use enfilade_world::{
     Flood, PartId, Place, Pose, Posted, Shape, Space, SpaceViewer, ThingError, ThingId, Things, Tie,
 };
@@ -19,25 +20,8 @@ fn offices(seed: u64) -> World {
     })
 }
 
-fn cabin(seed: u64) -> World {
-    room_grid(&GridParams {
-        size: [1, 1, 1],
-        windows: 1.0,
-        ..GridParams::offices(1, seed)
-    })
-}
-
 fn place(part: PartId, cell: CellId) -> Place {
     Place { part, cell }
-}
-
-fn random_point(rng: &mut Rng, b: &Aabb) -> DVec3 {
-    DVec3::from_array([0, 1, 2].map(|k| rng.range(b.min[k], b.max[k])))
-}
-
-fn random_turn(rng: &mut Rng) -> DQuat {
-    let mut one = || rng.range(-1.0, 1.0);
-    DQuat::from_xyzw(one(), one(), one(), one()).normalize()
 }
 
 /// A random point in a cell that is not outdoors.
@@ -45,32 +29,12 @@ fn random_indoors(space: &Space, rng: &mut Rng) -> DVec3 {
     let layout = space.layout(PartId::ROOT);
     loop {
         let cell = CellId(rng.below(layout.n_cells()) as u32);
-        let p = random_point(rng, &layout.cell(cell).bounds);
+        let p = rng.point_in(&layout.cell(cell).bounds);
         let found = layout.locate(p);
         if found.is_some_and(|c| !layout.cell(c).is_outdoor) {
             return p;
         }
     }
-}
-
-/// True if a rotated box meets a polygon: a part of it lies between the box's sides.
-fn box_meets(half: DVec3, pose: &Pose, piece: &[DVec3]) -> bool {
-    let mut left = Some(Winding::new(piece.to_vec()));
-    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        for side in [axis, -axis] {
-            let plane = Plane::through(pose.point(side * half), -pose.direction(side));
-            left = left.and_then(|w| w.clipped(&plane, 0.0));
-        }
-    }
-    left.is_some()
-}
-
-/// True if a ball meets a polygon, by its triangles.
-fn ball_meets(radius: f64, center: DVec3, piece: &[DVec3]) -> bool {
-    (2..piece.len()).any(|i| {
-        let triangle = [piece[0], piece[i - 1], piece[i]];
-        center.distance(closest_point_on_triangle(center, &triangle)) <= radius
-    })
 }
 
 #[test]
@@ -84,7 +48,7 @@ fn a_shape_reaches_the_cells_that_openings_which_it_meets_join_to_its_own() {
     for i in 0..4000 {
         let center = random_indoors(&space, &mut rng);
         let pose = Pose {
-            turn: random_turn(&mut rng),
+            turn: rng.turn(),
             at: center,
         };
         let half = DVec3::from_array([0, 1, 2].map(|_| rng.range(0.05, 2.5)));
@@ -101,7 +65,7 @@ fn a_shape_reaches_the_cells_that_openings_which_it_meets_join_to_its_own() {
                 if is_ball {
                     ball_meets(half.x, center, piece)
                 } else {
-                    box_meets(half, &pose, piece)
+                    box_meets(half, pose.turn, pose.at, piece)
                 }
             };
             if opening.pieces().any(meets) {
@@ -176,7 +140,7 @@ fn things_that_move_are_where_the_locator_and_a_new_flood_say() {
         let k = rng.below(ids.len());
         let at = things.pose(ids[k]).unwrap().1.at;
         let stride = if step % 50 == 0 { 4.0 } else { 0.1 };
-        let to = at + random_turn(&mut rng) * DVec3::X * stride;
+        let to = at + rng.turn() * DVec3::X * stride;
         let pose = Pose::from_translation(to);
         let moved = things.set_pose(&space, ids[k], PartId::ROOT, pose).unwrap();
         assert_eq!(moved.to, space.locate(PartId::ROOT, to));
@@ -213,7 +177,9 @@ fn carried_things_move_with_the_room_and_free_ones_do_not() {
     let root = offices(4);
     let mut space = Space::new(&root).unwrap();
     let away = Pose::from_translation(DVec3::X * -60.0);
-    let ship = space.add_part(&cabin(1), PartId::ROOT, away).unwrap();
+    let ship = space
+        .add_part(&cabin(1, 1.0, 4), PartId::ROOT, away)
+        .unwrap();
     let mut things = Things::new();
     let middle = Pose::from_translation(DVec3::new(1.5, 1.0, 1.5));
     let ball = || Shape::sphere(0.2).unwrap();
@@ -274,7 +240,7 @@ fn a_thing_in_a_door_between_rooms_is_in_both_until_they_separate() {
     let root = room_grid(&GridParams::two_rooms());
     let mut space = Space::new(&root).unwrap();
     let far = Pose::from_translation(DVec3::X * 100.0);
-    let world = cabin(1);
+    let world = cabin(1, 1.0, 4);
     let [a, b] = [0, 1].map(|_| space.add_part(&world, PartId::ROOT, far).unwrap());
     let window = space.layout(a).opening(PortalId(0));
     let (center, normal, [inner, outer]) = (window.center(), window.normal(), window.cells());
@@ -328,7 +294,7 @@ fn a_thing_that_can_be_seen_is_in_the_answer() {
     let (mut n_seen, mut n_checked) = (0, 0);
     for _ in 0..400 {
         let eye = random_indoors(&space, &mut rng).as_vec3();
-        let toward = random_turn(&mut rng) * DVec3::X;
+        let toward = rng.turn() * DVec3::X;
         let up = [0.0, 1.0, 0.0];
         let toward_f32 = toward.as_vec3().to_array();
         let view = View::perspective(eye.to_array(), toward_f32, up, 1.2, 1.0).unwrap();
@@ -338,7 +304,7 @@ fn a_thing_that_can_be_seen_is_in_the_answer() {
         n_seen += seen.len();
         for &(id, center, radius) in &balls[1..] {
             // A point of the ball in reach of its cell's air that the eye sees.
-            let p = center + random_turn(&mut rng) * DVec3::X * radius * rng.unit();
+            let p = center + rng.turn() * DVec3::X * radius * rng.unit();
             let to = p - eye.as_dvec3();
             let forward = toward.normalize();
             let is_in_view = to.dot(forward) > 0.0 && {

@@ -103,33 +103,7 @@ struct Edge {
 }
 
 fn of_plane(bsp: &Bsp<'_>, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<Separator> {
-    let eps = reach * bsp.tolerance.plane;
-    let points = |k: usize| &bsp.portals[group[k] as usize].points;
-    let boxes: Vec<Aabb> = (0..group.len())
-        .map(|k| Aabb::of_points(points(k)).expanded(eps))
-        .collect();
-    let near = BoxTree::new(&boxes);
-    let edges: Vec<Vec<Edge>> = (0..group.len())
-        .map(|k| {
-            let p = points(k);
-            (0..p.len())
-                .map(|i| {
-                    let (a, b) = (p[i], p[(i + 1) % p.len()]);
-                    edge(a, b, eps, bsp, solids, |take| {
-                        let around = Aabb::of_points(&[a, b]).expanded(eps);
-                        near.for_each_in_box(&around, |o| {
-                            if o as usize != k
-                                && bsp.purse.spend(3)
-                                && let Some(i) = shared(a, b, points(o as usize), eps)
-                            {
-                                take(o, i);
-                            }
-                        });
-                    })
-                })
-                .collect()
-        })
-        .collect();
+    let edges = edges(bsp, reach * bsp.tolerance.plane, group, solids);
     let mut is_alive = vec![true; group.len()];
     let mut queue: Vec<u32> = (0..group.len() as u32).collect();
     while let Some(k) = queue.pop() {
@@ -173,6 +147,33 @@ fn of_plane(bsp: &Bsp<'_>, reach: f64, group: &[u32], solids: &BoxTree) -> Vec<S
             portals,
         })
         .collect()
+}
+
+/// Returns the edges of each portal of a group.
+fn edges(bsp: &Bsp<'_>, eps: f64, group: &[u32], solids: &BoxTree) -> Vec<Vec<Edge>> {
+    let points = |k: usize| &bsp.portals[group[k] as usize].points;
+    let boxes: Vec<Aabb> = (0..group.len())
+        .map(|k| Aabb::of_points(points(k)).expanded(eps))
+        .collect();
+    let near = BoxTree::new(&boxes);
+    let edge_of = |k: usize, a: DVec3, b: DVec3| {
+        edge(a, b, eps, bsp, solids, |take| {
+            let around = Aabb::of_points(&[a, b]).expanded(eps);
+            near.for_each_in_box(&around, |o| {
+                if o as usize != k
+                    && bsp.purse.spend(3)
+                    && let Some(i) = shared(a, b, points(o as usize), eps)
+                {
+                    take(o, i);
+                }
+            });
+        })
+    };
+    let edges_of = |k: usize| {
+        let ends = points(k).iter().zip(points(k).iter().cycle().skip(1));
+        ends.map(|(&a, &b)| edge_of(k, a, b)).collect()
+    };
+    (0..group.len()).map(edges_of).collect()
 }
 
 impl Edge {

@@ -143,35 +143,29 @@ pub(super) fn inside_of(
     let (Some(lo), Some(hi)) = (grid.voxel_at(bounds.min), grid.voxel_at(bounds.max)) else {
         return filled;
     };
-    let up_and_down = [
-        DVec3::new(0.013, 1.0, 0.007),
-        DVec3::new(-0.007, -1.0, 0.013),
-    ];
+    let is_free = |&[x, y, z]: &[usize; 3]| !filled.get(x, y, z);
+    let is_inside = |&[x, y, z]: &[usize; 3]| {
+        let origin = grid.center(x, y, z);
+        let up_and_down = [
+            DVec3::new(0.013, 1.0, 0.007),
+            DVec3::new(-0.007, -1.0, 0.013),
+        ];
+        up_and_down.into_iter().all(|direction| {
+            let ray = Ray {
+                origin,
+                direction,
+                t_max: f64::INFINITY,
+            };
+            bvh.closest_hit(&ray, |_| false).is_some_and(|h| !h.front)
+        })
+    };
+    let row = |y: usize, z: usize| (lo[0]..=hi[0]).map(move |x| [x, y, z]);
     let inner: Vec<[usize; 3]> = (lo[2]..=hi[2])
         .into_par_iter()
-        .flat_map_iter(|z| {
-            let filled = &filled;
-            (lo[1]..=hi[1]).flat_map(move |y| {
-                (lo[0]..=hi[0])
-                    .filter(move |&x| !filled.get(x, y, z))
-                    .filter(allowance.each(WORK_A_RAY))
-                    .filter_map(move |x| {
-                        let origin = grid.center(x, y, z);
-                        let meets_back = |direction: DVec3| {
-                            let ray = Ray {
-                                origin,
-                                direction,
-                                t_max: f64::INFINITY,
-                            };
-                            bvh.closest_hit(&ray, |_| false).is_some_and(|h| !h.front)
-                        };
-                        up_and_down
-                            .iter()
-                            .all(|&d| meets_back(d))
-                            .then_some([x, y, z])
-                    })
-            })
-        })
+        .flat_map_iter(|z| (lo[1]..=hi[1]).flat_map(move |y| row(y, z)))
+        .filter(is_free)
+        .filter(allowance.each(WORK_A_RAY))
+        .filter(is_inside)
         .collect();
     for [x, y, z] in inner {
         filled.set(x, y, z, true);

@@ -12,10 +12,11 @@ use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use enfilade::geom::ray::segment_to_triangle_distance;
-use enfilade::geom::{Aabb, DMat3, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
+use enfilade::geom::{Aabb, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
 use enfilade::runtime::{DetailId, Sight, SightState};
 use enfilade::world::{Body, Cast, Caster, Contacts, Impact, Layout};
 use enfilade::{CellId, World};
+use enfilade_testkit::oracle::box_to_triangle_distance;
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 use parry3d::math::{Pose, Vector};
 use parry3d::query::{Ray, RayCast, ShapeCastHit, ShapeCastOptions, cast_shapes};
@@ -258,32 +259,7 @@ fn gap(body: &Body, at: DVec3, t: &Triangle) -> f64 {
         Body::Capsule { half, radius } => {
             segment_to_triangle_distance(at - half, at + half, t) - radius
         }
-        Body::Box { half, turn } => {
-            // In the box's own axes.
-            let turn = DMat3::from_quat(turn).transpose();
-            let t = t.map(|p| turn * (p - at));
-            let own = Aabb::new(-half, half);
-            if t.iter().any(|p| own.contains(*p)) {
-                return 0.0;
-            }
-            let corners = own.corners();
-            let mut least = f64::INFINITY;
-            for i in 0..8 {
-                for k in [1, 2, 4] {
-                    if i & k == 0 {
-                        let d = segment_to_triangle_distance(corners[i], corners[i | k], &t);
-                        least = least.min(d);
-                    }
-                }
-            }
-            for face in own.triangles() {
-                for i in 0..3 {
-                    let d = segment_to_triangle_distance(t[i], t[(i + 1) % 3], &face);
-                    least = least.min(d);
-                }
-            }
-            least
-        }
+        Body::Box { half, turn } => box_to_triangle_distance(half, turn, at, t),
     }
 }
 

@@ -9,9 +9,9 @@ use enfilade::world::{
     Lamp, LampId, Lights, PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie,
 };
 use enfilade::{PortalId, World};
-use enfilade_testkit::{GridParams, Rng, room_grid, scaled_world};
+use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
-use super::things::{offices, random_indoors, random_turn};
+use super::things::{offices, random_indoors};
 use crate::rows::Figure;
 
 const MOTIONS: usize = 1_000_000;
@@ -32,17 +32,6 @@ fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// Returns a room with a window in each wall, 3 to 6 m, times `size`.
-fn cabin(seed: u64, size: f32, furniture: usize) -> World {
-    let world = room_grid(&GridParams {
-        size: [1, 1, 1],
-        windows: 1.0,
-        furniture,
-        ..GridParams::offices(1, seed)
-    });
-    scaled_world(world, size)
-}
-
 fn vector(rng: &mut Rng, reach: f64) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|_| rng.range(-reach, reach)))
 }
@@ -57,7 +46,7 @@ pub(super) fn passings(_: &str) -> anyhow::Result<Figure> {
     let (mut n_missed, mut n_known) = (0, 0);
     for _ in 0..MOTIONS {
         let start = Pose {
-            turn: random_turn(&mut rng),
+            turn: rng.turn(),
             at: vector(&mut rng, 4.0),
         };
         let axis = vector(&mut rng, 1.0).normalize_or(DVec3::Y);
@@ -232,7 +221,7 @@ pub(super) fn far(_: &str) -> anyhow::Result<Figure> {
     let mut space = Space::new(&worlds[0])?;
     let at = DVec3::new(10_000.0, 3.0, -7_000.0);
     let start = Pose {
-        turn: random_turn(&mut Rng::new(1)),
+        turn: Rng::new(1).turn(),
         at,
     };
     let ship = space.add_part(&worlds[1], PartId::ROOT, start)?;
@@ -288,7 +277,7 @@ pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
         let k = rng.below(LAMPS);
         let at = point(lamps[k].at);
         // Within its range, so that most samples matter.
-        let p = at + random_turn(&mut rng) * DVec3::X * f64::from(lamps[k].range) * rng.unit();
+        let p = at + rng.turn() * DVec3::X * f64::from(lamps[k].range) * rng.unit();
         let Some(place) = space.locate(PartId::ROOT, p) else {
             continue;
         };

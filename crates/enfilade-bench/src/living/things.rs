@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use anyhow::Context;
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
-use enfilade::geom::{Aabb, DQuat, DVec3, Plane, Sets, Winding, closest_point_on_triangle};
+use enfilade::geom::{Aabb, DVec3, Sets};
 use enfilade::runtime::{Sight, SightOptions, SightState, View, Viewer};
 use enfilade::world::{
     Flood, Layout, PartId, Place, Pose, Posted, Shape, Space, SpaceViewer, Things, Tie,
 };
 use enfilade::{CellId, PortalId, World};
-use enfilade_cli::cameras::walk;
+use enfilade_render::walk;
+use enfilade_testkit::oracle::{ball_meets, box_meets};
 use enfilade_testkit::{GridParams, Rng, dirkse_maze, room_grid};
 
 use crate::rows::Figure;
@@ -40,18 +41,12 @@ pub(super) fn random_indoors(space: &Space, rng: &mut Rng) -> DVec3 {
     let layout = space.layout(PartId::ROOT);
     loop {
         let cell = CellId(rng.below(layout.n_cells()) as u32);
-        let b = layout.cell(cell).bounds;
-        let p = DVec3::from_array([0, 1, 2].map(|k| rng.range(b.min[k], b.max[k])));
+        let p = rng.point_in(&layout.cell(cell).bounds);
         let found = layout.locate(p);
         if found.is_some_and(|c| !layout.cell(c).is_outdoor) {
             return p;
         }
     }
-}
-
-pub(super) fn random_turn(rng: &mut Rng) -> DQuat {
-    let mut one = || rng.range(-1.0, 1.0);
-    DQuat::from_xyzw(one(), one(), one(), one()).normalize()
 }
 
 /// Counts shapes whose flood differs from the cells that the openings they meet join to their own, computed by other
@@ -64,7 +59,7 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
     let (mut n_wrong, mut n_several) = (0, 0);
     for i in 0..SHAPES {
         let pose = Pose {
-            turn: random_turn(&mut rng),
+            turn: rng.turn(),
             at: random_indoors(&space, &mut rng),
         };
         let half = DVec3::from_array([0, 1, 2].map(|_| rng.range(0.05, 3.0)));
@@ -114,7 +109,7 @@ fn joined(layout: &Layout, half: DVec3, is_ball: bool, pose: &Pose) -> Sets {
             if is_ball {
                 ball_meets(half.x, pose.at, piece)
             } else {
-                box_meets(half, pose, piece)
+                box_meets(half, pose.turn, pose.at, piece)
             }
         });
         if is_met {
@@ -123,25 +118,6 @@ fn joined(layout: &Layout, half: DVec3, is_ball: bool, pose: &Pose) -> Sets {
         }
     }
     sets
-}
-
-/// Returns `true` if a rotated box meets a polygon: a part of it lies between the box's sides.
-fn box_meets(half: DVec3, pose: &Pose, piece: &[DVec3]) -> bool {
-    let mut left = Some(Winding::new(piece.to_vec()));
-    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        for side in [axis, -axis] {
-            let plane = Plane::through(pose.point(side * half), -pose.direction(side));
-            left = left.and_then(|w| w.clipped(&plane, 0.0));
-        }
-    }
-    left.is_some()
-}
-
-fn ball_meets(radius: f64, center: DVec3, piece: &[DVec3]) -> bool {
-    (2..piece.len()).any(|i| {
-        let triangle = [piece[0], piece[i - 1], piece[i]];
-        center.distance(closest_point_on_triangle(center, &triangle)) <= radius
-    })
 }
 
 /// Walks a thing of 0.3 m and counts steps after which its cell differs from the locator's.
@@ -209,7 +185,7 @@ impl Steps {
         let mut heading = DVec3::X;
         while way.len() < STEPS {
             if rng.chance(0.02) {
-                heading = random_turn(&mut rng) * DVec3::X;
+                heading = rng.turn() * DVec3::X;
             }
             let to = at + heading * rng.range(0.005, 0.1);
             let found = space.locate(root, to);
@@ -219,7 +195,7 @@ impl Steps {
                 way.push(to);
                 cells.push(found);
             } else {
-                heading = random_turn(&mut rng) * DVec3::X;
+                heading = rng.turn() * DVec3::X;
             }
         }
         let mut own = Self {

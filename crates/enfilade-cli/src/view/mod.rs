@@ -15,7 +15,9 @@ use anyhow::{Context, anyhow};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sightlines, Target};
-use enfilade_render::{AdapterChoice, Camera, Paint, Sparing, Studio};
+use enfilade_render::{
+    AdapterChoice, Camera, FOV, Paint, Sparing, Studio, good_camera, portal_looked_at,
+};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{
@@ -33,7 +35,7 @@ use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, refuse_stream, write_whole};
 use enfilade_cli::adapter;
-use enfilade_cli::cameras::{FOV, good_camera, path_text, portal_looked_at, read_path};
+use enfilade_cli::cameras::{path_text, read_path};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world;
 

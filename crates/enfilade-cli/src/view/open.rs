@@ -9,7 +9,7 @@ use std::time::Instant;
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
-use enfilade_render::{AdapterChoice, Camera, Frame, Paint, Sparing, Studio, Style};
+use enfilade_render::{AdapterChoice, Camera, FOV, Frame, Paint, Sparing, Studio, Style};
 use winit::dpi::PhysicalSize;
 use winit::keyboard::KeyCode;
 use winit::window::{CursorGrabMode, Window};
@@ -20,7 +20,6 @@ use super::walker::Walker;
 use crate::formats::Format;
 use crate::output::{Outputs, write_whole};
 use crate::render::{light, portal_marks};
-use enfilade_cli::cameras::FOV;
 
 /// State that exists once the window is open.
 pub(super) struct Open {

@@ -5,7 +5,7 @@ use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState};
 use enfilade::world::{Build, Contacts, Layout, Walker as Body};
 
-use enfilade_cli::cameras::EYE_HEIGHT;
+use enfilade_render::EYE_HEIGHT;
 
 /// A body in a world or, when it flies, an eye.
 pub(super) struct Walker {

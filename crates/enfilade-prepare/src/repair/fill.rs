@@ -277,15 +277,15 @@ fn triangulated(
         for i in 0..n - length {
             let j = i + length;
             let mut best = (f64::INFINITY, 0);
-            if is_free(i, j) {
-                for k in i + 1..j {
-                    let sum = least[i * n + k] + least[k * n + j];
-                    if sum < best.0 {
-                        let sum = sum + area([i, k, j]);
-                        if sum < best.0 {
-                            best = (sum, k);
-                        }
-                    }
+            let apexes = if is_free(i, j) { i + 1..j } else { 0..0 };
+            for k in apexes {
+                let parts = least[i * n + k] + least[k * n + j];
+                if parts >= best.0 {
+                    continue;
+                }
+                let sum = parts + area([i, k, j]);
+                if sum < best.0 {
+                    best = (sum, k);
                 }
             }
             least[i * n + j] = best.0;

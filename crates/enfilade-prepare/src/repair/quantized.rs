@@ -109,18 +109,15 @@ impl Corners {
             let around = DVec3::splat(2.0 * self.longest);
             let (low, high) = (cell(at - around), cell(at + around));
             let mut best: Option<(f64, u32)> = None;
-            for x in low[0]..=high[0] {
-                for y in low[1]..=high[1] {
-                    for z in low[2]..=high[2] {
-                        for &head in cells.get(&[x, y, z]).map_or(&[][..], Vec::as_slice) {
-                            let d = at.distance_squared(points[head as usize]);
-                            if best.is_none_or(|(least, of)| (d, head) < (least, of))
-                                && self.may_be_one(points, head, p)
-                            {
-                                best = Some((d, head));
-                            }
-                        }
-                    }
+            let [xs, ys, zs] = [0, 1, 2].map(|k| low[k]..=high[k]);
+            let row = |x: i64, y: i64| zs.clone().map(move |z| [x, y, z]);
+            let near = xs.flat_map(|x| ys.clone().flat_map(move |y| row(x, y)));
+            for &head in near.filter_map(|cell| cells.get(&cell)).flatten() {
+                let d = at.distance_squared(points[head as usize]);
+                if best.is_none_or(|(least, of)| (d, head) < (least, of))
+                    && self.may_be_one(points, head, p)
+                {
+                    best = Some((d, head));
                 }
             }
             match best {

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::Context;
 
 use super::Figures;
-use crate::RELEASE;
+use crate::process::binary;
 
 /// Path of the earlier build.
 const BEFORE: &str = "ENFILADE_BEFORE";
@@ -16,8 +16,8 @@ const SCENES: [&str; 3] = ["institute", "kit-edc", "clinic"];
 /// Largest ratio of its processor time to that of the earlier build.
 const MOST: f64 = 2.0;
 
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
-    let folder = crate::scenes_dir();
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
+    let folder = crate::process::scenes_dir();
     let before = std::env::var_os(BEFORE);
     for scene in SCENES {
         let beside = |dir: &Path| dir.with_file_name("scenes2").join(scene);
@@ -33,7 +33,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
         let world = format!("tight-{scene}.glb");
         let baked = rows.enfilade(&["bake", &model, "--detail", &detail, "-o", &world], 600)?;
         anyhow::ensure!(baked.code == Some(0), "{scene}: {}", baked.said);
-        let after = user_seconds(rows, &RELEASE.binary("enfilade"), &world)?;
+        let after = user_seconds(rows, &binary("enfilade"), &world)?;
         let before = user_seconds(rows, Path::new(before), &world)?;
         rows.at_most("tight: time of pvs", scene, after / before, MOST);
     }
@@ -41,7 +41,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
 }
 
 /// Returns the time to find all visible parts of a world, on one thread. [Units: s]
-fn user_seconds(rows: &Figures, binary: &Path, world: &str) -> anyhow::Result<f64> {
+fn user_seconds(rows: &Figures<'_>, binary: &Path, world: &str) -> anyhow::Result<f64> {
     let mut timed = Command::new("/usr/bin/time");
     timed.args(["-f", "%U"]).arg(binary);
     timed.args(["pvs", world, "--into", "tight-seen.glb"]);

@@ -8,10 +8,11 @@ use anyhow::Context;
 use serde_json::Value;
 
 use super::Figures;
-use crate::{RELEASE, output_of, run_to_end, scenes_dir};
+use crate::process::{binary, output_of, scenes_dir};
+use crate::rows::Chosen;
 
 /// Shuffles per scene.
-pub(super) const COUNT: usize = 20;
+const COUNT: usize = 20;
 
 const METHODS: [&str; 3] = ["watershed", "bsp", "delaunay"];
 
@@ -19,13 +20,13 @@ const METHODS: [&str; 3] = ["watershed", "bsp", "delaunay"];
 const MOST: u32 = 3600;
 
 /// A scene as files.
-struct Subject {
+struct SceneFiles {
     name: String,
     inputs: Vec<PathBuf>,
     detail: Option<PathBuf>,
 }
 
-impl Subject {
+impl SceneFiles {
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.inputs.iter().chain(&self.detail)
     }
@@ -48,15 +49,11 @@ impl Subject {
 
 /// Counts, by scene and builder, shuffles that change cells or portals, and those that change any byte. A rejected
 /// scene must be rejected in any order.
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
-    run_to_end(&mut RELEASE.cargo(
-        "build",
-        &["-p", "enfilade-testkit", "--example", "generate"],
-    ))?;
-    let seeds = rows.shuffles.clone();
-    for subject in subjects(&rows.scenes)? {
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
+    let seeds = rows.options.runs(COUNT);
+    for subject in subjects(&rows.options.chosen)? {
         let mut differ = [[0; 2]; METHODS.len()];
-        let all = |subject: &Subject| -> anyhow::Result<Vec<Baked>> {
+        let all = |subject: &SceneFiles| -> anyhow::Result<Vec<Baked>> {
             METHODS
                 .iter()
                 .map(|method| bake(rows, subject, method))
@@ -66,7 +63,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
         for seed in seeds.clone() {
             let folder = rows.path("shuffled");
             for file in subject.files() {
-                let mut generate = Command::new(RELEASE.binary("examples/generate"));
+                let mut generate = Command::new(binary("examples/generate"));
                 generate.arg(file).args(["--shuffle", &seed.to_string()]);
                 output_of(generate.arg("-o").arg(&folder), None)?;
             }
@@ -87,7 +84,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
 
 /// Returns the scene folders in the folder of real scenes and in the one beside it whose name ends in 2, and single
 /// files in folders without; the small ones first.
-fn subjects(asked: &[String]) -> anyhow::Result<Vec<Subject>> {
+fn subjects(chosen: &Chosen) -> anyhow::Result<Vec<SceneFiles>> {
     let first = scenes_dir().context("no real scenes: set ENFILADE_SCENES to their folder")?;
     let mut second = first.clone().into_os_string();
     second.push("2");
@@ -98,7 +95,7 @@ fn subjects(asked: &[String]) -> anyhow::Result<Vec<Subject>> {
             let inside = scene.join("scene.glb");
             if inside.is_file() {
                 let detail = Some(scene.join("detail.glb")).filter(|f| f.is_file());
-                all.push(Subject {
+                all.push(SceneFiles {
                     name: name.into_owned(),
                     inputs: vec![inside],
                     detail,
@@ -112,7 +109,7 @@ fn subjects(asked: &[String]) -> anyhow::Result<Vec<Subject>> {
                     .contains(&file.extension())
             };
             all.extend(list(&scene).into_iter().filter(is_known).map(|file| {
-                Subject {
+                SceneFiles {
                     name: file
                         .file_stem()
                         .unwrap_or_default()
@@ -124,8 +121,7 @@ fn subjects(asked: &[String]) -> anyhow::Result<Vec<Subject>> {
             }));
         }
     }
-    let is_asked = |s: &Subject| asked.is_empty() || asked.iter().any(|a| s.name.starts_with(&**a));
-    all.retain(is_asked);
+    all.retain(|s| chosen.has_scene(&s.name));
     all.sort_by_key(|s| (s.size(), s.name.clone()));
     Ok(all)
 }
@@ -146,7 +142,7 @@ struct Baked {
     graph: Option<[Value; 2]>,
 }
 
-fn bake(rows: &Figures, subject: &Subject, method: &str) -> anyhow::Result<Baked> {
+fn bake(rows: &Figures<'_>, subject: &SceneFiles, method: &str) -> anyhow::Result<Baked> {
     let world = rows.path("order.glb");
     // Remove the output of an earlier bake.
     let _ = std::fs::remove_file(&world);
@@ -170,7 +166,7 @@ fn bake(rows: &Figures, subject: &Subject, method: &str) -> anyhow::Result<Baked
             graph: None,
         });
     }
-    let mut inspect = Command::new(RELEASE.binary("enfilade"));
+    let mut inspect = Command::new(binary("enfilade"));
     inspect.args(["inspect", "--json"]).arg(&world);
     let graph: Value = serde_json::from_str(&output_of(&mut inspect, None)?)?;
     Ok(Baked {

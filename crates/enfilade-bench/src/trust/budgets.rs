@@ -4,7 +4,7 @@ use super::scenes::{cuboid, obj, scenes};
 use super::{Figures, Ran, holds};
 
 /// Files of a few bytes that would need gigabytes, and outputs that would be lost.
-pub(super) fn cases(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn cases(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     for n in [100_000, 1_048_576] {
         rows.write("clusters.prt", &format!("PRT1\n{n}\n0\n"))?;
         let ran = rows.enfilade(&["pvs", "clusters.prt", "-o", "clusters.pvs"], 60)?;
@@ -33,7 +33,7 @@ pub(super) fn cases(rows: &mut Figures) -> anyhow::Result<()> {
 }
 
 /// Small scenes of unusual shapes, with each method: baked, or rejected with a remedy, in bounded time and memory.
-pub(super) fn nasty(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn nasty(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     for (scene, text) in scenes() {
         rows.write("nasty.obj", &text)?;
         for method in ["watershed", "bsp", "delaunay"] {
@@ -50,12 +50,12 @@ pub(super) fn nasty(rows: &mut Figures) -> anyhow::Result<()> {
 }
 
 /// Large scenes, if available.
-pub(super) fn large(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn large(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     for (name, file, most) in [
         ("recast-dungeon", "recast-dungeon/scene.glb", 15.0),
         ("monastery", "samurai_monastry.obj", 30.0),
     ] {
-        let dirs = crate::scenes();
+        let dirs = crate::process::scenes();
         let folders = dirs.iter().filter_map(|dir| dir.parent());
         let found = folders.map(|dir| dir.join(file)).find(|path| path.exists());
         let bar = format!("<= {most}");
@@ -80,7 +80,7 @@ const MEMORY: &str = "300M";
 const MOST_MEMORY: f64 = 1.2 * 300.0 / 1024.0 + 100e6 / (1u64 << 30) as f64;
 
 /// Nasty scenes in commands that build worlds, within time and memory limits: built, or rejected with a remedy.
-pub(super) fn bounds(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn bounds(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     let methods = ["watershed", "bsp", "delaunay"];
     for (scene, text) in scenes() {
         rows.write("nasty.obj", &text)?;
@@ -97,7 +97,7 @@ pub(super) fn bounds(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn bound(rows: &mut Figures, name: &str, args: &[&str]) -> anyhow::Result<()> {
+fn bound(rows: &mut Figures<'_>, name: &str, args: &[&str]) -> anyhow::Result<()> {
     let ends = |ran: &Ran| matches!(ran.code, Some(0 | 1));
     let time = TIME.to_string();
     let ran = rows.enfilade(&[args, &["--max-time", &time]].concat(), 120)?;
@@ -110,8 +110,8 @@ fn bound(rows: &mut Figures, name: &str, args: &[&str]) -> anyhow::Result<()> {
 }
 
 /// Estimates of a bake compared with its use, and the time per unit of work of its stages.
-pub(super) fn estimates(rows: &mut Figures) -> anyhow::Result<()> {
-    let dirs = crate::scenes();
+pub(super) fn estimates(rows: &mut Figures<'_>) -> anyhow::Result<()> {
+    let dirs = crate::process::scenes();
     let files = dirs.iter().map(|dir| dir.join("scene.glb"));
     for path in files.filter(|path| path.exists()) {
         let path = path.canonicalize()?;

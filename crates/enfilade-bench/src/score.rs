@@ -1,4 +1,4 @@
-//! `cargo xtask score`: rooms, doors and windows found, compared with those that architects modeled.
+//! Score: rooms, doors and windows found, compared with those that architects modeled.
 //!
 //! A scene folder with a `truth.json` is baked with default settings and queried through `inspect --json` and
 //! `locate`, as a user would. `docs/benchmarks/rooms.md` defines the figures.
@@ -12,7 +12,9 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::{Profile, output_of, run_to_end, scenes, target_dir, write_between_marks};
+use crate::floors::{self, COLUMNS};
+use crate::process::{bake_command, binary, output_of, scenes, target_dir, write_between_marks};
+use crate::table::Table;
 
 pub(crate) type V3 = [f64; 3];
 
@@ -64,7 +66,7 @@ pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
 }
 
 /// One row of the table; `None` if a scene has nothing of the kind.
-pub(crate) struct Row {
+pub(crate) struct Score {
     pub(crate) name: String,
     n_rooms: usize,
     /// In the order of [`COLUMNS`].
@@ -73,15 +75,15 @@ pub(crate) struct Row {
     failed: Vec<String>,
 }
 
-pub(crate) const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
-
-/// Scores `dirs`, or all real scenes if that is empty; prints the table, and writes it to `docs/benchmarks/rooms.md` if
-/// `is_written`.
-pub(crate) fn run(
-    profile: Profile,
+/// Scores `dirs`, or all real scenes if that is empty; prints the table and the misses in each scene, and writes the
+/// table to `docs/benchmarks/rooms.md` if `is_written`. With `baked`, the folder of worlds baked before, bakes none.
+/// Fails if a figure lies below its floor.
+pub(crate) fn bench_score(
+    out: &mut Table,
     dirs: &[PathBuf],
+    baked: Option<&Path>,
     is_written: bool,
-) -> anyhow::Result<Vec<Row>> {
+) -> anyhow::Result<()> {
     let mut dirs = if dirs.is_empty() {
         scenes()
     } else {
@@ -91,35 +93,26 @@ pub(crate) fn run(
     if dirs.is_empty() {
         bail!("no scene with a truth.json; name folders, or set ENFILADE_SCENES");
     }
-    run_to_end(&mut profile.cargo("build", &["-p", "enfilade-cli"]))?;
     let rows = dirs
         .iter()
-        .map(|d| score_scene(profile, d).with_context(|| d.display().to_string()))
+        .map(|d| score_scene(d, baked).with_context(|| d.display().to_string()))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    print(&rows);
+    // Worlds baked before have no time of a bake.
+    out.push_text(&table(&rows, baked.is_none()));
+    out.push(String::new());
+    for row in rows.iter().filter(|row| !row.failed.is_empty()) {
+        out.push(format!("{}: {}", row.name, row.failed.join("; ")));
+    }
     if is_written {
         // Without seconds: they depend more on the machine than on the program.
         write_between_marks("rooms.md", &table(&rows, false))?;
     }
-    Ok(rows)
-}
-
-/// Prints the table, and the misses in each scene.
-pub(crate) fn print(rows: &[Row]) {
-    // Worlds baked elsewhere have no time of a bake.
-    println!(
-        "{}",
-        table(rows, rows.iter().all(|r| r.seconds.is_finite()))
-    );
-    for row in rows {
-        if !row.failed.is_empty() {
-            println!("{}: {}", row.name, row.failed.join("; "));
-        }
-    }
+    let figures = rows.iter().map(|row| (row.name.as_str(), row.figures));
+    floors::check(out, figures)
 }
 
 /// Returns the table in Markdown; the last row is the average over the scenes that have a figure.
-fn table(rows: &[Row], with_seconds: bool) -> String {
+fn table(rows: &[Score], with_seconds: bool) -> String {
     let show = |f: Option<f64>| f.map_or_else(|| "–".to_owned(), |f| format!("{f:.2}"));
     let seconds = |text: String| {
         if with_seconds {
@@ -162,15 +155,13 @@ fn table(rows: &[Row], with_seconds: bool) -> String {
 }
 
 /// Returns the cell of each point, `-` for none.
-pub(crate) fn locate(profile: Profile, world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
+pub(crate) fn locate(world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>> {
     let text: String = points
         .iter()
         .map(|p| format!("{} {} {}\n", p[0], p[1], p[2]))
         .collect();
     let said = output_of(
-        Command::new(profile.binary("enfilade"))
-            .arg("locate")
-            .arg(world),
+        Command::new(binary("enfilade")).arg("locate").arg(world),
         Some(&text),
     )?;
     let lines: Vec<String> = said.split_whitespace().map(str::to_owned).collect();
@@ -206,30 +197,30 @@ fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
     group
 }
 
-fn score_scene(profile: Profile, dir: &Path) -> anyhow::Result<Row> {
+fn score_scene(dir: &Path, baked: Option<&Path>) -> anyhow::Result<Score> {
     let name = dir.file_name().unwrap_or_default().to_string_lossy();
-    let world = target_dir().join(format!("score-{name}.glb"));
+    let world = match baked {
+        Some(folder) => folder.join(format!("{name}.glb")),
+        None => target_dir().join(format!("score-{name}.glb")),
+    };
     let start = Instant::now();
-    output_of(&mut profile.bake_command(dir, &world), None)?;
+    if baked.is_none() {
+        output_of(&mut bake_command(dir, &world), None)?;
+    }
     let seconds = start.elapsed().as_secs_f64();
-    let row = score_world(profile, dir, &world, &inspect(profile, &world)?)?;
-    Ok(Row { seconds, ..row })
+    let score = score_world(dir, &world, &inspect(&world)?)?;
+    Ok(Score { seconds, ..score })
 }
 
 /// Returns the output of `inspect --json`.
-pub(crate) fn inspect(profile: Profile, world: &Path) -> anyhow::Result<Value> {
-    let mut command = Command::new(profile.binary("enfilade"));
+pub(crate) fn inspect(world: &Path) -> anyhow::Result<Value> {
+    let mut command = Command::new(binary("enfilade"));
     command.arg("inspect").arg(world).arg("--json");
     Ok(serde_json::from_str(&output_of(&mut command, None)?)?)
 }
 
 /// Scores a world, given its output of `inspect`, against the truth in its scene's folder.
-pub(crate) fn score_world(
-    profile: Profile,
-    dir: &Path,
-    world: &Path,
-    graph: &Value,
-) -> anyhow::Result<Row> {
+pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Result<Score> {
     let name = dir
         .file_name()
         .unwrap_or_default()
@@ -238,7 +229,7 @@ pub(crate) fn score_world(
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)
         .with_context(|| format!("{name}/truth.json"))?;
     let (rooms, openings) = (list(&truth["rooms"]), list(&truth["openings"]));
-    let locate = |points: &[V3]| locate(profile, world, points);
+    let locate = |points: &[V3]| locate(world, points);
     let mut failed = Vec::new();
 
     let samples = Samples::of(rooms, openings, &locate)?;
@@ -256,7 +247,7 @@ pub(crate) fn score_world(
         .count();
     let n = rooms.len();
     let per_n = |x: usize| (n > 0).then(|| x as f64 / n as f64);
-    Ok(Row {
+    Ok(Score {
         name,
         n_rooms: n,
         figures: [
@@ -273,7 +264,7 @@ pub(crate) fn score_world(
 }
 
 /// Returns the elements of an array; none of anything else.
-fn list(v: &Value) -> &[Value] {
+pub(crate) fn list(v: &Value) -> &[Value] {
     v.as_array().map_or(&[], Vec::as_slice)
 }
 
@@ -376,14 +367,14 @@ fn portals_of(graph: &Value) -> Vec<Portal> {
 }
 
 /// The place of an opening of the truth.
-struct Place {
+struct OpeningPlace {
     center: V3,
     normal: V3,
     thickness: f64,
     area: f64,
 }
 
-impl Place {
+impl OpeningPlace {
     fn of(opening: &Value) -> Option<Self> {
         let corners = list(&opening["corners"]);
         let corners: Vec<V3> = corners.iter().filter_map(vec3).collect();
@@ -439,9 +430,9 @@ fn find_openings(
         .collect();
     let places = usable
         .iter()
-        .map(|o| Place::of(o).context("an opening without place"))
-        .collect::<anyhow::Result<Vec<Place>>>()?;
-    let probes: Vec<V3> = places.iter().flat_map(Place::probes).collect();
+        .map(|o| OpeningPlace::of(o).context("an opening without place"))
+        .collect::<anyhow::Result<Vec<OpeningPlace>>>()?;
+    let probes: Vec<V3> = places.iter().flat_map(OpeningPlace::probes).collect();
     let sides = locate(&probes)?;
     let mut found = FoundOpenings::default();
     for (k, (o, place)) in usable.iter().zip(&places).enumerate() {

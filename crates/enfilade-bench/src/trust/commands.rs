@@ -45,7 +45,7 @@ const REFUSED: [&str; 6] = [
     "render w.glb -o out.png --size 16384x16384 --eye 1,1.5,1 --look 2,1.5,2 --adapter software",
 ];
 
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     for (scene, text, more) in inputs() {
         rows.write("w.obj", &text)?;
         for (name, bytes) in more {
@@ -78,7 +78,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn bounded(rows: &Figures, line: &str) -> anyhow::Result<Ran> {
+fn bounded(rows: &Figures<'_>, line: &str) -> anyhow::Result<Ran> {
     let (time, memory) = (TIME.to_string(), format!("{MEMORY}M"));
     let mut args: Vec<&str> = line.split(' ').collect();
     args.extend(["--max-time", &time, "--max-memory", &memory]);

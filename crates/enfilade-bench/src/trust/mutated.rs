@@ -16,10 +16,10 @@ use super::Figures;
 use super::inputs::{INPUTS, Input, MADE, write};
 use super::mutate::mutated;
 use super::random::Random;
-use crate::RELEASE;
+use crate::process::binary;
 
 /// Default number of runs.
-pub(super) const COUNT: usize = 20_000;
+const COUNT: usize = 20_000;
 
 /// Limit of processor time of a run with one thread, which a busy machine does not increase. [Units: s]
 const LIMIT: u64 = 20;
@@ -36,7 +36,7 @@ const AT_ONCE: usize = 2;
 /// Bad ends of a run; the last: an error that the command calls a bug, or a world that it cannot decode again.
 const ENDS: [&str; 4] = ["panics", "aborts", "hangs", "bugs"];
 
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     if !cfg!(unix) {
         rows.print("mutated", "all", None, "= 0", None);
         return Ok(());
@@ -48,7 +48,8 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
         std::fs::create_dir_all(dir)?;
     }
     prepare(&clean)?;
-    let next = AtomicUsize::new(rows.runs.start);
+    let runs = rows.options.runs(COUNT);
+    let next = AtomicUsize::new(runs.start);
     let found = Mutex::new(Vec::new());
     std::thread::scope(|scope| -> anyhow::Result<()> {
         let workers: Vec<_> = (0..AT_ONCE)
@@ -58,7 +59,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
                     finds: &finds,
                     folder: folder.join(number.to_string()),
                 };
-                let (next, found, end) = (&next, &found, rows.runs.end);
+                let (next, found, end) = (&next, &found, runs.end);
                 scope.spawn(move || worker.work(next, end, found))
             })
             .collect();
@@ -70,7 +71,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
         Ok(())
     })?;
     let found = found.into_inner().unwrap_or_default();
-    let all = format!("{} files", rows.runs.len());
+    let all = format!("{} files", runs.len());
     for (end, name) in ENDS.iter().enumerate() {
         let n = found.iter().filter(|&&e| e == end).count();
         rows.print(
@@ -226,7 +227,7 @@ fn command(folder: &Path, line: &str, file: &str) -> anyhow::Result<(Option<Exit
             &format!("ulimit -v {MEMORY}; ulimit -t {LIMIT}; ulimit -c 0; exec \"$@\""),
             "sh",
         ])
-        .arg(RELEASE.binary("enfilade"))
+        .arg(binary("enfilade"))
         .args(args.split_whitespace())
         .current_dir(folder)
         .env("RAYON_NUM_THREADS", "1")
@@ -256,7 +257,9 @@ mod tests {
 
     #[test]
     fn every_input_is_chosen_and_a_run_repeats() {
-        let folder = crate::target_dir().join("tmp").join("mutated-inputs");
+        let folder = crate::process::target_dir()
+            .join("tmp")
+            .join("mutated-inputs");
         std::fs::create_dir_all(&folder).expect("a folder");
         write(&folder).expect("files");
         for made in ["world.glb", "world.ev", "grid.ev", "grid.search"] {

@@ -8,8 +8,7 @@ use anyhow::Context;
 use serde_json::Value;
 
 use super::Figures;
-use crate::check::node_path;
-use crate::{GATE, output_of, root};
+use crate::process::{output_of, root, target_dir};
 
 /// Runs of each test.
 const RUNS: u32 = 10;
@@ -27,7 +26,7 @@ const WAITING: [(&str, &[&str]); 2] = [
 ];
 
 /// Counts the runs out of ten that pass, for each test, beside four busy loops.
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     for (package, targets) in WAITING {
         let built = test_binaries(package)?;
         for target in targets {
@@ -42,8 +41,12 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
 
 /// Returns names and paths of a crate's test binaries, built as in the gate.
 fn test_binaries(package: &str) -> anyhow::Result<Vec<(String, PathBuf)>> {
-    let args = ["-p", package, "--no-run", "--message-format=json"];
-    let told = output_of(&mut GATE.cargo("test", &args), None)?;
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo
+        .current_dir(root())
+        .args(["test", "--profile", "gate"]);
+    cargo.args(["-p", package, "--no-run", "--message-format=json"]);
+    let told = output_of(&mut cargo, None)?;
     let messages = told.lines().filter_map(|l| serde_json::from_str(l).ok());
     let binary = |message: Value| {
         let name = message["target"]["name"].as_str()?.to_owned();
@@ -57,7 +60,7 @@ fn test_binaries(package: &str) -> anyhow::Result<Vec<(String, PathBuf)>> {
 fn passes(package: &str, binary: &Path) -> bool {
     let done = Command::new(binary)
         .current_dir(root().join("crates").join(package))
-        .env("NODE_PATH", node_path())
+        .env("NODE_PATH", target_dir().join("tools/node_modules"))
         .env("ENFILADE_NEEDS_WINDOW", "1")
         .stdout(Stdio::null())
         .stderr(Stdio::null())

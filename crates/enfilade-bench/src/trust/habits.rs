@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use anyhow::Context;
 
 use super::{Figures, holds};
-use crate::RELEASE;
+use crate::process::binary;
 
 /// A name that sets a terminal's title, clears the screen, begins a line and reverses text.
 const NAME: &str = "odd\u{1b}]0;owned\u{7}\u{1b}[2J\nwrote all\u{9b}31m\u{202e}gnp\u{2066}";
@@ -15,7 +15,7 @@ const NAME: &str = "odd\u{1b}]0;owned\u{7}\u{1b}[2J\nwrote all\u{9b}31m\u{202e}g
 /// Real buildings, if available.
 const BUILDINGS: [&str; 3] = ["duplex", "fzk-haus", "samplehouse4"];
 
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
     let folder = rows.path("habits");
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder)?;
@@ -27,7 +27,7 @@ pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
 }
 
 fn enfilade(folder: &Path, args: &[&str]) -> anyhow::Result<Output> {
-    let mut command = Command::new(RELEASE.binary("enfilade"));
+    let mut command = Command::new(binary("enfilade"));
     command.args(args).current_dir(folder).stdin(Stdio::null());
     command.output().context("cannot start the command")
 }
@@ -45,7 +45,7 @@ fn n_hidden(done: &Output) -> usize {
 }
 
 /// Objects, materials and files with odd names, through the commands that print them.
-fn names(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
+fn names(rows: &mut Figures<'_>, folder: &Path) -> anyhow::Result<()> {
     let name = serde_json::to_string(NAME)?;
     let done = enfilade(folder, &["demo", "-o", "."])?;
     anyhow::ensure!(done.status.success(), "{done:?}");
@@ -106,7 +106,7 @@ fn renamed(glb: &[u8], name: &str) -> anyhow::Result<Vec<u8>> {
 }
 
 /// Files not named as output are not overwritten, nor the targets of links.
-fn kept(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
+fn kept(rows: &mut Figures<'_>, folder: &Path) -> anyhow::Result<()> {
     for (command, file) in [
         ("demo -o", "house.glb"),
         ("demo -o", "world.glb"),
@@ -159,7 +159,7 @@ fn kept(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn extensions(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
+fn extensions(rows: &mut Figures<'_>, folder: &Path) -> anyhow::Result<()> {
     for (command, file) in [
         (
             "sound world.glb --listener 2,1,2 --source 3,1,2 -o",
@@ -184,8 +184,8 @@ fn extensions(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
 }
 
 /// Pipes that end early, and pipes that never end.
-fn streams(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
-    let mut command = Command::new(RELEASE.binary("enfilade"));
+fn streams(rows: &mut Figures<'_>, folder: &Path) -> anyhow::Result<()> {
+    let mut command = Command::new(binary("enfilade"));
     command
         .args(["bake", "house.glb", "-o", "-"])
         .current_dir(folder);
@@ -195,7 +195,7 @@ fn streams(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
         .spawn()?;
     drop(child.stdout.take());
     rows.is("habits cut", "bake", child.wait()?.code() == Some(1));
-    let binary = RELEASE.binary("enfilade").to_string_lossy().into_owned();
+    let binary = binary("enfilade").to_string_lossy().into_owned();
     for line in [
         "bake - -o x.glb",
         "pvs - -o x.pvs",
@@ -216,8 +216,8 @@ fn streams(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
 }
 
 /// Compares two reports on one world, byte by byte.
-fn same(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
-    let scenes = crate::scenes();
+fn same(rows: &mut Figures<'_>, folder: &Path) -> anyhow::Result<()> {
+    let scenes = crate::process::scenes();
     let scene_of = |name: &str| {
         scenes
             .iter()
@@ -239,7 +239,7 @@ fn same(rows: &mut Figures, folder: &Path) -> anyhow::Result<()> {
         anyhow::ensure!(done.status.success(), "{done:?}");
         let mut pages = Vec::new();
         for threads in ["1", "2"] {
-            let mut command = Command::new(RELEASE.binary("enfilade"));
+            let mut command = Command::new(binary("enfilade"));
             command.args(["report", "same.glb", "--no-pictures", "-o", "-"]);
             let command = command
                 .current_dir(folder)

@@ -8,8 +8,8 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::score::{V3, center_and_area, dot, inspect, locate, score_world, sub, unit, vec3};
-use crate::{RELEASE, add_scene_files};
+use crate::process::{add_scene_files, bake_command, binary};
+use crate::score::{V3, center_and_area, dot, inspect, list, locate, score_world, sub, unit, vec3};
 
 /// The figures of a bake.
 #[derive(Clone)]
@@ -55,7 +55,7 @@ pub(super) fn measure(
     let mut seconds = f64::INFINITY;
     let mut said = String::new();
     for i in 0..REPEATS {
-        let mut command = RELEASE.bake_command(dir, world);
+        let mut command = bake_command(dir, world);
         command.args(settings);
         let start = Instant::now();
         let done = command.output().context("cannot start enfilade")?;
@@ -68,8 +68,8 @@ pub(super) fn measure(
             break;
         }
     }
-    let graph = inspect(RELEASE, world)?;
-    let row = score_world(RELEASE, dir, world, &graph)?;
+    let graph = inspect(world)?;
+    let row = score_world(dir, world, &graph)?;
     let [rooms, doors, windows, _, extra, _] = row.figures;
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)?;
     let matter: Vec<V3> = list(&truth["matter"]).iter().filter_map(vec3).collect();
@@ -93,10 +93,6 @@ pub(super) fn measure(
     })
 }
 
-fn list(v: &Value) -> &[Value] {
-    v.as_array().map_or(&[], Vec::as_slice)
-}
-
 /// Counts the points in indoor cells that are not rooms: a box taken for furniture stands in a room's air.
 fn n_cells_of_matter(
     graph: &Value,
@@ -111,9 +107,9 @@ fn n_cells_of_matter(
         .iter()
         .flat_map(|r| list(&r["sample_points"]));
     let points: Vec<V3> = points.filter_map(vec3).collect();
-    let rooms: BTreeSet<String> = locate(RELEASE, world, &points)?.into_iter().collect();
+    let rooms: BTreeSet<String> = locate(world, &points)?.into_iter().collect();
     let indoors = indoor_ids(graph);
-    let cells = locate(RELEASE, world, matter)?;
+    let cells = locate(world, matter)?;
     let is_wrong = |id: &&String| indoors.contains(*id) && !rooms.contains(*id);
     Ok(cells.iter().filter(is_wrong).count())
 }
@@ -124,7 +120,7 @@ pub(super) fn n_indoors(graph: &Value, world: &Path, points: &[V3]) -> anyhow::R
         return Ok(0);
     }
     let indoors = indoor_ids(graph);
-    let cells = locate(RELEASE, world, points)?;
+    let cells = locate(world, points)?;
     Ok(cells.iter().filter(|&id| indoors.contains(id)).count())
 }
 
@@ -146,7 +142,7 @@ fn n_missing(said: &str) -> usize {
 
 /// Counts the promises that `verify` finds broken; lines blocked by the source's triangles are not tried.
 fn broken(dir: &Path, world: &Path, rays: u64) -> Result<u64, String> {
-    let mut command = Command::new(RELEASE.binary("enfilade"));
+    let mut command = Command::new(binary("enfilade"));
     command.arg("verify").arg(world);
     add_scene_files(&mut command, dir, Some("--source"));
     command.args(["--rays", &rays.to_string(), "--json"]);

@@ -5,10 +5,10 @@
 //! Chaigne, "Digital delay networks for designing artificial reverberators", 1991). O(samples). A delay changes by at
 //! most a tenth of real time, so that a switch to another shortest path bends the pitch instead of clicking.
 
-use enfilade::world::SPEED_OF_SOUND;
+use crate::reverb::SPEED_OF_SOUND;
 
 /// Samples for which one answer of the listener is used.
-pub(crate) const BLOCK: usize = 256;
+pub const AUDIO_BLOCK: usize = 256;
 /// Delay lines of the tail, with almost no common divisors. [Units: s]
 const LINES: [f64; 4] = [0.0297, 0.0371, 0.0411, 0.0437];
 /// Factor on all samples, so that loud rooms do not clip.
@@ -18,46 +18,48 @@ const FASTEST: f64 = 0.1;
 
 /// The sound heard at the end of a block.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Block {
+pub struct AudioBlock {
     /// Length of the path to the listener. [Units: wu]
-    pub(crate) length: f64,
+    pub length: f64,
     /// Amplitude, and delay relative to the nearer ear, left and right. [Units: s]
-    pub(crate) ears: [(f64, f64); 2],
+    pub ears: [(f64, f64); 2],
     /// Amplitude of the room.
-    pub(crate) room: f64,
-    /// [Units: s]
-    pub(crate) rt60: f64,
+    pub room: f64,
+    /// Decay time of the room. [Units: s]
+    pub rt60: f64,
 }
 
 /// Renders the sound heard, block by block. The source repeats.
-pub(crate) struct Renderer<'s> {
+pub struct Auralizer<'s> {
     source: &'s [f32],
     rate: f64,
     /// Delays of the ears at the end of the previous block. [Units: samples]
     delays: Option<[f64; 2]>,
-    last: Block,
+    last: AudioBlock,
     tail: Tail,
     /// Samples so far.
     now: u64,
     out: Vec<[f32; 2]>,
 }
 
-impl<'s> Renderer<'s> {
-    pub(crate) fn new(source: &'s [f32], rate: u32) -> Self {
+impl<'s> Auralizer<'s> {
+    /// Returns a renderer of the sound of one source, in samples at a rate. [Units: 1/s]
+    #[must_use]
+    pub fn new(source: &'s [f32], rate: u32) -> Self {
         let rate = f64::from(rate);
         Self {
             source,
             rate,
             delays: None,
-            last: Block::default(),
+            last: AudioBlock::default(),
             tail: Tail::new(rate),
             now: 0,
-            out: Vec::with_capacity(BLOCK),
+            out: Vec::with_capacity(AUDIO_BLOCK),
         }
     }
 
     /// Returns the samples of the next block, left and right.
-    pub(crate) fn render(&mut self, block: &Block) -> &[[f32; 2]] {
+    pub fn render(&mut self, block: &AudioBlock) -> &[[f32; 2]] {
         self.out.clear();
         if self.source.is_empty() {
             return &self.out;
@@ -69,10 +71,10 @@ impl<'s> Renderer<'s> {
         } else {
             *block
         };
-        let most = FASTEST * BLOCK as f64;
+        let most = FASTEST * AUDIO_BLOCK as f64;
         let next = [0, 1].map(|k| goal[k].clamp(delays[k] - most, delays[k] + most));
-        for i in 0..BLOCK {
-            let share = (i + 1) as f64 / BLOCK as f64;
+        for i in 0..AUDIO_BLOCK {
+            let share = (i + 1) as f64 / AUDIO_BLOCK as f64;
             let mix = |a: f64, b: f64| a + (b - a) * share;
             let now = self.now as f64;
             let room = self.tail.next(
@@ -148,7 +150,8 @@ impl Tail {
 }
 
 /// A sound for trials: two soft tones, struck twice a second.
-pub(crate) fn test_sound(rate: u32) -> Vec<f32> {
+#[must_use]
+pub fn test_sound(rate: u32) -> Vec<f32> {
     let n = rate / 2;
     let sample = |i: u32| {
         let t = f64::from(i) / f64::from(rate);
@@ -192,15 +195,15 @@ mod tests {
                 .map(|w| (w[1] - w[0]).abs())
                 .fold(0.0, f32::max)
         };
-        let block = |length: f64| Block {
+        let block = |length: f64| AudioBlock {
             length,
             ears: [(1.0, 0.0), (0.7, 3e-4)],
-            ..Block::default()
+            ..AudioBlock::default()
         };
         let blocks: Vec<_> = (0..300)
             .map(|k| block(if k < 150 { 30.0 } else { 10.0 }))
             .collect();
-        let mut renderer = Renderer::new(&source, 44100);
+        let mut renderer = Auralizer::new(&source, 44100);
         let out: Vec<_> = (blocks.iter())
             .flat_map(|b| renderer.render(b).to_vec())
             .collect();

@@ -1,7 +1,4 @@
-//! `cargo xtask bench trust`: hostile and huge input, each figure with its bar.
-//!
-//! Each figure is a row: in JSON a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if a
-//! requirement is missing, which `note` then names.
+//! `bench trust`: hostile and huge input, each figure with its bar.
 
 mod budgets;
 mod commands;
@@ -21,23 +18,28 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::Context;
-use serde_json::json;
 
-use crate::{RELEASE, run_to_end, target_dir};
+use crate::process::{binary, target_dir};
+use crate::rows::{Chosen, RowPrinter};
 
 /// The options of the bench.
-#[derive(Default)]
-pub(crate) struct TrustOptions {
-    /// Print a JSON object per row instead of a table.
-    pub(crate) is_json: bool,
-    /// Beginnings of row names; empty for all.
-    pub(crate) rows: Vec<String>,
-    /// Indices of the damaged files to try.
-    pub(crate) runs: Range<usize>,
-    /// Indices of the shuffles to try.
-    pub(crate) shuffles: Range<usize>,
-    /// Beginnings of the names of scenes to shuffle; empty for all.
-    pub(crate) scenes: Vec<String>,
+#[derive(clap::Args)]
+pub(crate) struct Trust {
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Number of damaged files of `mutated`, and of shuffles of each scene of `order`; 20,000 and 20 by default.
+    #[arg(long)]
+    count: Option<usize>,
+    /// Index of the first of them.
+    #[arg(long, default_value_t = 0)]
+    from: usize,
+}
+
+impl Trust {
+    /// Returns the indices of damaged files or shuffles to try, given their default number.
+    fn runs(&self, n: usize) -> Range<usize> {
+        self.from..self.from.saturating_add(self.count.unwrap_or(n))
+    }
 }
 
 /// The parts by the first word of their rows: a module and a line here for each.
@@ -56,71 +58,36 @@ const PARTS: &[(&str, Part)] = &[
     ("tight", tight::run),
 ];
 
-type Part = fn(&mut Figures) -> anyhow::Result<()>;
-
-/// Returns the indices of `n` damaged files starting at `from`; of the default number if `n` is not given.
-pub(crate) fn runs(from: usize, n: Option<usize>) -> Range<usize> {
-    from..from.saturating_add(n.unwrap_or(mutated::COUNT))
-}
-
-/// Same as [`runs`] for shuffles.
-pub(crate) fn shuffles(from: usize, n: Option<usize>) -> Range<usize> {
-    from..from.saturating_add(n.unwrap_or(order::COUNT))
-}
+type Part = fn(&mut Figures<'_>) -> anyhow::Result<()>;
 
 /// Measures and prints; fails if a bar is missed.
-pub(crate) fn run(options: &TrustOptions) -> anyhow::Result<()> {
-    run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-cli"]))?;
+pub(crate) fn bench_trust(options: &Trust, is_json: bool) -> anyhow::Result<()> {
     let folder = target_dir().join("trust");
     std::fs::create_dir_all(&folder)?;
     let mut rows = Figures {
-        is_json: options.is_json,
+        printer: RowPrinter::new(is_json),
         folder,
-        runs: options.runs.clone(),
-        shuffles: options.shuffles.clone(),
-        scenes: options.scenes.clone(),
-        n: [0; 3],
+        options,
     };
     for (name, part) in PARTS.iter().copied() {
-        let is_asked = |row: &String| name.starts_with(row.as_str());
-        if options.rows.is_empty() || options.rows.iter().any(is_asked) {
+        if options.chosen.has_row(name) {
             part(&mut rows)?;
         }
     }
-    let [failed, passed, unknown] = rows.n;
-    eprintln!("{passed} bars met, {failed} missed, {unknown} unknown");
-    anyhow::ensure!(failed == 0, "{failed} bars are missed");
-    Ok(())
+    rows.printer.finish()
 }
 
 /// The printed figures.
-struct Figures {
-    is_json: bool,
+struct Figures<'a> {
+    printer: RowPrinter,
     /// Folder of inputs and outputs.
     folder: PathBuf,
-    /// Indices of the damaged files to try.
-    runs: Range<usize>,
-    /// Indices of the shuffles to try.
-    shuffles: Range<usize>,
-    /// Beginnings of the names of scenes to shuffle.
-    scenes: Vec<String>,
-    /// Number of bars missed, met and unknown.
-    n: [usize; 3],
+    options: &'a Trust,
 }
 
-impl Figures {
+impl Figures<'_> {
     fn print(&mut self, row: &str, scene: &str, value: Option<f64>, bar: &str, ok: Option<bool>) {
-        self.n[ok.map_or(2, usize::from)] += 1;
-        if self.is_json {
-            println!(
-                "{}",
-                json!({"row": row, "scene": scene, "value": value, "bar": bar, "ok": ok})
-            );
-            return;
-        }
-        let value = value.map_or_else(|| "–".to_owned(), |v| format!("{v:.2}"));
-        let word = ok.map_or("–", |ok| if ok { "ok" } else { "NOT MET" });
-        println!("{row:<24} {scene:<28} {value:>10}  {bar:<10} {word}");
+        self.printer.print(row, scene, value, bar, ok, "");
     }
 
     fn at_most(&mut self, row: &str, scene: &str, value: f64, most: f64) {
@@ -141,7 +108,7 @@ impl Figures {
     fn enfilade(&self, args: &[&str], most: u32) -> anyhow::Result<Ran> {
         let mut timed = Command::new("/usr/bin/time");
         timed.args(["-f", "%e %M", "timeout", &most.to_string()]);
-        timed.arg(RELEASE.binary("enfilade")).args(args);
+        timed.arg(binary("enfilade")).args(args);
         let done = timed
             .current_dir(&self.folder)
             .output()

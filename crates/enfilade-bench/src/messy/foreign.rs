@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::Bench;
 use super::measure::n_indoors;
+use crate::process::{binary, output_of, scenes_dir};
 use crate::score::{V3, inspect};
-use crate::{RELEASE, output_of, scenes_dir};
 
 /// A point inside a storey that is glazed all around. [Units: wu]
 const IN_HALL: V3 = [10.0, 3.0, -6.0];
@@ -30,19 +30,19 @@ pub(super) fn run(bench: &mut Bench<'_>) -> anyhow::Result<()> {
     ];
     for (file, settings, judge) in scenes {
         let path = folder.join(file);
-        if !path.is_file() || !bench.wants_scene(file) {
+        if !path.is_file() || !bench.options.chosen.has_scene(file) {
             continue;
         }
         bench.rows.scene = file.into();
         let world = bench.folder.join("foreign.glb");
-        let mut bake = Command::new(RELEASE.binary("enfilade"));
+        let mut bake = Command::new(binary("enfilade"));
         bake.arg("bake")
             .arg(&path)
             .args(settings)
             .arg("-o")
             .arg(&world);
         let judged = output_of(&mut bake, None)
-            .and_then(|_| inspect(RELEASE, &world))
+            .and_then(|_| inspect(&world))
             .and_then(|graph| judge(bench, &path, &world, &graph));
         if let Err(error) = judged {
             bench.rows.failed(&error);

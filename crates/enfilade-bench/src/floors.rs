@@ -5,49 +5,33 @@
 
 use anyhow::bail;
 
-use crate::score::{COLUMNS, Row};
+use crate::table::Table;
 
-/// The minimum shares of rooms, doors and windows: the first three of [`COLUMNS`].
-struct Floor {
-    scene: &'static str,
-    shares: [f64; 3],
-}
+/// Names of the figures of a score.
+pub(crate) const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
+
+/// A scene, and the minimum shares of rooms, doors and windows: the first three of [`COLUMNS`].
+type Floor = (&'static str, [f64; 3]);
 
 const FLOORS: [Floor; 6] = [
-    Floor {
-        scene: "duplex",
-        shares: [0.89, 0.99, 0.99],
-    },
-    Floor {
-        scene: "fzk-haus",
-        shares: [0.99, 0.99, 0.99],
-    },
-    Floor {
-        scene: "institute",
-        shares: [0.98, 0.99, 0.99],
-    },
-    Floor {
-        scene: "jasmin-sun",
-        shares: [0.89, 0.87, 0.91],
-    },
-    Floor {
-        scene: "kit-edc",
-        shares: [0.99, 0.99, 0.99],
-    },
-    Floor {
-        scene: "samplehouse4",
-        shares: [0.74, 0.99, 0.99],
-    },
+    ("duplex", [0.89, 0.99, 0.99]),
+    ("fzk-haus", [0.99, 0.99, 0.99]),
+    ("institute", [0.98, 0.99, 0.99]),
+    ("jasmin-sun", [0.89, 0.87, 0.91]),
+    ("kit-edc", [0.99, 0.99, 0.99]),
+    ("samplehouse4", [0.74, 0.99, 0.99]),
 ];
 
 /// Fails with a line for each figure below its floor. Scenes without a floor pass, but are listed.
-pub(crate) fn check(rows: &[Row]) -> anyhow::Result<()> {
+pub(crate) fn check<'n>(
+    out: &mut Table,
+    rows: impl Iterator<Item = (&'n str, [Option<f64>; 6])>,
+) -> anyhow::Result<()> {
     let mut low = Vec::new();
-    for row in rows {
-        let shares = [row.figures[0], row.figures[1], row.figures[2]];
-        match FLOORS.iter().find(|f| f.scene == row.name) {
-            Some(floor) => low.extend(below(floor, shares)),
-            None => println!("{}: no floor in xtask/src/floors.rs", row.name),
+    for (name, [rooms, doors, windows, ..]) in rows {
+        match FLOORS.iter().find(|f| f.0 == name) {
+            Some(floor) => low.extend(below(floor, [rooms, doors, windows])),
+            None => out.push(format!("{name}: no floor in {}", file!())),
         }
     }
     if !low.is_empty() {
@@ -57,14 +41,14 @@ pub(crate) fn check(rows: &[Row]) -> anyhow::Result<()> {
 }
 
 /// Returns the figures that are below their floors or missing.
-fn below(floor: &Floor, shares: [Option<f64>; 3]) -> Vec<String> {
+fn below(&(scene, floor): &Floor, shares: [Option<f64>; 3]) -> Vec<String> {
     (0..3)
-        .filter(|&k| !shares[k].is_some_and(|share| share >= floor.shares[k]))
+        .filter(|&k| !shares[k].is_some_and(|share| share >= floor[k]))
         .map(|k| {
             let share = shares[k].map_or_else(|| "none".to_owned(), |s| format!("{s:.3}"));
             format!(
-                "{}: {} {share}, below the floor of {}",
-                floor.scene, COLUMNS[k], floor.shares[k]
+                "{scene}: {} {share}, below the floor of {}",
+                COLUMNS[k], floor[k]
             )
         })
         .collect()
@@ -74,10 +58,7 @@ fn below(floor: &Floor, shares: [Option<f64>; 3]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    const FLOOR: Floor = Floor {
-        scene: "a house",
-        shares: [0.89, 0.99, 0.99],
-    };
+    const FLOOR: Floor = ("a house", [0.89, 0.99, 0.99]);
 
     #[test]
     fn a_room_less_is_below_the_floor_and_rounding_is_not() {
@@ -97,13 +78,13 @@ mod tests {
 
     #[test]
     fn floors_lie_a_hundredth_below_what_is_written() {
-        let page = std::fs::read_to_string(crate::root().join("docs/benchmarks/rooms.md"));
+        let page = std::fs::read_to_string(crate::process::root().join("docs/benchmarks/rooms.md"));
         let page = page.expect("the page of the scores");
-        for floor in &FLOORS {
+        for (scene, floor) in &FLOORS {
             let row = page
                 .lines()
-                .find_map(|l| l.strip_prefix(&format!("| {} |", floor.scene)))
-                .unwrap_or_else(|| panic!("{} has no row", floor.scene));
+                .find_map(|l| l.strip_prefix(&format!("| {scene} |")))
+                .unwrap_or_else(|| panic!("{scene} has no row"));
             let written: Vec<f64> = row
                 .split('|')
                 .skip(1)
@@ -111,13 +92,12 @@ mod tests {
                 .map(|f| f.trim().parse().expect("a figure"))
                 .collect();
             for (k, written) in written.iter().enumerate() {
-                let gap = written - floor.shares[k];
+                let gap = written - floor[k];
                 assert!(
                     (gap - 0.01).abs() < 1e-9,
-                    "{}: {} is written as {written}, its floor is {}",
-                    floor.scene,
+                    "{scene}: {} is written as {written}, its floor is {}",
                     COLUMNS[k],
-                    floor.shares[k]
+                    floor[k]
                 );
             }
         }

@@ -8,16 +8,15 @@ use anyhow::Context;
 use serde_json::Value;
 
 use super::Figures;
-use crate::{RELEASE, output_of, run_to_end, scenes};
+use crate::process::{binary, output_of, scenes};
 
 /// Real buildings, from three programs.
 const SCENES: [&str; 3] = ["samplehouse4", "duplex", "fzk-haus"];
 
 /// Prints a row per kind and scene: places at which it is found, all of them if `ok`; unknown if a scene has no such
 /// place.
-pub(super) fn run(rows: &mut Figures) -> anyhow::Result<()> {
-    run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-bench"]))?;
-    let mut command = Command::new(RELEASE.binary("enfilade-bench"));
+pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
+    let mut command = Command::new(binary("enfilade-bench"));
     command.arg("tampered");
     for scene in SCENES {
         let found = scenes().into_iter().find(|dir| dir.ends_with(scene));

@@ -1,70 +1,57 @@
-//! `cargo xtask bench`: growth of time and memory of a bake with the building, the voxel kernels beside other
-//! implementations, and the tables of `enfilade-bench`.
+//! Growth of time and memory of a bake with the building, and the voxel kernels beside other implementations.
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
 use serde_json::Value;
 
-use crate::{RELEASE, output_of, root, run_to_end, target_dir, write_between_marks};
+use crate::process::{bake_command, binary, output_of, root, target_dir, write_between_marks};
+use crate::score::inspect;
+use crate::table::Table;
 
 /// Rooms of the towers, a factor of 4 apart.
 const SIZES: [usize; 4] = [16, 64, 256, 1024];
 
 /// Prints the table of growth, and writes it to `docs/benchmarks/growth.md` if `is_written`. With `peers`, the folder
 /// of the scripts that generate the kernels' inputs, also prints the kernels' table.
-pub(crate) fn run(peers: Option<&Path>, is_written: bool) -> anyhow::Result<()> {
+pub(crate) fn bench_growth(
+    table: &mut Table,
+    peers: Option<&Path>,
+    is_written: bool,
+) -> anyhow::Result<()> {
     if let Some(peers) = peers {
         kernels(peers)?;
     }
-    growth(is_written)
-}
-
-/// Runs the table named by the first of `args`; returns its exit code.
-pub(crate) fn measure(args: &[String]) -> ExitCode {
-    let run = || {
-        run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-bench"]))?;
-        let mut bench = Command::new(RELEASE.binary("enfilade-bench"));
-        let status = bench.args(args).status()?;
-        anyhow::Ok(u8::try_from(status.code().unwrap_or(1)).unwrap_or(1))
-    };
-    run().map_or_else(
-        |error| {
-            eprintln!("xtask: {error:#}");
-            ExitCode::FAILURE
-        },
-        ExitCode::from,
-    )
+    let text = growth()?;
+    table.push_text(&text);
+    if is_written {
+        write_between_marks("growth.md", &text)?;
+    }
+    Ok(())
 }
 
 fn kernels(peers: &Path) -> anyhow::Result<()> {
-    run_to_end(&mut RELEASE.cargo(
-        "build",
-        &["-p", "enfilade-voxel", "--example", "kernel_bench"],
-    ))?;
     let data = target_dir().join("kernel-bench");
     std::fs::create_dir_all(&data)?;
     let mut python = Command::new("python3");
     python
         .arg(root().join("scripts/bench_kernels.py"))
         .arg("--bench")
-        .arg(RELEASE.binary("examples/kernel_bench"))
+        .arg(binary("examples/kernel_bench"))
         .arg("--data")
         .arg(data)
         .arg("--peers")
         .arg(peers);
-    run_to_end(&mut python)
+    let status = python.status().context("cannot start python3")?;
+    anyhow::ensure!(status.success(), "{python:?} failed: {status}");
+    Ok(())
 }
 
-fn growth(is_written: bool) -> anyhow::Result<()> {
-    run_to_end(&mut RELEASE.cargo("build", &["-p", "enfilade-cli"]))?;
-    run_to_end(&mut RELEASE.cargo(
-        "build",
-        &["-p", "enfilade-testkit", "--example", "generate"],
-    ))?;
+/// Returns the tables of growth and of the stages' times.
+fn growth() -> anyhow::Result<String> {
     let mut table = String::from(
         "| rooms | cells | triangles | M voxels | M occupied | wall s | user s | exponent | peak MiB | bytes a voxel |\n\
          | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n",
@@ -112,11 +99,7 @@ fn growth(is_written: bool) -> anyhow::Result<()> {
     for (name, seconds) in stages {
         let _ = writeln!(stage_table, "| {name} | {} |", seconds.join(" | "));
     }
-    println!("{table}\n{stage_table}");
-    if is_written {
-        write_between_marks("growth.md", &format!("{table}\n{stage_table}"))?;
-    }
-    Ok(())
+    Ok(format!("{table}\n{stage_table}"))
 }
 
 /// The bake of a tower.
@@ -135,7 +118,7 @@ struct Tower {
 
 fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     let dir = target_dir().join(format!("tower-{rooms}"));
-    let mut generate = Command::new(RELEASE.binary("examples/generate"));
+    let mut generate = Command::new(binary("examples/generate"));
     output_of(
         generate
             .args(["tower", "--rooms", &rooms.to_string(), "-o"])
@@ -144,14 +127,8 @@ fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     )?;
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)?;
     let world = dir.join("world.glb");
-    let used = used_by(RELEASE.bake_command(&dir, &world).arg("-v"))?;
-    let graph: Value = serde_json::from_str(&output_of(
-        Command::new(RELEASE.binary("enfilade"))
-            .arg("inspect")
-            .arg(&world)
-            .arg("--json"),
-        None,
-    )?)?;
+    let used = used_by(bake_command(&dir, &world).arg("-v"))?;
+    let graph = inspect(&world)?;
     let count = |name: &str| {
         graph["stats"]["counts"][name]
             .as_f64()

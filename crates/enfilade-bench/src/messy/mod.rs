@@ -1,8 +1,6 @@
-//! `cargo xtask bench messy`: robustness of rooms and doors against disturbed models, each figure with its bar.
+//! `bench messy`: robustness of rooms and doors against disturbed models, each figure with its bar.
 //!
-//! Scenes with a truth are baked unchanged and disturbed by the test kit's `generate`, and the results compared. Each
-//! figure is a row: in JSON a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if a
-//! requirement is missing, which `note` then names.
+//! Scenes with a truth are baked unchanged and disturbed by the test kit's `generate`, and the results compared.
 
 mod foreign;
 mod measure;
@@ -12,26 +10,20 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::Context;
-use serde_json::json;
 
-use crate::{RELEASE, output_of, run_to_end, scenes, scenes_in, target_dir};
+use crate::process::{binary, output_of, scenes, scenes_in, target_dir};
+use crate::rows::{Chosen, RowPrinter, shown};
 use measure::{Measured, measure};
 
 /// The options of the bench.
-#[derive(Default)]
-pub(crate) struct Options {
-    /// Print a JSON object per row instead of a table.
-    pub(crate) is_json: bool,
-    /// Beginnings of row names; empty for all.
-    pub(crate) rows: Vec<String>,
-    /// Beginnings of scene names; empty for all.
-    pub(crate) scenes: Vec<String>,
+#[derive(clap::Args)]
+pub(crate) struct Messy {
+    #[command(flatten)]
+    chosen: Chosen,
     /// Segments that `verify` tries, and as many rays.
-    pub(crate) rays: Option<u64>,
+    #[arg(long, default_value_t = 1_000_000)]
+    rays: u64,
 }
-
-/// Default number of rays.
-const RAYS: u64 = 1_000_000;
 
 /// Generated scenes, disturbed like the real ones.
 const GENERATED: [&str; 7] = [
@@ -52,7 +44,7 @@ struct Case {
     spoilt: Option<&'static [&'static str]>,
     /// Arguments of `bake`.
     settings: &'static [&'static str],
-    judge: fn(&mut Rows, &Measured, &Measured),
+    judge: fn(&mut MessyRows, &Measured, &Measured),
 }
 
 const CASES: [Case; 13] = [
@@ -91,7 +83,7 @@ const CASES: [Case; 13] = [
 const fn moved(
     label: &'static str,
     spoilt: &'static [&'static str],
-    judge: fn(&mut Rows, &Measured, &Measured),
+    judge: fn(&mut MessyRows, &Measured, &Measured),
 ) -> Case {
     Case {
         label,
@@ -112,7 +104,7 @@ const fn exact(label: &'static str, spoilt: &'static [&'static str]) -> Case {
     }
 }
 
-fn near_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
+fn near_moved(rows: &mut MessyRows, now: &Measured, before: &Measured) {
     rows.at_least("rooms", now.rooms, before.rooms, 0.03);
     rows.at_least("doors", now.doors, before.doors, 0.03);
     rows.at_most("portals ratio", now.portals_to(before), 1.2);
@@ -121,7 +113,7 @@ fn near_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
 }
 
 /// Gaps are wider than the default hole: cracks are allowed, but only a few.
-fn far_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
+fn far_moved(rows: &mut MessyRows, now: &Measured, before: &Measured) {
     rows.at_least("rooms", now.rooms, before.rooms, 0.05);
     rows.at_least("doors", now.doors, before.doors, 0.05);
     rows.at_most("cracks a pair and plane", now.cracks as f64, 1.0);
@@ -129,42 +121,26 @@ fn far_moved(rows: &mut Rows, now: &Measured, before: &Measured) {
     rows.broken(now);
 }
 
-fn quantized(rows: &mut Rows, now: &Measured, before: &Measured) {
+fn quantized(rows: &mut MessyRows, now: &Measured, before: &Measured) {
     rows.at_least("rooms", now.rooms, before.rooms, 0.0);
     rows.at_least("doors", now.doors, before.doors, 0.0);
     rows.at_most("portals ratio", now.portals_to(before), 1.1);
 }
 
 /// Prints rows, and keeps figures for averages.
-struct Rows {
-    is_json: bool,
+struct MessyRows {
+    printer: RowPrinter,
     label: String,
     scene: String,
     /// True for a real scene: its figures count for averages.
     is_real: bool,
     figures: BTreeMap<String, Vec<f64>>,
-    n: [usize; 3],
 }
 
-impl Rows {
+impl MessyRows {
     fn print(&mut self, row: &str, value: Option<f64>, bar: &str, ok: Option<bool>, note: &str) {
         let row = format!("{} {row}", self.label);
-        self.n[ok.map_or(2, usize::from)] += 1;
-        if self.is_json {
-            let mut line =
-                json!({"row": row, "scene": self.scene, "value": value, "bar": bar, "ok": ok});
-            if !note.is_empty() {
-                line["note"] = note.into();
-            }
-            println!("{line}");
-        } else {
-            let value = value.map_or_else(|| "–".to_owned(), shown);
-            let word = ok.map_or("–", |ok| if ok { "ok" } else { "NOT MET" });
-            println!(
-                "{row:<38} {:<22} {value:>10}  {bar:<8} {word} {note}",
-                self.scene
-            );
-        }
+        self.printer.print(&row, &self.scene, value, bar, ok, note);
     }
 
     /// Prints a share that may be lower than `wanted` by `slack`. No row if the scene has no such thing.
@@ -221,14 +197,6 @@ impl Rows {
     }
 }
 
-fn shown(x: f64) -> String {
-    if x == x.trunc() {
-        format!("{x:.0}")
-    } else {
-        format!("{x:.3}")
-    }
-}
-
 /// A scene with a truth, and its undisturbed figures.
 struct Base {
     name: String,
@@ -239,31 +207,19 @@ struct Base {
 
 /// The bench and its state.
 struct Bench<'a> {
-    options: &'a Options,
-    rows: Rows,
+    options: &'a Messy,
+    rows: MessyRows,
     folder: PathBuf,
 }
 
 impl Bench<'_> {
-    fn wants_row(&self, label: &str) -> bool {
-        is_asked(&self.options.rows, label)
-    }
-
-    fn wants_scene(&self, name: &str) -> bool {
-        is_asked(&self.options.scenes, name)
-    }
-
-    fn rays(&self) -> u64 {
-        self.options.rays.unwrap_or(RAYS)
-    }
-
     /// Bakes a scene folder and judges it, or prints why that failed.
     fn try_scene(
         &mut self,
         dir: &Path,
         settings: &[&str],
         rays: u64,
-        judge: impl FnOnce(&mut Rows, &Measured),
+        judge: impl FnOnce(&mut MessyRows, &Measured),
     ) -> Option<Measured> {
         let world = self.folder.join("world.glb");
         match measure(dir, &world, settings, rays) {
@@ -294,12 +250,15 @@ impl Bench<'_> {
             .filter(|d| d.join("truth.json").is_file())
             .map(|d| base(d, true))
             .collect();
-        for name in GENERATED.into_iter().filter(|n| self.wants_scene(n)) {
+        for name in GENERATED
+            .into_iter()
+            .filter(|n| self.options.chosen.has_scene(n))
+        {
             let dir = self.folder.join("as-it-is").join(name);
             generate(&[name, "--rooms", "16"], &dir)?;
             all.push(base(dir, false));
         }
-        all.retain(|b| self.wants_scene(&b.name));
+        all.retain(|b| self.options.chosen.has_scene(&b.name));
         Ok(all)
     }
 
@@ -328,7 +287,7 @@ impl Bench<'_> {
                 spoilt
             }
         };
-        let rays = self.rays();
+        let rays = self.options.rays;
         self.try_scene(&dir, case.settings, rays, |rows, now| {
             (case.judge)(rows, now, &before);
         });
@@ -364,7 +323,7 @@ impl Bench<'_> {
         self.rows.label = "fault".into();
         for dir in scenes_in(&folder) {
             let name = name_of(&dir);
-            if !self.wants_scene(&name) {
+            if !self.options.chosen.has_scene(&name) {
                 continue;
             }
             self.rows.scene = name;
@@ -384,34 +343,27 @@ impl Bench<'_> {
 }
 
 /// Measures the chosen figures and prints a row for each.
-pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
-    for example in [
-        &["enfilade-cli"][..],
-        &["enfilade-testkit", "--example", "generate"],
-    ] {
-        run_to_end(&mut RELEASE.cargo("build", &[&["-p"], example].concat()))?;
-    }
+pub(crate) fn bench_messy(options: &Messy, is_json: bool) -> anyhow::Result<()> {
     let mut bench = Bench {
         options,
-        rows: Rows {
-            is_json: options.is_json,
+        rows: MessyRows {
+            printer: RowPrinter::new(is_json),
             label: String::new(),
             scene: String::new(),
             is_real: false,
             figures: BTreeMap::new(),
-            n: [0; 3],
         },
         folder: target_dir().join("messy"),
     };
     let has_hole = output_of(
-        Command::new(RELEASE.binary("enfilade")).args(["bake", "--help"]),
+        Command::new(binary("enfilade")).args(["bake", "--help"]),
         None,
     )?
     .contains("--smallest-hole");
     let has_quantize = Command::new(QUANTIZE).arg("--version").output().is_ok();
     let mut bases = bench.bases()?;
     for case in &CASES {
-        if !bench.wants_row(case.label) {
+        if !options.chosen.has_row(case.label) {
             continue;
         }
         let lacks = if !case.settings.is_empty() && !has_hole {
@@ -433,22 +385,17 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
         bench.rows.average("doors", 0.80);
         bench.rows.average("windows", 0.75);
     }
-    if bench.wants_row("undisturbed") {
+    if options.chosen.has_row("undisturbed") {
         bench.undisturbed(&mut bases);
     }
-    if bench.wants_row("fault") {
+    if options.chosen.has_row("fault") {
         bench.faults()?;
     }
-    if bench.wants_row("foreign") {
+    if options.chosen.has_row("foreign") {
         foreign::run(&mut bench)?;
     }
-    let [not_met, met, unknown] = bench.rows.n;
-    eprintln!("{met} met, {not_met} not met, {unknown} not measured");
+    bench.rows.printer.report();
     Ok(())
-}
-
-fn is_asked(asked: &[String], name: &str) -> bool {
-    asked.is_empty() || asked.iter().any(|a| name.starts_with(a.as_str()))
 }
 
 fn name_of(dir: &Path) -> String {
@@ -458,7 +405,7 @@ fn name_of(dir: &Path) -> String {
 
 /// Runs the test kit's `generate`.
 fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
-    let example = RELEASE.binary("examples/generate");
+    let example = binary("examples/generate");
     output_of(Command::new(example).args(args).arg("-o").arg(to), None).map(drop)
 }
 
@@ -485,17 +432,6 @@ fn quantize(from: &Path, to: &Path) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn rows_and_scenes_are_asked_for_by_how_they_begin() {
-        let asked = |list: &[&str], name| {
-            let list: Vec<String> = list.iter().map(|s| (*s).to_owned()).collect();
-            is_asked(&list, name)
-        };
-        assert!(asked(&[], "moved-1e-5"));
-        assert!(asked(&["fault", "moved"], "moved-1e-5"));
-        assert!(!asked(&["moved-1e-3"], "moved-1e-5"));
-    }
 
     #[test]
     fn every_case_has_a_label_of_its_own() {

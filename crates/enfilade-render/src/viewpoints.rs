@@ -1,0 +1,329 @@
+//! Viewpoints: found automatically, or on a walk.
+
+use enfilade_cpg::{Cell, CellId, PortalId, World};
+use enfilade_runtime::{Sight, Sightlines};
+
+use crate::camera::Camera;
+use crate::gpu::RenderError;
+use crate::ids::Shown;
+use crate::studio::{Culling, Studio};
+
+/// Height of an eye above the floor. [Units: wu]
+pub const EYE_HEIGHT: f32 = 1.6;
+
+/// Default angle of a picture from its lower to its upper edge. [Units: rad]
+pub const FOV: f32 = 1.1;
+
+fn center(cell: &Cell) -> [f32; 3] {
+    [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5)
+}
+
+/// The eye of a person who stands below `p`.
+fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
+    let hit = lines.first_hit(p, [p[0], p[1] - 100.0, p[2]])?;
+    let floor = p[1] - 100.0 * hit.t as f32;
+    Some([p[0], floor + EYE_HEIGHT, p[2]])
+}
+
+/// Most rooms that a photographer looks into.
+const ROOMS: usize = 8;
+/// Least distance of a photographer from walls. [Units: wu]
+const ELBOW: f32 = 0.45;
+/// Directions probed for the longest view.
+const HEADINGS: usize = 24;
+
+/// Finds the place a photographer would choose: where two walls of a large, preferably furnished, room meet, at eye
+/// height, along one of the longest views. Among these, takes the place whose picture shows most objects and
+/// openings, far away, with nothing right before it. For a world without rooms, shows all of it from outside. Draws
+/// some 200 small pictures.
+///
+/// # Errors
+///
+/// If a picture cannot be drawn.
+pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
+    let lines = Sightlines::build(world);
+    let mut best = (f32::NEG_INFINITY, overview(studio));
+    for (id, cell, worth) in rooms(world) {
+        for eye in corners(&studio.sight, &lines, id, cell) {
+            for toward in headings(&lines, cell, eye) {
+                let camera = Camera {
+                    eye,
+                    toward,
+                    fov_y: FOV,
+                };
+                let score = interest(studio, &camera)? + 0.5 * worth.ln_1p();
+                if score > best.0 {
+                    best = (score, camera);
+                }
+            }
+        }
+    }
+    Ok(best.1)
+}
+
+/// The rooms with the most floor, with their worth: floor area, increased by each object.
+fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
+    let mut objects = vec![0_u32; world.graph.cells.len()];
+    for cell in world.details.iter().flat_map(|d| &d.cells) {
+        objects[cell.idx()] += 1;
+    }
+    let worth = |id: CellId, cell: &Cell| {
+        let height = (cell.aabb[1][1] - cell.aabb[0][1]).clamp(2.0, 4.0);
+        let floor = cell.volume / height;
+        // Beyond this size, a larger hall is not better.
+        floor.min(150.0) * (1.0 + (objects[id.idx()] as f32).ln_1p())
+    };
+    let mut out: Vec<_> = (world.graph.indoor_cells())
+        .filter(|(_, cell)| cell.volume > 0.0)
+        .map(|(id, cell)| (id, cell, worth(id, cell)))
+        .collect();
+    out.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
+    out.truncate(ROOMS);
+    out
+}
+
+/// Eyes of a person in a room: where two walls meet, and in the middle.
+fn corners(sight: &Sight, lines: &Sightlines, id: CellId, cell: &Cell) -> Vec<[f32; 3]> {
+    let [low, high] = cell.aabb;
+    let middle = center(cell);
+    let is_clear = |eye: [f32; 3]| {
+        (0..8).all(|i| {
+            let (z, x) = (i as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
+            let arm = [eye[0] + x * ELBOW, eye[1], eye[2] + z * ELBOW];
+            lines.first_hit(eye, arm).is_none()
+        })
+    };
+    let stand = |p: [f32; 3]| {
+        let is_here = |e: &[f32; 3]| sight.locate(*e) == Some(id);
+        if !is_here(&p) {
+            return None;
+        }
+        // At half the height of the cell if it is lower than a person or has no floor.
+        Some(standing(lines, p).filter(is_here).unwrap_or(p))
+    };
+    let mut out: Vec<[f32; 3]> = Vec::new();
+    for [u, v] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+        let corner = [[low[0], high[0]][u], middle[1], [low[2], high[2]][v]];
+        // On the way from the walls to the middle, the first place with elbow room.
+        let place = (1..=10).find_map(|step| {
+            let t = step as f32 * 0.05;
+            let p = [0, 1, 2].map(|k| corner[k] + (middle[k] - corner[k]) * t);
+            stand(p).filter(|&eye| is_clear(eye))
+        });
+        out.extend(place);
+    }
+    out.extend(stand(middle));
+    out
+}
+
+/// Directions worth a picture: across the room, along the longest view, and between the two; slightly downwards.
+fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
+    let angle = |i: usize| i as f32 * std::f32::consts::TAU / HEADINGS as f32;
+    let free: Vec<f32> = (0..HEADINGS)
+        .map(|i| {
+            let (z, x) = angle(i).sin_cos();
+            let end = [eye[0] + x * 40.0, eye[1], eye[2] + z * 40.0];
+            lines
+                .first_hit(eye, end)
+                .map_or(40.0, |h| h.t as f32 * 40.0)
+        })
+        .collect();
+    // A view counts with its neighbors on both sides.
+    let open = |i: usize| {
+        let at = |d: usize| free[(i + HEADINGS + d - 2) % HEADINGS];
+        (0..5).map(at).sum::<f32>()
+    };
+    let mut longest = 0;
+    for i in 1..HEADINGS {
+        if open(i) > open(longest) + 1e-3 {
+            longest = i;
+        }
+    }
+    let (z, x) = angle(longest).sin_cos();
+    let along = [x, z];
+    let to = center(cell);
+    let across = [to[0] - eye[0], to[2] - eye[2]];
+    let length = across[0].hypot(across[1]);
+    let level = |[x, z]: [f32; 2]| [x, -0.07, z];
+    let mut out = vec![level(along)];
+    // In the middle of a room, no direction leads across it.
+    if length > 0.5 {
+        let across = across.map(|d| d / length);
+        out.push(level(across));
+        let between = [along[0] + across[0], along[1] + across[1]];
+        let length = between[0].hypot(between[1]);
+        if length > 0.3 {
+            out.push(level(between.map(|d| d / length)));
+        }
+    }
+    out
+}
+
+/// The whole world, obliquely from above.
+fn overview(studio: &Studio) -> Camera {
+    let [low, high] = studio.world.bounds();
+    let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
+    let size = [0, 1, 2].map(|k| high[k] - low[k]);
+    let radius = (size[0] * size[0] + size[1] * size[1] + size[2] * size[2]).sqrt() * 0.5;
+    let back = [0.55, 0.5, 0.67].map(|d| d * radius * 2.1);
+    Camera::looking_at([0, 1, 2].map(|k| center[k] + back[k]), center)
+}
+
+/// The interest of a picture: objects above all, openings of the room, depth; less if something is right before the
+/// eye.
+fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
+    const SMALL: [u32; 2] = [48, 27];
+    let [solid, _] = studio.ids(camera, Culling::Portals, SMALL)?;
+    let (mut walls, mut objects) = (Vec::new(), Vec::new());
+    let (mut near, mut sky, mut depths) = (0_u32, 0_u32, Vec::new());
+    for (shown, depth) in &solid.pixels {
+        match *shown {
+            Shown::Sky => sky += 1,
+            Shown::Structure { triangle } => {
+                let chunk = studio.world.chunk_of_triangle(triangle);
+                walls.push(chunk.and_then(|c| studio.world.batch_of_chunk(c)));
+            }
+            Shown::Detail { detail, .. } => objects.push(detail),
+            // A shut door is as dull as a wall.
+            Shown::Plug { .. } => walls.push(None),
+        }
+        if *depth > 0.0 {
+            let distance = Camera::distance_of(*depth);
+            near += u32::from(distance < 1.2);
+            depths.push(distance.min(30.0).ln_1p());
+        }
+    }
+    walls.sort_unstable();
+    walls.dedup();
+    let furnished = objects.len() as u32;
+    objects.sort_unstable();
+    objects.dedup();
+    // Deep on the whole, without a wall that fills one side.
+    depths.sort_unstable_by(f32::total_cmp);
+    let quarter = depths.get(depths.len() / 4).copied().unwrap_or_default();
+    let view = camera.view(SMALL[0] as f32 / SMALL[1] as f32)?;
+    let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
+    // Openings of a few pixels are not visible as such.
+    let is_wide = |r: [f32; 4]| (r[2] - r[0]) * (r[3] - r[1]) > 0.01;
+    let openings = (seen.visits().iter())
+        .filter(|v| v.via.is_some() && is_wide(v.rectangle))
+        .count();
+    let n = (SMALL[0] * SMALL[1]) as f32;
+    let share = |count: u32| count as f32 / n;
+    Ok(1.2 * (objects.len() as f32).ln_1p()
+        + 0.4 * (walls.len() as f32).ln_1p()
+        + 0.35 * (openings.min(8) as f32)
+        + 1.5 * depths.iter().sum::<f32>() / n
+        + 1.5 * quarter
+        + 2.0 * share(furnished).min(0.4)
+        - 5.0 * share(near)
+        - share(sky))
+}
+
+/// A walk through the doorways of a world, one view per meter: points, each with the direction of walking.
+/// [Units: wu]
+#[must_use]
+pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 3])> {
+    let mut stops = Vec::new();
+    let graph = &world.graph;
+    let mut been = vec![0_u32; graph.cells.len()];
+    let Some((first, _)) = graph.indoor_cells().next() else {
+        return Vec::new();
+    };
+    let (mut cell, mut came_by) = (first, None);
+    stops.push(center(&graph[cell]));
+    // Always go to the least visited neighbor, through the first such portal.
+    while stops.len() < 2 * views {
+        been[cell.idx()] += 1;
+        let next = graph
+            .exits(cell)
+            .filter(|exit| !graph[exit.to].outdoor)
+            .min_by_key(|exit| (been[exit.to.idx()], Some(exit.id) == came_by, exit.id));
+        let Some(exit) = next else { break };
+        stops.push(exit.portal.center());
+        stops.push(center(&graph[exit.to]));
+        (cell, came_by) = (exit.to, Some(exit.id));
+    }
+    // One view per meter.
+    let mut out = Vec::new();
+    for pair in stops.windows(2) {
+        let d = [0, 1, 2].map(|k| pair[1][k] - pair[0][k]);
+        let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        let n = (length.ceil() as usize).max(1);
+        for i in 0..n {
+            let t = i as f32 / n as f32;
+            let at = [0, 1, 2].map(|k| pair[0][k] + d[k] * t);
+            if length > 0.0 && sight.locate(at).is_some() && out.len() < views {
+                out.push((at, [d[0], 0.0, d[2]]));
+            }
+        }
+    }
+    out
+}
+
+/// The cameras of a [`walk`], at eye height where there is a floor; `fov_y` in radians.
+#[must_use]
+pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> Vec<Camera> {
+    let lines = Sightlines::build(world);
+    let mut last = [1.0, 0.0, 0.0];
+    walk(world, sight, views)
+        .into_iter()
+        .map(|(p, toward)| {
+            // A vertical direction has no heading: keep the last one.
+            if toward[0].hypot(toward[2]) > 1e-3 {
+                last = toward;
+            }
+            let eye = standing(&lines, p).filter(|&e| sight.locate(e).is_some());
+            Camera {
+                eye: eye.unwrap_or(p),
+                toward: last,
+                fov_y,
+            }
+        })
+        .collect()
+}
+
+/// The openable portal nearest to the center of a camera's view, with its distance. [Units: wu] Time grows with the
+/// portals.
+#[must_use]
+pub fn portal_looked_at(
+    world: &World,
+    lines: &Sightlines,
+    camera: &Camera,
+) -> Option<(PortalId, f32)> {
+    let length = camera.toward.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let forward = camera.toward.map(|x| x / length.max(1e-9));
+    let far = 30.0;
+    let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * far);
+    let wall = lines
+        .first_hit(camera.eye, end)
+        .map_or(far, |h| h.t as f32 * far);
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|k| a[k] - b[k]);
+    let cross = |a: [f32; 3], b: [f32; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let mut best: Option<(PortalId, f32)> = None;
+    for (i, portal) in (0..).zip(&world.graph.portals) {
+        let facing = dot(portal.normal, forward);
+        let t = dot(portal.normal, sub(portal.outline[0], camera.eye)) / facing;
+        if facing.abs() < 1e-6 || t <= 0.0 || t > wall + 0.05 || best.is_some_and(|b| b.1 <= t) {
+            continue;
+        }
+        let p = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * t);
+        let next = portal.outline.iter().cycle().skip(1);
+        let is_inside = portal
+            .outline
+            .iter()
+            .zip(next)
+            .all(|(a, b)| dot(portal.normal, cross(sub(*b, *a), sub(p, *a))) >= 0.0);
+        if is_inside {
+            best = Some((PortalId(i), t));
+        }
+    }
+    best
+}
