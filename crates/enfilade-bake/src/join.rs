@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::{DVec3, Sets};
 
-use crate::complex::{Complex, Contact, LeafCells, Partition, Vote};
+use crate::complex::{Complex, LeafCells, OpenContact, Partition, Vote};
 use crate::structure::OUTDOORS;
 
 /// Bit that marks the label of a void; the other bits are the region that the void belongs to.
@@ -102,7 +102,7 @@ pub(crate) fn join_unparted(
     votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],
 ) -> bool {
-    let mut between: BTreeMap<[u32; 2], Contact> = BTreeMap::new();
+    let mut between: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
     for (pair, contact) in complex.contacts(cells) {
         let [a, b] = pair.map(|c| cells.label_of_cell[c as usize]);
         if a != b && ![a, b].contains(&u32::MAX) {

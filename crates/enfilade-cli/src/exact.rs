@@ -6,7 +6,8 @@ use std::path::Path;
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::shown;
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, LostPixel, Mark, Oracle, Picture, Shape, Shown, Studio, Style,
+    AdapterChoice, Camera, Culling, LostPixel, Mark, MarkShape, Oracle, Picture, PixelContent,
+    Studio, Style,
 };
 use enfilade_testkit::Rng;
 use serde::Serialize;
@@ -122,21 +123,21 @@ impl fmt::Display for Exactness {
 }
 
 /// The content of a pixel in words, and the cells that see it.
-fn named(studio: &Studio, world: &World, shown: Shown) -> (String, Vec<CellId>) {
+fn named(studio: &Studio, world: &World, shown: PixelContent) -> (String, Vec<CellId>) {
     match shown {
-        Shown::Sky => ("the sky".into(), Vec::new()),
-        Shown::Structure { triangle } => {
+        PixelContent::Sky => ("the sky".into(), Vec::new()),
+        PixelContent::Structure { triangle } => {
             let chunk = studio.world.chunk_of_triangle(triangle);
             let batch = chunk.and_then(|c| studio.world.batch_of_chunk(c));
             let cells = batch.map_or(Vec::new(), |b| world.batches[b as usize].cells.clone());
             let batch = batch.map_or("?".to_owned(), |b| b.to_string());
             (format!("triangle {triangle} of batch {batch}"), cells)
         }
-        Shown::Plug { portal } => (
+        PixelContent::Plug { portal } => (
             format!("what fills {portal}"),
             world.graph[portal].cells.to_vec(),
         ),
-        Shown::Detail { detail, .. } => {
+        PixelContent::Detail { detail, .. } => {
             let d = &world.details[detail as usize];
             (format!("detail {detail} ({})", d.name), d.cells.clone())
         }
@@ -276,7 +277,7 @@ fn picture_of_loss(
         .map(|l| {
             let at = |i: usize, d: f32| (l.at[i] as f32 + 0.5 + d) / size[i] as f32 * 2.0 - 1.0;
             Mark {
-                shape: Shape::Rectangle([at(0, -4.0), -at(1, 4.0), at(0, 4.0), -at(1, -4.0)]),
+                shape: MarkShape::Rectangle([at(0, -4.0), -at(1, 4.0), at(0, 4.0), -at(1, -4.0)]),
                 color: [1.0, 0.0, 0.2, 1.0],
                 width: 1.5,
                 on_top: true,

@@ -8,8 +8,8 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, FOV, Frame, Mark, Paint, Picture, Projection, Shape, Sparing,
-    Studio, Style, good_camera, walk_cameras,
+    AdapterChoice, Camera, Culling, FOV, Frame, Mark, MarkShape, Paint, Picture, Projection,
+    Sparing, Studio, Style, good_camera, walk_cameras,
 };
 use serde_json::json;
 
@@ -419,9 +419,9 @@ pub(crate) fn portal_marks(
             width,
             on_top,
         };
-        let area = Shape::Area(outline.clone());
+        let area = MarkShape::Area(outline.clone());
         marks.push(mark(area, [1.0, 0.62, 0.05, 0.10], 0.0, false));
-        let line = Shape::Outline(outline.clone());
+        let line = MarkShape::Outline(outline.clone());
         marks.push(mark(line.clone(), [1.0, 0.45, 0.02, 0.22], width, true));
         marks.push(mark(line, [1.0, 0.45, 0.02, 1.0], width, false));
     }
@@ -431,7 +431,7 @@ pub(crate) fn portal_marks(
         .filter(|v| v.via.is_some() && v.face == 0)
     {
         marks.push(Mark {
-            shape: Shape::Rectangle(v.rectangle),
+            shape: MarkShape::Rectangle(v.rectangle),
             color: [0.05, 0.55, 0.9, 0.8],
             width: size[1] as f32 / 480.0,
             on_top: true,
@@ -465,14 +465,18 @@ pub(crate) fn above(
     // Walls along the view have no visible side: draw their edges at the cut.
     for segment in section(world, cut) {
         marks.push(line(
-            Shape::Line(segment),
+            MarkShape::Line(segment),
             [0.03, 0.03, 0.04, 1.0],
             width * 0.6,
         ));
     }
     for p in seen.portals() {
         let outline = world.graph[*p].outline.clone();
-        marks.push(line(Shape::Outline(outline), [1.0, 0.42, 0.0, 1.0], width));
+        marks.push(line(
+            MarkShape::Outline(outline),
+            [1.0, 0.42, 0.0, 1.0],
+            width,
+        ));
     }
     // Pictures from above show rooms, not the ground around them.
     let mut low = [f32::INFINITY; 3];
@@ -494,7 +498,7 @@ pub(crate) fn above(
         let flat = d[0].hypot(d[2]).max(1e-6);
         let end = [0, 1, 2].map(|k| camera.eye[k] + d[k] / flat * reach * [1.0, 0.0, 1.0][k]);
         marks.push(line(
-            Shape::Line([camera.eye, end]),
+            MarkShape::Line([camera.eye, end]),
             [0.02, 0.30, 0.85, 0.9],
             width,
         ));
@@ -510,7 +514,7 @@ pub(crate) fn above(
             ]
         })
         .collect();
-    marks.push(line(Shape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));
+    marks.push(line(MarkShape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));
     // Slightly oblique, so that walls have a side.
     let toward = [0.0, -1.0, -0.38];
     let height = (z * 0.94 + (high[1] - low[1]) * 0.38).max(x / aspect) * 1.06;

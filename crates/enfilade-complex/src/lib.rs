@@ -100,7 +100,7 @@ pub struct Vote {
 
 /// Area of the openings, other than cracks, between two cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contact {
+pub struct OpenContact {
     /// Area on candidates. [Units: wu²]
     pub on_candidates: f64,
     /// Area beside them. [Units: wu²]
@@ -283,8 +283,8 @@ impl Complex<'_> {
     ///
     /// Time: `O(F log F)` for `F` openings; makes no polygons.
     #[must_use]
-    pub fn contacts(&self, cells: &LeafCells) -> BTreeMap<[u32; 2], Contact> {
-        let mut contacts: BTreeMap<[u32; 2], Contact> = BTreeMap::new();
+    pub fn contacts(&self, cells: &LeafCells) -> BTreeMap<[u32; 2], OpenContact> {
+        let mut contacts: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
         for facet in self.graph.facets.iter().filter(|f| !f.is_narrow) {
             let [a, b] = facet.leaves.map(|l| cells.cell_of_leaf[l as usize]);
             if a != b && ![a, b].contains(&leaf_cells::SOLID) {

@@ -5,7 +5,7 @@ use enfilade_geom::{Aabb, DVec3, Plane};
 
 /// A region's measures.
 #[derive(Clone, Copy, Debug)]
-pub struct Shape {
+pub struct RegionShape {
     /// Mean of its vertices.
     pub middle: DVec3,
     /// [Units: wu³]
@@ -67,7 +67,7 @@ pub fn halves(region: Region, plane: &Plane, bounds: &Aabb, eps: f64) -> [Region
 
 /// Returns the measures of a region.
 #[must_use]
-pub fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
+pub fn shape_of(region: &[(Plane, Poly)]) -> Option<RegionShape> {
     let corners = || region.iter().flat_map(|(_, points)| points.iter().copied());
     let n = corners().count();
     if region.len() < 4 {
@@ -78,5 +78,5 @@ pub fn shape_of(region: &[(Plane, Poly)]) -> Option<Shape> {
         .iter()
         .map(|(face, points)| poly::area(points) * face.signed_distance(middle) / 3.0)
         .sum();
-    (volume > 0.0).then_some(Shape { middle, volume })
+    (volume > 0.0).then_some(RegionShape { middle, volume })
 }

@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 
 use glam::Vec4;
 
-use crate::ray::{Hit, Ray, ShearedRay, closest_point_on_triangle, triangle_touches_box};
+use crate::ray::{Ray, RayHit, ShearedRay, closest_point_on_triangle, triangle_touches_box};
 use crate::{Aabb, DVec3, Triangle};
 use build::{Built, Node, build_nodes, round_down, round_up};
 
@@ -105,15 +105,15 @@ impl Bvh {
     ///
     /// At equal `t`, the triangle with the least index.
     #[must_use]
-    pub fn closest_hit(&self, ray: &Ray, mut excluded: impl FnMut(u32) -> bool) -> Option<Hit> {
+    pub fn closest_hit(&self, ray: &Ray, mut excluded: impl FnMut(u32) -> bool) -> Option<RayHit> {
         let sheared = ShearedRay::new(ray);
-        let mut best: Option<Hit> = None;
+        let mut best: Option<RayHit> = None;
         let _ = self.walk::<()>(ray, DVec3::ZERO, |i, t_max| {
             if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
                 let id = self.ids[i];
                 let is_nearer = best.is_none_or(|b| t < b.t || (t == b.t && id < b.triangle));
                 if is_nearer && !excluded(id) {
-                    best = Some(Hit {
+                    best = Some(RayHit {
                         t,
                         triangle: id,
                         front,
@@ -127,11 +127,11 @@ impl Bvh {
     }
 
     /// Calls `visit` for each triangle that the ray meets, in arbitrary order.
-    pub fn for_each_hit(&self, ray: &Ray, mut visit: impl FnMut(Hit)) {
+    pub fn for_each_hit(&self, ray: &Ray, mut visit: impl FnMut(RayHit)) {
         let sheared = ShearedRay::new(ray);
         let _ = self.walk::<()>(ray, DVec3::ZERO, |i, t_max| {
             if let Some((t, front)) = sheared.hit(&self.triangles[i], *t_max) {
-                visit(Hit {
+                visit(RayHit {
                     t,
                     triangle: self.ids[i],
                     front,

@@ -22,7 +22,7 @@ pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
 pub use plane::Plane;
-pub use ray::{Hit, Ray, closest_point_on_segment, closest_point_on_triangle};
+pub use ray::{Ray, RayHit, closest_point_on_segment, closest_point_on_triangle};
 pub use sets::Sets;
 pub use shown::{Shown, is_hidden, shown};
 pub use solid::{BoxTree, ConvexSolid, SolidError};

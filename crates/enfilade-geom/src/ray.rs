@@ -39,7 +39,7 @@ impl Ray {
 
 /// Intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
+pub struct RayHit {
     /// Position along the ray, in lengths of its direction.
     pub t: f64,
     /// Index of the triangle.
@@ -105,12 +105,12 @@ impl ShearedRay {
     }
 }
 
-/// Intersects `ray` with one triangle; [`Hit::triangle`] is 0. Edges and vertices count as hit, a triangle
+/// Intersects `ray` with one triangle; [`RayHit::triangle`] is 0. Edges and vertices count as hit, a triangle
 /// seen edge-on does not.
 #[must_use]
-pub fn hit_triangle(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
+pub fn hit_triangle(ray: &Ray, triangle: &Triangle) -> Option<RayHit> {
     let (t, front) = ShearedRay::new(ray).hit(&triangle.map(|p| p.to_array()), ray.t_max)?;
-    Some(Hit {
+    Some(RayHit {
         t,
         triangle: 0,
         front,

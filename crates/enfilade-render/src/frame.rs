@@ -1,7 +1,7 @@
 //! The contents and style of a frame.
 
 use crate::camera::Projection;
-use crate::list::DrawList;
+use crate::list::RenderList;
 use crate::marks::Mark;
 
 /// The coloring of surfaces.
@@ -50,7 +50,7 @@ pub struct Frame<'a> {
     /// The projection to the screen.
     pub projection: Projection,
     /// The draws.
-    pub list: &'a DrawList,
+    pub list: &'a RenderList,
     /// The style.
     pub style: Style,
     /// Lines and polygons drawn over it.

@@ -9,14 +9,14 @@ use crate::camera::Projection;
 use crate::formats::ID;
 use crate::frame::Style;
 use crate::gpu::{Gpu, RenderError};
-use crate::list::DrawList;
-use crate::renderer::{Renderer, Stage};
+use crate::list::RenderList;
+use crate::renderer::{RenderStage, Renderer};
 use crate::resources::{bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
 
 /// The object visible at one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Shown {
+pub enum PixelContent {
     /// The sky.
     Sky,
     /// A structural triangle.
@@ -46,7 +46,7 @@ pub struct IdPicture {
     /// Rows.
     pub height: u32,
     /// For each pixel, the visible object and its depth (1 at the near plane, 0 at infinity).
-    pub pixels: Vec<(Shown, f32)>,
+    pub pixels: Vec<(PixelContent, f32)>,
 }
 
 /// The pixels in which two id pictures differ.
@@ -64,9 +64,9 @@ pub struct LostPixel {
     /// Column and row.
     pub at: [u32; 2],
     /// The expected object and its depth.
-    pub expected: (Shown, f32),
+    pub expected: (PixelContent, f32),
     /// The visible object and its depth.
-    pub found: (Shown, f32),
+    pub found: (PixelContent, f32),
 }
 
 impl IdPicture {
@@ -76,7 +76,7 @@ impl IdPicture {
     ///
     /// If the pixel lies outside the picture.
     #[must_use]
-    pub fn at(&self, [x, y]: [u32; 2]) -> (Shown, f32) {
+    pub fn at(&self, [x, y]: [u32; 2]) -> (PixelContent, f32) {
         self.pixels[y as usize * self.width as usize + x as usize]
     }
 
@@ -118,9 +118,9 @@ impl Renderer {
         &mut self,
         gpu: &Gpu,
         world: &GpuWorld,
-        stage: &Stage,
+        stage: &RenderStage,
         projection: &Projection,
-        list: &DrawList,
+        list: &RenderList,
         size: [u32; 2],
     ) -> Result<[IdPicture; 2], RenderError> {
         self.resize(gpu, size)?;
@@ -194,12 +194,12 @@ fn read_ids(
             let word = |i: usize| u32::from_le_bytes([p[i], p[i + 1], p[i + 2], p[i + 3]]);
             let triangle = word(4);
             let shown = match word(0) {
-                0 => Shown::Sky,
+                0 => PixelContent::Sky,
                 1 => match world.portal_of_plug(triangle) {
-                    Some(portal) => Shown::Plug { portal },
-                    None => Shown::Structure { triangle },
+                    Some(portal) => PixelContent::Plug { portal },
+                    None => PixelContent::Structure { triangle },
                 },
-                n => Shown::Detail {
+                n => PixelContent::Detail {
                     detail: n - 2,
                     triangle,
                 },

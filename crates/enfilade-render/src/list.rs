@@ -14,7 +14,7 @@ use crate::scene::{Finish, GpuWorld, Span};
 /// Why an object is drawn although it is not visible, for pictures that explain culling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Reason {
+pub enum DrawReason {
     /// It is visible.
     Seen = 0,
     /// It is outside the view frustum.
@@ -40,7 +40,7 @@ pub(crate) struct Run {
     pub(crate) finish: Finish,
     /// True if its vertices have normals.
     pub(crate) is_smooth: bool,
-    /// Range of [`DrawList::instances`].
+    /// Range of [`RenderList::instances`].
     pub(crate) instances: Range<u32>,
     /// `None` for the whole picture.
     pub(crate) scissor: Option<Scissor>,
@@ -90,7 +90,7 @@ pub struct Shot<'a> {
 
 /// The draws of one frame, in order.
 #[derive(Clone, Debug, Default)]
-pub struct DrawList {
+pub struct RenderList {
     pub(crate) opaque: Vec<Run>,
     /// Far to near.
     pub(crate) transparent: Vec<Run>,
@@ -101,7 +101,7 @@ pub struct DrawList {
     n_triangles: u64,
 }
 
-impl DrawList {
+impl RenderList {
     /// Returns the number of drawn triangles.
     #[must_use]
     pub fn n_triangles(&self) -> u64 {
@@ -160,7 +160,7 @@ impl DrawList {
 /// Builds draw lists frame by frame; reuses its buffers.
 #[derive(Default)]
 pub struct Lister {
-    list: DrawList,
+    list: RenderList,
     stamp: u32,
     /// For each cell, number of the frame that last saw it, and the part of the screen where it is visible.
     rectangles: Vec<(u32, [f32; 4])>,
@@ -199,11 +199,11 @@ impl Lister {
     }
 
     /// Moves out the last list with its buffers; give them back with [`Lister::give`].
-    pub(crate) fn take(&mut self) -> DrawList {
+    pub(crate) fn take(&mut self) -> RenderList {
         std::mem::take(&mut self.list)
     }
 
-    pub(crate) fn give(&mut self, list: DrawList) {
+    pub(crate) fn give(&mut self, list: RenderList) {
         self.list = list;
     }
 
@@ -214,10 +214,10 @@ impl Lister {
         sight: &Sight,
         state: &SightState,
         eye: [f32; 3],
-    ) -> &DrawList {
+    ) -> &RenderList {
         let chunks = 0..world.chunks.len() as u32;
         let details = 0..world.details.len() as u32;
-        self.begin(Reason::Seen);
+        self.begin(DrawReason::Seen);
         self.chunks.extend(chunks.map(|c| (0, c)));
         self.details
             .extend(details.map(|d| (world.details[d as usize].mesh, 0, d)));
@@ -234,12 +234,12 @@ impl Lister {
         seen: &Seen<'_>,
         shot: &Shot<'_>,
         sparing: &Sparing,
-    ) -> &DrawList {
+    ) -> &RenderList {
         let is_flat = seen.visits().iter().all(|v| v.face == 0);
         let is_whole = seen.counts().is_eye_lost || seen.counts().is_capped;
         let is_cut = shot.has_scissors && is_flat && !is_whole;
         let size = is_cut.then_some(shot.size);
-        self.begin(Reason::Seen);
+        self.begin(DrawReason::Seen);
         if size.is_some() {
             self.rectangles.resize(sight.n_cells(), (0, [0.0; 4]));
             for v in seen.visits() {
@@ -301,8 +301,8 @@ impl Lister {
         state: &SightState,
         chunks: impl Iterator<Item = ChunkId>,
         details: impl Iterator<Item = DetailId>,
-        reason: Reason,
-    ) -> &DrawList {
+        reason: DrawReason,
+    ) -> &RenderList {
         self.begin(reason);
         self.chunks.extend(chunks.map(|c| (0, c.0)));
         self.details
@@ -311,7 +311,7 @@ impl Lister {
         self.finish(world, sight, [0.0; 3], None)
     }
 
-    fn begin(&mut self, reason: Reason) {
+    fn begin(&mut self, reason: DrawReason) {
         self.stamp = self.stamp.wrapping_add(1);
         if self.stamp == 0 {
             self.rectangles.clear();
@@ -356,7 +356,7 @@ impl Lister {
         sight: &Sight,
         eye: [f32; 3],
         size: Option<[u32; 2]>,
-    ) -> &DrawList {
+    ) -> &RenderList {
         let eye = Vec3::from(eye);
         let reason = self.list.instances[0];
         // Within a batch, keep the order of the buffer, so that neighbors join.

@@ -7,7 +7,7 @@ use crate::camera::Projection;
 
 /// The shape of a mark.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shape {
+pub enum MarkShape {
     /// A closed line through world points. [Units: wu]
     Outline(Vec<[f32; 3]>),
     /// A line between two world points. [Units: wu]
@@ -22,7 +22,7 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
     /// The shape.
-    pub shape: Shape,
+    pub shape: MarkShape,
     /// Linear color with opacity.
     pub color: [f32; 4],
     /// Width of lines. [Units: px]
@@ -51,21 +51,21 @@ pub(crate) fn corners(
         let out = &mut out[usize::from(mark.on_top)];
         let mut line = |a, b| add_line(out, mark, [a, b], size);
         match &mark.shape {
-            Shape::Line([a, b]) => line(clip(*a), clip(*b)),
-            Shape::Outline(points) => {
+            MarkShape::Line([a, b]) => line(clip(*a), clip(*b)),
+            MarkShape::Outline(points) => {
                 let next = points.iter().cycle().skip(1);
                 for (a, b) in points.iter().zip(next) {
                     line(clip(*a), clip(*b));
                 }
             }
-            Shape::Rectangle([l, b, r, t]) => {
+            MarkShape::Rectangle([l, b, r, t]) => {
                 let points =
                     [[l, b], [r, b], [r, t], [l, t]].map(|[x, y]| Vec4::new(*x, *y, 1.0, 1.0));
                 for i in 0..4 {
                     line(points[i], points[(i + 1) % 4]);
                 }
             }
-            Shape::Area(points) => {
+            MarkShape::Area(points) => {
                 for pair in points.windows(2).skip(1) {
                     let triangle = [points[0], pair[0], pair[1]].map(clip);
                     // The adapter clips parts behind the eye.

@@ -11,7 +11,7 @@ use enfilade_geom::{Bvh, DMat4, DVec3, Ray, Triangle};
 use enfilade_runtime::{DetailId, Sight, SightState};
 
 use crate::camera::Camera;
-use crate::ids::{LostPixel, Shown};
+use crate::ids::{LostPixel, PixelContent};
 use crate::materials::{Look, looks_of};
 use crate::scene::plug;
 
@@ -21,14 +21,14 @@ const NUDGE: f64 = 1.0 / 64.0;
 /// Opaque and transparent triangles, each with its object in id pictures.
 struct Layers {
     bvhs: [Bvh; 2],
-    keys: [Vec<Shown>; 2],
+    keys: [Vec<PixelContent>; 2],
 }
 
 /// Layers in construction.
 struct LayersBuilder<'w> {
     looks: &'w [Look],
     triangles: [Vec<Triangle>; 2],
-    keys: [Vec<Shown>; 2],
+    keys: [Vec<PixelContent>; 2],
 }
 
 impl<'w> LayersBuilder<'w> {
@@ -45,7 +45,7 @@ impl<'w> LayersBuilder<'w> {
         primitive: &Primitive,
         indices: &[u32],
         place: &dyn Fn(DVec3) -> DVec3,
-        key: &dyn Fn(u32) -> Shown,
+        key: &dyn Fn(u32) -> PixelContent,
     ) {
         let look = (primitive.material).and_then(|m| self.looks.get(m as usize));
         let to = usize::from(look.is_some_and(|l| l.is_transparent));
@@ -90,7 +90,7 @@ impl<'w> Oracle<'w> {
         let mut n = 0;
         for (i, batch) in (0..).zip(&world.batches) {
             let indices = sight.indices(i);
-            let key = |t| Shown::Structure { triangle: n + t };
+            let key = |t| PixelContent::Structure { triangle: n + t };
             filling.add(&batch.primitive, indices, &|p| p, &key);
             n += indices.len() as u32 / 3;
         }
@@ -198,7 +198,7 @@ impl<'w> Oracle<'w> {
         camera: &Camera,
         at: [u32; 2],
         size: [u32; 2],
-        shown: Shown,
+        shown: PixelContent,
         is_transparent: bool,
     ) -> bool {
         let [right, up, _] = camera.axes().map(|v| dvec(v.to_array()));
@@ -216,10 +216,10 @@ impl<'w> Oracle<'w> {
         met([0.0; 2], 0.0) && (0..half).filter(is_way).nth(2).is_some()
     }
 
-    fn is_met_by(&self, ray: &Ray, shown: Shown, is_transparent: bool) -> bool {
+    fn is_met_by(&self, ray: &Ray, shown: PixelContent, is_transparent: bool) -> bool {
         let first = self.first_on(ray, is_transparent);
         if first.is_infinite() {
-            return shown == Shown::Sky;
+            return shown == PixelContent::Sky;
         }
         let ray = Ray {
             t_max: first + 1e-6 * (first + f64::from(Camera::NEAR)),
@@ -282,7 +282,7 @@ fn moving(
     }
     for portal in state.shut_portals() {
         let plug = plug(world, sight, portal);
-        let key = |_| Shown::Plug { portal };
+        let key = |_| PixelContent::Plug { portal };
         filling.add(&plug, &plug.indices, &|p| p, &key);
     }
     filling.finish()
@@ -301,7 +301,7 @@ fn add_detail(
     let m = pose.map_or(own, |pose| pose * own);
     let mut n = first_of_mesh[object.mesh as usize];
     for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-        let key = |t| Shown::Detail {
+        let key = |t| PixelContent::Detail {
             detail: id.0,
             triangle: n + t,
         };
@@ -398,10 +398,10 @@ mod tests {
         let camera = Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0]);
         let met = |x, shown| oracle.is_met(&camera, [x, 2], [4, 4], shown, false);
         // Chunks reorder the two triangles.
-        let wall = [0, 1].map(|triangle| Shown::Structure { triangle });
-        assert!(wall.iter().any(|&t| met(2, t)) && !met(2, Shown::Sky));
-        assert!(met(1, Shown::Sky) && !wall.iter().any(|&t| met(1, t)));
-        assert!(!met(2, Shown::Structure { triangle: 9 }));
+        let wall = [0, 1].map(|triangle| PixelContent::Structure { triangle });
+        assert!(wall.iter().any(|&t| met(2, t)) && !met(2, PixelContent::Sky));
+        assert!(met(1, PixelContent::Sky) && !wall.iter().any(|&t| met(1, t)));
+        assert!(!met(2, PixelContent::Structure { triangle: 9 }));
     }
 
     #[test]
@@ -437,8 +437,8 @@ mod tests {
         for (width, is_there) in [(0.004, false), (0.06, true)] {
             let world = slit(width);
             let oracle = oracle(&world);
-            let behind = [4, 5].map(|triangle| Shown::Structure { triangle });
-            let met = |t: &Shown| oracle.is_met(&camera, [2, 2], [5, 5], *t, false);
+            let behind = [4, 5].map(|triangle| PixelContent::Structure { triangle });
+            let met = |t: &PixelContent| oracle.is_met(&camera, [2, 2], [5, 5], *t, false);
             assert_eq!(behind.iter().any(met), is_there, "{width}");
         }
         // 10 cm before the wall, a pixel is smaller than the tolerance, by which walls may be off.
@@ -447,8 +447,8 @@ mod tests {
         for (width, is_there) in [(tolerance, false), (4.0 * tolerance, true)] {
             let world = slit(width as f32);
             let oracle = oracle(&world);
-            let behind = [4, 5].map(|triangle| Shown::Structure { triangle });
-            let met = |t: &Shown| oracle.is_met(&camera, [1000; 2], [2001; 2], *t, false);
+            let behind = [4, 5].map(|triangle| PixelContent::Structure { triangle });
+            let met = |t: &PixelContent| oracle.is_met(&camera, [1000; 2], [2001; 2], *t, false);
             assert_eq!(behind.iter().any(met), is_there, "{width}");
         }
     }

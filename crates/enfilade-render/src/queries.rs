@@ -17,7 +17,7 @@ use glam::Vec3;
 use crate::Style;
 use crate::camera::Camera;
 use crate::gpu::RenderError;
-use crate::list::{DrawList, Reason};
+use crate::list::{DrawReason, RenderList};
 use crate::resources::{depth_attachment, map_bytes};
 use crate::scene::Finish;
 use crate::shadings::set_buffers;
@@ -63,7 +63,7 @@ impl Studio {
         world: &World,
         camera: &Camera,
         size: [u32; 2],
-    ) -> Result<(DrawList, QueryCounts), RenderError> {
+    ) -> Result<(RenderList, QueryCounts), RenderError> {
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
         self.follow_state();
@@ -98,7 +98,7 @@ impl Studio {
                 &self.state,
                 chunks,
                 details,
-                Reason::Seen,
+                DrawReason::Seen,
             )
             .clone();
         Ok((list, counts))
@@ -191,7 +191,7 @@ impl Studio {
     ) -> Result<Vec<u64>, RenderError> {
         let (gpu, renderer) = (&self.gpu, &mut self.renderer);
         let n = asked.len() as u32;
-        let structure = DrawList::of_structure();
+        let structure = RenderList::of_structure();
         renderer.write_instances(gpu, &self.world, &structure);
         renderer.marks.write(gpu, bytemuck::cast_slice(corners));
         let globals = renderer.globals_group(gpu);

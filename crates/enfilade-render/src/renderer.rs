@@ -9,7 +9,7 @@ use crate::formats::{COLOR, DEPTH};
 use crate::frame::{Frame, Paint, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::light::{Light, LightGlobals};
-use crate::list::{DrawList, Run};
+use crate::list::{RenderList, Run};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::pipelines::{Layouts, Pipelines};
@@ -62,7 +62,7 @@ pub struct Renderer {
 }
 
 /// A world's bind groups and shadow map.
-pub struct Stage {
+pub struct RenderStage {
     world: wgpu::BindGroup,
     pub(crate) light: Light,
     shadow_from_world: Mat4,
@@ -128,10 +128,10 @@ impl Renderer {
         gpu: &Gpu,
         world: &GpuWorld,
         light: Light,
-        everything: &DrawList,
-    ) -> Stage {
+        everything: &RenderList,
+    ) -> RenderStage {
         let (shadow_from_world, texel) = self.sun_view(world);
-        let stage = Stage {
+        let stage = RenderStage {
             world: self.world_group(gpu, &light),
             light,
             shadow_from_world,
@@ -172,7 +172,7 @@ impl Renderer {
     pub(crate) fn explain(
         &mut self,
         gpu: &Gpu,
-        stage: &mut Stage,
+        stage: &mut RenderStage,
         explanation: Option<wgpu::TextureView>,
     ) {
         self.explanation = explanation;
@@ -194,8 +194,8 @@ impl Renderer {
         &mut self,
         gpu: &Gpu,
         world: &GpuWorld,
-        stage: &Stage,
-        all: &DrawList,
+        stage: &RenderStage,
+        all: &RenderList,
     ) {
         let projection = Projection::parallel([0.0; 3], [0.0, -1.0, 0.0], 1.0, 1.0, 1.0);
         self.write_globals(gpu, stage, &projection, &Style::default(), [1, 1]);
@@ -229,7 +229,7 @@ impl Renderer {
     }
 
     /// Writes the instances of a list in its order.
-    pub(crate) fn write_instances(&mut self, gpu: &Gpu, world: &GpuWorld, list: &DrawList) {
+    pub(crate) fn write_instances(&mut self, gpu: &Gpu, world: &GpuWorld, list: &RenderList) {
         self.drawn.clear();
         self.drawn.extend(list.instances.iter().map(|&key| {
             let number = (key & crate::list::INSTANCE_MASK) as usize;
@@ -241,7 +241,7 @@ impl Renderer {
     pub(crate) fn write_globals(
         &self,
         gpu: &Gpu,
-        stage: &Stage,
+        stage: &RenderStage,
         projection: &Projection,
         style: &Style,
         size: [u32; 2],
@@ -318,7 +318,7 @@ impl Renderer {
         &mut self,
         gpu: &Gpu,
         world: &GpuWorld,
-        stage: &Stage,
+        stage: &RenderStage,
         frame: &Frame<'_>,
         output: &wgpu::TextureView,
         size: [u32; 2],
@@ -405,9 +405,9 @@ impl Renderer {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         world: &GpuWorld,
-        stage: &Stage,
+        stage: &RenderStage,
         shadings: &Shadings,
-        list: &DrawList,
+        list: &RenderList,
         size: [u32; 2],
     ) {
         pass.set_bind_group(0, &stage.world, &[]);
@@ -475,7 +475,7 @@ impl Renderer {
         &mut self,
         gpu: &Gpu,
         world: &GpuWorld,
-        stage: &Stage,
+        stage: &RenderStage,
         frame: &Frame<'_>,
         size: [u32; 2],
     ) -> Result<Picture, RenderError> {

@@ -16,7 +16,7 @@ use glam::Vec3;
 use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
-use crate::marks::{Mark, Shape};
+use crate::marks::{Mark, MarkShape};
 use crate::materials::{Look, looks_of};
 use filling::{Filling, Level};
 use placed::{Moving, Placed, bounds_of, placed};
@@ -200,7 +200,7 @@ impl GpuWorld {
             .copied()
             .unwrap_or_default();
         Mark {
-            shape: Shape::Area(
+            shape: MarkShape::Area(
                 self.outlines
                     .get(portal.0 as usize)
                     .cloned()

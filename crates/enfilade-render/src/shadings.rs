@@ -2,7 +2,7 @@
 
 use crate::frame::{Frame, Paint};
 use crate::gpu::Gpu;
-use crate::list::{DrawList, Run};
+use crate::list::{RenderList, Run};
 use crate::pipelines::{Layouts, Pipelines, Shading, Variant};
 use crate::resources::Grown;
 use crate::scene::{Finish, GpuWorld};
@@ -88,7 +88,7 @@ impl Shadings {
         gpu: &Gpu,
         layouts: &Layouts,
         pipelines: &mut Pipelines,
-        list: &DrawList,
+        list: &RenderList,
     ) {
         let mut prepare = |variant| {
             pipelines.prepare(gpu, layouts, variant);

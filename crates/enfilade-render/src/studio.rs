@@ -9,10 +9,10 @@ use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::ids::IdPicture;
 use crate::light::{Light, sun_of};
-use crate::list::{DrawList, Lister, Shot, Sparing};
+use crate::list::{Lister, RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::renderer::{Renderer, Stage};
+use crate::renderer::{RenderStage, Renderer};
 use crate::scene::GpuWorld;
 
 /// The part of a world that is drawn.
@@ -28,7 +28,7 @@ pub enum Culling {
 }
 
 /// An off-screen target, for benchmarks.
-pub struct Target {
+pub struct StudioTarget {
     view: wgpu::TextureView,
     size: [u32; 2],
 }
@@ -48,7 +48,7 @@ pub struct Studio {
     /// Reductions for distant rooms with culling by portals. Off by default.
     pub sparing: Sparing,
     pub(crate) renderer: Renderer,
-    pub(crate) stage: Stage,
+    pub(crate) stage: RenderStage,
     pub(crate) lister: Lister,
     /// Positions of the leaves as drawn last: [`SightState::shares`].
     placed: Vec<Option<f32>>,
@@ -148,7 +148,7 @@ impl Studio {
         eye: [f32; 3],
         culling: Culling,
         size: [u32; 2],
-    ) -> &DrawList {
+    ) -> &RenderList {
         self.follow_state();
         let (world, sight) = (&self.world, &self.sight);
         let shot = Shot {
@@ -188,13 +188,13 @@ impl Studio {
         eye: [f32; 3],
         culling: Culling,
         size: [u32; 2],
-    ) -> DrawList {
+    ) -> RenderList {
         self.list(view, eye, culling, size);
         self.lister.take()
     }
 
     /// Takes the buffers of a list back.
-    pub fn give_list(&mut self, list: DrawList) {
+    pub fn give_list(&mut self, list: RenderList) {
         self.lister.give(list);
     }
 
@@ -203,7 +203,7 @@ impl Studio {
     /// # Errors
     ///
     /// A size beyond the adapter's limit.
-    pub fn target(&self, size: [u32; 2]) -> Result<Target, RenderError> {
+    pub fn target(&self, size: [u32; 2]) -> Result<StudioTarget, RenderError> {
         self.gpu.check_picture(size)?;
         let texture = crate::resources::texture(
             &self.gpu,
@@ -212,7 +212,7 @@ impl Studio {
             self.renderer.format(),
             wgpu::TextureUsages::COPY_SRC,
         );
-        Ok(Target {
+        Ok(StudioTarget {
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
             size,
         })
@@ -223,7 +223,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::draw`].
-    pub fn draw_to(&mut self, frame: &Frame<'_>, target: &Target) -> Result<(), RenderError> {
+    pub fn draw_to(&mut self, frame: &Frame<'_>, target: &StudioTarget) -> Result<(), RenderError> {
         self.draw(frame, &target.view, target.size)
     }
 
@@ -331,7 +331,7 @@ impl Studio {
     fn ids_of(
         &mut self,
         camera: &Camera,
-        list: &DrawList,
+        list: &RenderList,
         size: [u32; 2],
     ) -> Result<[IdPicture; 2], RenderError> {
         let projection = camera.projection(size[0] as f32 / size[1] as f32)?;
@@ -372,7 +372,7 @@ impl Studio {
     }
 
     /// Lists everything.
-    pub fn everything(&mut self) -> DrawList {
+    pub fn everything(&mut self) -> RenderList {
         self.follow_state();
         (self.lister)
             .everything(&self.world, &self.sight, &self.state, [0.0; 3])

@@ -5,7 +5,7 @@ use enfilade_runtime::{Sight, Sightlines};
 
 use crate::camera::Camera;
 use crate::gpu::RenderError;
-use crate::ids::Shown;
+use crate::ids::PixelContent;
 use crate::studio::{Culling, Studio};
 
 /// Height of an eye above the floor. [Units: wu]
@@ -178,14 +178,14 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     let (mut near, mut sky, mut depths) = (0_u32, 0_u32, Vec::new());
     for (shown, depth) in &solid.pixels {
         match *shown {
-            Shown::Sky => sky += 1,
-            Shown::Structure { triangle } => {
+            PixelContent::Sky => sky += 1,
+            PixelContent::Structure { triangle } => {
                 let chunk = studio.world.chunk_of_triangle(triangle);
                 walls.push(chunk.and_then(|c| studio.world.batch_of_chunk(c)));
             }
-            Shown::Detail { detail, .. } => objects.push(detail),
+            PixelContent::Detail { detail, .. } => objects.push(detail),
             // A shut door is as dull as a wall.
-            Shown::Plug { .. } => walls.push(None),
+            PixelContent::Plug { .. } => walls.push(None),
         }
         if *depth > 0.0 {
             let distance = Camera::distance_of(*depth);

@@ -1,7 +1,7 @@
 //! Doors in pictures: leaves in their positions, and plugs of shut openings. FEATURES: W5.
 
 use enfilade_cpg::{PortalId, World};
-use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, Oracle, Shown, Studio};
+use enfilade_render::{AdapterChoice, Camera, Culling, Gpu, Oracle, PixelContent, Studio};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -62,8 +62,8 @@ fn culling_changes_no_pixel_however_doors_stand() {
         }
         for (shown, _) in &culled[0].pixels {
             match *shown {
-                Shown::Plug { .. } => n_plug += 1,
-                Shown::Detail { detail, .. } => {
+                PixelContent::Plug { .. } => n_plug += 1,
+                PixelContent::Detail { detail, .. } => {
                     let name = &world.details[detail as usize].name;
                     n_leaf += usize::from(name.starts_with("leaf"));
                 }
@@ -79,7 +79,7 @@ fn share(
     studio: &mut Studio,
     camera: &Camera,
     culling: Culling,
-    is_it: impl Fn(&Shown) -> bool,
+    is_it: impl Fn(&PixelContent) -> bool,
 ) -> f64 {
     let [solid, _] = studio.ids(camera, culling, SIZE).unwrap();
     let n = solid.pixels.iter().filter(|p| is_it(&p.0)).count();
@@ -111,9 +111,10 @@ fn a_closed_opening_without_a_leaf_is_filled_also_with_corners_behind_the_eye() 
             fov_y: 1.6,
         };
         for culling in ALL {
-            let sky = share(&mut studio, &camera, culling, |s| *s == Shown::Sky);
+            let sky = share(&mut studio, &camera, culling, |s| *s == PixelContent::Sky);
             assert_eq!(sky, 0.0, "{culling:?} {aside}");
-            let plug = |s: &Shown| matches!(s, Shown::Plug { portal } if *portal == door);
+            let plug =
+                |s: &PixelContent| matches!(s, PixelContent::Plug { portal } if *portal == door);
             assert!(
                 share(&mut studio, &camera, culling, plug) > 0.2,
                 "{culling:?} {aside}"
@@ -130,8 +131,8 @@ fn a_shut_leaf_hides_what_fills_its_opening_and_an_open_one_shows_the_room_behin
     let outline = &world.graph[door].outline;
     let center = [0, 1, 2].map(|k| outline.iter().map(|p| p[k]).sum::<f32>() / 4.0);
     let normal = world.graph[door].normal;
-    let is_leaf = |s: &Shown| matches!(s, Shown::Detail { .. });
-    let is_plug = |s: &Shown| matches!(s, Shown::Plug { .. });
+    let is_leaf = |s: &PixelContent| matches!(s, PixelContent::Detail { .. });
+    let is_plug = |s: &PixelContent| matches!(s, PixelContent::Plug { .. });
     for side in [-1.5, 1.5] {
         let eye = [0, 1, 2].map(|k| center[k] + side * normal[k]);
         let camera = Camera::looking_at(eye, center);
@@ -148,7 +149,7 @@ fn a_shut_leaf_hides_what_fills_its_opening_and_an_open_one_shows_the_room_behin
             let [solid, _] = studio.ids(&camera, culling, SIZE).unwrap();
             let (through, _) = solid.at([SIZE[0] / 2, SIZE[1] / 2]);
             assert!(
-                matches!(through, Shown::Structure { .. }),
+                matches!(through, PixelContent::Structure { .. }),
                 "{culling:?}: {through:?}"
             );
             assert_eq!(share(&mut studio, &camera, culling, is_plug), 0.0);

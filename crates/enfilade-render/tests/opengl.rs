@@ -5,8 +5,8 @@
 use enfilade_cpg::{DetailObject, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Gpu, Mark, Oracle, Paint, Picture, RenderError, Shape, Shown,
-    Studio, Style,
+    AdapterChoice, Camera, Culling, Gpu, Mark, MarkShape, Oracle, Paint, Picture, PixelContent,
+    RenderError, Studio, Style,
 };
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
@@ -102,7 +102,7 @@ fn pictures(studio: &mut Studio, world: &World, camera: &Camera) -> Vec<Picture>
     let marks: Vec<Mark> = portals
         .enumerate()
         .map(|(i, p)| Mark {
-            shape: Shape::Outline(p.outline.clone()),
+            shape: MarkShape::Outline(p.outline.clone()),
             color: [1.0, 0.8, 0.1, 1.0],
             width: 1.5,
             on_top: i % 2 == 0,
@@ -244,7 +244,8 @@ fn by_opengl_too_surfaces_stay_apart_far_away() {
         let mut studio = Studio::new(gl, &world).unwrap();
         let [solid, _] = studio.ids(&camera, Culling::Everything, SIZE).unwrap();
         let of = |n: u32| {
-            let is = |s: &Shown| matches!(s, Shown::Detail { detail, .. } if *detail == n);
+            let is =
+                |s: &PixelContent| matches!(s, PixelContent::Detail { detail, .. } if *detail == n);
             solid.pixels.iter().filter(|p| is(&p.0)).count()
         };
         assert!(

@@ -6,8 +6,8 @@ use std::f32::consts::{PI, TAU};
 use enfilade_cpg::{CellId, DetailObject, World};
 use enfilade_geom::scene::{Material, Mesh, Primitive, Texture};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Gpu, GpuWorld, Mark, Oracle, Paint, RenderError, Shape,
-    Shown, Sparing, Studio, Style,
+    AdapterChoice, Camera, Culling, Frame, Gpu, GpuWorld, Mark, MarkShape, Oracle, Paint,
+    PixelContent, RenderError, Sparing, Studio, Style,
 };
 use enfilade_runtime::Sight;
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -328,7 +328,7 @@ fn paints_and_marks_change_what_is_seen() {
     assert_ne!(lit, draw(Paint::Cells, &[]));
     assert_ne!(lit, draw(Paint::Overdraw, &[]));
     let mark = Mark {
-        shape: Shape::Rectangle([-0.5, -0.5, 0.5, 0.5]),
+        shape: MarkShape::Rectangle([-0.5, -0.5, 0.5, 0.5]),
         color: [1.0, 0.0, 0.0, 1.0],
         width: 3.0,
         on_top: true,
@@ -353,7 +353,7 @@ fn a_world_without_anything_is_sky() {
             .pixels
             .iter()
             .chain(&glass.pixels)
-            .all(|p| p.0 == Shown::Sky)
+            .all(|p| p.0 == PixelContent::Sky)
     );
     studio
         .picture(&camera, Culling::Portals, Style::default(), &[], SIZE)
@@ -370,7 +370,7 @@ fn eyes_outside_and_in_walls_see_all_that_a_picture_without_culling_shows() {
         let camera = Camera::looking_at([high[0] + out, center[1], high[2] + out], center);
         let [whole, culled] = studio.ids_compared(&camera, SIZE).unwrap();
         assert_eq!(whole[0].difference(&culled[0]).lost, []);
-        assert!(whole[0].pixels.iter().any(|p| p.0 != Shown::Sky));
+        assert!(whole[0].pixels.iter().any(|p| p.0 != PixelContent::Sky));
     }
 }
 

@@ -173,7 +173,7 @@ impl Shape {
         })
     }
 
-    fn named(&self, detail: DetailId, hit: &enfilade_geom::Hit, to_world: &DMat4) -> DetailHit {
+    fn named(&self, detail: DetailId, hit: &enfilade_geom::RayHit, to_world: &DMat4) -> DetailHit {
         let primitive = self.first.partition_point(|&f| f <= hit.triangle) - 1;
         let corners = self.triangles[hit.triangle as usize];
         DetailHit {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Purse, Winding};
 
-use crate::complex::region::Shape;
+use crate::complex::region::RegionShape;
 use crate::complex::{LabelSettings, Vote};
 use crate::config::{BspConfig, Rooms};
 use crate::proposal::Proposal;
@@ -88,7 +88,7 @@ fn label_settings(scene: &Scene) -> LabelSettings {
 /// Leaves divided into cells.
 struct Parted {
     cells: LeafCells,
-    shapes: Vec<Option<Shape>>,
+    shapes: Vec<Option<RegionShape>>,
     /// `true` for each leaf of a cell too narrow for a room, if shape decides on rooms; a guide may make narrower
     /// cells.
     is_narrow: Vec<bool>,
@@ -146,7 +146,7 @@ impl Parted {
                 OUTDOORS + 1 + cell
             }
         };
-        let of_leaf = |(leaf, shape): (usize, &Option<Shape>)| {
+        let of_leaf = |(leaf, shape): (usize, &Option<RegionShape>)| {
             let (cell, shape) = (cells.of_leaf[leaf], (*shape)?);
             // A narrow cell that leaks into a room is part of that room; the complex sees to it.
             let counts = cell != NO_CELL && !self.is_narrow.get(leaf).is_some_and(|n| *n);

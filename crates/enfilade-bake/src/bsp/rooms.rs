@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::MergeSettings;
 use crate::complex::poly;
-use crate::complex::region::Shape;
+use crate::complex::region::RegionShape;
 use crate::structure::{Mergeable, Pair, join_rooms, lies_in_slab};
 
 use super::cells::{self, LeafCells, NO_CELL};
@@ -39,7 +39,7 @@ pub(super) fn may_be_pinch(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSetting
 
 /// Evidence of rooms besides the tree.
 pub(super) struct Evidence<'a> {
-    pub(super) shapes: &'a [Option<Shape>],
+    pub(super) shapes: &'a [Option<RegionShape>],
     /// Triangles of door leaves and panes.
     pub(super) closures: &'a Bvh,
     /// Heights at which storeys end, ascending. [Units: wu]

@@ -2,13 +2,17 @@
 
 use enfilade_geom::{DVec3, Purse};
 
-use crate::complex::region::{Region, Shape, halves, shape_of, whole};
+use crate::complex::region::{Region, RegionShape, halves, shape_of, whole};
 
 use super::tolerance::Tolerance;
 use super::tree::{Tree, leaf_index};
 
 /// Returns measures of all leaves; `None` for those that rounding left without a volume.
-pub(super) fn shapes(tree: &Tree, tolerance: &Tolerance, purse: Purse<'_>) -> Vec<Option<Shape>> {
+pub(super) fn shapes(
+    tree: &Tree,
+    tolerance: &Tolerance,
+    purse: Purse<'_>,
+) -> Vec<Option<RegionShape>> {
     let mut out = vec![None; tree.contents.len()];
     visit(
         tree,

@@ -76,8 +76,8 @@ proptest! {
         let bvh = Bvh::build(&soup);
         for t_max in [1.0, f64::INFINITY] {
             let ray = Ray { origin: a, direction: b - a, t_max };
-            let mut all: Vec<Hit> = soup.iter().enumerate()
-                .filter_map(|(i, t)| hit_triangle(&ray, t).map(|h| Hit { triangle: i as u32, ..h }))
+            let mut all: Vec<RayHit> = soup.iter().enumerate()
+                .filter_map(|(i, t)| hit_triangle(&ray, t).map(|h| RayHit { triangle: i as u32, ..h }))
                 .collect();
             let mut found = Vec::new();
             bvh.for_each_hit(&ray, |h| found.push(h));
