@@ -30,6 +30,7 @@ mod pull;
 mod reverb;
 mod sampling;
 mod search;
+mod sequences;
 mod shape;
 mod sound;
 mod space;
