@@ -83,6 +83,12 @@ const SHORT: Limit = Limit {
 };
 /// A listener or source that has moved by less keeps its sequences. [Units: wu]
 const KEPT: f64 = 0.25;
+/// Angle of a bend from which on it is a source of its own: some 30°, over which the field behind an edge passes from that of the
+/// source to that of the edge (Kouyoumjian & Pathak 1974). [Units: rad]
+const BEND: f64 = 0.5;
+/// Length of string over which directions are averaged: half a wave at 500 Hz. Nearer bends are not heard as places of their
+/// own. [Units: wu]
+const BLUR: f64 = 0.343;
 /// Maximum loss at one edge: what screens reach outdoors, where turbulence fills the shadow (Maekawa 1968). [Units: dB]
 const MOST_LOSS: f64 = 24.0;
 
@@ -183,7 +189,7 @@ pub struct Heard {
     pub length: f64,
     /// Unit vector towards the last bend of the shortest path; zero if the source is at the listener.
     pub nearest: DVec3,
-    /// Unit vector towards the sound, averaged over all paths by energy.
+    /// Unit vector towards the sound, averaged over all paths by energy, and over the first half wave of each at 500 Hz.
     pub direction: DVec3,
     /// Amplitude relative to that at one meter in the open, without the room's reverberation: the mean over the bands by energy.
     pub gain: f64,
@@ -215,6 +221,8 @@ struct Route {
     toll: f64,
     length: f64,
     toward: DVec3,
+    /// The direction in which it is heard.
+    arrival: DVec3,
     /// `false` if it is only measured.
     is_heard: bool,
 }
@@ -340,6 +348,7 @@ impl Listener {
                     toll: tolls.sum(),
                     length: 0.0,
                     toward: DVec3::ZERO,
+                    arrival: DVec3::ZERO,
                     is_heard,
                 });
             }
@@ -360,6 +369,7 @@ impl Listener {
         route.length = self.string.pull_from(self.at, at, start, pieces);
         route.toward = self.string.departure();
         let points = self.string.points();
+        route.arrival = arrival_direction(points);
         source.points[range].copy_from_slice(&points[1..points.len() - 1]);
     }
 
@@ -403,7 +413,7 @@ impl Listener {
                 *sum += fade * gain;
                 own += fade * gain;
             }
-            heard.direction += route.toward * own;
+            heard.direction += route.arrival * own;
             heard.n_ways += 1;
         }
         heard.direction = heard.direction.normalize_or(heard.nearest);
@@ -425,8 +435,10 @@ impl Listener {
         let (portals, points) = (&source.portals[range.clone()], &source.points[range]);
         let mut energy = [route.length.max(1.0).powi(-2); N_BANDS];
         for (i, &portal) in portals.iter().enumerate() {
-            let before = if i == 0 { self.at } else { points[i - 1] };
-            let after = points.get(i + 1).copied().unwrap_or(at);
+            let back = (0..i).rev().map(|k| points[k]).chain([self.at]);
+            let before = straight_end(points[i], back);
+            let onward = points[i + 1..].iter().copied().chain([at]);
+            let after = straight_end(points[i], onward);
             let opening = layout.opening(portal);
             let area = opening.area() * self.open[portal.idx()];
             let rims = acoustics.rims(portal);
@@ -443,6 +455,49 @@ impl Listener {
         }
         energy
     }
+}
+
+/// Returns the end of the straight part of a string that begins at `from`, extended straight from there. A slight bend shortens
+/// what is behind it in proportion to its angle, so that a portal crossed straight has no influence on the losses at others.
+fn straight_end(from: DVec3, points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let (mut at, mut first, mut last) = (from, DVec3::ZERO, DVec3::ZERO);
+    let (mut length, mut share) = (0.0, 1.0);
+    for p in points {
+        let leg = p.distance(at);
+        if leg < 1e-9 {
+            continue;
+        }
+        let toward = (p - at) / leg;
+        if first == DVec3::ZERO {
+            first = toward;
+        } else {
+            share *= (1.0 - last.angle_between(toward) / BEND).max(0.0);
+        }
+        length += share * leg;
+        (at, last) = (p, toward);
+    }
+    from + first * length
+}
+
+/// Returns the mean direction of the first part of a string.
+fn arrival_direction(points: &[DVec3]) -> DVec3 {
+    let Some((&from, rest)) = points.split_first() else {
+        return DVec3::ZERO;
+    };
+    let (mut at, mut left, mut sum) = (from, BLUR, DVec3::ZERO);
+    for &p in rest {
+        let leg = p.distance(at);
+        let share = (left / leg.max(1e-12)).min(1.0);
+        let end = at.lerp(p, share);
+        // The mean of the points of this leg, by its length.
+        sum += (at.midpoint(end) - from) * (share * leg);
+        left -= share * leg;
+        at = p;
+        if left <= 0.0 {
+            break;
+        }
+    }
+    sum.normalize_or_zero()
 }
 
 /// Returns the share of directions that the wall around an opening takes at a point: 0 in the opening, 1 far from it. As for a disc

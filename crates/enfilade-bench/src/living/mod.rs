@@ -10,6 +10,7 @@ mod paths;
 mod rooms;
 mod sound;
 mod things;
+mod walls;
 
 use enfilade::cpg::World;
 
@@ -62,6 +63,7 @@ pub(crate) const ROWS: &[Row] = &[
     made("levels: lengths", &["offices-100"], levels::length_in),
     baked("levels: lengths", LIVED_IN, levels::length),
     made("sound: reverb", &["coupled-rooms"], sound::reverb),
+    baked("reverberation: areas", &["institute"], walls::areas),
     made("sound: cost", &["offices-1000"], sound::cost),
 ];
 
