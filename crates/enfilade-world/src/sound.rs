@@ -81,6 +81,8 @@ const SHORT: Limit = Limit {
     longest: [1.1, 0.5],
     steps: 400,
 };
+/// Share of the energy below which a sequence is dropped until the next search: 24 of them are 0.1 dB at most.
+const LEAST: f64 = 1e-3;
 /// A listener or source that has moved by less keeps its sequences. [Units: wu]
 const KEPT: f64 = 0.25;
 /// Angle of a bend from which on it is a source of its own: some 30°, over which the field behind an edge passes from that of the
@@ -209,8 +211,8 @@ struct Source {
     portals: Vec<PortalId>,
     /// Crossings of the strings when last pulled.
     points: Vec<DVec3>,
-    /// `true` if there are more sequences than are counted.
-    is_cut: bool,
+    /// Length beyond that of the best at which sequences have faded out. [Units: wu]
+    cut: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -223,8 +225,46 @@ struct Route {
     toward: DVec3,
     /// The direction in which it is heard.
     arrival: DVec3,
+    /// Energy when last heard, the sum over the bands.
+    loudness: f64,
     /// `false` if it is only measured.
     is_heard: bool,
+}
+
+impl Route {
+    /// Length, with what is added for shut portals. [Units: wu]
+    fn total(&self) -> f64 {
+        self.length + self.toll
+    }
+}
+
+impl Source {
+    fn best(&self) -> f64 {
+        let heard = self.routes.iter().filter(|r| r.is_heard);
+        heard.map(Route::total).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Sets where sequences have faded out, after all are pulled: the last of those found stands for all that were not.
+    fn set_cut(&mut self) {
+        let best = self.best();
+        let heard = self.routes.iter().filter(|r| r.is_heard);
+        let last = heard.map(Route::total).fold(0.0, f64::max);
+        let whole = best * (HEARD.longest[0] - 1.0) + HEARD.longest[1];
+        self.cut = if self.cut == 0.0 {
+            whole.min(last - best)
+        } else {
+            whole
+        };
+    }
+
+    /// Drops sequences that need not be pulled again until the next search.
+    fn drop_faint(&mut self, least: f64) {
+        let lengths = self.routes.iter().map(|r| r.length);
+        let shortest = lengths.fold(f64::INFINITY, f64::min);
+        self.routes.retain(|r| {
+            r.is_heard && r.loudness >= least || !r.is_heard && r.length <= shortest + KEPT
+        });
+    }
 }
 
 /// A pair of ears, with reusable buffers: allocates nothing once they have grown.
@@ -320,7 +360,14 @@ impl Listener {
         for k in 0..self.sources[id].routes.len() {
             self.pull(layout, id, k, at);
         }
-        self.sum_up(acoustics, layout, id, at)
+        if is_kept {
+            return self.sum_up(acoustics, layout, id, at);
+        }
+        self.sources[id].set_cut();
+        let heard = self.sum_up(acoustics, layout, id, at);
+        let loudest = heard.map_or(0.0, |h| h.gain * h.gain) * N_BANDS as f64;
+        self.sources[id].drop_faint(LEAST * loudest);
+        heard
     }
 
     fn choose_routes(&mut self, acoustics: &Acoustics, id: usize, cell: CellId, at: DVec3) {
@@ -349,11 +396,12 @@ impl Listener {
                     length: 0.0,
                     toward: DVec3::ZERO,
                     arrival: DVec3::ZERO,
+                    loudness: 0.0,
                     is_heard,
                 });
             }
             if is_heard {
-                source.is_cut = n == limit.n;
+                source.cut = if n == limit.n { 0.0 } else { f64::INFINITY };
             }
         }
     }
@@ -374,24 +422,15 @@ impl Listener {
     }
 
     fn sum_up(
-        &self,
+        &mut self,
         acoustics: &Acoustics,
         layout: &Layout,
         id: usize,
         at: DVec3,
     ) -> Option<Heard> {
         let source = &self.sources[id];
-        let total = |r: &Route| r.length + r.toll;
-        let heard_routes = || source.routes.iter().filter(|r| r.is_heard);
-        let best = heard_routes().map(total).fold(f64::INFINITY, f64::min);
-        // The last of those found stands for all that were not.
-        let last = heard_routes().map(total).fold(0.0, f64::max);
-        let whole = best * HEARD.longest[0] + HEARD.longest[1];
-        let end = if source.is_cut {
-            last.min(whole)
-        } else {
-            whole
-        };
+        let best = source.best();
+        let end = best + source.cut;
         let shortest = source
             .routes
             .iter()
@@ -402,23 +441,32 @@ impl Listener {
             ..Heard::default()
         };
         let mut energy = [0.0; N_BANDS];
-        for route in heard_routes() {
-            let over = (end - total(route)) / (end - best).max(1e-9);
-            let fade = over.clamp(0.0, 1.0);
-            // A tie of more sequences than are counted.
-            let fade = if end > best { fade } else { 1.0 };
+        let mut loudness = [0.0; HEARD.n];
+        let routes = source.routes.iter().filter(|r| r.is_heard);
+        for (loudness, route) in loudness.iter_mut().zip(routes) {
+            // A tie of more sequences than are counted has no room to fade.
+            let fade = if source.cut > 0.0 {
+                ((end - route.total()) / source.cut).clamp(0.0, 1.0)
+            } else {
+                1.0
+            };
             let gains = self.route_energy(acoustics, layout, source, route, at);
             let mut own = 0.0;
             for (sum, gain) in energy.iter_mut().zip(gains) {
                 *sum += fade * gain;
                 own += fade * gain;
             }
+            *loudness = own;
             heard.direction += route.arrival * own;
             heard.n_ways += 1;
         }
         heard.direction = heard.direction.normalize_or(heard.nearest);
         heard.gain = (energy.iter().sum::<f64>() / N_BANDS as f64).sqrt();
         heard.bands = energy.map(f64::sqrt);
+        let routes = self.sources[id].routes.iter_mut().filter(|r| r.is_heard);
+        for (route, loudness) in routes.zip(loudness) {
+            route.loudness = loudness;
+        }
         Some(heard)
     }
 
@@ -471,7 +519,11 @@ fn straight_end(from: DVec3, points: impl Iterator<Item = DVec3>) -> DVec3 {
         if first == DVec3::ZERO {
             first = toward;
         } else {
-            share *= (1.0 - last.angle_between(toward) / BEND).max(0.0);
+            // The chord stands for the angle: they differ by a percent up to 0.5.
+            share *= (1.0 - last.distance(toward) / BEND).max(0.0);
+        }
+        if share == 0.0 {
+            break;
         }
         length += share * leg;
         (at, last) = (p, toward);
