@@ -13,7 +13,7 @@ use super::sound::Office;
 use crate::rows::Figure;
 
 /// Number of walks in a building, half of them through doors that stand half open.
-const N_WALKS: usize = 100;
+const N_WALKS: usize = 1000;
 /// Number of sources heard on one walk, each counted as a walk.
 const N_SOURCES: usize = 5;
 /// Length of a walk on either side of the opening, in centimeters.
