@@ -35,7 +35,10 @@ pub(crate) struct Sound {
     /// Sound that the source repeats: the first channel of a WAV file. A test sound if not given.
     #[arg(long, value_name = "FILE")]
     wav: Option<PathBuf>,
-    /// Closed portals, by number.
+    /// Portals whose leaves are opened, by number, or `all`; repeatable. Otherwise doors stand as in the model, mostly shut.
+    #[arg(long, value_name = "all|PORTAL")]
+    open: Vec<String>,
+    /// Closed portals, by number; after those opened.
     #[arg(long, value_name = "PORTAL,…", value_delimiter = ',')]
     closed: Vec<u32>,
     /// File for the sound, a WAV file of two channels of 16 bits.
@@ -89,6 +92,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
             n.saturating_sub(1)
         );
     }
+    let opened = opened(&args.open, n)?;
     let (rate, source) = match &args.wav {
         Some(path) => read_wav(path, seconds)?,
         None => (RATE, test_sound(RATE)),
@@ -98,6 +102,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
         n_blocks: n_blocks(seconds, rate),
         seconds_of_block: AUDIO_BLOCK as f64 / f64::from(rate),
         source: exact(args.source),
+        opened: &opened,
     };
     let rows = match &args.output {
         None => walk.hear(args, &world, &allowance, |_| Ok(()))?,
@@ -134,6 +139,7 @@ struct HeardWalk<'a> {
     n_blocks: usize,
     seconds_of_block: f64,
     source: DVec3,
+    opened: &'a [PortalId],
 }
 
 impl HeardWalk<'_> {
@@ -148,6 +154,7 @@ impl HeardWalk<'_> {
         let layout = Layout::new(world);
         let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
         let mut state = SightState::new(&sight);
+        self.opened.iter().for_each(|&p| state.open(p));
         args.closed.iter().for_each(|&p| state.close(PortalId(p)));
         let acoustics = Acoustics::new(&layout, world, &Transmission::default());
         let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |material| {
@@ -206,6 +213,25 @@ impl HeardWalk<'_> {
         }
         Ok(rows)
     }
+}
+
+/// The portals named by `--open`.
+fn opened(names: &[String], n: usize) -> anyhow::Result<Vec<PortalId>> {
+    let mut portals = Vec::new();
+    for name in names {
+        if name == "all" {
+            portals.extend((0..n as u32).map(PortalId));
+            continue;
+        }
+        match name.parse::<u32>() {
+            Ok(p) if (p as usize) < n => portals.push(PortalId(p)),
+            _ => bail!(
+                "--open {name}: give `all` or one of the portals 0 to {}",
+                n.saturating_sub(1)
+            ),
+        }
+    }
+    Ok(portals)
 }
 
 /// Moves a value towards another with a time constant of a fifth of a second: leaving and entering a room is gradual.

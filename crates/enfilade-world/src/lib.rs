@@ -31,6 +31,7 @@ mod pull;
 mod reverb;
 mod sampling;
 mod search;
+mod sequences;
 mod shape;
 mod sound;
 mod space;
@@ -63,7 +64,7 @@ pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND, absorption_of_
 pub use sampling::Sampling;
 pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
 pub use shape::{Shape, ShapeError};
-pub use sound::{Acoustics, Heard, Listener, Transmission};
+pub use sound::{Acoustics, Heard, Listener, OCTAVES, Transmission};
 pub use space::{PartId, Place, Space, SpaceError};
 pub use sweep::Passing;
 pub use taut::TautString;

@@ -123,7 +123,7 @@ impl Ways {
         self.first_point[portal.idx()]..self.first_point[portal.idx() + 1]
     }
 
-    fn exits_of(&self, cell: CellId) -> &[Exit] {
+    pub(crate) fn exits_of(&self, cell: CellId) -> &[Exit] {
         let first = &self.first_exit[cell.idx()..];
         &self.exits[first[0] as usize..first[1] as usize]
     }
@@ -143,7 +143,12 @@ impl Ways {
     }
 
     /// Returns the lengths from one point of a cell to those of one of its portals, in order.
-    fn lengths(&self, cell: CellId, from: u32, to: PortalId) -> impl Iterator<Item = f64> + '_ {
+    pub(crate) fn lengths(
+        &self,
+        cell: CellId,
+        from: u32,
+        to: PortalId,
+    ) -> impl Iterator<Item = f64> + '_ {
         let table = &self.bent[cell.idx()];
         let portal = self.portal[from as usize] as usize;
         let row =
@@ -160,7 +165,7 @@ impl Ways {
         })
     }
 
-    fn node(&self, point: u32, into: CellId) -> u32 {
+    pub(crate) fn node(&self, point: u32, into: CellId) -> u32 {
         let portal = self.portal[point as usize] as usize;
         2 * point + side(self.cells[portal], into) as u32
     }
@@ -389,6 +394,27 @@ impl LengthSearch {
             is_settled: false,
         };
         self.heap.push(Reverse((length.to_bits(), node)));
+    }
+
+    /// Returns the length to a crossing; infinite if it was not reached.
+    pub(crate) fn label(&self, node: u32) -> f64 {
+        let label = &self.labels[node as usize];
+        if label.stamp == self.stamp && label.is_settled {
+            label.length
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// Returns the extra cost of a portal, the same from both sides, where the search has come `from` behind it.
+    pub(crate) fn toll_of(&self, ways: &Ways, portal: PortalId, from: CellId) -> f64 {
+        let other = 1 - side(ways.cells[portal.idx()], from);
+        let toll = &self.tolls[2 * portal.idx() + other];
+        if toll.stamp == self.stamp {
+            toll.cost
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// Returns the portals passed, ascending by length.

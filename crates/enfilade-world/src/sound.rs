@@ -1,30 +1,38 @@
 //! Sound of sources as a listener hears it: direction, distance and level of the paths through openings.
 //!
-//! One [length search](LengthSearch) from the listener serves all sources: the best few sequences of portals for each, any number
-//! deep, [pulled taut](TautString). Along a string each portal reduces the level by
+//! Two [length searches](LengthSearch) from the listener serve all sources: one for the shortest way, whatever is shut, and one that
+//! counts shut doors as longer, for what is heard. From these come the best few sequences of portals for each source, any number
+//! deep, [pulled taut](TautString). Along a string each portal reduces the level, in six octave bands, by
 //!
 //! - diffraction at its edge: Maekawa ("Noise reduction by screens", 1968) in the closed form of Kurze & Anderson ("Sound
-//!   attenuation by barriers", 1971) by the Fresnel number of the detour over the edge, below 0 on the bright side: 5 dB at
-//!   grazing, none in the clear;
-//! - its limited area: the share of the first Fresnel zone that is open (Born & Wolf, "Principles of Optics", §8.2);
-//! - the transmission loss of a leaf or pane, by [kind](Transmission), where it is shut, and by the open share where it is not.
+//!   attenuation by barriers", 1971), by the Fresnel number of the detour over the edge; on the bright side, by that of the
+//!   distance of the string from the edge, below 0: 5 dB at grazing, fading to none in the clear. In the opening itself there is
+//!   nothing to go around: the loss counts by the share of directions that the wall around the opening takes there;
+//! - its limited area: the share of the first Fresnel zone that its clear area takes (Born & Wolf, "Principles of Optics", §8.2);
+//! - the transmission loss of a leaf or pane, by [kind](Transmission), for the rest.
 //!
-//! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, so that
-//! none appears or vanishes abruptly. The search may still replace a sequence by another of equal length but different level, so
-//! levels change by at most 0.4 dB per centimeter walked. All of this is for one wavelength, that of 500 Hz. O(portals of a
-//! sequence) per source.
+//! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, or the
+//! first that is not counted. Each of these is a continuous function of both places, so levels need no smoothing, and the answer
+//! does not depend on earlier ones, but for sequences being searched anew only after some movement. O(portals of a sequence)
+//! per source and band.
 //!
-//! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.7 m. Within a concave cell strings
-//! are straight, too short where a wall of the cell is in between.
+//! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.09 m and more. Within a concave
+//! cell strings are straight, too short where a wall of the cell is in between.
+
+mod edge;
 
 use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
 use enfilade_geom::{DVec3, Winding};
 use enfilade_runtime::SightState;
 
+use self::edge::{arrival_direction, detour, edge_loss, straight_end, through_area, wall_share};
+
 use crate::layout::Layout;
+use crate::reverb::SPEED_OF_SOUND;
 use crate::sampling::Sampling;
-use crate::search::{Arrival, LengthSearch, Ways};
-use crate::taut::{TautString, best_on_edge};
+use crate::search::{LengthSearch, Ways};
+use crate::sequences::{Limit, Sequences};
+use crate::taut::TautString;
 
 /// Transmission loss of shut openings. [Units: dB] [Limit: ≥ 0]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,20 +68,27 @@ pub struct Acoustics {
     has_pane: Vec<bool>,
 }
 
-/// Wavelength of 500 Hz. [Units: wu]
-const WAVELENGTH: f64 = 0.686;
-/// Maximum number of sequences per source, and how much longer than the best they may be.
-const N_ROUTES: usize = 4;
-const LONGEST: f64 = 1.5;
+/// Number of octave bands.
+const N_BANDS: usize = 6;
+/// Centers of the octave bands, those in which materials are measured (ISO 354). [Units: Hz]
+pub const OCTAVES: [f64; N_BANDS] = [125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0];
+/// Sequences of a source that are heard. Longer ones by half, and by 5 m, count, as these are mostly more than 10 dB down in rooms;
+/// 24 are more than the doors of most corridors.
+const HEARD: Limit = Limit {
+    n: 24,
+    longest: [1.5, 5.0],
+    steps: 1500,
+};
+/// Sequences of a source that may be the shortest, as lengths through sample points are a few percent too long.
+const SHORT: Limit = Limit {
+    n: 6,
+    longest: [1.1, 0.5],
+    steps: 400,
+};
+/// Share of the energy below which a sequence is dropped until the next search: 24 of them are 0.1 dB at most.
+const LEAST: f64 = 1e-3;
 /// A listener or source that has moved by less keeps its sequences. [Units: wu]
 const KEPT: f64 = 0.25;
-/// Maximum loss at one edge. [Units: dB]
-const MOST_LOSS: f64 = 24.0;
-/// Maximum change of levels per meter that listener and source move. [Units: dB]
-const SLEW: f64 = 40.0;
-/// Larger jumps count as teleports, at which levels change at once. [Units: wu]
-const TELEPORT: f64 = 0.5;
-
 impl Acoustics {
     /// Prepares a world. O(portals).
     #[must_use]
@@ -171,10 +186,12 @@ pub struct Heard {
     pub length: f64,
     /// Unit vector towards the last bend of the shortest path; zero if the source is at the listener.
     pub nearest: DVec3,
-    /// Unit vector towards the sound, averaged over all paths by energy.
+    /// Unit vector towards the sound, averaged over all paths by energy, and over the first half wave of each at 500 Hz.
     pub direction: DVec3,
-    /// Amplitude relative to that at one meter in the open, without the room's reverberation.
+    /// Amplitude relative to that at one meter in the open, without the room's reverberation: the mean over the bands by energy.
     pub gain: f64,
+    /// The same in each [octave band](OCTAVES).
+    pub bands: [f64; N_BANDS],
     /// Number of paths counted.
     pub n_ways: u32,
 }
@@ -189,15 +206,8 @@ struct Source {
     portals: Vec<PortalId>,
     /// Crossings of the strings when last pulled.
     points: Vec<DVec3>,
-    last: Option<LastHeard>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct LastHeard {
-    listener: DVec3,
-    source: DVec3,
-    doors: u64,
-    gain: f64,
+    /// Length beyond that of the best at which sequences have faded out. [Units: wu]
+    cut: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -208,6 +218,48 @@ struct Route {
     toll: f64,
     length: f64,
     toward: DVec3,
+    /// The direction in which it is heard.
+    arrival: DVec3,
+    /// Energy when last heard, the sum over the bands.
+    loudness: f64,
+    /// `false` if it is only measured.
+    is_heard: bool,
+}
+
+impl Route {
+    /// Length, with what is added for shut portals. [Units: wu]
+    fn total(&self) -> f64 {
+        self.length + self.toll
+    }
+}
+
+impl Source {
+    fn best(&self) -> f64 {
+        let heard = self.routes.iter().filter(|r| r.is_heard);
+        heard.map(Route::total).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Sets where sequences have faded out, after all are pulled: the last of those found stands for all that were not.
+    fn set_cut(&mut self) {
+        let best = self.best();
+        let heard = self.routes.iter().filter(|r| r.is_heard);
+        let last = heard.map(Route::total).fold(0.0, f64::max);
+        let whole = best * (HEARD.longest[0] - 1.0) + HEARD.longest[1];
+        self.cut = if self.cut == 0.0 {
+            whole.min(last - best)
+        } else {
+            whole
+        };
+    }
+
+    /// Drops sequences that need not be pulled again until the next search.
+    fn drop_faint(&mut self, least: f64) {
+        let lengths = self.routes.iter().map(|r| r.length);
+        let shortest = lengths.fold(f64::INFINITY, f64::min);
+        self.routes.retain(|r| {
+            r.is_heard && r.loudness >= least || !r.is_heard && r.length <= shortest + KEPT
+        });
+    }
 }
 
 /// A pair of ears, with reusable buffers: allocates nothing once they have grown.
@@ -217,16 +269,15 @@ struct Route {
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     search: LengthSearch,
+    /// The search without regard to shut doors.
+    shortest: LengthSearch,
     n_searches: u64,
-    /// Number of times that doors have moved.
-    doors: u64,
     place: Option<(CellId, DVec3)>,
     at: DVec3,
     transmitted: Vec<f64>,
     open: Vec<f64>,
     sources: Vec<Source>,
-    arrivals: Vec<Arrival>,
-    crossings: Vec<(crate::layout::Exit, DVec3)>,
+    sequences: Sequences,
     string: TautString,
 }
 
@@ -255,7 +306,6 @@ impl Listener {
             self.transmitted[i] = transmitted;
             self.open[i] = acoustics.open_share(state, portal);
         }
-        self.doors += u64::from(!is_same);
         let is_near = |(c, p): (CellId, DVec3)| c == cell && p.distance(at) < KEPT;
         if is_same && self.place.is_some_and(is_near) {
             return;
@@ -267,6 +317,8 @@ impl Listener {
             .run(&acoustics.ways, cell, at, f64::INFINITY, |exit| {
                 Some(toll(transmitted[exit.portal.idx()]))
             });
+        self.shortest
+            .run(&acoustics.ways, cell, at, f64::INFINITY, |_| Some(0.0));
     }
 
     /// Returns the number of searches of sequences, for cost statistics.
@@ -303,50 +355,49 @@ impl Listener {
         for k in 0..self.sources[id].routes.len() {
             self.pull(layout, id, k, at);
         }
-        let mut heard = self.sum_up(acoustics, layout, id, at)?;
-        let last = &mut self.sources[id].last;
-        if let Some(last) = last.filter(|l| l.doors == self.doors) {
-            let moved = last.listener.distance(self.at) + last.source.distance(at);
-            let most = 10f64.powf(0.05 * SLEW * moved);
-            if moved < TELEPORT {
-                heard.gain = heard.gain.clamp(last.gain / most, last.gain * most);
-            }
+        if is_kept {
+            return self.sum_up(acoustics, layout, id, at);
         }
-        *last = Some(LastHeard {
-            listener: self.at,
-            source: at,
-            doors: self.doors,
-            gain: heard.gain,
-        });
-        Some(heard)
+        self.sources[id].set_cut();
+        let heard = self.sum_up(acoustics, layout, id, at);
+        let loudest = heard.map_or(0.0, |h| h.gain * h.gain) * N_BANDS as f64;
+        self.sources[id].drop_faint(LEAST * loudest);
+        heard
     }
 
     fn choose_routes(&mut self, acoustics: &Acoustics, id: usize, cell: CellId, at: DVec3) {
-        let ways = &acoustics.ways;
-        self.search
-            .arrivals(ways, cell, at, LONGEST, N_ROUTES, &mut self.arrivals);
         let source = &mut self.sources[id];
         (source.search, source.cell, source.at) = (self.n_searches, Some(cell), at);
         source.routes.clear();
         source.portals.clear();
         source.points.clear();
-        for arrival in &self.arrivals {
-            self.search.crossings(ways, arrival, &mut self.crossings);
-            let tolls = self
-                .crossings
-                .iter()
-                .map(|(exit, _)| toll(self.transmitted[exit.portal.idx()]));
-            source.routes.push(Route {
-                first: source.portals.len() as u32,
-                n: self.crossings.len() as u32,
-                toll: tolls.sum(),
-                length: 0.0,
-                toward: DVec3::ZERO,
-            });
-            source
-                .portals
-                .extend(self.crossings.iter().map(|c| c.0.portal));
-            source.points.extend(self.crossings.iter().map(|c| c.1));
+        for (search, limit, is_heard) in
+            [(&self.search, HEARD, true), (&self.shortest, SHORT, false)]
+        {
+            let ends = (cell, at);
+            let n = self.sequences.find(search, &acoustics.ways, ends, limit);
+            for found in 0..n {
+                let first = source.portals.len();
+                for (portal, point) in self.sequences.portals(found) {
+                    source.portals.push(portal);
+                    source.points.push(point);
+                }
+                let own = source.portals[first..].iter();
+                let tolls = own.map(|p| toll(self.transmitted[p.idx()]));
+                source.routes.push(Route {
+                    first: first as u32,
+                    n: (source.portals.len() - first) as u32,
+                    toll: tolls.sum(),
+                    length: 0.0,
+                    toward: DVec3::ZERO,
+                    arrival: DVec3::ZERO,
+                    loudness: 0.0,
+                    is_heard,
+                });
+            }
+            if is_heard {
+                source.cut = if n == limit.n { 0.0 } else { f64::INFINITY };
+            }
         }
     }
 
@@ -361,23 +412,20 @@ impl Listener {
         route.length = self.string.pull_from(self.at, at, start, pieces);
         route.toward = self.string.departure();
         let points = self.string.points();
+        route.arrival = arrival_direction(points);
         source.points[range].copy_from_slice(&points[1..points.len() - 1]);
     }
 
     fn sum_up(
-        &self,
+        &mut self,
         acoustics: &Acoustics,
         layout: &Layout,
         id: usize,
         at: DVec3,
     ) -> Option<Heard> {
         let source = &self.sources[id];
-        let total = |r: &Route| r.length + r.toll;
-        let best = source
-            .routes
-            .iter()
-            .map(total)
-            .fold(f64::INFINITY, f64::min);
+        let best = source.best();
+        let end = best + source.cut;
         let shortest = source
             .routes
             .iter()
@@ -387,123 +435,72 @@ impl Listener {
             nearest: shortest.toward,
             ..Heard::default()
         };
-        let mut energy = 0.0;
-        for route in &source.routes {
-            let over = (LONGEST - total(route) / best.max(1.0)) / (LONGEST - 1.0);
-            let fade = over.clamp(0.0, 1.0).powi(2);
-            let gain = self.route_gain(acoustics, layout, source, route, at);
-            let own = fade * gain * gain;
-            energy += own;
-            heard.direction += route.toward * own;
+        let mut energy = [0.0; N_BANDS];
+        let mut loudness = [0.0; HEARD.n];
+        let routes = source.routes.iter().filter(|r| r.is_heard);
+        for (loudness, route) in loudness.iter_mut().zip(routes) {
+            // A tie of more sequences than are counted has no room to fade.
+            let fade = if source.cut > 0.0 {
+                ((end - route.total()) / source.cut).clamp(0.0, 1.0)
+            } else {
+                1.0
+            };
+            let gains = self.route_energy(acoustics, layout, source, route, at);
+            let mut own = 0.0;
+            for (sum, gain) in energy.iter_mut().zip(gains) {
+                *sum += fade * gain;
+                own += fade * gain;
+            }
+            *loudness = own;
+            heard.direction += route.arrival * own;
             heard.n_ways += 1;
         }
         heard.direction = heard.direction.normalize_or(heard.nearest);
-        heard.gain = energy.sqrt();
+        heard.gain = (energy.iter().sum::<f64>() / N_BANDS as f64).sqrt();
+        heard.bands = energy.map(f64::sqrt);
+        let routes = self.sources[id].routes.iter_mut().filter(|r| r.is_heard);
+        for (route, loudness) in routes.zip(loudness) {
+            route.loudness = loudness;
+        }
         Some(heard)
     }
 
-    /// Returns the amplitude along a route.
-    fn route_gain(
+    /// Returns the energy along a route, by octave band.
+    fn route_energy(
         &self,
         acoustics: &Acoustics,
         layout: &Layout,
         source: &Source,
         route: &Route,
         at: DVec3,
-    ) -> f64 {
+    ) -> [f64; N_BANDS] {
         let range = route.first as usize..(route.first + route.n) as usize;
         let (portals, points) = (&source.portals[range.clone()], &source.points[range]);
-        let mut gain = 1.0 / route.length.max(1.0);
+        let mut energy = [route.length.max(1.0).powi(-2); N_BANDS];
         for (i, &portal) in portals.iter().enumerate() {
-            let before = if i == 0 { self.at } else { points[i - 1] };
-            let after = points.get(i + 1).copied().unwrap_or(at);
-            let transmitted = self.transmitted[portal.idx()];
-            let area = layout.opening(portal).area() * self.open[portal.idx()];
-            // Sound through the leaf passes its whole area.
-            let leaf = (transmitted - self.open[portal.idx()]).max(0.0);
-            let free =
-                self.open[portal.idx()] * through_area(area, before, points[i], after).powi(2);
-            gain *= (free + leaf).sqrt();
-            let detour = detour(acoustics.rims(portal), before, points[i], after);
-            gain *= 10f64.powf(-0.05 * edge_loss(2.0 * detour / WAVELENGTH));
+            let back = (0..i).rev().map(|k| points[k]).chain([self.at]);
+            let before = straight_end(points[i], back);
+            let onward = points[i + 1..].iter().copied().chain([at]);
+            let after = straight_end(points[i], onward);
+            let opening = layout.opening(portal);
+            let area = opening.area() * self.open[portal.idx()];
+            let rims = acoustics.rims(portal);
+            let beside = wall_share(&opening, rims, before) * wall_share(&opening, rims, after);
+            let detour = detour(rims, before, points[i], after);
+            for (energy, frequency) in energy.iter_mut().zip(OCTAVES) {
+                let wave = SPEED_OF_SOUND / frequency;
+                // Sound through the leaf passes its whole area.
+                let free = through_area(area, wave, before, points[i], after).powi(2);
+                let through = free + (1.0 - free) * acoustics.shut[portal.idx()];
+                let loss = beside * edge_loss(2.0 * detour / wave);
+                *energy *= through * 10f64.powf(-0.1 * loss);
+            }
         }
-        gain
+        energy
     }
 }
 
 /// Extra length of a shut portal in comparisons of sequences: a meter for each decibel. [Units: wu]
 fn toll(transmitted: f64) -> f64 {
     -10.0 * transmitted.max(1e-12).log10()
-}
-
-/// Returns the amplitude that passes an area on the way between two points, relative to a large area.
-fn through_area(area: f64, before: DVec3, at: DVec3, after: DVec3) -> f64 {
-    let (d1, d2) = (before.distance(at), after.distance(at));
-    // Number of first Fresnel zones in the area, times π; the zone vanishes at the opening itself.
-    let zone = WAVELENGTH * d1 * d2 / (d1 + d2).max(1e-9);
-    area / area.hypot(zone).max(1e-12)
-}
-
-/// Returns the extra length over the nearest edge: above 0 where the string bends about it, below 0 where it passes in the clear.
-/// [Units: wu]
-fn detour(rims: &[[DVec3; 2]], before: DVec3, at: DVec3, after: DVec3) -> f64 {
-    let straight = before.distance(after);
-    let bent = before.distance(at) + at.distance(after) - straight;
-    if bent > 1e-9 * (1.0 + straight) {
-        return bent;
-    }
-    let over = rims.iter().map(|&[a, b]| {
-        let (edge, _) = best_on_edge(before, after, a, b);
-        before.distance(edge) + edge.distance(after) - straight
-    });
-    -over.fold(f64::INFINITY, f64::min).max(0.0)
-}
-
-/// Returns the loss at an edge, by the Fresnel number of the detour over it. [Units: dB]
-fn edge_loss(fresnel: f64) -> f64 {
-    let x = (std::f64::consts::TAU * fresnel.abs()).sqrt();
-    if x < 1e-6 {
-        return 5.0;
-    }
-    if fresnel > 0.0 {
-        return (5.0 + 20.0 * (x / x.tanh()).log10()).min(MOST_LOSS);
-    }
-    // In the clear from about -0.19 on.
-    if x > 1.2 {
-        return 0.0;
-    }
-    (5.0 + 20.0 * (x / x.tan()).log10()).max(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// W11: Maekawa's chart.
-    #[test]
-    fn edge_losses_equal_maekawas_chart() {
-        for (fresnel, decibels) in [
-            (0.0, 5.0),
-            (1.0, 13.0),
-            (10.0, 23.0),
-            (100.0, 24.0),
-            (-1.0, 0.0),
-        ] {
-            let loss = edge_loss(fresnel);
-            assert!((loss - decibels).abs() < 0.3, "{fresnel}: {loss}");
-        }
-        for k in -4000..4000 {
-            let x = f64::from(k) * 1e-3;
-            assert!((edge_loss(x) - edge_loss(x + 1e-3)).abs() < 0.15, "{x}");
-        }
-    }
-
-    /// W11.
-    #[test]
-    fn a_small_hole_lets_less_through_but_not_close_by() {
-        let (a, x, b) = (DVec3::ZERO, DVec3::X * 3.0, DVec3::X * 6.0);
-        assert!(through_area(4.0, a, x, b) > 0.95);
-        assert!(through_area(0.01, a, x, b) < 0.02);
-        assert_eq!(through_area(0.01, x, x, b), 1.0);
-    }
 }

@@ -425,7 +425,7 @@ fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
 }
 
 /// As [`best_place`], on an edge: unfolds the triangles of `a` and of `b` with its line into one plane.
-pub(crate) fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
+fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
     let length = from.distance(to);
     if length == 0.0 {
         return (from, DVec3::ZERO);

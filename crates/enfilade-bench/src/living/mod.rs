@@ -5,10 +5,12 @@
 mod actors;
 mod bodies;
 mod graphs;
+mod levels;
 mod paths;
 mod rooms;
 mod sound;
 mod things;
+mod walls;
 
 use enfilade::cpg::World;
 
@@ -16,6 +18,8 @@ use crate::rows::{Figure, Measure, Row};
 
 /// Graphs of 1,500 cells.
 const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
+/// Real buildings with doors.
+const LIVED_IN: &[&str] = &["duplex", "institute", "fzk-haus"];
 /// Those of the graphs that contract.
 const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
@@ -52,9 +56,14 @@ pub(crate) const ROWS: &[Row] = &[
     baked("paths: length", &["recast-dungeon"], paths::dungeon),
     made("sound: length", &["offices-16"], sound::length),
     made("sound: direction", &["offices-16"], sound::direction),
-    made("sound: doorway", &["offices-100"], sound::doorway),
-    baked("sound: doorway", &["institute"], sound::doorway_baked),
+    made("levels", &["offices-100"], levels::level_in),
+    baked("levels", LIVED_IN, levels::level),
+    made("levels: directions", &["offices-100"], levels::direction_in),
+    baked("levels: directions", LIVED_IN, levels::direction),
+    made("levels: lengths", &["offices-100"], levels::length_in),
+    baked("levels: lengths", LIVED_IN, levels::length),
     made("sound: reverb", &["coupled-rooms"], sound::reverb),
+    baked("reverberation: areas", &["institute"], walls::areas),
     made("sound: cost", &["offices-1000"], sound::cost),
 ];
 

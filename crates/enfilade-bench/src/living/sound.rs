@@ -12,14 +12,14 @@ use enfilade_testkit::{GridParams, Rng, room_grid};
 
 use crate::rows::Figure;
 
-struct Office {
-    layout: Layout,
-    acoustics: Acoustics,
-    state: SightState,
+pub(super) struct Office {
+    pub(super) layout: Layout,
+    pub(super) acoustics: Acoustics,
+    pub(super) state: SightState,
 }
 
 impl Office {
-    fn new(world: &World) -> anyhow::Result<Self> {
+    pub(super) fn new(world: &World) -> anyhow::Result<Self> {
         let layout = Layout::new(world);
         let acoustics = Acoustics::new(&layout, world, &Transmission::default());
         let state = SightState::new(&Sight::build(world)?);
@@ -30,7 +30,7 @@ impl Office {
         })
     }
 
-    fn offices(n: usize, seed: u64) -> anyhow::Result<Self> {
+    pub(super) fn offices(n: usize, seed: u64) -> anyhow::Result<Self> {
         let params = GridParams {
             outdoors: false,
             windows: 0.0,
@@ -41,7 +41,7 @@ impl Office {
         Self::new(&room_grid(&params))
     }
 
-    fn place(&self, rng: &mut Rng) -> Option<(CellId, DVec3)> {
+    pub(super) fn place(&self, rng: &mut Rng) -> Option<(CellId, DVec3)> {
         let indoors = |c: &CellId| !self.layout.cell(*c).is_outdoor;
         (0..10_000).find_map(|_| {
             let cell = CellId(rng.below(self.layout.n_cells()) as u32);
@@ -135,49 +135,6 @@ pub(super) fn direction(name: &str) -> anyhow::Result<Figure> {
         most: 1.0,
         note: format!("degrees, the worst of {n} pairs"),
     })
-}
-
-/// Measures the largest change of level per centimeter on walks straight through each doorway. [Units: dB/cm]
-fn steepest(site: &Office, note: &str) -> anyhow::Result<Figure> {
-    let mut rng = Rng::new(9);
-    let (mut value, mut n): (f64, usize) = (0.0, 0);
-    let mut ears = Listener::new();
-    for p in (0..site.layout.n_portals() as u32).map(PortalId) {
-        let opening = site.layout.opening(p);
-        for _ in 0..4 {
-            let source = site.place(&mut rng).context("no place")?;
-            let mut before: Option<f64> = None;
-            n += 1;
-            for k in -150..150 {
-                let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.01;
-                let Some(cell) = site.layout.locate(at) else {
-                    before = None;
-                    continue;
-                };
-                ears.listen(&site.acoustics, &site.state, cell, at);
-                let Some(heard) = ears.hear(&site.acoustics, &site.layout, 0, source.0, source.1)
-                else {
-                    break;
-                };
-                let level = 20.0 * heard.gain.max(1e-12).log10();
-                value = value.max(before.map_or(0.0, |b| (level - b).abs()));
-                before = Some(level);
-            }
-        }
-    }
-    Ok(Figure {
-        value,
-        most: 0.5,
-        note: format!("dB per centimeter, the largest on {n} walks through {note}"),
-    })
-}
-
-pub(super) fn doorway(_: &str) -> anyhow::Result<Figure> {
-    steepest(&Office::offices(100, 5)?, "doorways of offices")
-}
-
-pub(super) fn doorway_baked(world: &World) -> anyhow::Result<Figure> {
-    steepest(&Office::new(world)?, "portals of all kinds")
 }
 
 /// Compares coupled rooms with the closed-form balance of energy, and a single room with Sabine's formula: worst

@@ -1,0 +1,174 @@
+//! Losses of sound at the edges of one opening.
+//!
+//! Maekawa ("Noise reduction by screens", 1968) in the closed form of Kurze & Anderson ("Sound attenuation by barriers", 1971), and
+//! the share of the first Fresnel zone (Born & Wolf, "Principles of Optics", §8.2). All are continuous in the ends of the string.
+
+use enfilade_geom::DVec3;
+
+use crate::layout::Opening;
+
+/// Angle of a bend from which on it is a source of its own: some 30°, over which the field behind an edge passes from that of the
+/// source to that of the edge (Kouyoumjian & Pathak 1974). [Units: rad]
+const BEND: f64 = 0.5;
+/// Length of string over which directions are averaged: half a wave at 500 Hz. Nearer bends are not heard as places of their
+/// own. [Units: wu]
+const BLUR: f64 = 0.343;
+/// Maximum loss at one edge: what screens reach outdoors, where turbulence fills the shadow (Maekawa 1968). [Units: dB]
+const MOST_LOSS: f64 = 24.0;
+
+/// Returns the end of the straight part of a string that begins at `from`, extended straight from there. A slight bend shortens
+/// what is behind it in proportion to its angle, so that a portal crossed straight has no influence on the losses at others.
+pub(super) fn straight_end(from: DVec3, points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let (mut at, mut first, mut last) = (from, DVec3::ZERO, DVec3::ZERO);
+    let (mut length, mut share) = (0.0, 1.0);
+    for p in points {
+        let leg = p.distance(at);
+        if leg < 1e-9 {
+            continue;
+        }
+        let toward = (p - at) / leg;
+        if first == DVec3::ZERO {
+            first = toward;
+        } else {
+            // The chord stands for the angle: they differ by a percent up to 0.5.
+            share *= (1.0 - last.distance(toward) / BEND).max(0.0);
+        }
+        if share == 0.0 {
+            break;
+        }
+        length += share * leg;
+        (at, last) = (p, toward);
+    }
+    from + first * length
+}
+
+/// Returns the mean direction of the first part of a string.
+pub(super) fn arrival_direction(points: &[DVec3]) -> DVec3 {
+    let Some((&from, rest)) = points.split_first() else {
+        return DVec3::ZERO;
+    };
+    let (mut at, mut left, mut sum) = (from, BLUR, DVec3::ZERO);
+    for &p in rest {
+        let leg = p.distance(at);
+        let share = (left / leg.max(1e-12)).min(1.0);
+        let end = at.lerp(p, share);
+        // The mean of the points of this leg, by its length.
+        sum += (at.midpoint(end) - from) * (share * leg);
+        left -= share * leg;
+        at = p;
+        if left <= 0.0 {
+            break;
+        }
+    }
+    sum.normalize_or_zero()
+}
+
+/// Returns the share of directions that the wall around an opening takes at a point: 0 in the opening, 1 far from it. As for a disc
+/// of equal area on its axis.
+pub(super) fn wall_share(opening: &Opening<'_>, rims: &[[DVec3; 2]], p: DVec3) -> f64 {
+    let height = opening.height_of(p);
+    let foot = p - opening.normal() * height;
+    let is_before = |piece: &[DVec3]| {
+        let edges = (0..piece.len()).map(|i| (piece[i], piece[(i + 1) % piece.len()]));
+        let mut insides = edges.map(|(a, b)| opening.normal().dot((b - a).cross(foot - a)));
+        insides.all(|inside| inside >= 0.0)
+    };
+    let squared = if opening.pieces().any(is_before) {
+        height * height
+    } else {
+        let edges = rims.iter().map(|&[a, b]| {
+            let along = (b - a) * ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            (a + along).distance_squared(p)
+        });
+        edges.fold(f64::INFINITY, f64::min)
+    };
+    if squared == f64::INFINITY {
+        return 1.0;
+    }
+    let disc = opening.area() / std::f64::consts::PI;
+    (squared / (squared + disc).max(1e-12)).sqrt()
+}
+
+/// Returns the amplitude that passes an area on the way between two points, relative to a large area.
+pub(super) fn through_area(area: f64, wave: f64, before: DVec3, at: DVec3, after: DVec3) -> f64 {
+    if area <= 0.0 {
+        return 0.0;
+    }
+    let (d1, d2) = (before.distance(at), after.distance(at));
+    // Number of first Fresnel zones in the area, times π; the zone vanishes at the opening itself.
+    let zone = wave * d1 * d2 / (d1 + d2).max(1e-9);
+    area / area.hypot(zone).max(1e-12)
+}
+
+/// Returns the extra length over the nearest edge: above 0 where the string bends about it, below 0 where it passes in the clear,
+/// there for small angles, so that it vanishes in the opening itself. [Units: wu]
+pub(super) fn detour(rims: &[[DVec3; 2]], before: DVec3, at: DVec3, after: DVec3) -> f64 {
+    let straight = before.distance(after);
+    let bent = before.distance(at) + at.distance(after) - straight;
+    if bent > 1e-9 * (1.0 + straight) {
+        return bent;
+    }
+    let ray = (after - before).normalize_or_zero();
+    // Edges as seen along the string.
+    let aside = |p: DVec3| (p - at) - ray * ray.dot(p - at);
+    let squares = rims.iter().map(|&[a, b]| {
+        let (a, b) = (aside(a), aside(b));
+        let share = -a.dot(b - a) / (b - a).length_squared().max(1e-18);
+        (a + (b - a) * share.clamp(0.0, 1.0)).length_squared()
+    });
+    let square = squares.fold(f64::INFINITY, f64::min);
+    let (d1, d2) = (before.distance(at), after.distance(at));
+    if square == f64::INFINITY {
+        return f64::NEG_INFINITY;
+    }
+    -0.5 * square * (d1 + d2) / (d1 * d2).max(1e-12)
+}
+
+/// Returns the loss at an edge, by the Fresnel number of the detour over it. [Units: dB]
+pub(super) fn edge_loss(fresnel: f64) -> f64 {
+    let x = (std::f64::consts::TAU * fresnel.abs()).sqrt();
+    if x < 1e-6 {
+        return 5.0;
+    }
+    if fresnel > 0.0 {
+        return (5.0 + 20.0 * (x / x.tanh()).log10()).min(MOST_LOSS);
+    }
+    // In the clear from about -0.19 on.
+    if x > 1.2 {
+        return 0.0;
+    }
+    (5.0 + 20.0 * (x / x.tan()).log10()).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// W11: Maekawa's chart.
+    #[test]
+    fn edge_losses_equal_maekawas_chart() {
+        for (fresnel, decibels) in [
+            (0.0, 5.0),
+            (1.0, 13.0),
+            (10.0, 23.0),
+            (100.0, 24.0),
+            (-1.0, 0.0),
+        ] {
+            let loss = edge_loss(fresnel);
+            assert!((loss - decibels).abs() < 0.3, "{fresnel}: {loss}");
+        }
+        for k in -4000..4000 {
+            let x = f64::from(k) * 1e-3;
+            assert!((edge_loss(x) - edge_loss(x + 1e-3)).abs() < 0.15, "{x}");
+        }
+    }
+
+    /// W11.
+    #[test]
+    fn a_small_hole_lets_less_through_but_not_close_by() {
+        let (a, x, b) = (DVec3::ZERO, DVec3::X * 3.0, DVec3::X * 6.0);
+        assert!(through_area(4.0, 0.686, a, x, b) > 0.95);
+        assert!(through_area(0.01, 0.686, a, x, b) < 0.02);
+        assert_eq!(through_area(0.01, 0.686, x, x, b), 1.0);
+    }
+}
