@@ -15,6 +15,7 @@ use enfilade_runtime::{Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
+pub use meet::Docking;
 use neighbors::Neighbors;
 
 mod meet;
@@ -128,6 +129,7 @@ pub struct Space {
     n_cells: usize,
     /// The boxes of all parts but the root.
     neighbors: Neighbors,
+    pub(crate) docking: Docking,
     buffers: Buffers,
 }
 
@@ -152,6 +154,7 @@ impl Space {
             parts: Vec::new(),
             n_cells: 0,
             neighbors: Neighbors::default(),
+            docking: Docking::default(),
             buffers: Buffers::default(),
         };
         space.push(world, PartId::ROOT, Pose::IDENTITY)?;
@@ -411,7 +414,7 @@ impl Space {
         &self.parts[place.part.idx()].guests[place.cell.idx()]
     }
 
-    /// Returns the doors of other parts that a part's door currently meets.
+    /// Returns the doors of other parts that a part's door currently meets, within the tolerance of [`Docking`].
     #[must_use]
     pub fn meets(&self, part: PartId, portal: PortalId) -> &[(PartId, PortalId)] {
         let doors = &self.parts[part.idx()].doors;

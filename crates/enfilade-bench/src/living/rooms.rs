@@ -28,12 +28,12 @@ const PICTURE: [usize; 2] = [96, 72];
 const LAMPS: usize = 200;
 const SAMPLES: usize = 10_000_000;
 
-fn point(p: [f32; 3]) -> DVec3 {
+pub(super) fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
 /// Returns a room with a window in each wall, 3 to 6 m, times `size`.
-fn cabin(seed: u64, size: f32, furniture: usize) -> World {
+pub(super) fn cabin(seed: u64, size: f32, furniture: usize) -> World {
     let world = room_grid(&GridParams {
         size: [1, 1, 1],
         windows: 1.0,
