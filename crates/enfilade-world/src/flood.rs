@@ -155,7 +155,10 @@ impl Flood {
             let Some(beyond) = doors.iter().find(|d| d.portal == portal) else {
                 continue;
             };
-            if self.meets(space, posted, other, portal) && passes(other, portal) {
+            // As if they touched: through the prism between the two.
+            let radius = space.parts[other.idx()].layout.opening(portal).radius();
+            let depth = space.docking.depth(radius);
+            if self.is_within(space, posted, (other, portal), depth) && passes(other, portal) {
                 let cell = beyond.inner;
                 self.add(space, Place { part: other, cell });
             }
@@ -180,10 +183,21 @@ impl Flood {
 
     /// Returns `true` if the shape meets a portal's opening.
     fn meets(&mut self, space: &Space, posted: &Posted, id: PartId, portal: PortalId) -> bool {
+        self.is_within(space, posted, (id, portal), 0.0)
+    }
+
+    /// Returns `true` if the shape is within a distance of a portal's opening.
+    fn is_within(
+        &mut self,
+        space: &Space,
+        posted: &Posted,
+        (id, portal): (PartId, PortalId),
+        distance: f64,
+    ) -> bool {
         let layout = &space.parts[id.idx()].layout;
         let opening = layout.opening(portal);
         let posed = self.posed_in(space, posted, id);
-        let margin = layout.tolerance();
+        let margin = layout.tolerance() + distance;
         let distance = opening.bounds().distance_squared(posed.origin).sqrt();
         let clearance = distance - posted.reach - margin;
         let is_met = clearance <= 0.0 && {

@@ -65,7 +65,7 @@ pub use sampling::Sampling;
 pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
 pub use shape::{Shape, ShapeError};
 pub use sound::{Acoustics, Heard, Listener, OCTAVES, Transmission};
-pub use space::{PartId, Place, Space, SpaceError};
+pub use space::{Docking, PartId, Place, Space, SpaceError};
 pub use sweep::Passing;
 pub use taut::TautString;
 pub use things::{Moved, ThingError, ThingId, Things, Tie};

@@ -101,6 +101,17 @@ impl SpaceViewer {
         part.viewer.advance(&question);
         part.viewer.take_crossings(&mut self.crossings);
         self.hand_on(space, start);
+        if let Some(place) = at {
+            // An eye in the seam of two parts is in both.
+            let eye = enfilade_geom::DVec3::from_array(view.eye().map(f64::from));
+            let eye = space.between(frame, start).point(eye);
+            let queue = &mut self.queue;
+            space.for_each_beyond(place, eye, |other, portal, cell| {
+                if space.parts[other.idx()].state.is_open(portal) {
+                    queue.push((other, cell, Window::screen()));
+                }
+            });
+        }
         if at.is_none() {
             for id in (1..space.parts.len() as u32).map(PartId) {
                 if let Some(border) = space.parts[id.idx()].border {
@@ -160,9 +171,12 @@ impl SpaceViewer {
                 for place in &door.leads_to {
                     add(place.part, place.cell, window);
                 }
-                for &(other, _) in &door.meets {
-                    if let Some(border) = space.parts[other.idx()].border {
-                        add(other, border, window);
+                for &(other, portal) in &door.meets {
+                    let its = &space.parts[other.idx()];
+                    if let Some(border) = its.border {
+                        // Its door may be nearer than the one that the view leaves by.
+                        let radius = its.layout.opening(portal).radius();
+                        add(other, border, &window.earlier(space.docking.depth(radius)));
                     }
                 }
             }

@@ -283,7 +283,8 @@ impl PathSearch {
     }
 
     /// Returns the walking distance of a point from the start of [`PathSearch::cells_within`]; `None` if the walker cannot stand
-    /// there or did not reach it. Square by square, so up to 3 % too long. [Units: wu]
+    /// there or did not reach it. Square by square, so up to 2.8 % too long within a cell, and more through
+    /// portals, which it passes at fixed points: 7.8 % is the most measured. [Units: wu]
     pub fn distance(&mut self, map: &WalkMap, layout: &Layout, to: DVec3) -> Option<f64> {
         let goal = map.floors.below(to)?;
         let (cell, from) = self.search.start()?;

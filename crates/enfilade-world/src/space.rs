@@ -15,7 +15,11 @@ use enfilade_runtime::{Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
-use crate::shape::is_near;
+pub use meet::Docking;
+use neighbors::Neighbors;
+
+mod meet;
+mod neighbors;
 
 /// Index of a part of a [`Space`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -97,6 +101,17 @@ pub(crate) struct Part {
     pub(crate) first_cell: u32,
 }
 
+impl Part {
+    /// Returns its box in the root's frame, with the tolerance of its geometry.
+    fn bounds(&self) -> Aabb {
+        if self.hull.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let corners = self.hull.corners().map(|p| self.pose.point(p));
+        Aabb::of_points(&corners).expanded(self.layout.tolerance())
+    }
+}
+
 /// A portal from a part to its surroundings.
 pub(crate) struct BorderDoor {
     pub(crate) portal: PortalId,
@@ -112,6 +127,9 @@ pub(crate) struct BorderDoor {
 pub struct Space {
     pub(crate) parts: Vec<Part>,
     n_cells: usize,
+    /// The boxes of all parts but the root.
+    neighbors: Neighbors,
+    pub(crate) docking: Docking,
     buffers: Buffers,
 }
 
@@ -122,6 +140,7 @@ struct Buffers {
     cells: Vec<CellId>,
     stack: Vec<i32>,
     order: Vec<PartId>,
+    near: Vec<PartId>,
 }
 
 impl Space {
@@ -134,6 +153,8 @@ impl Space {
         let mut space = Self {
             parts: Vec::new(),
             n_cells: 0,
+            neighbors: Neighbors::default(),
+            docking: Docking::default(),
             buffers: Buffers::default(),
         };
         space.push(world, PartId::ROOT, Pose::IDENTITY)?;
@@ -196,11 +217,12 @@ impl Space {
             layout,
         });
         self.n_cells += n_cells;
+        self.neighbors.push(Aabb::EMPTY);
         Ok(())
     }
 
     /// Moves a part, and everything that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they
-    /// touch). Allocates nothing once its lists have grown.
+    /// touch, parts beside them). Allocates nothing once its lists have grown.
     ///
     /// # Errors
     ///
@@ -225,6 +247,9 @@ impl Space {
             let own = &mut self.parts[moved.idx()];
             own.pose = host_pose.after(&own.local);
             buffers.order.extend_from_slice(&own.children);
+            let bounds = own.bounds();
+            self.neighbors.set(moved, bounds);
+            let own = &self.parts[moved.idx()];
             // Parts that stand entirely within their host have moved with it.
             let is_within = own.stands_in.iter().all(|p| p.part == host);
             if moved == part || !is_within {
@@ -241,7 +266,9 @@ impl Space {
         for place in stands_in.drain(..) {
             let host = &mut self.parts[place.part.idx()];
             let guests = &mut host.guests[place.cell.idx()];
-            guests.retain(|g| *g != id);
+            if let Ok(at) = guests.binary_search(&id) {
+                guests.remove(at);
+            }
             host.has_guests[place.cell.idx()] = !guests.is_empty();
         }
         let own = &self.parts[id.idx()];
@@ -301,47 +328,6 @@ impl Space {
             }
             self.touched(part.host, margin, buffers, places);
         }
-    }
-
-    /// Updates the doors of other parts that the doors of a part meet, both ways.
-    fn meet(&mut self, id: PartId, buffers: &mut Buffers) {
-        let n_parts = self.parts.len();
-        for other in (1..n_parts as u32).map(PartId).filter(|p| *p != id) {
-            for door in &mut self.parts[other.idx()].doors {
-                door.meets.retain(|m| m.0 != id);
-            }
-            for door in &mut self.parts[id.idx()].doors {
-                door.meets.retain(|m| m.0 != other);
-            }
-            if !self.are_near(id, other) {
-                continue;
-            }
-            let to_own = self.between(other, id);
-            for a in 0..self.parts[id.idx()].doors.len() {
-                for b in 0..self.parts[other.idx()].doors.len() {
-                    let (own, its) = (&self.parts[id.idx()], &self.parts[other.idx()]);
-                    let portals = [own.doors[a].portal, its.doors[b].portal];
-                    if !is_met([own, its], portals, &to_own, &mut buffers.other) {
-                        continue;
-                    }
-                    let doors = &mut self.parts[id.idx()].doors;
-                    doors[a].meets.push((other, portals[1]));
-                    let doors = &mut self.parts[other.idx()].doors;
-                    doors[b].meets.push((id, portals[0]));
-                }
-            }
-        }
-    }
-
-    /// Returns `true` if the hulls of two parts may touch.
-    fn are_near(&self, a: PartId, b: PartId) -> bool {
-        let [a, b] = [a, b].map(|p| &self.parts[p.idx()]);
-        if a.hull.is_empty() || b.hull.is_empty() {
-            return false;
-        }
-        let [middle_a, middle_b] = [a, b].map(|p| p.pose.point(p.hull.center()));
-        let reach = (a.hull.size().length() + b.hull.size().length()) * 0.5;
-        middle_a.distance(middle_b) <= reach + a.layout.tolerance() + b.layout.tolerance()
     }
 
     fn check(&self, part: PartId) -> Result<(), SpaceError> {
@@ -428,7 +414,7 @@ impl Space {
         &self.parts[place.part.idx()].guests[place.cell.idx()]
     }
 
-    /// Returns the doors of other parts that a part's door currently meets.
+    /// Returns the doors of other parts that a part's door currently meets, within the tolerance of [`Docking`].
     #[must_use]
     pub fn meets(&self, part: PartId, portal: PortalId) -> &[(PartId, PortalId)] {
         let doors = &self.parts[part.idx()].doors;
@@ -478,26 +464,6 @@ impl Space {
         }
         cell.map(|cell| Place { part: id, cell })
     }
-}
-
-/// Returns `true` if openings of two parts touch; `between` maps points of the second to the frame of the first.
-fn is_met(
-    parts: [&Part; 2],
-    portals: [PortalId; 2],
-    between: &Pose,
-    buffer: &mut Vec<DVec3>,
-) -> bool {
-    let margin = parts[0].layout.tolerance() + parts[1].layout.tolerance();
-    let opening = parts[0].layout.opening(portals[0]);
-    let beyond = parts[1].layout.opening(portals[1]);
-    let reach = opening.radius() + beyond.radius() + margin;
-    let center = between.point(beyond.center());
-    opening.center().distance(center) <= reach
-        && beyond.pieces().any(|piece| {
-            buffer.clear();
-            buffer.extend(piece.iter().map(|p| between.point(*p)));
-            opening.pieces().any(|p| is_near(p, buffer, margin))
-        })
 }
 
 /// Returns the box around all cells but the outdoors, and all triangles.

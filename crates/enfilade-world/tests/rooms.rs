@@ -318,7 +318,14 @@ fn doors_lead_to_their_surroundings_and_meet_on_contact() {
             -1.0
         };
     let turned = Pose::about(window.center(), DVec3::Y, std::f64::consts::PI);
-    for (gap, n) in [(1.0, 0), (0.0, 1), (0.01, 0)] {
+    for (gap, n) in [
+        (1.0, 0),
+        (0.0, 1),
+        (0.01, 1),
+        (-0.01, 1),
+        (0.011, 0),
+        (-0.011, 0),
+    ] {
         let apart = Pose::from_translation(far + outward * gap);
         space.set_pose(b_id, apart.after(&turned)).unwrap();
         let met = space.meets(a_id, PortalId(0));
@@ -383,6 +390,56 @@ fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
         let is_room = |s: enfilade_runtime::Seen| s.cells().contains(&CellId(0));
         assert_eq!(seen.of_part(b_id).is_some_and(is_room), sees);
     }
+}
+
+#[test]
+fn rooms_behind_docked_doors_are_seen_despite_gaps_and_overlaps() {
+    let root = room_grid(&GridParams::two_rooms());
+    let [a, b] = [cabin(1, 1.0), cabin(1, 1.0)];
+    let mut space = Space::new(&root).unwrap();
+    let far = Pose::from_translation(DVec3::new(100.0, 0.0, 0.0));
+    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, far).unwrap());
+    let mut viewer = SpaceViewer::new(&space);
+    let window = space.layout(a_id).opening(PortalId(0));
+    let (center, radius) = (window.center(), window.radius());
+    let sign = if window.cells()[1] == outdoors_of(&a) {
+        1.0
+    } else {
+        -1.0
+    };
+    let outward = window.normal() * sign;
+    for gap in [-0.01, -0.001, -0.0001, 0.0, 0.0001, 0.001, 0.01] {
+        for degrees in [-1.0, 0.0, 1.0_f64] {
+            let turn = Pose::about(
+                center,
+                DVec3::Y,
+                std::f64::consts::PI + degrees.to_radians(),
+            );
+            let shift = Pose::from_translation(far.at + outward * gap);
+            space.set_pose(b_id, shift.after(&turn)).unwrap();
+            // From afar, near the seam, and where both rooms are.
+            for back in [2.0, 0.1, 0.005] {
+                let eye = (center - outward * back).as_vec3().to_array();
+                for id in [a_id, b_id] {
+                    let view = View::around(eye).unwrap();
+                    let seen = viewer.see(&space, id, &view);
+                    let other = if id == a_id { b_id } else { a_id };
+                    let is_room = |s: enfilade_runtime::Seen| s.cells().contains(&CellId(0));
+                    assert!(
+                        seen.of_part(other).is_some_and(is_room),
+                        "{gap} {degrees} {back}"
+                    );
+                }
+            }
+        }
+    }
+    // Not side by side.
+    let along = outward.cross(DVec3::Y) * (2.0 * radius);
+    let turn = Pose::about(center, DVec3::Y, std::f64::consts::PI);
+    space
+        .set_pose(b_id, Pose::from_translation(far.at + along).after(&turn))
+        .unwrap();
+    assert_eq!(space.meets(a_id, PortalId(0)), []);
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod actors;
 mod bodies;
 mod graphs;
 mod levels;
+mod parts;
 mod paths;
 mod rooms;
 mod sound;
@@ -23,6 +24,9 @@ const LIVED_IN: &[&str] = &["duplex", "institute", "fzk-haus"];
 /// Those of the graphs that contract.
 const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
+/// Numbers of moving parts.
+const PARTS: &[&str] = &["cabins-10", "cabins-100", "cabins-1600"];
+
 pub(crate) const ROWS: &[Row] = &[
     made("cells of things", &["offices-1000"], things::cells),
     made("moving", &["offices-1000"], things::moved),
@@ -31,6 +35,9 @@ pub(crate) const ROWS: &[Row] = &[
     made("moving portals", &["cabin"], rooms::passings),
     made("moving rooms", &["cabins"], rooms::poses),
     made("moving rooms: far", &["cabins"], rooms::far),
+    made("parts: one", PARTS, parts::one),
+    made("parts: all", &["cabins-1600"], parts::all),
+    made("docking", &["cabins"], parts::docking),
     made("maze with movers", &["maze"], things::maze),
     made("lights", &["offices-1000"], rooms::lamps),
     made("cost", &["offices-10000"], rooms::cost),

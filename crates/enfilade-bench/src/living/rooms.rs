@@ -28,7 +28,7 @@ const PICTURE: [usize; 2] = [96, 72];
 const LAMPS: usize = 200;
 const SAMPLES: usize = 10_000_000;
 
-fn point(p: [f32; 3]) -> DVec3 {
+pub(super) fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 

@@ -29,6 +29,17 @@ impl Window {
         }
     }
 
+    /// Returns the window of a view that begins nearer to the eye by a distance. [Units: wu]
+    #[must_use]
+    pub fn earlier(&self, by: f64) -> Self {
+        Self {
+            // A plane at the eye bounds nothing.
+            entry: self.entry.map(|(n, h)| (n, h - by)).filter(|e| e.1 > 0.0),
+            near: (self.near - by).max(0.0),
+            ..*self
+        }
+    }
+
     /// Returns the window of a view [in another frame](crate::View::in_frame); `turn` maps directions of that frame to this one.
     #[must_use]
     pub fn in_frame(&self, turn: &DMat3) -> Self {
