@@ -15,33 +15,13 @@ use enfilade_runtime::{Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
+pub use id::{PartId, Place};
 pub use meet::Docking;
 use neighbors::Neighbors;
 
+mod id;
 mod meet;
 mod neighbors;
-
-/// Index of a part of a [`Space`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct PartId(pub u32);
-
-impl PartId {
-    /// The part at rest that contains all others.
-    pub const ROOT: Self = Self(0);
-
-    pub(crate) fn idx(self) -> usize {
-        self.0 as usize
-    }
-}
-
-/// A cell of a part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Place {
-    /// The part.
-    pub part: PartId,
-    /// The cell, of the part's own graph.
-    pub cell: CellId,
-}
 
 /// Reason why a part cannot be added or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

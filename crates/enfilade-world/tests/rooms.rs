@@ -395,7 +395,7 @@ fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
 #[test]
 fn rooms_behind_docked_doors_are_seen_despite_gaps_and_overlaps() {
     let root = room_grid(&GridParams::two_rooms());
-    let [a, b] = [cabin(1, 1.0), cabin(1, 1.0)];
+    let [a, b] = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
     let mut space = Space::new(&root).unwrap();
     let far = Pose::from_translation(DVec3::new(100.0, 0.0, 0.0));
     let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, far).unwrap());

@@ -221,6 +221,34 @@ impl Pair {
             .places(&self.space, ball)
             .any(|p| p.part == self.ids[1 - from]))
     }
+    /// Counts what is lost across the seam from one cabin, and the items that rays hit.
+    fn judge(
+        &self,
+        from: usize,
+        viewer: &mut SpaceViewer,
+        rng: &mut Rng,
+    ) -> anyhow::Result<[usize; 2]> {
+        let met = self.space.meets(self.ids[from], PortalId(0));
+        let mut wrong = usize::from(met != [(self.ids[1 - from], PortalId(0))]);
+        wrong += usize::from(!self.passes(from)?);
+        let layout = self.space.layout(self.ids[from]);
+        let cell = layout.cell(CellId(0)).bounds;
+        let mut n_items = 0;
+        for k in 0..8 {
+            let share = DVec3::from_array([0, 1, 2].map(|_| rng.range(0.1, 0.9)));
+            let mut eye = cell.min + cell.size() * share;
+            if k == 0 {
+                // In the overlap, or just before the seam.
+                eye = layout.opening(PortalId(0)).center();
+                eye += (cell.center() - eye).normalize() * 0.003;
+            }
+            let hit = self.hit(from, eye, rng);
+            let seen = self.seen(viewer, from, eye)?;
+            n_items += hit.len();
+            wrong += hit.difference(&seen).count();
+        }
+        Ok([wrong, n_items])
+    }
 }
 
 /// Counts items seen, meetings and balls that differ between cabins that dock with an error and cabins that touch.
@@ -237,27 +265,9 @@ pub(super) fn docking(_: &str) -> anyhow::Result<Figure> {
                 pair.set(gap_mm * 1e-3, degrees.to_radians())?;
                 let mut wrong = 0;
                 for from in [0, 1] {
-                    let met = pair.space.meets(pair.ids[from], PortalId(0));
-                    wrong += usize::from(met != [(pair.ids[1 - from], PortalId(0))]);
-                    wrong += usize::from(!pair.passes(from)?);
-                    let cell = pair.space.layout(pair.ids[from]).cell(CellId(0)).bounds;
-                    for k in 0..8 {
-                        let share = DVec3::from_array([0, 1, 2].map(|_| rng.range(0.1, 0.9)));
-                        let mut eye = cell.min + cell.size() * share;
-                        if k == 0 {
-                            // In the overlap, or just before the seam.
-                            eye = pair
-                                .space
-                                .layout(pair.ids[from])
-                                .opening(PortalId(0))
-                                .center();
-                            eye += (cell.center() - eye).normalize() * 0.003;
-                        }
-                        let hit = pair.hit(from, eye, &mut rng);
-                        let seen = pair.seen(&mut viewer, from, eye)?;
-                        n_items += hit.len();
-                        wrong += hit.difference(&seen).count();
-                    }
+                    let [lost, hit] = pair.judge(from, &mut viewer, &mut rng)?;
+                    wrong += lost;
+                    n_items += hit;
                 }
                 n_wrong += wrong;
                 if wrong > 0 {

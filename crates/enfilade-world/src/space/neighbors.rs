@@ -7,7 +7,7 @@
 
 use enfilade_geom::{Aabb, DVec3};
 
-use super::PartId;
+use super::id::PartId;
 
 const NONE: u32 = u32::MAX;
 
@@ -19,14 +19,14 @@ const LEVELS: [f64; 2] = [-10.0, 50.0];
 #[derive(Default)]
 pub(super) struct Neighbors {
     /// Per part.
-    entries: Vec<Entry>,
+    entries: Vec<BoxEntry>,
     /// First part of each bucket; a power of two.
     heads: Vec<u32>,
     /// Each level in use with the number of its boxes.
     levels: Vec<(i32, u32)>,
 }
 
-struct Entry {
+struct BoxEntry {
     bounds: Aabb,
     /// `None` for an empty box.
     key: Option<Key>,
@@ -70,7 +70,7 @@ fn cell_of(p: DVec3, side: f64) -> [i64; 3] {
 impl Neighbors {
     /// Adds the box of the next part.
     pub(super) fn push(&mut self, bounds: Aabb) {
-        self.entries.push(Entry {
+        self.entries.push(BoxEntry {
             bounds: Aabb::EMPTY,
             key: None,
             before: NONE,
@@ -125,7 +125,7 @@ impl Neighbors {
     }
 
     fn unlink(&mut self, at: u32) {
-        let Entry {
+        let BoxEntry {
             key, before, next, ..
         } = self.entries[at as usize];
         let Some(key) = key else { return };
