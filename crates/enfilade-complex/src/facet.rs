@@ -302,6 +302,9 @@ fn is_along<'a>(
     let mut parts: SmallVec<[[f64; 2]; 8]> = covers
         .filter_map(|c| part_within(a, b, c, normal, reach))
         .collect();
+    if parts.is_empty() {
+        return false;
+    }
     parts.sort_by(|p, q| p[0].total_cmp(&q[0]));
     let slack = reach / a.distance(b);
     let end = parts.iter().fold(0.0, |end: f64, part| {
@@ -349,12 +352,17 @@ mod tests {
 
     /// Returns the number of open pieces of a facet in z = 0, 1 m long and a fourth of the tolerance wide.
     fn pieces_of_sliver(covers: &[Cover]) -> usize {
+        pieces_of(1.0, covers)
+    }
+
+    /// Returns the number of open pieces of a facet of this length.
+    fn pieces_of(length: f64, covers: &[Cover]) -> usize {
         let tolerance = Tolerance::for_extent(10.0);
         let w = 0.25 * tolerance.width;
         let points = [
             DVec3::ZERO,
-            DVec3::X,
-            DVec3::new(1.0, w, 0.0),
+            DVec3::new(length, 0.0, 0.0),
+            DVec3::new(length, w, 0.0),
             DVec3::new(0.0, w, 0.0),
         ];
         let near: Vec<u32> = (0..covers.len() as u32).collect();
@@ -373,6 +381,11 @@ mod tests {
     #[test]
     fn a_sliver_is_open_unless_it_lies_beside_a_triangle() {
         assert_eq!(pieces_of_sliver(&[]), 1);
+        assert_eq!(
+            pieces_of(1e-6, &[]),
+            1,
+            "shorter than the tolerance is wide"
+        );
         let points = Poly::from_slice(&[DVec3::ZERO, DVec3::NEG_Y, DVec3::X]);
         let bounds = Aabb::of_points(&points);
         let beside = |candidate| Cover {
