@@ -78,7 +78,7 @@ struct Coupling {
 impl Reverb {
     /// Computes the rooms of a world's structure. `absorption` returns the coefficient of a material, `None` for triangles
     /// without one. A wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
-    /// O(area), for pieces of a quarter of a meter.
+    /// O(area) in pieces of a quarter of a meter, at most some thousands a triangle.
     #[must_use]
     pub fn new(
         layout: &Layout,
@@ -181,8 +181,8 @@ impl Reverb {
     }
 }
 
-/// Adds the area of a triangle to the rooms in front of it: cut into halves as small as
-/// [`PIECE`], each with its middle. O(pieces).
+/// Adds the area of a triangle to the rooms in front of it: cut into halves as small as [`PIECE`], or a share of its
+/// longest edge, [`FINEST`], each judged by its middle. O(pieces).
 fn add_pieces(
     layout: &Layout,
     cells: &[CellId],
@@ -190,6 +190,9 @@ fn add_pieces(
     alpha: f64,
     rooms: &mut [Room],
 ) {
+    let [a, b, c] = triangle;
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let piece = PIECE.max(longest / FINEST);
     let mut stack = vec![triangle];
     while let Some([a, b, c]) = stack.pop() {
         // Halved at the longest edge, which comes first.
@@ -198,7 +201,7 @@ fn add_pieces(
             .max_by(|i, k| lengths[*i].total_cmp(&lengths[*k]))
             .unwrap_or(0);
         let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][longest];
-        if lengths[longest] > PIECE {
+        if lengths[longest] > piece {
             let middle = a.midpoint(b);
             stack.extend([[c, a, middle], [b, c, middle]]);
             continue;
@@ -222,6 +225,8 @@ fn add_pieces(
 /// Edge of a piece of wall: a room of 2 m has 200 or more, and their cut at its edges is off by some percent at most, both ways.
 /// [Units: wu]
 const PIECE: f64 = 0.25;
+/// Most pieces along the longest edge of a triangle, some thousands in all: terrain has triangles of square kilometers.
+const FINEST: f64 = 64.0;
 /// Distance by which points are moved off a wall. [Units: wu]
 const OFF: f64 = 0.02;
 /// Absorbing area of the outdoors, which returns nothing. [Units: wu²]
