@@ -10,63 +10,33 @@
 //! - **No clock, no threads, no files**: equal queries in equal order give equal answers.
 
 mod actors;
-mod all_pairs;
-mod auralize;
-mod blocks;
-mod columns;
-mod contacts;
-mod ears;
-
-mod edges;
-mod flood;
-mod floors;
-mod geodesics;
-mod hops;
+mod bodies;
 mod layout;
 mod lights;
-mod look;
 mod paths;
 mod pose;
-mod pull;
-mod reverb;
-mod sampling;
-mod search;
-mod sequences;
 mod shape;
 mod sound;
 mod space;
-mod strides;
-mod sweep;
-mod taut;
 mod things;
-mod trees;
-mod walker;
 
 pub use actors::{
     ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
     WayPoint,
 };
-pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
-pub use contacts::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs};
-pub use ears::at_ears;
-pub use edges::Corner;
-pub use flood::{Flood, Posted};
-pub use floors::{Agent, Floors};
-pub use geodesics::Geodesics;
-pub use hops::Hops;
+pub use bodies::{Body, Build, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs, Walker};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
-pub use look::{SpaceSeen, SpaceViewer};
-pub use paths::{NoPath, Path, PathSearch, WalkMap};
-
+pub use paths::{
+    Agent, Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path,
+    PathSearch, Sampling, WalkMap, Ways,
+};
 pub use pose::Pose;
-pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND, absorption_of_name};
-pub use sampling::Sampling;
-pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
 pub use shape::{Shape, ShapeError};
-pub use sound::{Acoustics, Heard, Listener, OCTAVES, Transmission};
-pub use space::{Docking, PartId, Place, Space, SpaceError};
-pub use sweep::Passing;
-pub use taut::TautString;
-pub use things::{Moved, ThingError, ThingId, Things, Tie};
-pub use walker::{Build, Walker};
+pub use sound::{
+    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Heard, Listener,
+    OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, absorption_of_name, at_ears,
+    test_sound,
+};
+pub use space::{Docking, PartId, Passing, Place, Space, SpaceError, SpaceSeen, SpaceViewer};
+pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

@@ -9,8 +9,8 @@
 use enfilade_geom::DVec3;
 use enfilade_runtime::{SeeOptions, View};
 
-use crate::look::{SpaceSeen, SpaceViewer};
 use crate::space::{PartId, Place, Space};
+use crate::space::{SpaceSeen, SpaceViewer};
 
 /// Index of a lamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

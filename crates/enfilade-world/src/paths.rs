@@ -13,11 +13,30 @@
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 
-use crate::floors::{Agent, Floors};
 use crate::layout::{Exit, Layout};
-use crate::pull::{Bend, pull_taut};
-use crate::search::{Arrival, LengthSearch, Ways};
-use crate::strides::{Strides, walk_straight};
+use pull::{Bend, pull_taut};
+use strides::{Strides, walk_straight};
+
+pub use edges::Corner;
+pub use floors::{Agent, Floors};
+pub use geodesics::Geodesics;
+pub use hops::Hops;
+pub use sampling::Sampling;
+pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
+pub(crate) use sequences::{Limit, Sequences};
+
+mod all_pairs;
+mod columns;
+mod edges;
+mod floors;
+mod geodesics;
+mod hops;
+mod pull;
+mod sampling;
+mod search;
+mod sequences;
+mod strides;
+mod trees;
 
 /// Walkable paths of one kind of walker in a world. Made once, read by all searches.
 #[derive(Clone, Debug)]

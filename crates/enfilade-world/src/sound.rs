@@ -19,7 +19,12 @@
 //! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.09 m and more. Within a concave
 //! cell strings are straight, too short where a wall of the cell is in between.
 
+mod auralize;
+mod blocks;
+mod ears;
 mod edge;
+mod reverb;
+mod taut;
 
 use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
 use enfilade_geom::{DVec3, Winding};
@@ -28,11 +33,12 @@ use enfilade_runtime::SightState;
 use self::edge::{arrival_direction, detour, edge_loss, straight_end, through_area, wall_share};
 
 use crate::layout::Layout;
-use crate::reverb::SPEED_OF_SOUND;
-use crate::sampling::Sampling;
-use crate::search::{LengthSearch, Ways};
-use crate::sequences::{Limit, Sequences};
-use crate::taut::TautString;
+use crate::paths::{LengthSearch, Limit, Sampling, Sequences, Ways};
+
+pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
+pub use ears::at_ears;
+pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND, absorption_of_name};
+pub use taut::TautString;
 
 /// Transmission loss of shut openings. [Units: dB] [Limit: ≥ 0]
 #[derive(Clone, Copy, Debug, PartialEq)]

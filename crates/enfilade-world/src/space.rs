@@ -15,13 +15,18 @@ use enfilade_runtime::{Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
-pub use id::{PartId, Place};
-pub use meet::Docking;
 use neighbors::Neighbors;
 
+pub use id::{PartId, Place};
+pub use look::{SpaceSeen, SpaceViewer};
+pub use meet::Docking;
+pub use sweep::Passing;
+
 mod id;
+mod look;
 mod meet;
 mod neighbors;
+mod sweep;
 
 /// Reason why a part cannot be added or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

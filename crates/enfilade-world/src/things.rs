@@ -7,18 +7,19 @@
 //! References are links in two lists at once, of a thing and of a cell, taken from one pool: a move is O(cells reached), and
 //! allocates nothing once the pool has grown.
 
+mod flood;
 mod links;
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 use enfilade_runtime::Visit;
 
-use crate::flood::{Flood, Posted};
-use crate::look::SpaceSeen;
 use crate::pose::Pose;
 use crate::shape::Shape;
-use crate::space::{PartId, Place, Space};
+use crate::space::{PartId, Place, Space, SpaceSeen};
 use links::{Links, NONE};
+
+pub use flood::{Flood, Posted};
 
 /// Id of a thing. Never reused, even after the thing is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -5,7 +5,7 @@
 //! Chaigne, "Digital delay networks for designing artificial reverberators", 1991). O(samples). A delay changes by at
 //! most a tenth of real time, so that a switch to another shortest path bends the pitch instead of clicking.
 
-use crate::reverb::SPEED_OF_SOUND;
+use crate::sound::reverb::SPEED_OF_SOUND;
 
 /// Samples for which one answer of the listener is used.
 pub const AUDIO_BLOCK: usize = 256;

@@ -2,7 +2,7 @@
 
 use enfilade_geom::DVec3;
 
-use crate::reverb::SPEED_OF_SOUND;
+use crate::sound::reverb::SPEED_OF_SOUND;
 
 /// Returns the level and the delay at the left and the right ear, for sound from the direction `toward`.
 ///

@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 
-use crate::search::{LengthSearch, Ways};
+use crate::paths::search::{LengthSearch, Ways};
 
 /// Limits of an enumeration.
 #[derive(Clone, Copy, Debug)]

@@ -20,7 +20,7 @@
 
 use enfilade_geom::DVec3;
 
-use crate::blocks::{Block, solve};
+use crate::sound::blocks::{Block, solve};
 
 /// Relative gap between the length and its lower bound that ends the search.
 const GAP: f64 = 1e-6;

@@ -8,8 +8,8 @@
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 
-use crate::floors::Floors;
-use crate::strides::walk_straight;
+use crate::paths::floors::Floors;
+use crate::paths::strides::walk_straight;
 
 /// A point of a path, and its floor.
 pub(crate) type Bend = (DVec3, u32);
@@ -151,8 +151,8 @@ fn move_bend(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::floors::Agent;
     use crate::layout::Layout;
+    use crate::paths::floors::Agent;
     use enfilade_cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, World};
     use enfilade_geom::Aabb;
     use enfilade_geom::scene::Primitive;

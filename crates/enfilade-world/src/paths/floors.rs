@@ -17,8 +17,8 @@ use std::collections::BinaryHeap;
 use enfilade_cpg::{CellId, PortalId, PortalKind, World};
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
-use crate::columns::{Span, Squares, spans};
 use crate::layout::Layout;
+use crate::paths::columns::{Span, Squares, spans};
 
 /// The size and abilities of a walker.
 #[derive(Clone, Copy, Debug, PartialEq)]

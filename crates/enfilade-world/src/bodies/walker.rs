@@ -12,7 +12,7 @@ use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
 use enfilade_runtime::SightState;
 
-use crate::contacts::{Body, Cast, Caster, Contacts};
+use crate::bodies::{Body, Cast, Caster, Contacts};
 use crate::layout::Layout;
 
 /// Gap kept to walls. [Units: wu]

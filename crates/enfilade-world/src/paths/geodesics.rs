@@ -12,9 +12,9 @@
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::{Bvh, DVec3, Triangle, Winding};
 
-use crate::edges::{Corner, corners};
 use crate::layout::{Layout, Opening};
-use crate::search::Ways;
+use crate::paths::edges::{Corner, corners};
+use crate::paths::search::Ways;
 
 /// Distance between points along an edge. [Units: wu]
 const SPACING: f64 = 1.0;

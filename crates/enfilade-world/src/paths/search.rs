@@ -21,7 +21,7 @@ use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 
 use crate::layout::{Exit, Layout};
-use crate::sampling::{Sampling, sample};
+use crate::paths::sampling::{Sampling, sample};
 
 /// The graph of a search: crossings, and the lengths between them within each cell. Made once, read by all searches.
 #[derive(Clone, Debug)]

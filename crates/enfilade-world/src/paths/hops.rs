@@ -11,9 +11,9 @@
 
 use enfilade_cpg::{CellId, PortalId};
 
-use crate::all_pairs::{AllPairs, Edge, FAR, NONE, sum};
 use crate::layout::{Exit, Layout};
-use crate::trees::number_trees;
+use crate::paths::all_pairs::{AllPairs, Edge, FAR, NONE, sum};
+use crate::paths::trees::number_trees;
 
 /// Integer units of length per meter.
 const UNITS: f64 = 1e4;

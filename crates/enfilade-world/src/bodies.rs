@@ -12,6 +12,7 @@
 //! | `flood.rs` | the cells and triangles on a body's way |
 //! | `caster.rs` | casts and contacts |
 //! | `pairs.rs` | bodies that may touch each other |
+//! | `walker.rs` | a walker with gravity and steps |
 
 mod body;
 mod caster;
@@ -20,10 +21,12 @@ mod kernel;
 mod pairs;
 #[cfg(test)]
 mod tests;
+mod walker;
 mod walls;
 
 pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
+pub use walker::{Build, Walker};
 pub use walls::Contacts;

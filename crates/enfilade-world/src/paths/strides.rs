@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 
-use crate::floors::{Floors, NONE};
+use crate::paths::floors::{Floors, NONE};
 
 /// A search over the floors of one cell, with reusable buffers.
 #[derive(Clone, Debug, Default)]
