@@ -6,11 +6,11 @@
 //!
 //! The lit cells are computed on the first query after a change, O(cells lit), and kept.
 
+use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 use enfilade_runtime::{SeeOptions, View};
 
-use crate::space::{PartId, Place, Space};
-use crate::space::{SpaceSeen, SpaceViewer};
+use crate::space::{Change, PartId, Place, Space, SpaceSeen, SpaceViewer};
 
 /// Index of a lamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -64,6 +64,8 @@ pub struct Lights {
     lamps: Vec<Lit>,
     viewer: SpaceViewer,
     seen: Vec<LampId>,
+    /// Number of the last change of the space that it knows.
+    known: u64,
 }
 
 impl Lights {
@@ -79,6 +81,7 @@ impl Lights {
             lamps: Vec::new(),
             viewer: SpaceViewer::with_options(space, options),
             seen: Vec::new(),
+            known: 0,
         }
     }
 
@@ -112,33 +115,48 @@ impl Lights {
         Ok(())
     }
 
-    /// Call after a part has moved: marks for update the lamps in it, and those whose light may reach it.
-    pub fn part_moved(&mut self, space: &Space, part: PartId) {
+    /// Marks for update the lamps in a part that has moved, and those whose light may reach it.
+    fn mark_at(&mut self, space: &Space, part: PartId) {
         let own = &space.parts[part.idx()];
         for lit in &mut self.lamps {
-            let comes = |b: &Beam| b.place.part == part || own.stands_in.contains(&b.place);
+            let meets = || own.doors.iter().flat_map(|d| &d.meets);
+            let comes = |b: &Beam| {
+                b.place.part == part
+                    || own.stands_in.contains(&b.place)
+                    || meets().any(|(other, _)| b.place.part == *other)
+            };
             lit.is_current &= lit.lamp.frame != part && !lit.beams.iter().any(comes);
         }
         for &child in &own.children {
-            self.part_moved(space, child);
+            self.mark_at(space, child);
         }
     }
 
-    /// Call after a door has opened, closed or moved: marks for update the lamps that shine into a cell beside it.
-    pub fn door_changed(&mut self, space: &Space, part: PartId, portal: enfilade_cpg::PortalId) {
+    /// Marks for update the lamps that shine into a cell beside a door.
+    fn mark_beside(&mut self, space: &Space, part: PartId, portal: PortalId) {
         let own = &space.parts[part.idx()];
         let cells = own.layout.opening(portal).cells();
         let around = space.leads_to(part, portal);
         for lit in &mut self.lamps {
             let is_beside = |b: &Beam| {
-                b.place.part == part && cells.contains(&b.place.cell) || around.contains(&b.place)
+                let meets = space.meets(part, portal);
+                b.place.part == part && cells.contains(&b.place.cell)
+                    || around.contains(&b.place)
+                    || meets.iter().any(|m| m.0 == b.place.part)
             };
             lit.is_current &= !lit.beams.iter().any(is_beside);
         }
     }
 
-    /// Updates everything that has changed; other queries use the result. Allocates only while buffers grow.
-    pub fn update(&mut self, space: &Space) {
+    /// Updates the lamps that something has changed for; queries do it by themselves. Allocates only while buffers grow.
+    fn update(&mut self, space: &Space) {
+        match space.changes_since(&mut self.known) {
+            Some(changes) => changes.for_each(|change| match change {
+                Change::Part(part) => self.mark_at(space, part),
+                Change::Door(part, portal) => self.mark_beside(space, part, portal),
+            }),
+            None => self.lamps.iter_mut().for_each(|lit| lit.is_current = false),
+        }
         for lit in &mut self.lamps {
             if !lit.is_current {
                 lit.find(space, &mut self.viewer);
@@ -148,7 +166,8 @@ impl Lights {
     }
 
     /// Returns the places that a lamp lights, each at least once and none missing; none for a lamp that does not exist.
-    pub fn lit_by(&self, id: LampId) -> impl Iterator<Item = Place> + use<'_> {
+    pub fn lit_by(&mut self, space: &Space, id: LampId) -> impl Iterator<Item = Place> + use<'_> {
+        self.update(space);
         let lit = self.lamps.get(id.0 as usize);
         lit.into_iter().flat_map(|l| &l.beams).map(|b| b.place)
     }
@@ -156,7 +175,8 @@ impl Lights {
     /// Returns `true` if a lamp may light a point of a place, in the frame of its part; never `false` for a point that it does
     /// light.
     #[must_use]
-    pub fn may_light(&self, space: &Space, id: LampId, place: Place, p: DVec3) -> bool {
+    pub fn may_light(&mut self, space: &Space, id: LampId, place: Place, p: DVec3) -> bool {
+        self.update(space);
         let Some(lit) = self.lamps.get(id.0 as usize) else {
             return false;
         };
@@ -176,6 +196,7 @@ impl Lights {
     /// Returns the lamps whose light may fall on anything in a view, ascending: those that light a cell that it sees, and whose
     /// range reaches into the visible part of it.
     pub fn that_matter(&mut self, space: &Space, seen: &SpaceSeen) -> &[LampId] {
+        self.update(space);
         self.seen.clear();
         for (id, lit) in (0..).map(LampId).zip(&self.lamps) {
             if lit.matters(space, seen) {

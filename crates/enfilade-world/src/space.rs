@@ -9,19 +9,25 @@
 //!
 //! Coordinates are relative to a part; poses are in `f64`, so that a part ten kilometers away is as exact as a near one.
 
+use std::sync::Arc;
+
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_runtime::{Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
+use changes::Changes;
 use neighbors::Neighbors;
+
+pub(crate) use changes::Change;
 
 pub use id::{PartId, Place};
 pub use look::{SpaceSeen, SpaceViewer};
 pub use meet::Docking;
 pub use sweep::Passing;
 
+mod changes;
 mod id;
 mod look;
 mod meet;
@@ -63,6 +69,7 @@ pub enum SpaceError {
 
 /// A world that stands in another.
 pub(crate) struct Part {
+    pub(crate) world: Arc<World>,
     pub(crate) layout: Layout,
     pub(crate) sight: Sight,
     pub(crate) state: SightState,
@@ -108,13 +115,17 @@ pub(crate) struct BorderDoor {
     pub(crate) meets: Vec<(PartId, PortalId)>,
 }
 
-/// A world and the worlds that move in it.
+/// A world and the worlds that move in it: the model of all queries.
+///
+/// Holds the worlds, their layout and prepared visibility, poses of parts and the state of doors, each once. Whatever is derived
+/// from it, such as the cells of things or the reach of lamps, brings itself up to date when it is queried.
 pub struct Space {
     pub(crate) parts: Vec<Part>,
     n_cells: usize,
     /// The boxes of all parts but the root.
     neighbors: Neighbors,
     pub(crate) docking: Docking,
+    changes: Changes,
     buffers: Buffers,
 }
 
@@ -134,15 +145,16 @@ impl Space {
     /// # Errors
     ///
     /// If [`Sight::build`] rejects the world.
-    pub fn new(world: &World) -> Result<Self, SpaceError> {
+    pub fn new(world: impl Into<Arc<World>>) -> Result<Self, SpaceError> {
         let mut space = Self {
             parts: Vec::new(),
             n_cells: 0,
             neighbors: Neighbors::default(),
             docking: Docking::default(),
+            changes: Changes::default(),
             buffers: Buffers::default(),
         };
-        space.push(world, PartId::ROOT, Pose::IDENTITY)?;
+        space.push(world.into(), PartId::ROOT, Pose::IDENTITY)?;
         Ok(space)
     }
 
@@ -154,7 +166,7 @@ impl Space {
     /// If [`Sight::build`] rejects the world, the host does not exist, or the pose is not a rigid motion.
     pub fn add_part(
         &mut self,
-        world: &World,
+        world: impl Into<Arc<World>>,
         host: PartId,
         pose: Pose,
     ) -> Result<PartId, SpaceError> {
@@ -163,16 +175,16 @@ impl Space {
         if !pose.is_rigid() {
             return Err(SpaceError::NotRigid { part });
         }
-        self.push(world, host, pose)?;
+        self.push(world.into(), host, pose)?;
         self.parts[host.idx()].children.push(PartId(part));
         self.set_pose(PartId(part), pose)?;
         Ok(PartId(part))
     }
 
-    fn push(&mut self, world: &World, host: PartId, local: Pose) -> Result<(), SpaceError> {
+    fn push(&mut self, world: Arc<World>, host: PartId, local: Pose) -> Result<(), SpaceError> {
         let part = self.parts.len() as u32;
-        let sight = Sight::build(world).map_err(|source| SpaceError::Sight { part, source })?;
-        let layout = Layout::new(world);
+        let sight = Sight::build(&world).map_err(|source| SpaceError::Sight { part, source })?;
+        let layout = Layout::new(&world);
         let n_cells = layout.n_cells();
         let border = layout.outdoors().filter(|_| part > 0);
         let exits = border.map_or(&[][..], |cell| layout.exits(cell));
@@ -186,7 +198,7 @@ impl Space {
             })
             .collect();
         self.parts.push(Part {
-            hull: hull_of(world, &layout),
+            hull: hull_of(&world, &layout),
             state: SightState::new(&sight),
             sight,
             border,
@@ -200,6 +212,7 @@ impl Space {
             has_guests: vec![false; n_cells],
             first_cell: self.n_cells as u32,
             layout,
+            world,
         });
         self.n_cells += n_cells;
         self.neighbors.push(Aabb::EMPTY);
@@ -242,6 +255,7 @@ impl Space {
             }
         }
         self.buffers = buffers;
+        self.changed(Change::Part(part));
         Ok(())
     }
 
@@ -339,6 +353,12 @@ impl Space {
         self.n_cells
     }
 
+    /// Returns the world of a part.
+    #[must_use]
+    pub fn world(&self, part: PartId) -> &Arc<World> {
+        &self.parts[part.idx()].world
+    }
+
     /// Returns the cells and portals of a part.
     ///
     /// # Panics
@@ -359,11 +379,6 @@ impl Space {
     #[must_use]
     pub fn state(&self, part: PartId) -> &SightState {
         &self.parts[part.idx()].state
-    }
-
-    /// Returns the state of a part's doors, to open and close them.
-    pub fn state_mut(&mut self, part: PartId) -> &mut SightState {
-        &mut self.parts[part.idx()].state
     }
 
     /// Returns the pose of a part in the root's frame.

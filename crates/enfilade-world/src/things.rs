@@ -16,7 +16,7 @@ use enfilade_runtime::Visit;
 
 use crate::pose::Pose;
 use crate::shape::Shape;
-use crate::space::{PartId, Place, Space, SpaceSeen};
+use crate::space::{Change, PartId, Place, Space, SpaceSeen};
 use links::{Links, NONE};
 
 pub use flood::{Flood, Posted};
@@ -107,6 +107,8 @@ pub struct Things {
     stamps: Vec<u32>,
     stamp: u32,
     seen: Vec<ThingId>,
+    /// Number of the last change of the space that it knows.
+    known: u64,
     affected: Vec<u32>,
     in_cell: Vec<u32>,
     points: Vec<DVec3>,
@@ -221,6 +223,7 @@ impl Things {
         pose: Pose,
     ) -> Result<Moved, ThingError> {
         Self::check(space, frame, &pose)?;
+        self.update(space);
         let from = self.thing(id)?.place;
         let thing = self.at_mut(id.index);
         thing.pose = pose;
@@ -237,27 +240,22 @@ impl Things {
         Ok(Moved { from, to })
     }
 
-    /// Call after a part has moved ([`Space::set_pose`]), and after doors of parts have met or separated: updates the cells of
-    /// things that stand around it, that stick out of it, or that one of its doors has passed over. O(things in the cells of the
-    /// part, and in those in which it stands).
-    pub fn part_moved(&mut self, space: &Space, part: PartId) {
+    /// Updates the cells of things after parts have moved. Queries do it by themselves. O(things in the cells of the parts that
+    /// have moved since, and in those in which they stand).
+    fn update(&mut self, space: &Space) {
         let mut affected = std::mem::take(&mut self.affected);
         affected.clear();
-        let Some(own) = space.parts.get(part.idx()) else {
-            return;
-        };
-        let cells = own.first_cell..own.first_cell + own.layout.n_cells() as u32;
-        for cell in cells {
-            self.add_things_of(cell, &mut affected);
-        }
-        for place in &own.stands_in {
-            self.add_things_of(Self::cell_index(space, *place), &mut affected);
-        }
-        for &(other, portal) in own.doors.iter().flat_map(|d| &d.meets) {
-            let its = &space.parts[other.idx()];
-            for door in its.doors.iter().filter(|d| d.portal == portal) {
-                self.add_things_of(its.first_cell + door.inner.0, &mut affected);
-            }
+        match space.changes_since(&mut self.known) {
+            // A shut portal does not cut a thing that stands in it, so doors do not matter.
+            Some(changes) => changes.for_each(|change| {
+                if let Change::Part(part) = change {
+                    self.add_things_at(space, part, &mut affected);
+                }
+            }),
+            None => affected.extend((0..).zip(&self.slots).filter_map(|(i, s)| {
+                let is_placed = s.thing.as_ref().is_some_and(|t| t.tie != Tie::Global);
+                is_placed.then_some(i)
+            })),
         }
         affected.sort_unstable();
         affected.dedup();
@@ -266,10 +264,29 @@ impl Things {
             (own.clearance, own.room) = (0.0, 0.0);
             self.settle(space, thing);
         }
-        for child in own.children.iter().copied() {
-            self.part_moved(space, child);
-        }
         self.affected = affected;
+    }
+
+    /// Adds the things that stand in a part and those in it, around it, or at doors that meet its own: all that one of its doors
+    /// may have passed over, or that may stick out of it.
+    fn add_things_at(&self, space: &Space, part: PartId, affected: &mut Vec<u32>) {
+        let own = &space.parts[part.idx()];
+        let cells = own.first_cell..own.first_cell + own.layout.n_cells() as u32;
+        for cell in cells {
+            self.add_things_of(cell, affected);
+        }
+        for place in &own.stands_in {
+            self.add_things_of(Self::cell_index(space, *place), affected);
+        }
+        for &(other, portal) in own.doors.iter().flat_map(|d| &d.meets) {
+            let its = &space.parts[other.idx()];
+            for door in its.doors.iter().filter(|d| d.portal == portal) {
+                self.add_things_of(its.first_cell + door.inner.0, affected);
+            }
+        }
+        for child in own.children.iter().copied() {
+            self.add_things_at(space, child, affected);
+        }
     }
 
     /// Returns the pose of a thing in the frame of a part.
@@ -277,7 +294,8 @@ impl Things {
     /// # Errors
     ///
     /// If the thing does not exist.
-    pub fn pose(&self, id: ThingId) -> Result<(PartId, Pose), ThingError> {
+    pub fn pose(&mut self, space: &Space, id: ThingId) -> Result<(PartId, Pose), ThingError> {
+        self.update(space);
         let thing = self.thing(id)?;
         Ok((thing.frame, thing.placed))
     }
@@ -287,16 +305,18 @@ impl Things {
     /// # Errors
     ///
     /// If the thing does not exist.
-    pub fn place(&self, id: ThingId) -> Result<Option<Place>, ThingError> {
+    pub fn place(&mut self, space: &Space, id: ThingId) -> Result<Option<Place>, ThingError> {
+        self.update(space);
         Ok(self.thing(id)?.place)
     }
 
     /// Returns the places that it reaches into, in arbitrary order. A thing in solid matter keeps its last ones.
     pub fn places<'a>(
-        &'a self,
+        &'a mut self,
         space: &'a Space,
         id: ThingId,
     ) -> impl Iterator<Item = Place> + use<'a> {
+        self.update(space);
         let first = self.thing(id).map_or(NONE, |t| t.first_link);
         let cells = self.links.of_thing(first);
         cells.map(|cell| place_of(space, cell))
@@ -304,16 +324,18 @@ impl Things {
 
     /// Returns the things that reach into a cell, in arbitrary order.
     pub fn things_in<'a>(
-        &'a self,
+        &'a mut self,
         space: &Space,
         place: Place,
     ) -> impl Iterator<Item = ThingId> + use<'a> {
+        self.update(space);
         self.in_cell(Self::cell_index(space, place))
     }
 
     /// Returns the things in a view, ascending, each once: those whose shape meets the visible part of a cell that they are in,
     /// and all global ones. No visible thing is missing.
     pub fn see(&mut self, space: &Space, seen: &SpaceSeen) -> &[ThingId] {
+        self.update(space);
         self.seen.clear();
         self.seen.extend_from_slice(&self.globals);
         if self.stamp == u32::MAX {

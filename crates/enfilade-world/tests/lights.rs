@@ -3,7 +3,7 @@
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 use enfilade_runtime::{Sightlines, View};
-use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 use enfilade_world::{Lamp, LampError, LampId, Lights, PartId, Place, Pose, Space, SpaceViewer};
 
 fn offices(seed: u64) -> World {
@@ -37,9 +37,9 @@ fn root(cell: CellId) -> Place {
 #[test]
 fn a_point_in_reach_of_a_lamp_is_lit_and_the_lamp_matters_to_its_viewers() {
     let world = offices(1);
-    let mut space = Space::new(&world).unwrap();
+    let mut space = Space::new(world.clone()).unwrap();
     for portal in world.graph.portal_ids().step_by(3) {
-        space.state_mut(PartId::ROOT).close(portal);
+        space.close(PartId::ROOT, portal);
     }
     let lines = Sightlines::build(&world);
     let mut rng = Rng::new(2);
@@ -54,7 +54,6 @@ fn a_point_in_reach_of_a_lamp_is_lit_and_the_lamp_matters_to_its_viewers() {
     for lamp in &lamps {
         lights.add(&space, *lamp).unwrap();
     }
-    lights.update(&space);
     let state = space.state(PartId::ROOT);
     let (mut n_lit, mut n_dark) = (0, 0);
     let mut viewer = SpaceViewer::new(&space);
@@ -88,7 +87,7 @@ fn a_point_in_reach_of_a_lamp_is_lit_and_the_lamp_matters_to_its_viewers() {
 #[test]
 fn closing_doors_and_arriving_rooms_change_the_lit_cells() {
     let world = room_grid(&GridParams::two_rooms());
-    let mut space = Space::new(&world).unwrap();
+    let mut space = Space::new(world.clone()).unwrap();
     let mut lights = Lights::new(&space);
     let middle = space.layout(PartId::ROOT).opening(PortalId(0)).center();
     let normal = space.layout(PartId::ROOT).opening(PortalId(0)).normal();
@@ -99,15 +98,13 @@ fn closing_doors_and_arriving_rooms_change_the_lit_cells() {
     };
     let id = lights.add(&space, lamp).unwrap();
     let lit = |lights: &mut Lights, space: &Space| {
-        lights.update(space);
-        let mut cells: Vec<Place> = lights.lit_by(id).collect();
+        let mut cells: Vec<Place> = lights.lit_by(space, id).collect();
         cells.sort_unstable();
         cells.dedup();
         cells
     };
     assert_eq!(lit(&mut lights, &space), [0, 1].map(|c| root(CellId(c))));
-    space.state_mut(PartId::ROOT).close(PortalId(0));
-    lights.door_changed(&space, PartId::ROOT, PortalId(0));
+    space.close(PartId::ROOT, PortalId(0));
     assert_eq!(lit(&mut lights, &space), [root(CellId(0))]);
     // A cabin with windows comes to stand in the room that is lit.
     let cabin = room_grid(&GridParams {
@@ -117,25 +114,70 @@ fn closing_doors_and_arriving_rooms_change_the_lit_cells() {
     });
     let cabin = enfilade_testkit::scaled_world(cabin, 0.2);
     let far = Pose::from_translation(DVec3::X * 500.0);
-    let part = space.add_part(&cabin, PartId::ROOT, far).unwrap();
-    lights.part_moved(&space, part);
+    let part = space.add_part(cabin.clone(), PartId::ROOT, far).unwrap();
     assert_eq!(lit(&mut lights, &space).len(), 1);
     let beside = Pose::from_translation(middle - normal * 2.0 - DVec3::Y * 0.3);
     space.set_pose(part, beside).unwrap();
-    lights.part_moved(&space, part);
     let inside = Place {
         part,
         cell: CellId(0),
     };
     assert!(lit(&mut lights, &space).contains(&inside));
     space.set_pose(part, far).unwrap();
-    lights.part_moved(&space, part);
     assert!(!lit(&mut lights, &space).contains(&inside));
+}
+
+/// Cabins in solid matter, each without surroundings to shine into: a lamp in one lights the other once their doors meet, though
+/// nobody tells the lamps.
+#[test]
+fn a_lamp_lights_a_cabin_that_docks() {
+    let root = room_grid(&GridParams {
+        outdoors: false,
+        ..GridParams::two_rooms()
+    });
+    let mut space = Space::new(root).unwrap();
+    let world = std::sync::Arc::new(cabin(1, 1.0, 2));
+    let far = Pose::from_translation(DVec3::X * 100.0);
+    let [a, b] = [0, 1].map(|_| {
+        let part = space.add_part(world.clone(), PartId::ROOT, far);
+        part.unwrap()
+    });
+    let window = space.layout(a).opening(PortalId(0));
+    let turned = Pose::about(window.center(), DVec3::Y, std::f64::consts::PI);
+    let inner = window.cells().into_iter();
+    let inner = inner.filter(|c| !space.layout(a).cell(*c).is_outdoor);
+    let bounds = space.layout(a).cell(inner.last().unwrap()).bounds;
+    let at = window.center().lerp(bounds.center(), 0.2);
+    let apart = far.after(&Pose::from_translation(DVec3::X * 50.0));
+    space.set_pose(b, apart).unwrap();
+    assert!(space.leads_to(a, PortalId(0)).is_empty());
+    let mut lights = Lights::new(&space);
+    let lamp = Lamp {
+        frame: a,
+        at: at.as_vec3().to_array(),
+        range: 9.0,
+    };
+    let id = lights.add(&space, lamp).unwrap();
+    let lights_b =
+        |lights: &mut Lights, space: &Space| lights.lit_by(space, id).any(|p| p.part == b);
+    assert!(!lights_b(&mut lights, &space));
+    space.set_pose(b, far.after(&turned)).unwrap();
+    assert!(lights_b(&mut lights, &space));
+    // A window that shuts on the far side, too.
+    let [(_, portal)] = *space.meets(a, PortalId(0)) else {
+        panic!("they do not meet");
+    };
+    space.close(b, portal);
+    assert!(!lights_b(&mut lights, &space));
+    space.open(b, portal);
+    assert!(lights_b(&mut lights, &space));
+    space.set_pose(b, apart).unwrap();
+    assert!(!lights_b(&mut lights, &space));
 }
 
 #[test]
 fn lamps_that_are_none_are_refused() {
-    let space = Space::new(&offices(2)).unwrap();
+    let space = Space::new(offices(2)).unwrap();
     let mut lights = Lights::new(&space);
     let lamp = Lamp {
         frame: PartId::ROOT,

@@ -162,10 +162,10 @@ fn nested(depth: usize) -> Vec<World> {
 fn ray_hits_are_seen_through_sixteen_nested_rooms() {
     let worlds = nested(16);
     let refs: Vec<&World> = worlds.iter().collect();
-    let mut space = Space::new(&worlds[0]).unwrap();
+    let mut space = Space::new(worlds[0].clone()).unwrap();
     let mut host = PartId::ROOT;
     for world in &worlds[1..] {
-        host = space.add_part(world, host, Pose::IDENTITY).unwrap();
+        host = space.add_part(world.clone(), host, Pose::IDENTITY).unwrap();
     }
     let mut viewer = SpaceViewer::new(&space);
     let mut rng = Rng::new(1);
@@ -199,9 +199,11 @@ fn ray_hits_are_seen_between_adjacent_rooms() {
     let cabins: Vec<World> = (0..4).map(|k| cabin(k, 1.0, 2)).collect();
     let mut worlds = vec![&root];
     worlds.extend(&cabins);
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     for cabin in &cabins {
-        space.add_part(cabin, PartId::ROOT, Pose::IDENTITY).unwrap();
+        space
+            .add_part(cabin.clone(), PartId::ROOT, Pose::IDENTITY)
+            .unwrap();
     }
     // Beside the building, in a row, the gaps between them down to nothing.
     let layout = space.layout(PartId::ROOT);
@@ -240,12 +242,12 @@ fn ray_hits_are_seen_between_adjacent_rooms() {
 #[test]
 fn a_point_is_in_the_innermost_room_that_holds_it() {
     let worlds = nested(3);
-    let mut space = Space::new(&worlds[0]).unwrap();
+    let mut space = Space::new(worlds[0].clone()).unwrap();
     let mut host = PartId::ROOT;
     let mut rng = Rng::new(4);
     for k in 1..worlds.len() {
         let pose = pose_within(&mut rng, &worlds[k], &worlds[k - 1]);
-        host = space.add_part(&worlds[k], host, pose).unwrap();
+        host = space.add_part(worlds[k].clone(), host, pose).unwrap();
     }
     let sights: Vec<Sight> = worlds.iter().map(|w| Sight::build(w).unwrap()).collect();
     let mut found = [0; 4];
@@ -271,15 +273,15 @@ fn a_point_is_in_the_innermost_room_that_holds_it() {
 #[test]
 fn a_room_far_away_is_as_exact_as_a_near_one() {
     let worlds = [offices(5), cabin(5, 1.0, 2), cabin(6, 0.3, 2)];
-    let mut space = Space::new(&worlds[0]).unwrap();
+    let mut space = Space::new(worlds[0].clone()).unwrap();
     let far = DVec3::new(10_000.0, 3.0, -7_000.0);
     let turn = DQuat::from_axis_angle(DVec3::new(0.3, 0.9, 0.1).normalize(), 1.234);
     let ship = space
-        .add_part(&worlds[1], PartId::ROOT, Pose { turn, at: far })
+        .add_part(worlds[1].clone(), PartId::ROOT, Pose { turn, at: far })
         .unwrap();
     let boat = space
         .add_part(
-            &worlds[2],
+            worlds[2].clone(),
             ship,
             pose_within(&mut Rng::new(3), &worlds[2], &worlds[1]),
         )
@@ -301,10 +303,10 @@ fn a_room_far_away_is_as_exact_as_a_near_one() {
 fn doors_lead_to_their_surroundings_and_meet_on_contact() {
     let root = offices(3);
     let [a, b] = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let far = DVec3::new(100.0, 0.0, 0.0);
     let pose = Pose::from_translation(far);
-    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, pose).unwrap());
+    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w.clone(), PartId::ROOT, pose).unwrap());
     let outdoors = Place {
         part: PartId::ROOT,
         cell: outdoors_of(&root),
@@ -342,9 +344,9 @@ fn doors_lead_to_their_surroundings_and_meet_on_contact() {
 #[test]
 fn invalid_motions_are_refused_and_change_nothing() {
     let root = offices(3);
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let part = space
-        .add_part(&cabin(1, 1.0, 2), PartId::ROOT, Pose::IDENTITY)
+        .add_part(cabin(1, 1.0, 2), PartId::ROOT, Pose::IDENTITY)
         .unwrap();
     let broken = Pose::from_translation(DVec3::NAN);
     let stretched = Pose {
@@ -371,9 +373,9 @@ fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
     // Beyond a world without outdoors there is nothing.
     let root = room_grid(&GridParams::two_rooms());
     let [a, b] = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let far = Pose::from_translation(DVec3::new(100.0, 0.0, 0.0));
-    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, far).unwrap());
+    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w.clone(), PartId::ROOT, far).unwrap());
     let mut viewer = SpaceViewer::new(&space);
     let window = space.layout(a_id).opening(PortalId(0));
     let turned = Pose::about(window.center(), DVec3::Y, std::f64::consts::PI);
@@ -396,9 +398,9 @@ fn doors_that_meet_lead_from_one_to_the_other_without_air_between() {
 fn rooms_behind_docked_doors_are_seen_despite_gaps_and_overlaps() {
     let root = room_grid(&GridParams::two_rooms());
     let [a, b] = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let far = Pose::from_translation(DVec3::new(100.0, 0.0, 0.0));
-    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w, PartId::ROOT, far).unwrap());
+    let [a_id, b_id] = [&a, &b].map(|w| space.add_part(w.clone(), PartId::ROOT, far).unwrap());
     let mut viewer = SpaceViewer::new(&space);
     let window = space.layout(a_id).opening(PortalId(0));
     let (center, radius) = (window.center(), window.radius());
@@ -445,13 +447,13 @@ fn rooms_behind_docked_doors_are_seen_despite_gaps_and_overlaps() {
 #[test]
 fn things_beside_a_moving_room_are_found_in_their_new_cells() {
     let root = cabin(2, 30.0, 0);
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let away = Pose::from_translation(DVec3::X * -500.0);
     let ship = space
-        .add_part(&cabin(1, 1.0, 2), PartId::ROOT, away)
+        .add_part(cabin(1, 1.0, 2), PartId::ROOT, away)
         .unwrap();
     let beside = Pose::from_translation(DVec3::X * 8.0);
-    let boat = space.add_part(&cabin(1, 0.5, 2), ship, beside).unwrap();
+    let boat = space.add_part(cabin(1, 0.5, 2), ship, beside).unwrap();
     let hall = |cell| Place {
         part: PartId::ROOT,
         cell,

@@ -46,9 +46,9 @@ fn by_steps(
 fn no_passing_is_missed() {
     let world = cabin(1, 1.0, 4);
     let root = room_grid(&GridParams::two_rooms());
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let part = space
-        .add_part(&world, PartId::ROOT, Pose::IDENTITY)
+        .add_part(world.clone(), PartId::ROOT, Pose::IDENTITY)
         .unwrap();
     let mut rng = Rng::new(4);
     let mut passings: Vec<Passing> = Vec::new();
@@ -92,9 +92,9 @@ fn an_arc_is_not_its_chord() {
     // A window swings about a far hinge: the straight line between its ends passes the point by.
     let world = cabin(1, 1.0, 4);
     let root = room_grid(&GridParams::two_rooms());
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let part = space
-        .add_part(&world, PartId::ROOT, Pose::IDENTITY)
+        .add_part(world.clone(), PartId::ROOT, Pose::IDENTITY)
         .unwrap();
     let opening = space.layout(part).opening(enfilade_cpg::PortalId(0));
     let (center, normal) = (opening.center(), opening.normal());
@@ -117,9 +117,9 @@ fn an_arc_is_not_its_chord() {
 fn a_point_may_go_out_and_come_in_in_one_motion() {
     let world = cabin(1, 1.0, 4);
     let root = room_grid(&GridParams::two_rooms());
-    let mut space = Space::new(&root).unwrap();
+    let mut space = Space::new(root.clone()).unwrap();
     let part = space
-        .add_part(&world, PartId::ROOT, Pose::IDENTITY)
+        .add_part(world.clone(), PartId::ROOT, Pose::IDENTITY)
         .unwrap();
     let opening = space.layout(part).opening(enfilade_cpg::PortalId(0));
     let is_outward = space.layout(part).cell(opening.cells()[1]).is_outdoor;

@@ -20,14 +20,14 @@ const PITCH: f64 = 5.5;
 
 /// Returns a space with as many cabins on a square lattice as the name says, and their poses.
 fn fleet(n: usize) -> anyhow::Result<(Space, Vec<Pose>)> {
-    let cabin = cabin(1, 1.0, 0);
-    let mut space = Space::new(&room_grid(&GridParams::offices(10, 1)))?;
+    let cabin = std::sync::Arc::new(cabin(1, 1.0, 0));
+    let mut space = Space::new(room_grid(&GridParams::offices(10, 1)))?;
     let width = (n as f64).sqrt().ceil() as usize;
     let mut poses = Vec::new();
     for k in 0..n {
         let at = DVec3::new((k % width) as f64, 0.0, (k / width) as f64) * PITCH;
         let pose = Pose::from_translation(at + DVec3::X * 100.0);
-        space.add_part(&cabin, PartId::ROOT, pose)?;
+        space.add_part(cabin.clone(), PartId::ROOT, pose)?;
         poses.push(pose);
     }
     Ok((space, poses))
@@ -104,15 +104,15 @@ impl Pair {
             GridParams::two_rooms()
         });
         let worlds = [cabin(1, 1.0, 2), cabin(1, 1.0, 2)];
-        let mut space = Space::new(&root)?;
+        let mut space = Space::new(root.clone())?;
         let first = Pose::from_translation(DVec3::X * 100.0);
-        let a = space.add_part(&worlds[0], PartId::ROOT, first)?;
+        let a = space.add_part(worlds[0].clone(), PartId::ROOT, first)?;
         let window = space.layout(a).opening(PortalId(0));
         let is_inner_first = Some(window.cells()[1]) == space.layout(a).outdoors();
         let outward = window.normal() * if is_inner_first { 1.0 } else { -1.0 };
         let middle = window.center();
         let touching = first.after(&Pose::about(middle, DVec3::Y, std::f64::consts::PI));
-        let b = space.add_part(&worlds[1], PartId::ROOT, touching)?;
+        let b = space.add_part(worlds[1].clone(), PartId::ROOT, touching)?;
         Ok(Self {
             space,
             worlds,

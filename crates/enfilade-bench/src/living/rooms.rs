@@ -39,8 +39,8 @@ fn vector(rng: &mut Rng, reach: f64) -> DVec3 {
 /// Counts crossings that 1,024 straight lines per motion find and the run-time does not report.
 pub(super) fn passings(_: &str) -> anyhow::Result<Figure> {
     let world = cabin(1, 1.0, 0);
-    let mut space = Space::new(&room_grid(&GridParams::two_rooms()))?;
-    let part = space.add_part(&world, PartId::ROOT, Pose::IDENTITY)?;
+    let mut space = Space::new(room_grid(&GridParams::two_rooms()))?;
+    let part = space.add_part(world.clone(), PartId::ROOT, Pose::IDENTITY)?;
     let mut rng = Rng::new(4);
     let mut found: Vec<Passing> = Vec::new();
     let (mut n_missed, mut n_known) = (0, 0);
@@ -143,10 +143,10 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
     let worlds: Vec<World> = (0..=DEEP)
         .map(|k| cabin(7, size(k), if k == DEEP { 2 } else { 0 }))
         .collect();
-    let mut space = Space::new(&worlds[0])?;
+    let mut space = Space::new(worlds[0].clone())?;
     let mut host = PartId::ROOT;
     for world in &worlds[1..] {
-        host = space.add_part(world, host, Pose::IDENTITY)?;
+        host = space.add_part(world.clone(), host, Pose::IDENTITY)?;
     }
     let mut viewer = SpaceViewer::new(&space);
     let mut rng = Rng::new(1);
@@ -218,15 +218,15 @@ fn pose_within(rng: &mut Rng, own: &World, host: &World) -> Pose {
 /// Measures the error of a point of a room that moves ten kilometers away, after as many motions. [Units: mm]
 pub(super) fn far(_: &str) -> anyhow::Result<Figure> {
     let worlds = [cabin(5, 1.0, 0), cabin(5, 1.0, 0), cabin(6, 0.3, 0)];
-    let mut space = Space::new(&worlds[0])?;
+    let mut space = Space::new(worlds[0].clone())?;
     let at = DVec3::new(10_000.0, 3.0, -7_000.0);
     let start = Pose {
         turn: Rng::new(1).turn(),
         at,
     };
-    let ship = space.add_part(&worlds[1], PartId::ROOT, start)?;
+    let ship = space.add_part(worlds[1].clone(), PartId::ROOT, start)?;
     let boat = space.add_part(
-        &worlds[2],
+        worlds[2].clone(),
         ship,
         pose_within(&mut Rng::new(3), &worlds[2], &worlds[1]),
     )?;
@@ -253,9 +253,9 @@ pub(super) fn far(_: &str) -> anyhow::Result<Figure> {
 pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
     let mut world = offices(scene)?;
     world.details.clear();
-    let mut space = Space::new(&world)?;
+    let mut space = Space::new(world.clone())?;
     for portal in world.graph.portal_ids().step_by(3) {
-        space.state_mut(PartId::ROOT).close(portal);
+        space.close(PartId::ROOT, portal);
     }
     let lines = Sightlines::build(&world);
     let mut rng = Rng::new(2);
@@ -270,7 +270,6 @@ pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
         lights.add(&space, lamp)?;
         lamps.push(lamp);
     }
-    lights.update(&space);
     let state = space.state(PartId::ROOT);
     let (mut n_lit, mut n_lost, mut n_known) = (0_usize, 0_usize, 0_usize);
     for _ in 0..SAMPLES {
@@ -319,8 +318,8 @@ pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
 /// Returns the median time of a frame. [Units: µs]
 fn frame_us(n_cells: usize) -> anyhow::Result<f64> {
     let world = offices(&format!("offices-{n_cells}"))?;
-    let mut space = Space::new(&world)?;
-    let lift = space.add_part(&cabin(1, 0.4, 0), PartId::ROOT, Pose::IDENTITY)?;
+    let mut space = Space::new(world.clone())?;
+    let lift = space.add_part(cabin(1, 0.4, 0), PartId::ROOT, Pose::IDENTITY)?;
     let mut things = Things::new();
     let mut rng = Rng::new(3);
     let mut ids = Vec::new();
@@ -344,10 +343,9 @@ fn frame_us(n_cells: usize) -> anyhow::Result<f64> {
         let start = Instant::now();
         let at = Pose::from_translation(shaft + DVec3::Y * (f64::from(i % 20) * 0.05));
         space.set_pose(lift, at)?;
-        things.part_moved(&space, lift);
         for k in 0..200 {
             let id = ids[(i as usize * 200 + k) % ids.len()];
-            let (frame, pose) = things.pose(id)?;
+            let (frame, pose) = things.pose(&space, id)?;
             let step = Pose::from_translation(pose.at + vector(&mut rng, 0.03));
             let moved = things.set_pose(&space, id, frame, step)?;
             if moved.to.is_none() {

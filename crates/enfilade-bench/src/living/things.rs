@@ -52,7 +52,7 @@ pub(super) fn random_indoors(space: &Space, rng: &mut Rng) -> DVec3 {
 /// Counts shapes whose flood differs from the cells that the openings they meet join to their own, computed by other
 /// code.
 pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
-    let space = Space::new(&offices(scene)?)?;
+    let space = Space::new(offices(scene)?)?;
     let layout = space.layout(PartId::ROOT);
     let mut flood = Flood::default();
     let mut rng = Rng::new(1);
@@ -166,7 +166,7 @@ struct Steps {
 
 impl Steps {
     fn take(scene: &str) -> anyhow::Result<Self> {
-        let space = Space::new(&offices(scene)?)?;
+        let space = Space::new(offices(scene)?)?;
         let mut things = Things::new();
         let mut rng = Rng::new(2);
         let mut at = random_indoors(&space, &mut rng);
@@ -220,7 +220,7 @@ impl Steps {
         };
         let (mut stay, mut cross, mut n_stayed) = (0.0, 0.0, 0);
         let mut k = 0;
-        let mut last = things.place(id)?;
+        let mut last = things.place(&space, id)?;
         while k < STEPS {
             let start = Instant::now();
             let mut end = k;
@@ -257,7 +257,7 @@ pub(super) fn maze(_: &str) -> anyhow::Result<Figure> {
     let scene = dirkse_maze(1).scene;
     let context = BakeContext::new(&Silent, None);
     let world = bake(&scene, &BakeConfig::default(), &context)?.world;
-    let space = Space::new(&world)?;
+    let space = Space::new(world.clone())?;
     let root = PartId::ROOT;
     // One triangle per chunk, as Dirkse counts.
     let by_triangle = SightOptions {
@@ -296,7 +296,10 @@ pub(super) fn maze(_: &str) -> anyhow::Result<Figure> {
         let frustum = fine.see_through_walls(sight, &view);
         let n_frustum = frustum.n_triangles() as f64;
         let in_frustum = ghosts.iter().filter(|g| {
-            let at = things.pose(**g).map_or(DVec3::ZERO, |p| p.1.at).as_vec3();
+            let at = things
+                .pose(&space, **g)
+                .map_or(DVec3::ZERO, |p| p.1.at)
+                .as_vec3();
             let cells = frustum.cells();
             frustum.sees_box(cells, [(at - 0.5).to_array(), (at + 0.5).to_array()])
         });

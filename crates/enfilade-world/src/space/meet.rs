@@ -52,6 +52,7 @@ impl Space {
             self.meet(part, &mut buffers);
         }
         self.buffers = buffers;
+        self.changes.reset();
     }
 
     /// Calls `visit` with the doors of other parts, and the cells inside, that a point of a part's cell may be in, too: beside a
