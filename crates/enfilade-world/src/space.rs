@@ -28,6 +28,7 @@ pub use meet::Docking;
 pub use sweep::Passing;
 
 mod changes;
+mod doors;
 mod id;
 mod look;
 mod meet;

@@ -144,9 +144,9 @@ fn a_lamp_lights_a_cabin_that_docks() {
     });
     let window = space.layout(a).opening(PortalId(0));
     let turned = Pose::about(window.center(), DVec3::Y, std::f64::consts::PI);
-    let inner = window.cells().into_iter();
-    let inner = inner.filter(|c| !space.layout(a).cell(*c).is_outdoor);
-    let bounds = space.layout(a).cell(inner.last().unwrap()).bounds;
+    let mut cells = window.cells().into_iter();
+    let inner = cells.find(|c| !space.layout(a).cell(*c).is_outdoor);
+    let bounds = space.layout(a).cell(inner.unwrap()).bounds;
     let at = window.center().lerp(bounds.center(), 0.2);
     let apart = far.after(&Pose::from_translation(DVec3::X * 50.0));
     space.set_pose(b, apart).unwrap();
