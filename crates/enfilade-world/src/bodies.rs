@@ -8,7 +8,6 @@
 //! | --- | --- |
 //! | `body.rs` | spheres, capsules, boxes |
 //! | `kernel.rs` | one body, one triangle: contact, and time of first contact |
-//! | `walls.rs` | triangles by cell, made once |
 //! | `flood.rs` | the cells and triangles on a body's way |
 //! | `caster.rs` | casts and contacts |
 //! | `pairs.rs` | bodies that may touch each other |
@@ -22,11 +21,9 @@ mod pairs;
 #[cfg(test)]
 mod tests;
 mod walker;
-mod walls;
 
 pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
 pub use walker::{Build, Walker};
-pub use walls::Contacts;

@@ -24,7 +24,7 @@ pub use actors::{
     ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
     WayPoint,
 };
-pub use bodies::{Body, Build, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs, Walker};
+pub use bodies::{Body, Build, Cast, CastCounts, Caster, Contact, Impact, Pairs, Walker};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{

@@ -9,7 +9,7 @@
 //!
 //! Coordinates are relative to a part; poses are in `f64`, so that a part ten kilometers away is as exact as a near one.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Aabb, DVec3};
@@ -19,6 +19,7 @@ use crate::layout::Layout;
 use crate::pose::Pose;
 use changes::Changes;
 use neighbors::Neighbors;
+use walls::Walls;
 
 pub(crate) use changes::Change;
 
@@ -34,6 +35,7 @@ mod look;
 mod meet;
 mod neighbors;
 mod sweep;
+pub(crate) mod walls;
 
 /// Reason why a part cannot be added or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -74,6 +76,8 @@ pub(crate) struct Part {
     pub(crate) layout: Layout,
     pub(crate) sight: Sight,
     pub(crate) state: SightState,
+    /// Made by the first query of contacts.
+    walls: OnceLock<Walls>,
     /// The cell that stands for the surroundings.
     pub(crate) border: Option<CellId>,
     pub(crate) host: PartId,
@@ -212,6 +216,7 @@ impl Space {
             guests: vec![Vec::new(); n_cells],
             has_guests: vec![false; n_cells],
             first_cell: self.n_cells as u32,
+            walls: OnceLock::new(),
             layout,
             world,
         });
@@ -374,6 +379,12 @@ impl Space {
     #[must_use]
     pub fn sight(&self, part: PartId) -> &Sight {
         &self.parts[part.idx()].sight
+    }
+
+    /// Returns what bodies can hit in a part.
+    pub(crate) fn walls(&self, part: PartId) -> &Walls {
+        let part = &self.parts[part.idx()];
+        (part.walls).get_or_init(|| Walls::new(&part.world, &part.sight, &part.layout))
     }
 
     /// Returns the state of a part's doors.

@@ -13,8 +13,8 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 use enfilade::geom::ray::segment_to_triangle_distance;
 use enfilade::geom::{Aabb, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
-use enfilade::runtime::{DetailId, Sight, SightState};
-use enfilade::world::{Body, Cast, Caster, Contacts, Impact, Layout};
+use enfilade::runtime::DetailId;
+use enfilade::world::{Body, Cast, Caster, Impact, Layout, PartId, Place, Space};
 use enfilade::{CellId, World};
 use enfilade_testkit::oracle::box_to_triangle_distance;
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
@@ -35,32 +35,29 @@ fn made(scene: &str) -> anyhow::Result<World> {
     Ok(with_doors(world, |_| false))
 }
 
+const ROOT: PartId = PartId::ROOT;
+
 /// A world prepared for casts.
 struct Site {
-    world: World,
-    sight: Sight,
-    state: SightState,
-    layout: Layout,
-    contacts: Contacts,
+    space: Space,
 }
 
 impl Site {
     fn new(world: &World) -> anyhow::Result<Self> {
-        let sight = Sight::build(world)?;
-        let layout = Layout::new(world);
-        let contacts = Contacts::new(world, &sight, &layout);
-        let mut state = SightState::new(&sight);
+        let mut space = Space::new(world.clone())?;
         // Most doors are shut as modeled; open half of them.
         for portal in world.graph.portal_ids().filter(|p| p.0 % 2 == 0) {
-            state.open(portal);
+            space.open(ROOT, portal);
         }
-        Ok(Self {
-            world: world.clone(),
-            sight,
-            state,
-            layout,
-            contacts,
-        })
+        Ok(Self { space })
+    }
+
+    fn world(&self) -> &World {
+        self.space.world(ROOT)
+    }
+
+    fn layout(&self) -> &Layout {
+        self.space.layout(ROOT)
     }
 
     /// Returns a free body in some room, and a motion.
@@ -76,17 +73,17 @@ impl Site {
                 1..=5 => Body::Sphere { radius: size },
                 _ => Body::upright(1.7, size.min(0.4)),
             };
-            let cell = CellId(rng.below(self.layout.n_cells()) as u32);
-            let shape = self.layout.cell(cell);
+            let cell = CellId(rng.below(self.layout().n_cells()) as u32);
+            let shape = self.layout().cell(cell);
             let share = DVec3::new(rng.unit(), rng.unit(), rng.unit());
             let from = shape.bounds.min + shape.bounds.size() * share;
-            if shape.is_outdoor || self.layout.locate(from) != Some(cell) {
+            if shape.is_outdoor || self.layout().locate(from) != Some(cell) {
                 continue;
             }
             let mut is_free = true;
             let grown = grown(&body, FREE);
-            let (contacts, state) = (&self.contacts, &self.state);
-            caster.for_each_contact(contacts, state, &grown, from, cell, |_| is_free = false);
+            let (at, place) = ((ROOT, from), Place { part: ROOT, cell });
+            caster.for_each_contact(&self.space, &grown, at, place, |_| is_free = false);
             if !is_free {
                 continue;
             }
@@ -109,24 +106,28 @@ impl Site {
     fn cast(&self, caster: &mut Caster, way: &Way) -> Option<Impact> {
         let cast = Cast {
             body: &way.body,
+            frame: ROOT,
             from: way.from,
             by: way.by,
-            cell: way.cell,
+            place: Place {
+                part: ROOT,
+                cell: way.cell,
+            },
         };
-        caster.cast(&self.contacts, &self.state, &cast)
+        caster.cast(&self.space, &cast)
     }
 
     fn ways(&self, n: usize) -> Vec<Way> {
-        let (mut rng, mut caster) = (Rng::new(7), Caster::new(&self.contacts));
+        let (mut rng, mut caster) = (Rng::new(7), Caster::new());
         (0..n).map(|_| self.any(&mut rng, &mut caster)).collect()
     }
 
     /// Returns the triangles of an object in the world.
     fn of_detail(&self, id: DetailId) -> impl Iterator<Item = Triangle> + '_ {
-        let object = &self.world[id];
-        let pose = self.state.pose(id).unwrap_or(DMat4::IDENTITY);
+        let object = &self.world()[id];
+        let pose = self.space.state(ROOT).pose(id).unwrap_or(DMat4::IDENTITY);
         let place = pose * object.placement();
-        let primitives = &self.world.detail_meshes[object.mesh as usize].primitives;
+        let primitives = &self.world().detail_meshes[object.mesh as usize].primitives;
         primitives.iter().flat_map(move |p| {
             let at = move |i: u32| place.transform_point3(point(p.positions[i as usize]));
             let corners = p.indices.chunks_exact(3);
@@ -137,12 +138,12 @@ impl Site {
     /// Returns all triangles of the world, each once.
     fn mesh(&self) -> anyhow::Result<TriMesh> {
         let mut all: Vec<Triangle> = Vec::new();
-        for batch in self.world.batches.iter().filter(|b| !b.cells.is_empty()) {
+        for batch in self.world().batches.iter().filter(|b| !b.cells.is_empty()) {
             let at = |i: u32| point(batch.primitive.positions[i as usize]);
             let corners = batch.primitive.indices.chunks_exact(3);
             all.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
         }
-        for id in (0..self.world.details.len() as u32).map(DetailId) {
+        for id in (0..self.world().details.len() as u32).map(DetailId) {
             all.extend(self.of_detail(id));
         }
         let indices = (0..all.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
@@ -185,7 +186,7 @@ struct Brute {
 
 impl Brute {
     fn new(site: &Site) -> Self {
-        let world = &site.world;
+        let world = site.world();
         let n_cells = world.graph.cells.len();
         let mut obstacles = vec![Vec::new(); n_cells];
         let mut openings = vec![Vec::new(); n_cells];
@@ -199,7 +200,7 @@ impl Brute {
             }
         }
         for id in (0..world.details.len() as u32).map(DetailId) {
-            for cell in site.sight.cells_of_detail(world, id) {
+            for cell in site.space.sight(ROOT).cells_of_detail(world, id) {
                 obstacles[cell.idx()].extend(site.of_detail(id).map(boxed));
             }
         }
@@ -317,20 +318,20 @@ pub(super) fn missed(world: &World) -> anyhow::Result<Figure> {
         for thread in 0..n_threads {
             scope.spawn(move || {
                 let mut rng = Rng::stream(11, thread as u64);
-                let mut caster = Caster::new(&site.contacts);
+                let mut caster = Caster::new();
                 for _ in (thread..CASTS).step_by(n_threads) {
                     let way = site.any(&mut rng, &mut caster);
                     let impact = site.cast(&mut caster, &way);
                     let t = impact.map_or(1.0, |i| i.t);
                     // Deeper than a micrometer, or than the layout's tolerance.
-                    let margin = 1e-6_f64.max(site.layout.tolerance());
+                    let margin = 1e-6_f64.max(site.layout().tolerance());
                     let is_missed = brute.touches_before(&way, t, margin);
                     n_missed.fetch_add(u64::from(is_missed), Ordering::Relaxed);
                     n_impacts.fetch_add(u64::from(impact.is_some()), Ordering::Relaxed);
                     // The reported impact must touch something.
                     let at = way.from + way.by * t;
                     let is_off = impact.is_some_and(|i| {
-                        let cell = brute.obstacles[i.cell.idx()].iter();
+                        let cell = brute.obstacles[i.place.cell.idx()].iter();
                         let near = grown(&way.body, margin);
                         let mine = near.bounds(at);
                         let mut met = cell.filter(|(b, _)| b.overlaps(&mine));
@@ -412,7 +413,7 @@ fn peer_candidates(mesh: &TriMesh, way: &Way) -> u64 {
 pub(super) fn candidates(world: &World) -> anyhow::Result<Figure> {
     let site = Site::new(world)?;
     let mesh = site.mesh()?;
-    let mut caster = Caster::new(&site.contacts);
+    let mut caster = Caster::new();
     let (mut own, mut openings, mut others, mut cells) = (0, 0, 0, 0);
     for way in site.ways(CASTS) {
         let _ = site.cast(&mut caster, &way);
@@ -442,7 +443,7 @@ pub(super) fn time(world: &World) -> anyhow::Result<Figure> {
     let mesh = site.mesh()?;
     let ways = site.ways(CASTS);
     let peers: Vec<_> = ways.iter().map(|w| peer(&w.body)).collect();
-    let mut caster = Caster::new(&site.contacts);
+    let mut caster = Caster::new();
     let mut best = [f64::INFINITY; 2];
     let (mut late, mut impacts) = (0, 0);
     for round in 0..2 {

@@ -268,7 +268,7 @@ impl App<'_> {
             ..Shown::default()
         };
         Ok(Open {
-            walker: Walker::new(&self.world, &studio.sight, start.eye),
+            walker: Walker::new(&self.world, start.eye)?,
             window,
             surface,
             config,

@@ -2,36 +2,32 @@
 
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
-use enfilade::runtime::{Sight, SightState};
-use enfilade::world::{Build, Contacts, Layout, Walker as Body};
+use enfilade::runtime::SightState;
+use enfilade::world::{Build, PartId, Space, SpaceError, Walker as Body};
 
 use enfilade_render::EYE_HEIGHT;
 
 /// A body in a world or, when it flies, an eye.
 pub(super) struct Walker {
-    layout: Layout,
-    contacts: Contacts,
+    space: Space,
     body: Body,
     pub(super) eye: DVec3,
     pub(super) flies: bool,
 }
 
 impl Walker {
-    pub(super) fn new(world: &World, sight: &Sight, eye: [f32; 3]) -> Self {
-        let layout = Layout::new(world);
-        let contacts = Contacts::new(world, sight, &layout);
+    pub(super) fn new(world: &World, eye: [f32; 3]) -> Result<Self, SpaceError> {
         let build = Build {
             eye: EYE_HEIGHT.into(),
             ..Build::default()
         };
         let eye = DVec3::from(eye.map(f64::from));
-        Self {
-            body: Body::new(&contacts, build, eye),
-            layout,
-            contacts,
+        Ok(Self {
+            space: Space::new(world.clone())?,
+            body: Body::new(build, PartId::ROOT, eye),
             eye,
             flies: false,
-        }
+        })
     }
 
     /// Moves by `wish` (meters per second) for `seconds`; walls, furniture, leaves of doors as in `state`, and
@@ -42,8 +38,16 @@ impl Walker {
             return;
         }
         self.body.eye = self.eye;
-        let (contacts, layout) = (&self.contacts, &self.layout);
-        self.body.step(contacts, layout, state, wish, seconds);
+        if self.space.state(PartId::ROOT).shares() != state.shares()
+            || !self
+                .space
+                .state(PartId::ROOT)
+                .shut_portals()
+                .eq(state.shut_portals())
+        {
+            self.space.set_state(PartId::ROOT, state.clone());
+        }
+        self.body.step(&self.space, wish, seconds);
         self.eye = self.body.eye;
     }
 }
@@ -55,6 +59,7 @@ mod tests {
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
     use enfilade::geom::Aabb;
     use enfilade::geom::scene::{Mesh, Primitive};
+    use enfilade::runtime::Sight;
     use enfilade_testkit::{GridParams, room_grid};
 
     /// Rooms in a row, and a person in the middle of the first.
@@ -72,7 +77,7 @@ mod tests {
         let sight = Sight::build(world).unwrap();
         let [low, high] = world.graph.cells[0].aabb;
         let eye = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
-        (Walker::new(world, &sight, eye), SightState::new(&sight))
+        (Walker::new(world, eye).unwrap(), SightState::new(&sight))
     }
 
     /// A box as an object.

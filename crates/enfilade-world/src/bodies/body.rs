@@ -2,6 +2,8 @@
 
 use enfilade_geom::{Aabb, DMat3, DQuat, DVec3};
 
+use crate::pose::Pose;
+
 /// The shape of a body about its center. Sizes must not be negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Body {
@@ -56,6 +58,21 @@ impl Body {
             Self::Box { half, turn } => Self::Box {
                 half: half + margin,
                 turn,
+            },
+        }
+    }
+
+    /// Returns the body turned into another frame.
+    pub(super) fn turned(&self, to: &Pose) -> Self {
+        match *self {
+            Self::Sphere { radius } => Self::Sphere { radius },
+            Self::Capsule { half, radius } => Self::Capsule {
+                half: to.direction(half),
+                radius,
+            },
+            Self::Box { half, turn } => Self::Box {
+                half,
+                turn: to.turn * turn,
             },
         }
     }

@@ -3,14 +3,13 @@
 //! The flood (`flood.rs`) finds them, the kernel (`kernel.rs`) tests each: O(candidates), and casts shorten the flood at each
 //! impact. [`ALONG`] decides nearly tangential cases.
 
-use enfilade_cpg::CellId;
 use enfilade_geom::{DVec3, Triangle};
-use enfilade_runtime::{DetailId, SightState, Target};
+use enfilade_runtime::{DetailId, Target};
 
 use super::body::Body;
-use super::flood::{BodyFlood, CastCounts, Moving, Question};
+use super::flood::{BodyFlood, CastCounts, Motion};
 use super::kernel::{depth, point_of_contact, sweep};
-use super::walls::Contacts;
+use crate::space::{PartId, Place, Space};
 
 /// A body that approaches slower than this fraction of its motion slides along instead of hitting.
 const ALONG: f64 = 1e-9;
@@ -20,15 +19,17 @@ const ALONG: f64 = 1e-9;
 pub struct Cast<'a> {
     /// Its shape.
     pub body: &'a Body,
+    /// The part in whose frame it is given.
+    pub frame: PartId,
     /// Initial position of its center. [Units: wu]
     pub from: DVec3,
     /// Displacement. [Units: wu]
     pub by: DVec3,
-    /// The cell of its center; in solid matter, the last one that it was in.
-    pub cell: CellId,
+    /// The place of its center; in solid matter, the last one that it was in.
+    pub place: Place,
 }
 
-/// First impact of a moving body.
+/// First impact of a moving body, in the frame of its cast.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
     /// Time, as a fraction of the motion, 0 to 1.
@@ -37,13 +38,13 @@ pub struct Impact {
     pub normal: DVec3,
     /// Position. For a box that hits with a face or an edge, the middle of the contact area. [Units: wu]
     pub point: DVec3,
-    /// The target.
+    /// The target, in the part of `place`.
     pub target: Target,
-    /// The cell through which it was hit.
-    pub cell: CellId,
+    /// The place through which it was hit.
+    pub place: Place,
 }
 
-/// Contact of a resting body.
+/// Contact of a resting body, in the frame of the query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Unit vector of the shortest way out.
@@ -52,10 +53,10 @@ pub struct Contact {
     pub depth: f64,
     /// Position. [Units: wu]
     pub point: DVec3,
-    /// The target.
+    /// The target, in the part of `place`.
     pub target: Target,
-    /// The cell through which it was found.
-    pub cell: CellId,
+    /// The place through which it was found.
+    pub place: Place,
 }
 
 /// Queries contacts of bodies. Holds the buffers of the flood; use one per thread.
@@ -65,28 +66,25 @@ pub struct Contact {
 /// ```
 /// use enfilade_cpg::PortalId;
 /// use enfilade_geom::DVec3;
-/// use enfilade_runtime::{Sight, SightState, Target};
+/// use enfilade_runtime::Target;
 /// use enfilade_testkit::{GridParams, room_grid};
-/// use enfilade_world::{Body, Cast, Caster, Contacts, Layout};
+/// use enfilade_world::{Body, Cast, Caster, PartId, Space};
 ///
-/// let world = room_grid(&GridParams::two_rooms());
-/// let sight = Sight::build(&world)?;
-/// let mut state = SightState::new(&sight);
-/// let layout = Layout::new(&world);
-/// let contacts = Contacts::new(&world, &sight, &layout);
-/// let mut caster = Caster::new(&contacts);
+/// let mut space = Space::new(room_grid(&GridParams::two_rooms()))?;
+/// let mut caster = Caster::new();
 ///
 /// // A ball in front of the doorway rolls through.
 /// let body = Body::Sphere { radius: 0.25 };
-/// let from = layout.opening(PortalId(0)).center() - DVec3::X;
-/// let cell = layout.locate(from).expect("a room");
-/// let cast = Cast { body: &body, from, by: DVec3::X * 2.0, cell };
-/// assert_eq!(caster.cast(&contacts, &state, &cast), None);
-/// assert_eq!(caster.cells().len(), 2);
+/// let from = space.layout(PartId::ROOT).opening(PortalId(0)).center() - DVec3::X;
+/// let place = space.locate(PartId::ROOT, from).expect("a room");
+/// let frame = PartId::ROOT;
+/// let cast = Cast { body: &body, frame, from, by: DVec3::X * 2.0, place };
+/// assert_eq!(caster.cast(&space, &cast), None);
+/// assert_eq!(caster.places().len(), 2);
 ///
 /// // Unless it is shut.
-/// state.close(PortalId(0));
-/// let impact = caster.cast(&contacts, &state, &cast).expect("a panel");
+/// space.close(PartId::ROOT, PortalId(0));
+/// let impact = caster.cast(&space, &cast).expect("a panel");
 /// assert_eq!(impact.target, Target::Portal(PortalId(0)));
 /// assert!((impact.t - 0.375).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -96,33 +94,34 @@ pub struct Caster {
     flood: BodyFlood,
 }
 
+impl Default for Caster {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Caster {
-    /// Makes a caster for one world.
+    /// Makes a caster without buffers.
     #[must_use]
-    pub fn new(contacts: &Contacts) -> Self {
+    pub fn new() -> Self {
         Self {
-            flood: BodyFlood::new(contacts),
+            flood: BodyFlood::new(),
         }
     }
 
-    /// Returns the first impact of a moving body: on walls, seals, objects, leaves of doors where `state` puts them, and
-    /// openings that `state` shuts.
+    /// Returns the first impact of a moving body: on walls, seals, objects, leaves of doors in their current pose, shut openings,
+    /// and on all these of the parts that it reaches.
     ///
     /// Never misses a triangle of a cell that the body reaches by openings, nor stops at one behind a wall that it does not
     /// pass. A triangle touched at the start stops the body unless it moves away or along. Keep a gap, such as a millimeter, to a
     /// surface to slide along, or the seams of a floor stop the body. A body that does not move, or is not finite, hits nothing.
-    /// Takes a microsecond or less in rooms.
+    /// Takes a microsecond or less in rooms; the first query in a part prepares its triangles, O(n log n).
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
-    pub fn cast(
-        &mut self,
-        contacts: &Contacts,
-        state: &SightState,
-        cast: &Cast<'_>,
-    ) -> Option<Impact> {
-        self.cast_where(contacts, state, cast, |_| true)
+    /// If there is no such place.
+    pub fn cast(&mut self, space: &Space, cast: &Cast<'_>) -> Option<Impact> {
+        self.cast_where(space, cast, |_, _| true)
     }
 
     /// As [`Caster::cast`], ignoring objects for which `counts` returns `false`, such as carried ones or curtains.
@@ -132,18 +131,23 @@ impl Caster {
     /// As [`Caster::cast`].
     pub fn cast_where(
         &mut self,
-        contacts: &Contacts,
-        state: &SightState,
+        space: &Space,
         cast: &Cast<'_>,
-        counts: impl FnMut(DetailId) -> bool,
+        counts: impl FnMut(PartId, DetailId) -> bool,
     ) -> Option<Impact> {
-        let moving = Moving::new(contacts, cast.body, cast.from, cast.by)?;
         let slowest = -ALONG * cast.by.length();
+        let motion = Motion {
+            space,
+            body: cast.body,
+            frame: cast.frame,
+            from: cast.from,
+            by: cast.by,
+            place: cast.place,
+        };
         let mut best: Option<Impact> = None;
-        let by = cast.by;
-        let question = Question::new(contacts, state, &moving);
-        self.flood.run(&question, cast.cell, counts, |it, t_max| {
-            let touch = sweep(&moving.core, by, *t_max, it.corners);
+        self.flood.run(&motion, counts, |it, t_max| {
+            let (core, by) = (&it.moving.core, it.moving.by);
+            let touch = sweep(core, by, *t_max, it.corners);
             let Some(touch) = touch.filter(|touch| touch.normal.dot(by) < slowest) else {
                 return;
             };
@@ -154,83 +158,83 @@ impl Caster {
             *t_max = touch.t;
             let passed = by * touch.t;
             let corners = it.corners.map(|p| p - passed);
+            // Relative to the body, in the frame of the target.
             best = Some(Impact {
                 t,
                 normal: touch.normal,
-                point: cast.from + by * t + point_of_contact(&moving.core, &corners),
+                point: point_of_contact(core, &corners),
                 target: it.target,
-                cell: it.cell,
+                place: it.place,
             });
         });
-        best
+        best.map(|impact| Impact {
+            normal: turned(space, &motion, impact.place, impact.normal),
+            point: cast.from
+                + cast.by * impact.t
+                + turned(space, &motion, impact.place, impact.point),
+            ..impact
+        })
     }
 
-    /// Calls `visit` for all contacts of a resting body, in arbitrary order; a triangle that two cells see is reported for each
+    /// Calls `visit` for all contacts of a body that rests at a point of a part's frame, in arbitrary order; a triangle that two cells see is reported for each
     /// that the body reaches. Nothing for a body that is not finite.
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
+    /// If there is no such place.
     pub fn for_each_contact(
         &mut self,
-        contacts: &Contacts,
-        state: &SightState,
+        space: &Space,
         body: &Body,
-        at: DVec3,
-        cell: CellId,
+        (frame, at): (PartId, DVec3),
+        place: Place,
         mut visit: impl FnMut(&Contact),
     ) {
-        let Some(resting) = Moving::new(contacts, body, at, DVec3::ZERO) else {
-            return;
-        };
-        let question = Question::new(contacts, state, &resting);
-        self.flood.run(
-            &question,
-            cell,
-            |_| true,
-            |it, _| {
-                let Some(found) = depth(&resting.core, it.corners) else {
-                    return;
-                };
-                visit(&Contact {
-                    normal: found.normal,
-                    depth: found.depth,
-                    point: at + point_of_contact(&resting.core, it.corners),
-                    target: it.target,
-                    cell: it.cell,
-                });
-            },
-        );
+        let motion = Motion::rest(space, body, (frame, at), place);
+        let all = |_: PartId, _: DetailId| true;
+        self.flood.run(&motion, all, |it, _| {
+            let core = &it.moving.core;
+            let Some(found) = depth(core, it.corners) else {
+                return;
+            };
+            let to_own = |v: DVec3| turned(space, &motion, it.place, v);
+            visit(&Contact {
+                normal: to_own(found.normal),
+                depth: found.depth,
+                point: at + to_own(point_of_contact(core, it.corners)),
+                target: it.target,
+                place: it.place,
+            });
+        });
     }
 
     /// Calls `visit` for the triangles that a resting body may touch, for use with another narrow phase: all those of reached
-    /// cells whose boxes meet the body's bounding box.
+    /// cells whose boxes meet the body's bounding box, with the part of each.
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
+    /// If there is no such place.
     pub fn for_each_candidate(
         &mut self,
-        contacts: &Contacts,
-        state: &SightState,
+        space: &Space,
         body: &Body,
-        at: DVec3,
-        cell: CellId,
-        mut visit: impl FnMut(Target, &Triangle),
+        (frame, at): (PartId, DVec3),
+        place: Place,
+        mut visit: impl FnMut(PartId, Target, &Triangle),
     ) {
-        if let Some(resting) = Moving::new(contacts, body, at, DVec3::ZERO) {
-            let all = |_: DetailId| true;
-            let question = Question::new(contacts, state, &resting);
-            self.flood.run(&question, cell, all, |it, _| {
-                visit(it.target, &it.corners.map(|p| p + at));
-            });
-        }
+        let motion = Motion::rest(space, body, (frame, at), place);
+        let all = |_: PartId, _: DetailId| true;
+        self.flood.run(&motion, all, |it, _| {
+            let to_own = |v: DVec3| at + turned(space, &motion, it.place, v);
+            visit(it.place.part, it.target, &it.corners.map(to_own));
+        });
     }
 
-    /// Returns the cells that the body of the last query reached, before its impact if there was one; its own first.
+    /// Returns the places that the body of the last query reached, before its impact if there was one; its own first. The
+    /// outdoor cell of a part stands for its outside.
     #[must_use]
-    pub fn cells(&self) -> &[CellId] {
-        self.flood.cells()
+    pub fn places(&self) -> &[Place] {
+        self.flood.places()
     }
 
     /// Returns the cost of the last query.
@@ -238,4 +242,12 @@ impl Caster {
     pub fn counts(&self) -> CastCounts {
         self.flood.counts()
     }
+}
+
+/// Turns a vector from the frame of a place's part into that of a motion.
+fn turned(space: &Space, motion: &Motion<'_>, place: Place, v: DVec3) -> DVec3 {
+    if place.part == motion.frame {
+        return v;
+    }
+    space.between(place.part, motion.frame).direction(v)
 }

@@ -6,55 +6,62 @@ use enfilade_cpg::{CellId, DetailObject, PortalId, World};
 use enfilade_geom::ray::segment_to_triangle_distance;
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
-use enfilade_runtime::{DetailId, Sight, SightState, Sightlines, Target};
+use enfilade_runtime::{DetailId, Sightlines, Target};
 use enfilade_testkit::oracle::box_to_triangle_distance;
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
-use super::{Body, Cast, Caster, Contact, Contacts, Impact};
+use super::{Body, Cast, Caster, Contact, Impact};
 use crate::layout::Layout;
+use crate::space::{PartId, Place, Space};
 
-/// A world and everything that casts need of it.
+/// A world without moving parts, and a caster in it.
 struct Site {
-    world: World,
-    sight: Sight,
-    layout: Layout,
-    contacts: Contacts,
-    state: SightState,
+    space: Space,
     caster: RefCell<Caster>,
 }
 
+const ROOT: PartId = PartId::ROOT;
+
 impl Site {
     fn new(world: World) -> Self {
-        let sight = Sight::build(&world).unwrap();
-        let layout = Layout::new(&world);
-        let contacts = Contacts::new(&world, &sight, &layout);
         Self {
-            state: SightState::new(&sight),
-            caster: RefCell::new(Caster::new(&contacts)),
-            world,
-            sight,
-            layout,
-            contacts,
+            space: Space::new(world).unwrap(),
+            caster: RefCell::new(Caster::new()),
         }
     }
 
+    fn world(&self) -> &World {
+        self.space.world(ROOT)
+    }
+
+    fn layout(&self) -> &Layout {
+        self.space.layout(ROOT)
+    }
+
+    fn cells(&self) -> Vec<CellId> {
+        let caster = self.caster.borrow();
+        caster.places().iter().map(|p| p.cell).collect()
+    }
+
+    fn place(&self, p: DVec3) -> Place {
+        self.space.locate(ROOT, p).unwrap()
+    }
+
     fn cast(&self, body: &Body, from: DVec3, by: DVec3) -> Option<Impact> {
-        let cell = self.layout.locate(from).unwrap();
         let cast = Cast {
             body,
+            frame: ROOT,
             from,
             by,
-            cell,
+            place: self.place(from),
         };
-        let mut caster = self.caster.borrow_mut();
-        caster.cast(&self.contacts, &self.state, &cast)
+        self.caster.borrow_mut().cast(&self.space, &cast)
     }
 
     fn touched(&self, body: &Body, at: DVec3) -> Vec<Contact> {
-        let cell = self.layout.locate(at).unwrap();
         let mut all = Vec::new();
         let mut caster = self.caster.borrow_mut();
-        caster.for_each_contact(&self.contacts, &self.state, body, at, cell, |c| {
+        caster.for_each_contact(&self.space, body, (ROOT, at), self.place(at), |c| {
             all.push(*c);
         });
         all
@@ -63,26 +70,26 @@ impl Site {
     /// Returns all obstacles of a cell in world space.
     fn obstacles(&self, cell: CellId) -> Vec<Triangle> {
         let mut all = Vec::new();
-        for batch in self.world.batches_of(cell) {
+        for batch in self.world().batches_of(cell) {
             let corners = batch.primitive.indices.chunks_exact(3);
             let at = |i: u32| point(batch.primitive.positions[i as usize]);
             all.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
         }
-        for (id, object) in (0..).map(DetailId).zip(&self.world.details) {
-            if !(self.sight.cells_of_detail(&self.world, id)).contains(&cell) {
+        for (id, object) in (0..).map(DetailId).zip(&self.world().details) {
+            if !(self.space.sight(ROOT).cells_of_detail(self.world(), id)).contains(&cell) {
                 continue;
             }
-            let pose = self.state.pose(id).unwrap_or(DMat4::IDENTITY);
+            let pose = self.space.state(ROOT).pose(id).unwrap_or(DMat4::IDENTITY);
             let place = pose * object.placement();
-            for p in &self.world.detail_meshes[object.mesh as usize].primitives {
+            for p in &self.world().detail_meshes[object.mesh as usize].primitives {
                 let at = |i: u32| place.transform_point3(point(p.positions[i as usize]));
                 let corners = p.indices.chunks_exact(3);
                 all.extend(corners.map(|t| [at(t[0]), at(t[1]), at(t[2])]));
             }
         }
-        for exit in self.world.graph.exits(cell) {
-            if !self.state.is_open(exit.id) {
-                let off = f64::from(self.sight.depth_of_leaves(exit.id));
+        for exit in self.world().graph.exits(cell) {
+            if !self.space.state(ROOT).is_open(exit.id) {
+                let off = f64::from(self.space.sight(ROOT).depth_of_leaves(exit.id));
                 let off = point(exit.portal.normal).normalize() * off;
                 all.extend(self.opening(exit.id).map(|t| t.map(|p| p + off)));
             }
@@ -91,7 +98,7 @@ impl Site {
     }
 
     fn opening(&self, portal: PortalId) -> impl Iterator<Item = Triangle> + '_ {
-        let pieces = self.world.graph[portal].pieces.iter();
+        let pieces = self.world().graph[portal].pieces.iter();
         pieces
             .flat_map(|piece| (2..piece.len()).map(move |k| [0, k - 1, k].map(|i| point(piece[i]))))
     }
@@ -100,10 +107,10 @@ impl Site {
     /// at which it reaches each cell.
     fn brute(&self, body: &Body, margin: f64, from: DVec3, by: DVec3) -> (Option<f64>, Vec<f64>) {
         let grown = |margin: f64| body.grown(margin);
-        let n_cells = self.world.graph.cells.len();
+        let n_cells = self.world().graph.cells.len();
         let mut since = vec![f64::INFINITY; n_cells];
         let mut is_done = vec![false; n_cells];
-        since[self.layout.locate(from).unwrap().idx()] = 0.0;
+        since[self.layout().locate(from).unwrap().idx()] = 0.0;
         let mut first = f64::INFINITY;
         loop {
             let waiting = (0..n_cells).filter(|&c| !is_done[c] && since[c] <= first.min(1.0));
@@ -112,11 +119,11 @@ impl Site {
             is_done[c] = true;
             let cell = CellId(c as u32);
             let reach = since[c];
-            for exit in self.world.graph.exits(cell) {
+            for exit in self.world().graph.exits(cell) {
                 // Openings are grown by the layout's tolerance: a lower bound for impacts that must happen, an upper bound for
                 // others.
                 let more = if margin > 0.0 {
-                    self.layout.tolerance() + margin
+                    self.layout().tolerance() + margin
                 } else {
                     margin
                 };
@@ -232,13 +239,13 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
     let (mut n_impacts, mut n_cells) = (0, 0);
     for _ in 0..n {
         let body = random_body(rng, kind);
-        let from = random_point(rng, &site.world);
-        let Some(cell) = site.layout.locate(from) else {
+        let from = random_point(rng, site.world());
+        let Some(cell) = site.layout().locate(from) else {
             continue;
         };
         // Contacts at the start belong to another test.
         let is_free = site.touched(&body.grown(1e-4), from).is_empty();
-        if !is_free || site.layout.cell(cell).is_outdoor && rng.chance(0.7) {
+        if !is_free || site.layout().cell(cell).is_outdoor && rng.chance(0.7) {
             continue;
         }
         let by = DVec3::new(
@@ -247,7 +254,7 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
             rng.range(-6.0, 6.0),
         );
         let found = site.cast(&body, from, by);
-        n_cells += site.caster.borrow().cells().len();
+        n_cells += site.cells().len();
         n_impacts += usize::from(found.is_some());
         let (latest, _) = site.brute(&body, -margin, from, by);
         let (earliest, since) = site.brute(&body, margin, from, by);
@@ -261,7 +268,7 @@ fn compare(site: &Site, rng: &mut Rng, kind: usize, n: usize) -> [usize; 2] {
             t >= earliest - 1e-9,
             "too early: {body:?} {from} {by}: {t} {earliest}"
         );
-        for cell in site.caster.borrow().cells() {
+        for cell in site.cells() {
             assert!(since[cell.idx()] <= t + 1e-9, "{cell} is behind the impact");
         }
         if let Some(impact) = found {
@@ -292,11 +299,11 @@ fn casts_equal_a_test_of_every_reachable_triangle() {
             world = with_doors(world, |i| i % 3 == 0);
         }
         let mut site = Site::new(world);
-        for portal in site.world.graph.portal_ids() {
+        for portal in site.world().graph.portal_ids() {
             match rng.below(4) {
-                0 => site.state.close(portal),
-                1 => site.state.set_leaves(portal, rng.unit() as f32),
-                2 => site.state.open(portal),
+                0 => site.space.close(ROOT, portal),
+                1 => site.space.set_leaves(ROOT, portal, rng.unit() as f32),
+                2 => site.space.open(ROOT, portal),
                 _ => {}
             }
         }
@@ -314,20 +321,20 @@ fn points_hit_the_same_as_lines_of_sight() {
     let (mut n_hits, mut n_flat) = (0, 0);
     for (seed, turn) in [(1, 0.0), (2, 0.7)] {
         let mut site = Site::new(room_grid(&GridParams { turn, ..grid(seed) }));
-        for portal in site.world.graph.portal_ids().filter(|p| p.0 % 3 == 0) {
-            site.state.close(portal);
+        for portal in site.world().graph.portal_ids().filter(|p| p.0 % 3 == 0) {
+            site.space.close(ROOT, portal);
         }
-        let lines = Sightlines::build(&site.world);
+        let lines = Sightlines::build(site.world());
         for _ in 0..2000 {
             // Rounded as for lines of sight.
-            let from = random_point(&mut rng, &site.world).as_vec3();
-            let to = random_point(&mut rng, &site.world).as_vec3();
+            let from = random_point(&mut rng, site.world()).as_vec3();
+            let to = random_point(&mut rng, site.world()).as_vec3();
             let (a, b) = (from.as_dvec3(), to.as_dvec3());
-            if site.layout.locate(a).is_none() {
+            if site.layout().locate(a).is_none() {
                 continue;
             }
             let hit = lines
-                .pick(&site.state, from.to_array(), to.to_array())
+                .pick(site.space.state(ROOT), from.to_array(), to.to_array())
                 .unwrap();
             let found = site.cast(&Body::Sphere { radius: 0.0 }, a, b - a);
             assert_eq!(found.is_some(), hit.is_some(), "{a} {b} {found:?} {hit:?}");
@@ -357,8 +364,8 @@ fn two_rooms(doors: bool) -> (Site, DVec3, DVec3) {
         world
     };
     let site = Site::new(world);
-    let middle = site.layout.cell(CellId(0)).bounds.center();
-    let door = site.layout.opening(PortalId(0)).center();
+    let middle = site.layout().cell(CellId(0)).bounds.center();
+    let door = site.layout().opening(PortalId(0)).center();
     (site, middle, door)
 }
 
@@ -377,16 +384,16 @@ fn bodies_pass_open_doorways_and_stop_at_shut_ones_and_at_leaves() {
         matches!(target, Target::Detail { .. }) && (at - 1.24).abs() < 1e-6,
         "{at}"
     );
-    site.state.open(PortalId(0));
+    site.space.open(ROOT, PortalId(0));
     assert_eq!(stop(&site), None);
-    site.state.set_leaves(PortalId(0), 0.3);
+    site.space.set_leaves(ROOT, PortalId(0), 0.3);
     assert!(stop(&site).is_some());
-    site.state.close(PortalId(0));
+    site.space.close(ROOT, PortalId(0));
     let (_, at) = stop(&site).unwrap();
     assert!((at - 1.24).abs() < 1e-6, "not before the leaf: {at}");
     let (mut site, _, _) = two_rooms(false);
     assert_eq!(stop(&site), None);
-    site.state.close(PortalId(0));
+    site.space.close(ROOT, PortalId(0));
     let (target, at) = stop(&site).unwrap();
     assert_eq!(target, Target::Portal(PortalId(0)));
     assert!((at - 1.2).abs() < 1e-6, "{at}");
@@ -396,7 +403,7 @@ fn bodies_pass_open_doorways_and_stop_at_shut_ones_and_at_leaves() {
 fn only_cells_whose_openings_are_touched_are_searched() {
     let (site, middle, door) = two_rooms(false);
     let body = Body::Sphere { radius: 0.4 };
-    let cells = || site.caster.borrow().cells().to_vec();
+    let cells = || site.cells();
     assert!(site.touched(&body, middle).is_empty());
     assert_eq!(cells(), [CellId(0)]);
     let _ = site.touched(&body, door - DVec3::X * 0.39);
@@ -404,7 +411,7 @@ fn only_cells_whose_openings_are_touched_are_searched() {
     // Beside the opening, at the wall between both rooms.
     let beside = DVec3::new(
         door.x - 0.39,
-        site.layout.cell(CellId(0)).bounds.max.y - 0.5,
+        site.layout().cell(CellId(0)).bounds.max.y - 0.5,
         door.z,
     );
     assert!(!site.touched(&body, beside).is_empty());
@@ -455,7 +462,7 @@ fn objects_behind_a_wall_count_once_their_cell_is_reached() {
 #[test]
 fn contacts_at_the_start_stop_only_motion_into_them() {
     let (site, middle, _) = two_rooms(false);
-    let floor = site.layout.cell(CellId(0)).bounds.min.y;
+    let floor = site.layout().cell(CellId(0)).bounds.min.y;
     let turn = DQuat::from_rotation_y(0.3);
     let half = DVec3::splat(0.3);
     let bodies = [
@@ -491,12 +498,12 @@ fn contacts_are_those_of_every_reachable_triangle() {
     let mut n = 0;
     for i in 0..600 {
         let body = random_body(&mut rng, i % 3);
-        let at = random_point(&mut rng, &site.world);
-        if site.layout.locate(at).is_none() {
+        let at = random_point(&mut rng, site.world());
+        if site.layout().locate(at).is_none() {
             continue;
         }
         let found = site.touched(&body, at);
-        let cells = site.caster.borrow().cells().to_vec();
+        let cells = site.cells();
         let all: Vec<Triangle> = cells.iter().flat_map(|&c| site.obstacles(c)).collect();
         let touching = |margin: f64| {
             let body = body.grown(margin);
@@ -515,9 +522,8 @@ fn contacts_are_those_of_every_reachable_triangle() {
             n += 1;
         }
         let mut candidates = 0;
-        let cell = site.layout.locate(at).unwrap();
         let mut caster = site.caster.borrow_mut();
-        caster.for_each_candidate(&site.contacts, &site.state, &body, at, cell, |_, t| {
+        caster.for_each_candidate(&site.space, &body, (ROOT, at), site.place(at), |_, _, t| {
             assert!(body.bounds(at).expanded(1e-9).overlaps(&Aabb::of_points(t)));
             candidates += 1;
         });
@@ -531,19 +537,18 @@ fn queries_allocate_nothing_once_warm() {
     let site = Site::new(with_doors(room_grid(&grid(3)), |_| false));
     let mut rng = Rng::new(4);
     let points: Vec<DVec3> = (0..300)
-        .map(|_| random_point(&mut rng, &site.world))
+        .map(|_| random_point(&mut rng, site.world()))
         .collect();
     let mut next = 0;
     let mut ask = || {
         let body = random_body(&mut rng, next % 3);
         let at = points[next % 300];
         next += 1;
-        if site.layout.locate(at).is_some() {
+        if site.layout().locate(at).is_some() {
             let _ = site.cast(&body, at, DVec3::new(rng.range(-3.0, 3.0), -0.5, 2.0));
-            let cell = site.layout.locate(at).unwrap();
             let mut caster = site.caster.borrow_mut();
             let mut deepest = 0.0_f64;
-            caster.for_each_contact(&site.contacts, &site.state, &body, at, cell, |c| {
+            caster.for_each_contact(&site.space, &body, (ROOT, at), site.place(at), |c| {
                 deepest = deepest.max(c.depth);
             });
         }

@@ -7,13 +7,13 @@
 //!
 //! It keeps a gap to all obstacles ([`GAP`]); without it, rounding decides at seams of walls. Motion is level, so only the level
 //! parts of normals count.
+//!
+//! It is in the frame of the part whose floor it stands on, so a lift or a ship carries it along.
 
-use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
-use enfilade_runtime::SightState;
 
-use crate::bodies::{Body, Cast, Caster, Contacts};
-use crate::layout::Layout;
+use crate::bodies::{Body, Cast, Caster};
+use crate::space::{PartId, Place, Space};
 
 /// Gap kept to walls. [Units: wu]
 const GAP: f64 = 0.005;
@@ -54,58 +54,54 @@ impl Default for Build {
 /// A person who walks in a world. Allocates nothing once the buffers have grown.
 #[derive(Clone, Debug)]
 pub struct Walker {
-    /// Position of the eye; may be set. [Units: wu]
+    /// Position of the eye in the frame of its part; may be set. [Units: wu]
     pub eye: DVec3,
+    /// The part whose floor it stands on; may be set.
+    pub frame: PartId,
     build: Build,
     /// Downward speed. [Units: wu/s]
     falling: f64,
-    /// The last cell that it was in.
-    cell: Option<CellId>,
+    /// The last place that it was in.
+    place: Option<Place>,
     caster: Caster,
 }
 
 impl Walker {
-    /// Makes a walker at rest with its eye at a point.
+    /// Makes a walker at rest with its eye at a point of a part's frame.
     #[must_use]
-    pub fn new(contacts: &Contacts, build: Build, eye: DVec3) -> Self {
+    pub fn new(build: Build, frame: PartId, eye: DVec3) -> Self {
         Self {
             eye,
+            frame,
             build,
             falling: 0.0,
-            cell: None,
-            caster: Caster::new(contacts),
+            place: None,
+            caster: Caster::new(),
         }
     }
 
-    /// Returns the cell that it is in, or was in last; `None` before the first step, and if it was never in one.
+    /// Returns the place that it is in, or was in last; `None` before the first step, and if it was never in one.
     #[must_use]
-    pub fn cell(&self) -> Option<CellId> {
-        self.cell
+    pub fn place(&self) -> Option<Place> {
+        self.place
     }
 
-    /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors where
-    /// `state` puts them and openings that `state` shuts; falls, and climbs up to the height of a step. In no cell, nothing
-    /// stops it and it does not fall. [Units: wu/s, s]
+    /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors in
+    /// their current pose and shut openings; falls, and climbs up to the height of a step. In no cell, nothing stops it and it
+    /// does not fall. Enters and leaves parts through their doors; `wish` is in the frame of its part. [Units: wu/s, s]
     ///
     /// # Panics
     ///
-    /// If `contacts` and `layout` are not of one world.
-    pub fn step(
-        &mut self,
-        contacts: &Contacts,
-        layout: &Layout,
-        state: &SightState,
-        wish: DVec3,
-        seconds: f64,
-    ) {
+    /// If its part is not of `space`.
+    pub fn step(&mut self, space: &Space, wish: DVec3, seconds: f64) {
         let seconds = seconds.clamp(0.0, LONGEST);
         let flat = DVec3::new(wish.x, 0.0, wish.z) * seconds;
         if !(flat.is_finite() && self.eye.is_finite()) {
             return;
         }
-        self.slide(contacts, layout, state, flat);
-        self.push_out(contacts, layout, state);
-        self.stand(contacts, layout, state, seconds);
+        self.slide(space, flat);
+        self.push_out(space);
+        self.stand(space, seconds);
     }
 
     /// Returns the capsule from a step's height up to the eye, and the depth of its center below the eye.
@@ -117,19 +113,19 @@ impl Walker {
         (Body::Capsule { half, radius }, -half)
     }
 
-    /// Returns the cell of a point of it; in solid matter, the last one.
-    fn locate(&mut self, layout: &Layout, p: DVec3) -> Option<CellId> {
-        self.cell = layout.locate(p).or(self.cell);
-        self.cell
+    /// Returns the place of a point of it; in solid matter, the last one.
+    fn locate(&mut self, space: &Space, p: DVec3) -> Option<Place> {
+        self.place = space.locate(self.frame, p).or(self.place);
+        self.place
     }
 
-    fn slide(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, flat: DVec3) {
+    fn slide(&mut self, space: &Space, flat: DVec3) {
         let (body, below) = self.body();
         let mut left = flat;
         for _ in 0..SLIDES {
             let length = left.length();
             let from = self.eye + below;
-            let Some(cell) = self.locate(layout, from).filter(|_| length > 1e-9) else {
+            let Some(place) = self.locate(space, from).filter(|_| length > 1e-9) else {
                 self.eye += left;
                 return;
             };
@@ -137,11 +133,12 @@ impl Walker {
             let direction = left / length;
             let cast = Cast {
                 body: &body,
+                frame: self.frame,
                 from,
                 by: direction * (length + GAP),
-                cell,
+                place,
             };
-            let Some(impact) = self.caster.cast(contacts, state, &cast) else {
+            let Some(impact) = self.caster.cast(space, &cast) else {
                 self.eye += left;
                 return;
             };
@@ -158,16 +155,16 @@ impl Walker {
     }
 
     /// Moves out of obstacles, deepest first.
-    fn push_out(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState) {
+    fn push_out(&mut self, space: &Space) {
         let (body, below) = self.body();
         for _ in 0..SLIDES {
             let at = self.eye + below;
-            let Some(cell) = self.locate(layout, at) else {
+            let Some(place) = self.locate(space, at) else {
                 return;
             };
             let mut deepest = (0.0, DVec3::ZERO);
             self.caster
-                .for_each_contact(contacts, state, &body, at, cell, |contact| {
+                .for_each_contact(space, &body, (self.frame, at), place, |contact| {
                     let level = DVec3::new(contact.normal.x, 0.0, contact.normal.z);
                     if contact.depth > deepest.0
                         && let Some(normal) = level.try_normalize()
@@ -184,20 +181,22 @@ impl Walker {
     }
 
     /// Moves onto the floor, or towards it.
-    fn stand(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, seconds: f64) {
+    fn stand(&mut self, space: &Space, seconds: f64) {
         let Build {
             eye, step, climb, ..
         } = self.build;
         let knee = self.eye - DVec3::Y * (eye - step);
         let point = Body::Sphere { radius: 0.0 };
-        let floor = self.locate(layout, knee).and_then(|cell| {
+        let place = self.locate(space, knee);
+        let floor = place.and_then(|place| {
             let cast = Cast {
                 body: &point,
+                frame: self.frame,
                 from: knee,
                 by: -DVec3::Y * FAR,
-                cell,
+                place,
             };
-            self.caster.cast(contacts, state, &cast)
+            self.caster.cast(space, &cast)
         });
         let Some(floor) = floor else {
             // No floor below: do not fall.
@@ -213,42 +212,45 @@ impl Walker {
         } else {
             self.eye.y -= self.falling * seconds;
         }
+        if self.falling == 0.0 {
+            self.board(space, floor.place.part);
+        }
+    }
+
+    /// Changes to the frame of the part whose floor it stands on.
+    fn board(&mut self, space: &Space, part: PartId) {
+        if part != self.frame {
+            self.eye = space.between(self.frame, part).point(self.eye);
+            self.frame = part;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade_cpg::{DetailObject, PortalId, World};
+    use crate::layout::Layout;
+    use enfilade_cpg::{CellId, DetailObject, PortalId, World};
     use enfilade_geom::scene::{Mesh, Primitive};
     use enfilade_geom::{Aabb, DMat4};
-    use enfilade_runtime::Sight;
     use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
     struct Site {
-        contacts: Contacts,
-        layout: Layout,
-        state: SightState,
+        space: Space,
         walker: Walker,
     }
 
     impl Site {
         fn new(world: &World, eye: DVec3) -> Self {
-            let sight = Sight::build(world).unwrap();
-            let layout = Layout::new(world);
-            let contacts = Contacts::new(world, &sight, &layout);
             Self {
-                walker: Walker::new(&contacts, Build::default(), eye),
-                state: SightState::new(&sight),
-                layout,
-                contacts,
+                walker: Walker::new(Build::default(), PartId::ROOT, eye),
+                space: Space::new(world.clone()).unwrap(),
             }
         }
 
         fn walk(&mut self, wish: DVec3, seconds: f64) {
             for _ in 0..(seconds / 0.02).round() as usize {
-                let (contacts, layout) = (&self.contacts, &self.layout);
-                self.walker.step(contacts, layout, &self.state, wish, 0.02);
+                self.walker.step(&self.space, wish, 0.02);
             }
         }
     }
@@ -295,7 +297,7 @@ mod tests {
             ..GridParams::offices(9, 5)
         });
         let mut site = Site::new(&world, middle(&world));
-        let room = site.layout.cell(CellId(0)).bounds;
+        let room = site.space.layout(PartId::ROOT).cell(CellId(0)).bounds;
         let mut rng = Rng::new(6);
         let radius = Build::default().radius;
         // Not in a cupboard.
@@ -321,7 +323,7 @@ mod tests {
             farthest = farthest.max(eye.distance(start));
         }
         assert!(farthest > 1.0);
-        assert_eq!(site.walker.cell(), Some(CellId(0)));
+        assert_eq!(site.walker.place().map(|p| p.cell), Some(CellId(0)));
     }
 
     /// Covers W12: a walker slides along a wall at the speed that is left, and stands still where two walls meet.
@@ -385,12 +387,13 @@ mod tests {
         let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
         let door = Layout::new(&world).opening(PortalId(0)).center();
         let mut site = Site::new(&world, middle(&world));
-        site.state.set_leaves(PortalId(0), 1.0);
+        site.space.set_leaves(PartId::ROOT, PortalId(0), 1.0);
         site.walker.eye = DVec3::new(door.x + 0.4, 1.6, door.z);
         site.walk(DVec3::ZERO, 1.0);
         let before = site.walker.eye;
         for i in 1..=100 {
-            site.state.set_leaves(PortalId(0), 1.0 - i as f32 / 100.0);
+            site.space
+                .set_leaves(PartId::ROOT, PortalId(0), 1.0 - i as f32 / 100.0);
             site.walk(DVec3::ZERO, 0.02);
         }
         let after = site.walker.eye;
@@ -422,10 +425,10 @@ mod tests {
             "{}",
             site.walker.eye
         );
-        assert_eq!(site.walker.cell(), Some(CellId(0)));
+        assert_eq!(site.walker.place().map(|p| p.cell), Some(CellId(0)));
         // Shut, it holds.
         let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
-        site.state.close(PortalId(0));
+        site.space.close(PartId::ROOT, PortalId(0));
         site.walk(DVec3::ZERO, 3.0);
         assert!((site.walker.eye.y - hole.y - 1.6).abs() < 0.01);
     }
@@ -436,7 +439,7 @@ mod tests {
         let world = with_doors(room_grid(&GridParams::offices(20, 2)), |_| false);
         let mut site = Site::new(&world, middle(&world));
         for portal in world.graph.portal_ids() {
-            site.state.open(portal);
+            site.space.open(PartId::ROOT, portal);
         }
         let mut rng = Rng::new(1);
         let mut walk = |n: usize| {

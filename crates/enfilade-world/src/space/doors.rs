@@ -1,6 +1,7 @@
 //! The doors of a space: each setter records the change for those who depend on it.
 
 use enfilade_cpg::{CellId, PortalId};
+use enfilade_runtime::SightState;
 
 use super::{Change, PartId, Space};
 
@@ -47,6 +48,22 @@ impl Space {
             let exit = self.parts[part.idx()].layout.exits(cell)[i];
             self.door_changed(part, exit.portal);
         }
+    }
+
+    /// Replaces the state of all doors of a part, such as by one kept from before.
+    ///
+    /// # Panics
+    ///
+    /// If the state is not of the part's world.
+    pub fn set_state(&mut self, part: PartId, state: SightState) {
+        let known = &mut self.parts[part.idx()].state;
+        assert_eq!(
+            known.shares().len(),
+            state.shares().len(),
+            "a state of another world"
+        );
+        *known = state;
+        self.changes.reset();
     }
 
     fn door_changed(&mut self, part: PartId, portal: PortalId) {

@@ -14,34 +14,31 @@ use crate::layout::Layout;
 /// Poses between shut and open at which the box of a leaf's sweep is measured.
 const POSES: u32 = 16;
 
-/// Obstacles of a world by cell: walls, seals, objects, leaves of doors, shut portals. Made once, shared by any number of
-/// [`Caster`](crate::Caster)s.
+/// Obstacles of a world by cell: walls, seals, objects, leaves of doors, shut portals. Made once.
 #[derive(Clone, Debug)]
-pub struct Contacts {
-    pub(super) cells: Vec<CellWalls>,
-    pub(super) meshes: Vec<MeshWalls>,
+pub(crate) struct Walls {
+    pub(crate) cells: Vec<CellWalls>,
+    pub(crate) meshes: Vec<MeshWalls>,
     /// Per detail object; `None` for those without triangles.
-    pub(super) placed: Vec<Option<Placed>>,
+    pub(crate) placed: Vec<Option<Placed>>,
     /// Per portal.
-    pub(super) portal_cells: Vec<[CellId; 2]>,
-    /// Growth of openings in contact tests. [Units: wu]
-    pub(super) tolerance: f64,
+    pub(crate) portal_cells: Vec<[CellId; 2]>,
 }
 
 /// Obstacles of one cell.
 #[derive(Clone, Debug)]
-pub(super) struct CellWalls {
-    pub(super) bvh: Bvh,
+pub(crate) struct CellWalls {
+    pub(crate) bvh: Bvh,
     /// Per triangle of the tree.
-    pub(super) surfaces: Vec<TriangleOf>,
+    pub(crate) surfaces: Vec<TriangleOf>,
     /// Tree over the boxes of the objects that touch the cell, and their indices.
-    pub(super) tree: BoxTree,
-    pub(super) details: Vec<u32>,
+    pub(crate) tree: BoxTree,
+    pub(crate) details: Vec<u32>,
 }
 
 /// Owner of a triangle of a cell.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum TriangleOf {
+pub(crate) enum TriangleOf {
     Wall {
         batch: u32,
         triangle: u32,
@@ -59,31 +56,26 @@ pub(super) enum TriangleOf {
 
 /// The triangles of a mesh.
 #[derive(Clone, Debug)]
-pub(super) struct MeshWalls {
-    pub(super) bvh: Bvh,
+pub(crate) struct MeshWalls {
+    pub(crate) bvh: Bvh,
     /// Index of the first triangle of each primitive.
-    pub(super) first: Vec<u32>,
+    pub(crate) first: Vec<u32>,
 }
 
 /// A detail object in the model's pose.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
-    pub(super) mesh: u32,
-    pub(super) to_world: DMat4,
-    pub(super) to_mesh: DMat4,
+pub(crate) struct Placed {
+    pub(crate) mesh: u32,
+    pub(crate) to_world: DMat4,
+    pub(crate) to_mesh: DMat4,
     /// Its bounding box; for a leaf, that of its sweep. [Units: wu]
-    pub(super) bounds: Aabb,
-    pub(super) is_leaf: bool,
+    pub(crate) bounds: Aabb,
+    pub(crate) is_leaf: bool,
 }
 
-impl Contacts {
+impl Walls {
     /// Prepares a world. O(n log n) in triangles, each counted once for each cell that sees it.
-    ///
-    /// # Panics
-    ///
-    /// If `sight` or `layout` is not of this world.
-    #[must_use]
-    pub fn new(world: &World, sight: &Sight, layout: &Layout) -> Self {
+    pub(crate) fn new(world: &World, sight: &Sight, layout: &Layout) -> Self {
         let n_cells = layout.n_cells();
         let mut triangles: Vec<Vec<Triangle>> = vec![Vec::new(); n_cells];
         let mut surfaces: Vec<Vec<TriangleOf>> = vec![Vec::new(); n_cells];
@@ -122,21 +114,8 @@ impl Contacts {
             cells: cells.collect(),
             meshes,
             portal_cells,
-            tolerance: layout.tolerance(),
             placed,
         }
-    }
-
-    /// Returns the number of cells.
-    #[must_use]
-    pub fn n_cells(&self) -> usize {
-        self.cells.len()
-    }
-
-    /// Returns the number of triangles in the trees of all cells, portals included; one that several cells see counts for each.
-    #[must_use]
-    pub fn n_triangles(&self) -> usize {
-        self.cells.iter().map(|c| c.surfaces.len()).sum()
     }
 }
 
@@ -238,7 +217,7 @@ impl MeshWalls {
     }
 
     /// Returns the primitive of a triangle, and the triangle's index there.
-    pub(super) fn named(&self, triangle: u32) -> (u32, u32) {
+    pub(crate) fn named(&self, triangle: u32) -> (u32, u32) {
         let primitive = self.first.partition_point(|&f| f <= triangle) - 1;
         (primitive as u32, triangle - self.first[primitive])
     }
