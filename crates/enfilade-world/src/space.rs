@@ -77,7 +77,7 @@ pub(crate) struct Part {
     pub(crate) sight: Sight,
     pub(crate) state: SightState,
     /// Made by the first query of contacts.
-    walls: OnceLock<Walls>,
+    walls: OnceLock<Box<Walls>>,
     /// The cell that stands for the surroundings.
     pub(crate) border: Option<CellId>,
     pub(crate) host: PartId,
@@ -384,7 +384,7 @@ impl Space {
     /// Returns what bodies can hit in a part.
     pub(crate) fn walls(&self, part: PartId) -> &Walls {
         let part = &self.parts[part.idx()];
-        (part.walls).get_or_init(|| Walls::new(&part.world, &part.sight, &part.layout))
+        (part.walls).get_or_init(|| Box::new(Walls::new(&part.world, &part.sight, &part.layout)))
     }
 
     /// Returns the state of a part's doors.
