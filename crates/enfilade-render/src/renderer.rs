@@ -46,7 +46,7 @@ pub(crate) struct Shown<'a> {
     pub(crate) projection: Projection,
     /// Motion from that frame to that of the first world.
     pub(crate) pose: Pose,
-    pub(crate) style: &'a Style,
+    pub(crate) style: Style,
     pub(crate) marks: &'a [Mark],
     pub(crate) props: &'a [Prop],
     pub(crate) exposure: f32,
@@ -284,7 +284,7 @@ impl Renderer {
     ) -> Result<(), RenderError> {
         self.resize(gpu, size)?;
         let exposed = Exposed {
-            style: shown.style,
+            style: &shown.style,
             size,
             sun: self.sun,
             exposure: shown.exposure,
@@ -298,7 +298,7 @@ impl Renderer {
         }
         let marks = self.write_marks(gpu, parts, shown, size);
         let shadings: Vec<Shadings> = (parts.iter())
-            .map(|p| Shadings::of(shown.style, p.list, p.stage))
+            .map(|p| Shadings::of(&shown.style, p.list, p.stage))
             .collect();
         let ids = parts.iter().map(|p| p.id);
         let props = self.props.write(gpu, shown.props, ids);

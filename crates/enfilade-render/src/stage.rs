@@ -163,9 +163,7 @@ impl Globals {
                 .eye
                 .extend(f32::from(u8::from(projection.is_parallel)))
                 .to_array(),
-            sun: (turn.transpose() * sun.toward)
-                .extend(sun.texel)
-                .to_array(),
+            sun: (turn.transpose() * sun.toward).extend(sun.texel).to_array(),
             size: [w, h, 1.0 / w, 1.0 / h],
             style: [u32::from(style.paint == Paint::Cells), 0, 0, 0],
             light,

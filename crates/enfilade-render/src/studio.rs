@@ -31,8 +31,16 @@ pub enum Culling {
 
 /// An off-screen target, for benchmarks.
 pub struct StudioTarget {
-    view: wgpu::TextureView,
-    size: [u32; 2],
+    pub(crate) view: wgpu::TextureView,
+    pub(crate) size: [u32; 2],
+}
+
+/// A world beside the first, on the adapter.
+pub(crate) struct StudioPart {
+    pub(crate) world: GpuWorld,
+    pub(crate) stage: RenderStage,
+    /// Positions of the leaves as drawn last.
+    pub(crate) placed: Vec<Option<f32>>,
 }
 
 /// An adapter, a world on it, and the visibility queries that cull it.
@@ -53,9 +61,11 @@ pub struct Studio {
     pub(crate) stage: RenderStage,
     pub(crate) lister: Lister,
     /// Positions of the leaves as drawn last: [`SightState::shares`].
-    placed: Vec<Option<f32>>,
-    /// True if the shadow map is current.
-    has_shadows: bool,
+    pub(crate) placed: Vec<Option<f32>>,
+    /// Worlds beside the first, by [`PartId`] less one.
+    pub(crate) parts: Vec<StudioPart>,
+    /// Poses of the worlds that cast the shadows in the sun's map; `None` if it is out of date.
+    pub(crate) shadows_of: Option<Vec<Option<Pose>>>,
 }
 
 impl Studio {
@@ -94,7 +104,8 @@ impl Studio {
             renderer,
             stage,
             lister: Lister::new(),
-            has_shadows: false,
+            parts: Vec::new(),
+            shadows_of: None,
         })
     }
 
@@ -109,7 +120,7 @@ impl Studio {
         // Light does not depend on levels.
         let light = std::mem::replace(&mut self.stage.light, Light::uniform(&self.gpu)?);
         self.stage = self.renderer.stage(&self.gpu, light);
-        self.has_shadows = false;
+        self.shadows_of = None;
         Ok(())
     }
 
@@ -137,15 +148,16 @@ impl Studio {
         self.placed.clear();
         self.placed.extend_from_slice(self.state.shares());
         self.world.place(&self.state);
-        self.has_shadows = false;
+        self.shadows_of = None;
     }
 
     /// Draws the shadow map unless it is current.
     fn follow_sun(&mut self, style: &Style) {
-        if self.has_shadows || !style.shadows {
+        let alone = vec![Some(Pose::IDENTITY)];
+        if !style.shadows || self.shadows_of.as_ref() == Some(&alone) {
             return;
         }
-        self.has_shadows = true;
+        self.shadows_of = Some(alone);
         let all = Lister::new()
             .everything(&self.world, &self.sight, &self.state, [0.0; 3])
             .clone();
@@ -160,7 +172,7 @@ impl Studio {
 
     /// Returns the frame apart from the world.
     fn shown<'f>(&self, frame: &'f Frame<'_>) -> Shown<'f> {
-        let (style, projection) = (&frame.style, frame.projection);
+        let (style, projection) = (frame.style, frame.projection);
         // Parallel pictures have one exposure for all rooms.
         let is_eye = !projection.is_parallel && style.daylight;
         Shown {
@@ -385,8 +397,14 @@ impl Studio {
         size: [u32; 2],
     ) -> Result<[IdPicture; 2], RenderError> {
         let projection = camera.projection(size[0] as f32 / size[1] as f32)?;
-        self.renderer
-            .ids(&self.gpu, &self.world, &mut self.stage, &projection, list, size)
+        self.renderer.ids(
+            &self.gpu,
+            &self.world,
+            &mut self.stage,
+            &projection,
+            list,
+            size,
+        )
     }
 
     /// Draws everything that `projection` shows, colored by why each point is visible from another camera or not:
