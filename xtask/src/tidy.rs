@@ -111,7 +111,12 @@ const FENCES: [Fence; 18] = [
     },
     Fence {
         name: "enfilade-render",
-        siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-runtime"],
+        siblings: &[
+            "enfilade-geom",
+            "enfilade-cpg",
+            "enfilade-runtime",
+            "enfilade-world",
+        ],
         not: &["rayon", "anyhow", "clap", "winit"],
         words: &["std::fs", "std::thread"],
     },

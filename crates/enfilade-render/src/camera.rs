@@ -5,7 +5,8 @@
 //! before any multiplication, so that large coordinates cost no precision.
 
 use enfilade_runtime::{View, ViewError};
-use glam::{Mat4, Vec3, Vec4};
+use enfilade_world::Pose;
+use glam::{DVec3, Mat4, Vec3, Vec4};
 
 /// A perspective camera without roll: +Y is up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +69,7 @@ impl Camera {
         Ok(Projection {
             clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
             origin: Vec3::from(self.eye),
+            origin_low: Vec3::ZERO,
             eye: Vec3::from(self.eye),
             is_parallel: false,
         })
@@ -103,6 +105,8 @@ pub struct Projection {
     /// From points relative to `origin` to clip space.
     pub(crate) clip_from_relative: Mat4,
     pub(crate) origin: Vec3,
+    /// Remainder of the origin beyond `f32`, for frames far from it. Added to `origin`.
+    pub(crate) origin_low: Vec3,
     /// Origin of the lines of sight; far away for a parallel projection.
     pub(crate) eye: Vec3,
     pub(crate) is_parallel: bool,
@@ -137,8 +141,37 @@ impl Projection {
         Self {
             clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
             origin,
+            origin_low: Vec3::ZERO,
             eye: origin - forward * depth,
             is_parallel: true,
+        }
+    }
+
+    /// Returns the origin in full precision. [Units: wu]
+    pub(crate) fn exact_origin(&self) -> DVec3 {
+        self.origin.as_dvec3() + self.origin_low.as_dvec3()
+    }
+
+    /// Returns the same projection for points of another frame. `motion` maps that frame to this one.
+    #[must_use]
+    pub fn in_frame(&self, motion: &Pose) -> Self {
+        if *motion == Pose::IDENTITY {
+            return *self;
+        }
+        let exact = motion.point_back(self.exact_origin());
+        let origin = exact.as_vec3();
+        let eye = if self.is_parallel {
+            motion.point_back(self.eye.as_dvec3()).as_vec3()
+        } else {
+            origin
+        };
+        Self {
+            clip_from_relative: self.clip_from_relative
+                * Mat4::from_mat3(motion.matrix3().as_mat3()),
+            origin,
+            origin_low: (exact - origin.as_dvec3()).as_vec3(),
+            eye,
+            is_parallel: self.is_parallel,
         }
     }
 

@@ -7,12 +7,12 @@ use enfilade_cpg::PortalId;
 
 use crate::camera::Projection;
 use crate::formats::ID;
-use crate::frame::Style;
 use crate::gpu::{Gpu, RenderError};
 use crate::list::RenderList;
-use crate::renderer::{RenderStage, Renderer};
+use crate::renderer::Renderer;
 use crate::resources::{bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
+use crate::stage::RenderStage;
 
 /// The object visible at one pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -110,24 +110,20 @@ impl IdPicture {
 impl Renderer {
     /// Draws both id pictures of a list: opaque surfaces, and the nearest transparent one. Where two triangles
     /// coincide, the one listed first wins.
-    ///
-    /// # Errors
-    ///
-    /// A size beyond the adapter's limit; a device that was lost.
-    pub fn ids(
+    pub(crate) fn ids(
         &mut self,
         gpu: &Gpu,
         world: &GpuWorld,
-        stage: &RenderStage,
+        stage: &mut RenderStage,
         projection: &Projection,
         list: &RenderList,
         size: [u32; 2],
     ) -> Result<[IdPicture; 2], RenderError> {
         self.resize(gpu, size)?;
-        self.write_globals(gpu, stage, projection, &Style::default(), size);
-        self.write_instances(gpu, world, list);
+        self.write_camera(gpu, projection, size);
+        stage.write_instances(gpu, world, list);
         let entries = [
-            bound(0, &self.globals),
+            bound(0, &self.camera.buffer),
             bound(1, &world.corners),
             bound(2, &world.indices),
         ];
@@ -161,7 +157,7 @@ impl Renderer {
                 });
                 pass.set_pipeline(&self.pipelines.id);
                 pass.set_bind_group(0, &group, &[]);
-                pass.set_vertex_buffer(0, self.instances.buffer.slice(..));
+                pass.set_vertex_buffer(0, stage.instances.buffer.slice(..));
                 if let Some(listed) = &world.listed {
                     pass.set_vertex_buffer(1, listed.slice(..));
                 }

@@ -1,7 +1,7 @@
 //! Draws worlds of cells and portals with wgpu: to files without a display, or to a window's texture.
 //!
-//! Load a world once ([`GpuWorld`]). Each frame, a [`Lister`] turns the run-time's answer into a short list of draws,
-//! and a [`Renderer`] draws it. Any adapter that wgpu supports works, software included.
+//! Load a world once ([`Studio`]). Each frame, a [`Lister`] turns the run-time's answer into a short list of draws,
+//! which the studio draws. Any adapter that wgpu supports works, software included.
 //!
 //! # Limits
 //!
@@ -22,12 +22,15 @@ mod materials;
 mod oracle;
 mod picture;
 mod pipelines;
+mod props;
 mod queries;
 mod renderer;
 mod resources;
 mod scale;
 mod scene;
 mod shadings;
+mod space;
+mod stage;
 mod studio;
 mod viewpoints;
 
@@ -39,8 +42,9 @@ pub use list::{DrawReason, Lister, RenderList, Shot, Sparing};
 pub use marks::{Mark, MarkShape};
 pub use oracle::Oracle;
 pub use picture::Picture;
+pub use props::{Prop, PropMesh};
 pub use queries::QueryCounts;
-pub use renderer::{RenderStage, Renderer};
 pub use scene::{GpuWorld, cell_color};
+pub use space::{SpaceCounts, SpaceShot};
 pub use studio::{Culling, Studio, StudioTarget};
 pub use viewpoints::{EYE_HEIGHT, FOV, good_camera, portal_looked_at, walk, walk_cameras};

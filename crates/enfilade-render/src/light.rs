@@ -217,21 +217,26 @@ impl Light {
 
     /// Returns the exposure for an eye at a place, relative to the outdoors: longer in dim rooms, from which the
     /// outdoors then looks overexposed.
-    fn exposure(&self, eye: Vec3) -> f32 {
-        let cell = self.field.locate(eye.to_array());
-        let brightness = usize::try_from(cell)
-            .ok()
-            .and_then(|c| self.brightness.get(c));
-        match brightness {
-            Some(&b) if b > 0.0 => (MIDDLE / b).clamp(1.0, LONGEST),
-            _ => 1.0,
+    ///
+    /// `surroundings` is the [brightness](Light::brightness_at) around the world, relative to the outdoors.
+    pub(crate) fn exposure(&self, eye: Vec3, surroundings: f32) -> f32 {
+        match self.brightness_at(eye) {
+            Some(b) => (MIDDLE / (b * surroundings)).clamp(1.0, LONGEST),
+            None if surroundings < 1.0 => (MIDDLE / surroundings).clamp(1.0, LONGEST),
+            None => 1.0,
         }
     }
 
-    /// Returns the shader parameters for a camera at `origin`; `is_eye` if an eye is there.
-    pub(crate) fn globals(&self, origin: Vec3, is_eye: bool) -> LightGlobals {
-        let shift = (origin.as_dvec3() - self.field.origin).as_vec3();
-        let exposure = if is_eye { self.exposure(origin) } else { 1.0 };
+    /// Returns the brightness of the air at a place, relative to the outdoors; `None` outdoors.
+    pub(crate) fn brightness_at(&self, p: Vec3) -> Option<f32> {
+        let cell = self.field.locate(p.to_array());
+        let cell = usize::try_from(cell).ok()?;
+        self.brightness.get(cell).copied().filter(|b| *b > 0.0)
+    }
+
+    /// Returns the shader parameters for a camera at `origin`.
+    pub(crate) fn globals(&self, origin: DVec3, exposure: f32) -> LightGlobals {
+        let shift = (origin - self.field.origin).as_vec3();
         LightGlobals {
             shift: shift.extend(exposure).to_array(),
             ..self.globals

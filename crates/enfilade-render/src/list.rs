@@ -44,6 +44,8 @@ pub(crate) struct Run {
     pub(crate) instances: Range<u32>,
     /// `None` for the whole picture.
     pub(crate) scissor: Option<Scissor>,
+    /// Distance from the eye of a transparent run. [Units: wu]
+    pub(crate) distance: f32,
 }
 
 impl Run {
@@ -56,6 +58,7 @@ impl Run {
             is_smooth: span.is_smooth,
             instances,
             scissor,
+            distance: 0.0,
         }
     }
 }
@@ -172,7 +175,7 @@ pub struct Lister {
     plugs: Vec<PortalId>,
     /// Visible cells, ascending.
     cells: Vec<CellId>,
-    far: Vec<(f32, Run)>,
+    far: Vec<Run>,
 }
 
 /// Adds a run; extends the last one if it continues it.
@@ -378,7 +381,8 @@ impl Lister {
             let run = Run::of(&span, 0..1, scissor);
             if span.is_transparent {
                 let [low, high] = sight.chunks()[c as usize].aabb.map(Vec3::from);
-                self.far.push((((low + high) * 0.5).distance(eye), run));
+                let distance = ((low + high) * 0.5).distance(eye);
+                self.far.push(Run { distance, ..run });
             } else {
                 push_run(&mut self.list.opaque, run);
             }
@@ -402,7 +406,10 @@ impl Lister {
                 if span.is_transparent {
                     for (at, &(.., detail)) in (first..last).zip(group) {
                         let center = world.details[detail as usize].center;
-                        self.far.push((center.distance(eye), run(at..at + 1)));
+                        self.far.push(Run {
+                            distance: center.distance(eye),
+                            ..run(at..at + 1)
+                        });
                     }
                 } else {
                     self.list.opaque.push(run(first..last));
@@ -411,10 +418,8 @@ impl Lister {
         }
         // Equal distances in the order of the world, so that pictures are deterministic.
         self.far
-            .sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.first.cmp(&b.1.first)));
-        for (_, run) in self.far.drain(..) {
-            self.list.transparent.push(run);
-        }
+            .sort_by(|a, b| (b.distance.total_cmp(&a.distance)).then(a.first.cmp(&b.first)));
+        self.list.transparent.append(&mut self.far);
         &self.list
     }
 }

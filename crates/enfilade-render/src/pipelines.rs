@@ -45,6 +45,8 @@ pub(crate) struct Variant {
     pub(crate) casts_shadows: bool,
     pub(crate) has_light: bool,
     pub(crate) explains: bool,
+    /// True if the color is that of the instance.
+    pub(crate) is_prop: bool,
     /// True if it draws to the output, not to the intermediate target of the post pass.
     pub(crate) is_last: bool,
 }
@@ -434,6 +436,7 @@ impl Pipelines {
                     ("HAS_LIGHT", number(variant.has_light)),
                     ("IS_SMOOTH", number(variant.is_smooth)),
                     ("EXPLAINS", number(variant.explains)),
+                    ("IS_PROP", number(variant.is_prop)),
                 ],
             },
         );

@@ -14,7 +14,6 @@ use enfilade_cpg::{CellId, World};
 use enfilade_runtime::{ChunkId, DetailId, View};
 use glam::Vec3;
 
-use crate::Style;
 use crate::camera::Camera;
 use crate::gpu::RenderError;
 use crate::list::{DrawReason, RenderList};
@@ -115,8 +114,7 @@ impl Studio {
     ) -> Result<BTreeSet<CellId>, RenderError> {
         let projection = camera.projection(size[0] as f32 / size[1] as f32)?;
         self.renderer.resize(&self.gpu, size)?;
-        self.renderer
-            .write_globals(&self.gpu, &self.stage, &projection, &Style::default(), size);
+        self.renderer.write_camera(&self.gpu, &projection, size);
         // Opaque chunks: transparent or masked ones do not hide.
         let in_view: Vec<u32> = self
             .viewer
@@ -192,9 +190,8 @@ impl Studio {
         let (gpu, renderer) = (&self.gpu, &mut self.renderer);
         let n = asked.len() as u32;
         let structure = RenderList::of_structure();
-        renderer.write_instances(gpu, &self.world, &structure);
+        self.stage.write_instances(gpu, &self.world, &structure);
         renderer.marks.write(gpu, bytemuck::cast_slice(corners));
-        let globals = renderer.globals_group(gpu);
         let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
             label: Some("portals"),
             ty: wgpu::QueryType::Occlusion,
@@ -226,9 +223,9 @@ impl Studio {
                 occlusion_query_set: Some(&queries),
                 ..wgpu::RenderPassDescriptor::default()
             });
-            pass.set_bind_group(0, &globals, &[]);
+            pass.set_bind_group(0, &renderer.camera.group, &[]);
             pass.set_pipeline(&renderer.pipelines.depth);
-            set_buffers(&mut pass, &self.world, &renderer.instances);
+            set_buffers(&mut pass, &self.world, &self.stage.instances);
             for &c in new {
                 let span = &self.world.chunks[c as usize];
                 pass.draw_indexed(span.first..span.first + span.n, 0, 0..1);

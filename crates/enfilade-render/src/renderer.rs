@@ -2,37 +2,26 @@
 
 use std::ops::Range;
 
+use enfilade_world::{PartId, Pose};
 use glam::{Mat4, Vec3};
 
 use crate::camera::Projection;
 use crate::formats::{COLOR, DEPTH};
-use crate::frame::{Frame, Paint, Style};
+use crate::frame::{Paint, Style};
 use crate::gpu::{Gpu, RenderError};
-use crate::light::{Light, LightGlobals};
+use crate::light::Light;
 use crate::list::{RenderList, Run};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::pipelines::{Layouts, Pipelines};
+use crate::props::{Prop, PropDraw, PropMeshes};
 use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
-use crate::scene::{GpuWorld, Instance};
+use crate::scene::GpuWorld;
 use crate::shadings::{Shadings, draw_runs, set_buffers};
+use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage, Sunlight};
 
 /// Side of the shadow map. [Units: texels]
 const SHADOW_SIDE: u32 = 4096;
-
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Globals {
-    clip_from_relative: [[f32; 4]; 4],
-    relative_from_clip: [[f32; 4]; 4],
-    shadow_from_world: [[f32; 4]; 4],
-    origin: [f32; 4],
-    eye: [f32; 4],
-    sun: [f32; 4],
-    size: [f32; 4],
-    style: [u32; 4],
-    light: LightGlobals,
-}
 
 /// Intermediate targets of frames of one size.
 pub(crate) struct Targets {
@@ -42,44 +31,56 @@ pub(crate) struct Targets {
     post: wgpu::BindGroup,
 }
 
+/// One world of a frame.
+pub(crate) struct DrawnPart<'a> {
+    pub(crate) id: PartId,
+    pub(crate) world: &'a GpuWorld,
+    pub(crate) stage: &'a mut RenderStage,
+    pub(crate) list: &'a RenderList,
+}
+
+/// A frame apart from its worlds.
+#[derive(Clone, Copy)]
+pub(crate) struct Shown<'a> {
+    /// The projection in the frame of the camera.
+    pub(crate) projection: Projection,
+    /// Motion from that frame to that of the first world.
+    pub(crate) pose: Pose,
+    pub(crate) style: Style,
+    pub(crate) marks: &'a [Mark],
+    pub(crate) props: &'a [Prop],
+    pub(crate) exposure: f32,
+}
+
+impl Shown<'_> {
+    /// Returns the projection in the frame of a world.
+    fn projection_in(&self, stage: &RenderStage) -> Projection {
+        if stage.pose == self.pose {
+            return self.projection;
+        }
+        let motion = self.pose.inverse().after(&stage.pose);
+        self.projection.in_frame(&motion)
+    }
+}
+
 /// Draws worlds; one for each texture format.
-pub struct Renderer {
+pub(crate) struct Renderer {
     pub(crate) layouts: Layouts,
     pub(crate) pipelines: Pipelines,
-    pub(crate) globals: wgpu::Buffer,
-    pub(crate) instances: Grown,
-    /// Instances of the last list, reused from frame to frame.
-    drawn: Vec<Instance>,
+    /// Parameters of a frame in the camera's own frame.
+    pub(crate) camera: GlobalsBuffer,
     pub(crate) marks: Grown,
+    pub(crate) props: PropMeshes,
     pub(crate) targets: Option<Targets>,
     shadow_map: wgpu::TextureView,
     shadow_sampler: wgpu::Sampler,
-    /// Direction to the sun.
-    pub(crate) sun: Vec3,
-    /// The explanation of visibility, if requested.
-    explanation: Option<wgpu::TextureView>,
+    pub(crate) sun: Sunlight,
     format: wgpu::TextureFormat,
 }
 
-/// A world's bind groups and shadow map.
-pub struct RenderStage {
-    world: wgpu::BindGroup,
-    pub(crate) light: Light,
-    shadow_from_world: Mat4,
-    /// Size of a texel of the shadow map. [Units: wu]
-    texel: f32,
-}
-
 impl Renderer {
-    /// Returns a renderer of pictures for files.
-    #[must_use]
-    pub fn new(gpu: &Gpu) -> Self {
-        Self::with_format(gpu, COLOR)
-    }
-
-    /// Returns a renderer to targets of a format, such as a window's.
-    #[must_use]
-    pub fn with_format(gpu: &Gpu, format: wgpu::TextureFormat) -> Self {
+    /// Returns a renderer to targets of a format, such as a window's. `sun` points to the sun.
+    pub(crate) fn new(gpu: &Gpu, format: wgpu::TextureFormat, sun: Vec3) -> Self {
         let layouts = Layouts::new(gpu);
         let pipelines = Pipelines::new(gpu, &layouts, format);
         let side = SHADOW_SIDE.min(gpu.device.limits().max_texture_dimension_2d);
@@ -97,22 +98,19 @@ impl Renderer {
             ..wgpu::SamplerDescriptor::default()
         });
         Self {
+            camera: GlobalsBuffer::new(gpu, &layouts),
             layouts,
             pipelines,
-            globals: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("globals"),
-                size: size_of::<Globals>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
-            instances: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
-            drawn: Vec::new(),
             marks: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
+            props: PropMeshes::new(gpu),
             targets: None,
             shadow_map: shadow_map.create_view(&wgpu::TextureViewDescriptor::default()),
             shadow_sampler,
-            sun: Vec3::new(0.45, 0.75, 0.32).normalize(),
-            explanation: None,
+            sun: Sunlight {
+                toward: sun,
+                map_from_root: Mat4::IDENTITY,
+                texel: 0.0,
+            },
             format,
         }
     }
@@ -121,27 +119,20 @@ impl Renderer {
         self.format
     }
 
-    /// Prepares a world for this renderer: bind groups and shadow map. `everything` is the list of the whole
-    /// world, `light` its light. One world at a time: the shadow map is that of the last.
-    pub(crate) fn set_stage(
-        &mut self,
-        gpu: &Gpu,
-        world: &GpuWorld,
-        light: Light,
-        everything: &RenderList,
-    ) -> RenderStage {
-        let (shadow_from_world, texel) = self.sun_view(world);
-        let stage = RenderStage {
-            world: self.world_group(gpu, &light),
-            light,
-            shadow_from_world,
-            texel,
-        };
-        self.draw_shadows(gpu, world, &stage, everything);
-        stage
+    /// Prepares a world with its light for this renderer.
+    pub(crate) fn stage(&self, gpu: &Gpu, light: Light) -> RenderStage {
+        let globals = GlobalsBuffer::new(gpu, &self.layouts);
+        let world = self.world_group(gpu, &globals, &light, None);
+        RenderStage::new(gpu, world, globals, light)
     }
 
-    fn world_group(&self, gpu: &Gpu, light: &Light) -> wgpu::BindGroup {
+    fn world_group(
+        &self,
+        gpu: &Gpu,
+        globals: &GlobalsBuffer,
+        light: &Light,
+        explanation: Option<&wgpu::TextureView>,
+    ) -> wgpu::BindGroup {
         let view = |binding, view| wgpu::BindGroupEntry {
             binding,
             resource: wgpu::BindingResource::TextureView(view),
@@ -150,57 +141,70 @@ impl Renderer {
             binding,
             resource: wgpu::BindingResource::Sampler(sampler),
         };
-        // Without an explanation, bind a table of the same type that shaders ignore.
-        let explanation = self.explanation.as_ref().unwrap_or(&light.table);
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("world"),
             layout: &self.layouts.world,
             entries: &[
-                bound(0, &self.globals),
+                bound(0, &globals.buffer),
                 view(1, &self.shadow_map),
                 sampler(2, &self.shadow_sampler),
                 view(3, &light.table),
                 view(4, &light.starts),
                 view(5, &light.probes),
                 sampler(6, &light.sampler),
-                view(7, explanation),
+                // Without an explanation, bind a table of the same type that shaders ignore.
+                view(7, explanation.unwrap_or(&light.table)),
             ],
         })
     }
 
     /// Colors surfaces by why they are visible or not from now on; `None` ends that.
     pub(crate) fn explain(
-        &mut self,
+        &self,
         gpu: &Gpu,
         stage: &mut RenderStage,
         explanation: Option<wgpu::TextureView>,
     ) {
-        self.explanation = explanation;
-        stage.world = self.world_group(gpu, &stage.light);
+        stage.explanation = explanation;
+        let RenderStage { globals, light, .. } = &*stage;
+        stage.world = self.world_group(gpu, globals, light, stage.explanation.as_ref());
     }
 
-    /// Returns the view of the sun: parallel, over the whole world.
-    fn sun_view(&self, world: &GpuWorld) -> (Mat4, f32) {
-        let [low, high] = world.bounds;
+    /// Points the shadow map's view along the sun, parallel, over all worlds.
+    fn aim_sun(&mut self, parts: &[DrawnPart<'_>]) {
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for part in parts {
+            let [a, b] = part.world.bounds;
+            for i in 0..8 {
+                let side = |k: usize| if i >> k & 1 == 0 { a[k] } else { b[k] };
+                let p = Vec3::new(side(0), side(1), side(2)).as_dvec3();
+                let p = part.stage.pose.point(p).as_vec3();
+                (low, high) = (low.min(p), high.max(p));
+            }
+        }
+        let toward = self.sun.toward;
         let center = (low + high) * 0.5;
         let radius = ((high - low).length() * 0.5).max(0.1);
-        let back = Mat4::look_to_rh(center + self.sun * radius, -self.sun, Vec3::Z);
+        let back = Mat4::look_to_rh(center + toward * radius, -toward, Vec3::Z);
         let flat = Mat4::orthographic_rh(-radius, radius, -radius, radius, 0.0, 2.0 * radius);
-        (flat * back, 2.0 * radius / SHADOW_SIDE as f32)
+        self.sun.map_from_root = flat * back;
+        self.sun.texel = 2.0 * radius / SHADOW_SIDE as f32;
     }
 
-    /// Draws the shadow map.
-    pub(crate) fn draw_shadows(
-        &mut self,
-        gpu: &Gpu,
-        world: &GpuWorld,
-        stage: &RenderStage,
-        all: &RenderList,
-    ) {
+    /// Draws the shadow map: `parts` are all worlds, each with the list of everything in it.
+    pub(crate) fn draw_shadows(&mut self, gpu: &Gpu, parts: &mut [DrawnPart<'_>]) {
+        self.aim_sun(parts);
         let projection = Projection::parallel([0.0; 3], [0.0, -1.0, 0.0], 1.0, 1.0, 1.0);
-        self.write_globals(gpu, stage, &projection, &Style::default(), [1, 1]);
-        self.write_instances(gpu, world, all);
-        let group = self.globals_group(gpu);
+        let exposed = Exposed {
+            style: &Style::default(),
+            size: [1, 1],
+            sun: self.sun,
+            exposure: 1.0,
+        };
+        for part in &mut *parts {
+            part.stage.write_globals(gpu, &projection, &exposed);
+            part.stage.write_instances(gpu, part.world, part.list);
+        }
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -211,67 +215,27 @@ impl Renderer {
                 ..wgpu::RenderPassDescriptor::default()
             });
             pass.set_pipeline(&self.pipelines.shadow);
-            pass.set_bind_group(0, &group, &[]);
-            set_buffers(&mut pass, world, &self.instances);
-            for run in &all.opaque {
-                pass.draw_indexed(run.first..run.first + run.n, 0, run.instances.clone());
+            for part in parts {
+                pass.set_bind_group(0, &part.stage.globals.group, &[]);
+                set_buffers(&mut pass, part.world, &part.stage.instances);
+                for run in &part.list.opaque {
+                    pass.draw_indexed(run.first..run.first + run.n, 0, run.instances.clone());
+                }
             }
         }
         gpu.queue.submit([encoder.finish()]);
     }
 
-    pub(crate) fn globals_group(&self, gpu: &Gpu) -> wgpu::BindGroup {
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("globals"),
-            layout: &self.layouts.globals,
-            entries: &[bound(0, &self.globals)],
-        })
-    }
-
-    /// Writes the instances of a list in its order.
-    pub(crate) fn write_instances(&mut self, gpu: &Gpu, world: &GpuWorld, list: &RenderList) {
-        self.drawn.clear();
-        self.drawn.extend(list.instances.iter().map(|&key| {
-            let number = (key & crate::list::INSTANCE_MASK) as usize;
-            world.instances[number].drawn(key)
-        }));
-        self.instances.write(gpu, bytemuck::cast_slice(&self.drawn));
-    }
-
-    pub(crate) fn write_globals(
-        &self,
-        gpu: &Gpu,
-        stage: &RenderStage,
-        projection: &Projection,
-        style: &Style,
-        size: [u32; 2],
-    ) {
-        let [w, h] = size.map(|n| n as f32);
-        let globals = Globals {
-            clip_from_relative: projection.clip_from_relative.to_cols_array_2d(),
-            relative_from_clip: projection.clip_from_relative.inverse().to_cols_array_2d(),
-            shadow_from_world: stage.shadow_from_world.to_cols_array_2d(),
-            origin: projection.origin.extend(style.cut_above).to_array(),
-            eye: projection
-                .eye
-                .extend(f32::from(u8::from(projection.is_parallel)))
-                .to_array(),
-            sun: self.sun.extend(stage.texel).to_array(),
-            size: [w, h, 1.0 / w, 1.0 / h],
-            style: [
-                u32::from(style.paint == Paint::Cells),
-                u32::from(self.explanation.is_some()),
-                0,
-                0,
-            ],
-            light: {
-                // Parallel pictures have one exposure for all rooms.
-                let is_eye = !projection.is_parallel && style.daylight;
-                stage.light.globals(projection.origin, is_eye)
-            },
+    /// Writes the parameters of a frame of the camera alone, in the frame of the first world.
+    pub(crate) fn write_camera(&self, gpu: &Gpu, projection: &Projection, size: [u32; 2]) {
+        let exposed = Exposed {
+            style: &Style::default(),
+            size,
+            sun: self.sun,
+            exposure: 1.0,
         };
-        gpu.queue
-            .write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
+        let globals = Globals::new(projection, &Pose::IDENTITY, &exposed);
+        self.camera.write(gpu, &globals);
     }
 
     /// Makes the targets of a size unless they exist.
@@ -310,27 +274,41 @@ impl Renderer {
     }
 
     /// Draws a frame to `output`, a texture of the renderer's format and of `size`.
-    ///
-    /// # Errors
-    ///
-    /// A size beyond the adapter's limit.
-    pub fn draw(
+    pub(crate) fn draw(
         &mut self,
         gpu: &Gpu,
-        world: &GpuWorld,
-        stage: &RenderStage,
-        frame: &Frame<'_>,
+        parts: &mut [DrawnPart<'_>],
+        shown: &Shown<'_>,
         output: &wgpu::TextureView,
         size: [u32; 2],
     ) -> Result<(), RenderError> {
         self.resize(gpu, size)?;
-        self.write_globals(gpu, stage, &frame.projection, &frame.style, size);
-        let list = frame.list;
-        self.write_instances(gpu, world, list);
-        let marks = self.write_marks(gpu, world, frame, size);
-        let globals = self.globals_group(gpu);
-        let shadings = Shadings::of(frame, stage.light.is_known(), self.explanation.is_some());
-        shadings.prepare(gpu, &self.layouts, &mut self.pipelines, list);
+        let exposed = Exposed {
+            style: &shown.style,
+            size,
+            sun: self.sun,
+            exposure: shown.exposure,
+        };
+        let globals = Globals::new(&shown.projection, &shown.pose, &exposed);
+        self.camera.write(gpu, &globals);
+        for part in &mut *parts {
+            let projection = shown.projection_in(part.stage);
+            part.stage.write_globals(gpu, &projection, &exposed);
+            part.stage.write_instances(gpu, part.world, part.list);
+        }
+        let marks = self.write_marks(gpu, parts, shown, size);
+        let shadings: Vec<Shadings> = (parts.iter())
+            .map(|p| Shadings::of(&shown.style, p.list, p.stage))
+            .collect();
+        let ids = parts.iter().map(|p| p.id);
+        let props = self.props.write(gpu, shown.props, ids);
+        for ((part, shadings), props) in parts.iter().zip(&shadings).zip(&props) {
+            shadings.prepare(gpu, &self.layouts, &mut self.pipelines, part.list);
+            for prop in props {
+                let variant = shadings.prop(prop.span.is_smooth);
+                self.pipelines.prepare(gpu, &self.layouts, variant);
+            }
+        }
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -338,7 +316,8 @@ impl Renderer {
             return Ok(());
         };
         // Ambient occlusion and counts need the whole image; otherwise one pass draws everything.
-        let in_two = !shadings.is_last;
+        let is_count = shown.style.paint == Paint::Overdraw;
+        let in_two = is_count || shown.style.dark_corners;
         let first = if in_two { &targets.color } else { output };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surfaces"),
@@ -349,10 +328,13 @@ impl Renderer {
             depth_stencil_attachment: Some(depth_attachment(&targets.depth, Some(0.0))),
             ..wgpu::RenderPassDescriptor::default()
         });
-        self.draw_surfaces(&mut pass, world, stage, &shadings, list, size);
+        for ((part, shadings), props) in parts.iter().zip(&shadings).zip(&props) {
+            self.draw_surfaces(&mut pass, part, shadings, size);
+            self.draw_props(&mut pass, part, shadings, props, size);
+        }
         if in_two {
             drop(pass);
-            self.draw_picture(&mut encoder, &globals, targets, &shadings, output);
+            self.draw_picture(&mut encoder, targets, is_count, output);
             pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("glass"),
                 color_attachments: &[Some(color_attachment(output, None))],
@@ -362,17 +344,13 @@ impl Renderer {
         } else {
             pass.set_scissor_rect(0, 0, size[0], size[1]);
             pass.set_pipeline(&self.pipelines.sky);
-            pass.set_bind_group(0, &globals, &[]);
+            pass.set_bind_group(0, &self.camera.group, &[]);
             pass.draw(0..3, 0..1);
         }
-        if !list.transparent.is_empty() && !shadings.is_count {
-            pass.set_bind_group(0, &stage.world, &[]);
-            set_buffers(&mut pass, world, &self.instances);
-            draw_runs(&mut pass, world, &list.transparent, size, |run| {
-                self.pipelines.surface(shadings.glass(run))
-            });
+        if !is_count {
+            self.draw_glass(&mut pass, parts, &shadings, size);
         }
-        self.draw_marks(&mut pass, &globals, &marks, size);
+        self.draw_marks(&mut pass, &marks, size);
         drop(pass);
         gpu.queue.submit([encoder.finish()]);
         Ok(())
@@ -382,40 +360,95 @@ impl Renderer {
     fn write_marks(
         &mut self,
         gpu: &Gpu,
-        world: &GpuWorld,
-        frame: &Frame<'_>,
+        parts: &[DrawnPart<'_>],
+        shown: &Shown<'_>,
         size: [u32; 2],
     ) -> [Range<u32>; 2] {
-        let stand_ins: Vec<Mark> = frame
-            .list
-            .stand_ins
-            .iter()
-            .map(|&(portal, cell)| world.stand_in(portal, cell))
-            .collect();
-        let [behind, _] = crate::marks::corners(&stand_ins, &frame.projection, size);
-        let [hidden, on_top] = crate::marks::corners(frame.marks, &frame.projection, size);
-        let hidden = [behind, hidden].concat();
+        let mut hidden = Vec::new();
+        for part in parts.iter().filter(|p| !p.list.stand_ins.is_empty()) {
+            let stand_ins: Vec<Mark> = (part.list.stand_ins.iter())
+                .map(|&(portal, cell)| part.world.stand_in(portal, cell))
+                .collect();
+            let projection = shown.projection_in(part.stage);
+            let [behind, _] = crate::marks::corners(&stand_ins, &projection, size);
+            hidden.extend(behind);
+        }
+        let [below, on_top] = crate::marks::corners(shown.marks, &shown.projection, size);
+        hidden.extend(below);
         let n_hidden = hidden.len() as u32;
-        let marks = [hidden, on_top].concat();
-        self.marks.write(gpu, bytemuck::cast_slice(&marks));
-        [0..n_hidden, n_hidden..marks.len() as u32]
+        hidden.extend(on_top);
+        self.marks.write(gpu, bytemuck::cast_slice(&hidden));
+        [0..n_hidden, n_hidden..hidden.len() as u32]
     }
 
     fn draw_surfaces(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        world: &GpuWorld,
-        stage: &RenderStage,
+        part: &DrawnPart<'_>,
         shadings: &Shadings,
-        list: &RenderList,
         size: [u32; 2],
     ) {
-        pass.set_bind_group(0, &stage.world, &[]);
-        set_buffers(pass, world, &self.instances);
+        pass.set_bind_group(0, &part.stage.world, &[]);
+        set_buffers(pass, part.world, &part.stage.instances);
         let surface = |run: &Run| self.pipelines.surface(shadings.opaque(run));
-        draw_runs(pass, world, &list.opaque, size, surface);
+        draw_runs(pass, part.world, part.list.opaque.iter(), size, surface);
         if shadings.is_count {
-            draw_runs(pass, world, &list.transparent, size, surface);
+            let runs = part.list.transparent.iter();
+            draw_runs(pass, part.world, runs, size, surface);
+        }
+    }
+
+    fn draw_props(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        part: &DrawnPart<'_>,
+        shadings: &Shadings,
+        props: &[PropDraw],
+        size: [u32; 2],
+    ) {
+        if props.is_empty() {
+            return;
+        }
+        self.props.set_buffers(pass);
+        pass.set_scissor_rect(0, 0, size[0], size[1]);
+        pass.set_bind_group(0, &part.stage.world, &[]);
+        pass.set_bind_group(1, &part.world.textures[0], &[]);
+        for draw in props {
+            let span = &draw.span;
+            if let Some(pipeline) = self.pipelines.surface(shadings.prop(span.is_smooth)) {
+                pass.set_pipeline(pipeline);
+                let range = span.first..span.first + span.n;
+                pass.draw_indexed(range, 0, draw.instances.clone());
+            }
+        }
+    }
+
+    /// Draws the transparent surfaces of all worlds, far to near.
+    fn draw_glass(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        parts: &[DrawnPart<'_>],
+        shadings: &[Shadings],
+        size: [u32; 2],
+    ) {
+        let of_part = |(i, p): (usize, &DrawnPart<'_>)| {
+            let runs = p.list.transparent.iter().enumerate();
+            runs.map(move |(k, run)| (run.distance, i, k))
+                .collect::<Vec<_>>()
+        };
+        let mut order: Vec<_> = parts.iter().enumerate().flat_map(of_part).collect();
+        if parts.len() > 1 {
+            // Stable: each list is sorted already.
+            order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        for group in order.chunk_by(|a, b| a.1 == b.1) {
+            let (part, shadings) = (&parts[group[0].1], &shadings[group[0].1]);
+            pass.set_bind_group(0, &part.stage.world, &[]);
+            set_buffers(pass, part.world, &part.stage.instances);
+            let runs = group.iter().map(|g| &part.list.transparent[g.2]);
+            draw_runs(pass, part.world, runs, size, |run| {
+                self.pipelines.surface(shadings.glass(run))
+            });
         }
     }
 
@@ -423,9 +456,8 @@ impl Renderer {
     fn draw_picture(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        globals: &wgpu::BindGroup,
         targets: &Targets,
-        shadings: &Shadings,
+        is_count: bool,
         output: &wgpu::TextureView,
     ) {
         let mut picture = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -433,12 +465,12 @@ impl Renderer {
             color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
             ..wgpu::RenderPassDescriptor::default()
         });
-        picture.set_pipeline(if shadings.is_count {
+        picture.set_pipeline(if is_count {
             &self.pipelines.heat_map
         } else {
             &self.pipelines.post
         });
-        picture.set_bind_group(0, globals, &[]);
+        picture.set_bind_group(0, &self.camera.group, &[]);
         picture.set_bind_group(1, &targets.post, &[]);
         picture.draw(0..3, 0..1);
     }
@@ -446,7 +478,6 @@ impl Renderer {
     fn draw_marks(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        globals: &wgpu::BindGroup,
         [hidden, on_top]: &[Range<u32>; 2],
         size: [u32; 2],
     ) {
@@ -454,7 +485,7 @@ impl Renderer {
             return;
         }
         pass.set_scissor_rect(0, 0, size[0], size[1]);
-        pass.set_bind_group(0, globals, &[]);
+        pass.set_bind_group(0, &self.camera.group, &[]);
         pass.set_vertex_buffer(0, self.marks.buffer.slice(..));
         pass.set_pipeline(&self.pipelines.marks);
         pass.draw(hidden.clone(), 0..1);
@@ -462,28 +493,19 @@ impl Renderer {
         pass.draw(on_top.clone(), 0..1);
     }
 
-    /// Draws a frame and reads it back.
-    ///
-    /// # Errors
-    ///
-    /// A size beyond the adapter's limit; a device that was lost.
-    ///
-    /// # Panics
-    ///
-    /// If the renderer was made for a window's format, which cannot be read back.
-    pub fn picture(
+    /// Draws a frame and reads it back. Panics if the renderer was made for a window's format.
+    pub(crate) fn picture(
         &mut self,
         gpu: &Gpu,
-        world: &GpuWorld,
-        stage: &RenderStage,
-        frame: &Frame<'_>,
+        parts: &mut [DrawnPart<'_>],
+        shown: &Shown<'_>,
         size: [u32; 2],
     ) -> Result<Picture, RenderError> {
         assert_eq!(self.format, COLOR, "pictures are {COLOR:?}");
         self.resize(gpu, size)?;
         let target = texture(gpu, "picture", size, COLOR, wgpu::TextureUsages::COPY_SRC);
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-        self.draw(gpu, world, stage, frame, &view, size)?;
+        self.draw(gpu, parts, shown, &view, size)?;
         let [width, height] = size;
         let rgba = read_texture(gpu, &target, size, 4)?;
         Ok(Picture {

@@ -24,7 +24,7 @@ use textures::load_textures;
 
 pub use color::cell_color;
 pub(crate) use color::packed_cell_color;
-pub(crate) use filling::{CORNER_LAYOUT, Finish, Span};
+pub(crate) use filling::{CORNER_LAYOUT, Corner, Finish, Span};
 pub(crate) use placed::{INSTANCE_LAYOUT, Instance};
 pub(crate) use plug::plug;
 pub(crate) use textures::texture_layout;

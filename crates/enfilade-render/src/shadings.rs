@@ -1,11 +1,12 @@
 //! The choice of pipelines for the runs of a frame.
 
-use crate::frame::{Frame, Paint};
+use crate::frame::{Paint, Style};
 use crate::gpu::Gpu;
 use crate::list::{RenderList, Run};
 use crate::pipelines::{Layouts, Pipelines, Shading, Variant};
 use crate::resources::Grown;
 use crate::scene::{Finish, GpuWorld};
+use crate::stage::RenderStage;
 
 pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Grown) {
     pass.set_index_buffer(world.indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -16,7 +17,7 @@ pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, ins
 /// The pipelines of a frame.
 pub(crate) struct Shadings {
     pub(crate) is_count: bool,
-    pub(crate) is_last: bool,
+    is_last: bool,
     casts_shadows: bool,
     /// True if light is known by place.
     has_light: bool,
@@ -26,18 +27,17 @@ pub(crate) struct Shadings {
 }
 
 impl Shadings {
-    pub(crate) fn of(frame: &Frame<'_>, knows_places: bool, has_explanation: bool) -> Self {
-        let style = &frame.style;
+    pub(crate) fn of(style: &Style, list: &RenderList, stage: &RenderStage) -> Self {
         let is_count = style.paint == Paint::Overdraw;
         let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
         Self {
             is_count,
             is_last: !is_count && !style.dark_corners,
             casts_shadows: style.shadows,
-            has_light: style.daylight && knows_places,
-            explains: has_explanation
+            has_light: style.daylight && stage.light.is_known(),
+            explains: stage.explanation.is_some()
                 || style.paint == Paint::Cells
-                || frame.list.instances.iter().any(is_reasoned),
+                || list.instances.iter().any(is_reasoned),
             has_cut: style.cut_above < f32::INFINITY,
         }
     }
@@ -50,6 +50,7 @@ impl Shadings {
                 casts_shadows: false,
                 has_light: false,
                 explains: false,
+                is_prop: false,
                 is_last: false,
             };
         }
@@ -59,7 +60,21 @@ impl Shadings {
             casts_shadows: self.casts_shadows,
             has_light: self.has_light,
             explains: self.explains,
+            is_prop: false,
             is_last,
+        }
+    }
+
+    /// Returns the pipeline of props, smooth or flat.
+    pub(crate) fn prop(&self, is_smooth: bool) -> Variant {
+        let shading = if self.has_cut {
+            Shading::Masked
+        } else {
+            Shading::Plain
+        };
+        Variant {
+            is_prop: !self.is_count,
+            ..self.variant(shading, is_smooth, self.is_last)
         }
     }
 
@@ -107,10 +122,10 @@ impl Shadings {
 }
 
 /// Draws runs; changes pipelines, textures and scissors only where they differ. `surface` by run.
-pub(crate) fn draw_runs<'p>(
+pub(crate) fn draw_runs<'p, 'r>(
     pass: &mut wgpu::RenderPass<'_>,
     world: &GpuWorld,
-    runs: &[Run],
+    runs: impl Iterator<Item = &'r Run>,
     size: [u32; 2],
     surface: impl Fn(&Run) -> Option<&'p wgpu::RenderPipeline>,
 ) {

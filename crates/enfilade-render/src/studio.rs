@@ -2,6 +2,7 @@
 
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
+use enfilade_world::{PartId, Pose};
 
 use crate::camera::Camera;
 use crate::explain::Explanation;
@@ -12,8 +13,9 @@ use crate::light::{Light, sun_of};
 use crate::list::{Lister, RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::renderer::{RenderStage, Renderer};
+use crate::renderer::{DrawnPart, Renderer, Shown};
 use crate::scene::GpuWorld;
+use crate::stage::RenderStage;
 
 /// The part of a world that is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,8 +31,16 @@ pub enum Culling {
 
 /// An off-screen target, for benchmarks.
 pub struct StudioTarget {
-    view: wgpu::TextureView,
-    size: [u32; 2],
+    pub(crate) view: wgpu::TextureView,
+    pub(crate) size: [u32; 2],
+}
+
+/// A world beside the first, on the adapter.
+pub(crate) struct StudioPart {
+    pub(crate) world: GpuWorld,
+    pub(crate) stage: RenderStage,
+    /// Positions of the leaves as drawn last.
+    pub(crate) placed: Vec<Option<f32>>,
 }
 
 /// An adapter, a world on it, and the visibility queries that cull it.
@@ -51,7 +61,11 @@ pub struct Studio {
     pub(crate) stage: RenderStage,
     pub(crate) lister: Lister,
     /// Positions of the leaves as drawn last: [`SightState::shares`].
-    placed: Vec<Option<f32>>,
+    pub(crate) placed: Vec<Option<f32>>,
+    /// Worlds beside the first, by [`PartId`] less one.
+    pub(crate) parts: Vec<StudioPart>,
+    /// Poses of the worlds that cast the shadows in the sun's map; `None` if it is out of date.
+    pub(crate) shadows_of: Option<Vec<Option<Pose>>>,
 }
 
 impl Studio {
@@ -76,13 +90,9 @@ impl Studio {
     ) -> Result<Self, RenderError> {
         let sight = Sight::build(world)?;
         let on_gpu = GpuWorld::load(&gpu, world, &sight)?;
-        let mut renderer = Renderer::with_format(&gpu, format);
-        renderer.sun = sun_of(world);
-        let mut lister = Lister::new();
+        let renderer = Renderer::new(&gpu, format, sun_of(world));
         let state = SightState::new(&sight);
-        let all = lister.everything(&on_gpu, &sight, &state, [0.0; 3]);
-        let light = Light::uniform(&gpu)?;
-        let stage = renderer.set_stage(&gpu, &on_gpu, light, all);
+        let stage = renderer.stage(&gpu, Light::uniform(&gpu)?);
         Ok(Self {
             placed: state.shares().to_vec(),
             state,
@@ -93,7 +103,9 @@ impl Studio {
             sight,
             renderer,
             stage,
-            lister,
+            lister: Lister::new(),
+            parts: Vec::new(),
+            shadows_of: None,
         })
     }
 
@@ -107,8 +119,8 @@ impl Studio {
         self.world.place(&self.state);
         // Light does not depend on levels.
         let light = std::mem::replace(&mut self.stage.light, Light::uniform(&self.gpu)?);
-        let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
-        self.stage = self.renderer.set_stage(&self.gpu, &self.world, light, all);
+        self.stage = self.renderer.stage(&self.gpu, light);
+        self.shadows_of = None;
         Ok(())
     }
 
@@ -122,13 +134,13 @@ impl Studio {
         if self.stage.light.is_known() {
             return Ok(());
         }
-        let light = Light::of_world(&self.gpu, world, &self.sight, self.renderer.sun)?;
-        let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
-        self.stage = (self.renderer).set_stage(&self.gpu, &self.world, light, all);
+        let toward = self.renderer.sun.toward;
+        let light = Light::of_world(&self.gpu, world, &self.sight, toward)?;
+        self.stage = self.renderer.stage(&self.gpu, light);
         Ok(())
     }
 
-    /// Moves leaves as the state has them, and redraws the shadow map.
+    /// Moves leaves as the state has them.
     pub(crate) fn follow_state(&mut self) {
         if self.placed == self.state.shares() {
             return;
@@ -136,9 +148,45 @@ impl Studio {
         self.placed.clear();
         self.placed.extend_from_slice(self.state.shares());
         self.world.place(&self.state);
-        let all = (self.lister).everything(&self.world, &self.sight, &self.state, [0.0; 3]);
-        self.renderer
-            .draw_shadows(&self.gpu, &self.world, &self.stage, all);
+        self.shadows_of = None;
+    }
+
+    /// Draws the shadow map unless it is current.
+    fn follow_sun(&mut self, style: &Style) {
+        let alone = vec![Some(Pose::IDENTITY)];
+        if !style.shadows || self.shadows_of.as_ref() == Some(&alone) {
+            return;
+        }
+        self.shadows_of = Some(alone);
+        let all = Lister::new()
+            .everything(&self.world, &self.sight, &self.state, [0.0; 3])
+            .clone();
+        let part = DrawnPart {
+            id: PartId::ROOT,
+            world: &self.world,
+            stage: &mut self.stage,
+            list: &all,
+        };
+        self.renderer.draw_shadows(&self.gpu, &mut [part]);
+    }
+
+    /// Returns the frame apart from the world.
+    fn shown<'f>(&self, frame: &'f Frame<'_>) -> Shown<'f> {
+        let (style, projection) = (frame.style, frame.projection);
+        // Parallel pictures have one exposure for all rooms.
+        let is_eye = !projection.is_parallel && style.daylight;
+        Shown {
+            projection,
+            pose: Pose::IDENTITY,
+            style,
+            marks: frame.marks,
+            props: &[],
+            exposure: if is_eye {
+                self.stage.light.exposure(projection.origin, 1.0)
+            } else {
+                1.0
+            },
+        }
     }
 
     /// Lists the draws of a view, with leaves and plugs as [`Studio::state`] has them.
@@ -264,8 +312,15 @@ impl Studio {
         frame: &Frame<'_>,
         size: [u32; 2],
     ) -> Result<Picture, RenderError> {
-        self.renderer
-            .picture(&self.gpu, &self.world, &self.stage, frame, size)
+        self.follow_sun(&frame.style);
+        let shown = self.shown(frame);
+        let part = DrawnPart {
+            id: PartId::ROOT,
+            world: &self.world,
+            stage: &mut self.stage,
+            list: frame.list,
+        };
+        (self.renderer).picture(&self.gpu, &mut [part], &shown, size)
     }
 
     /// Draws a frame to a texture of the studio's format.
@@ -279,8 +334,15 @@ impl Studio {
         output: &wgpu::TextureView,
         size: [u32; 2],
     ) -> Result<(), RenderError> {
-        self.renderer
-            .draw(&self.gpu, &self.world, &self.stage, frame, output, size)
+        self.follow_sun(&frame.style);
+        let shown = self.shown(frame);
+        let part = DrawnPart {
+            id: PartId::ROOT,
+            world: &self.world,
+            stage: &mut self.stage,
+            list: frame.list,
+        };
+        (self.renderer).draw(&self.gpu, &mut [part], &shown, output, size)
     }
 
     /// Draws the id pictures of a camera: opaque surfaces, and the nearest transparent one.
@@ -335,8 +397,14 @@ impl Studio {
         size: [u32; 2],
     ) -> Result<[IdPicture; 2], RenderError> {
         let projection = camera.projection(size[0] as f32 / size[1] as f32)?;
-        self.renderer
-            .ids(&self.gpu, &self.world, &self.stage, &projection, list, size)
+        self.renderer.ids(
+            &self.gpu,
+            &self.world,
+            &mut self.stage,
+            &projection,
+            list,
+            size,
+        )
     }
 
     /// Draws everything that `projection` shows, colored by why each point is visible from another camera or not:

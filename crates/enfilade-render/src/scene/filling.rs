@@ -27,6 +27,25 @@ pub(crate) struct Corner {
     cell: u32,
 }
 
+impl Corner {
+    /// Returns a vertex of a prop, whose color is that of its instance.
+    pub(crate) fn of_prop(position: [f32; 3], normal: [f32; 3]) -> Self {
+        Self {
+            position,
+            normal: packed_normal(normal),
+            uv: [0.0; 2],
+            color: [u16::MAX; 4],
+            emissive: [0; 4],
+            cell: 0,
+        }
+    }
+}
+
+fn packed_normal(n: [f32; 3]) -> [i8; 4] {
+    let [x, y, z] = n.map(|v| (v.clamp(-1.0, 1.0) * 127.0).round() as i8);
+    [x, y, z, 127]
+}
+
 pub(crate) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Corner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
@@ -92,10 +111,8 @@ impl Filling<'_> {
         let uvs = primitive.uvs.get(look.uv_set);
         let base = self.corners.len() as u32;
         for (i, &position) in primitive.positions.iter().enumerate() {
-            let normal = primitive.normals.get(i).map_or([0; 4], |n| {
-                let [x, y, z] = n.map(|v| (v.clamp(-1.0, 1.0) * 127.0).round() as i8);
-                [x, y, z, 127]
-            });
+            let normal = primitive.normals.get(i);
+            let normal = normal.map_or([0; 4], |n| packed_normal(*n));
             let color = primitive.colors.get(i).copied().unwrap_or([1.0; 4]);
             self.corners.push(Corner {
                 position,

@@ -18,6 +18,16 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
+    /// Returns the transform of a prop of a linear color.
+    pub(crate) fn of_prop(placed: &Mat4, color: [f32; 3]) -> Self {
+        Self {
+            rows: rows(placed),
+            // Not structure.
+            key: 1,
+            color: packed(color.map(|c| c.clamp(0.0, 1.0).powf(1.0 / 2.2))),
+        }
+    }
+
     /// Returns it with the key of a draw.
     pub(crate) fn drawn(self, key: u32) -> Self {
         Self { key, ..self }

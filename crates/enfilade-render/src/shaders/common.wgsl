@@ -21,6 +21,12 @@ struct Globals {
     starts_density: vec4<f32>,
     // Leaf of the outside; first cell of the table; 1 if there is a field; number of cells.
     light: vec4<i32>,
+    // Remainder of the origin beyond floats; w: brightness of the surroundings, 1 outdoors.
+    origin_low: vec4<f32>,
+    // Rows of the rotation to the frame of the first world, whose +y is up; w of the second: height of the origin.
+    root_x: vec4<f32>,
+    root_y: vec4<f32>,
+    root_z: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;
@@ -32,6 +38,16 @@ const INSTANCE_MASK: u32 = 0x0fffffffu;
 fn place(p: vec3<f32>, row_x: vec4<f32>, row_y: vec4<f32>, row_z: vec4<f32>) -> vec3<f32> {
     let q = vec4(p, 1.0);
     return vec3(dot(row_x, q), dot(row_y, q), dot(row_z, q));
+}
+
+// Returns a point relative to the camera.
+fn relative_of(p: vec3<f32>) -> vec3<f32> {
+    return (p - globals.origin.xyz) - globals.origin_low.xyz;
+}
+
+// Turns a direction to the frame of the first world.
+fn to_root(v: vec3<f32>) -> vec3<f32> {
+    return vec3(dot(globals.root_x.xyz, v), dot(globals.root_y.xyz, v), dot(globals.root_z.xyz, v));
 }
 
 fn to_clip(relative: vec3<f32>) -> vec4<f32> {

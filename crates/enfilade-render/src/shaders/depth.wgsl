@@ -14,11 +14,11 @@ fn from_sun(in: Corner) -> @builtin(position) vec4<f32> {
 
 @vertex
 fn from_eye(in: Corner) -> @builtin(position) vec4<f32> {
-    return to_clip(place(in.position, in.row_x, in.row_y, in.row_z) - globals.origin.xyz);
+    return to_clip(relative_of(place(in.position, in.row_x, in.row_y, in.row_z)));
 }
 
 // For outlines, from their vertices alone.
 @vertex
 fn outline(@location(0) position: vec3<f32>) -> @builtin(position) vec4<f32> {
-    return to_clip(position - globals.origin.xyz);
+    return to_clip(relative_of(position));
 }

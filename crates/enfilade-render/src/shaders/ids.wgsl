@@ -8,7 +8,7 @@ struct Id {
 // Output for vertex `at` of all, three in a row per triangle.
 fn id_corner(p: vec3<f32>, at: u32, row_x: vec4<f32>, row_y: vec4<f32>, row_z: vec4<f32>, key: u32) -> Id {
     var out: Id;
-    out.clip = to_clip(place(p, row_x, row_y, row_z) - globals.origin.xyz);
+    out.clip = to_clip(relative_of(place(p, row_x, row_y, row_z)));
     // 0 means sky.
     out.id = vec2((key & INSTANCE_MASK) + 1u, at / 3u);
     return out;

@@ -47,7 +47,8 @@ fn probe(at: vec3<f32>, slab: f32, rows: f32) -> vec3<f32> {
 }
 
 // Outdoors: the sky above, the ground's reflection below; walls shaded by direction, so that their edges show.
-fn open_light(normal: vec3<f32>) -> vec3<f32> {
+fn open_light(own: vec3<f32>) -> vec3<f32> {
+    let normal = to_root(own);
     let up = normal.y * 0.5 + 0.5;
     return mix(vec3(0.30, 0.28, 0.26), vec3(0.50, 0.54, 0.60), up)
         * (0.90 + 0.10 * normal.x - 0.06 * normal.z);

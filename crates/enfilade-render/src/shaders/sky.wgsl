@@ -15,7 +15,7 @@ fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
 
 // Returns the color of the sky, or of the ground far below, along a line.
 fn sky_along(ray: vec3<f32>) -> vec3<f32> {
-    let t = clamp(ray.y, -0.15, 1.0);
+    let t = clamp(to_root(ray).y, -0.15, 1.0);
     let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.66, 0.70, 0.74), min(-t / 0.12, 1.0));
     let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
     // Overexposed for an eye in a room.

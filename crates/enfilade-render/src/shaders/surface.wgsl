@@ -11,6 +11,8 @@ override HAS_LIGHT: bool = false;
 override IS_SMOOTH: bool = false;
 // True if cells, or reasons of visibility, may determine the color.
 override EXPLAINS: bool = false;
+// True for copies of a mesh that have the color of their instance.
+override IS_PROP: bool = false;
 
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
@@ -50,7 +52,7 @@ struct Surface {
 @vertex
 fn corner(in: Corner) -> Surface {
     var out: Surface;
-    out.relative = place(in.position, in.row_x, in.row_y, in.row_z) - globals.origin.xyz;
+    out.relative = relative_of(place(in.position, in.row_x, in.row_y, in.row_z));
     out.clip = to_clip(out.relative);
     if IS_SMOOTH {
         let n = in.normal.xyz;
@@ -63,6 +65,9 @@ fn corner(in: Corner) -> Surface {
     }
     out.uv = in.uv;
     out.color = in.color;
+    if IS_PROP {
+        out.color = vec4(unpacked(in.key.y), 1.0);
+    }
     out.emissive = in.emissive;
     if EXPLAINS {
         let is_structure = (in.key.x & INSTANCE_MASK) == 0u;
@@ -145,7 +150,7 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     // Flat light, brightest on surfaces that face the eye; or the light of the place.
     var ambient = open_light(normal) + vec3(0.16 * facing);
     if HAS_LIGHT {
-        ambient = light_in(cell, place, normal) * (0.94 + 0.08 * facing);
+        ambient = light_in(cell, place, normal) * (globals.origin_low.w * (0.94 + 0.08 * facing));
     }
     var sun = max(dot(normal, globals.sun.xyz), 0.0);
     if CASTS_SHADOWS {
@@ -163,7 +168,7 @@ fn toned(c: vec3<f32>) -> vec3<f32> {
 }
 
 fn is_above_cut(in: Surface) -> bool {
-    return in.relative.y + globals.origin.y > globals.origin.w;
+    return dot(globals.root_y.xyz, in.relative) + globals.root_y.w > globals.origin.w;
 }
 
 fn cut(in: Surface, texel: vec4<f32>) {
@@ -208,7 +213,8 @@ fn glass(in: Surface) -> Drawn {
     if HAS_LIGHT {
         let place = in.relative + globals.field_shift.xyz;
         if s.cell >= 0 && entry(globals.light.y + s.cell * CELL_TEXELS).w == 0u {
-            around = 0.7 * toned(light_in(s.cell, place, along) * globals.field_shift.w);
+            let inside = light_in(s.cell, place, along) * globals.origin_low.w;
+            around = 0.7 * toned(inside * globals.field_shift.w);
         }
     }
     // A pane's own color is faint: mostly, it shows the things behind it.

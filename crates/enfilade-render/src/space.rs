@@ -1,0 +1,336 @@
+//! Pictures of a world and of the worlds that move in it.
+//!
+//! Each part of a [`Space`] is drawn in its own frame, by the same camera in that frame's coordinates: a part ten kilometers
+//! away is as exact as a near one. All parts share one depth, one sun with its shadows, one sky and one exposure.
+
+use enfilade_cpg::World;
+use enfilade_runtime::{Sight, View};
+use enfilade_world::{PartId, Pose, Space, SpaceSeen};
+use glam::{DVec3, Vec3};
+
+use crate::camera::Camera;
+use crate::frame::Style;
+use crate::gpu::RenderError;
+use crate::light::Light;
+use crate::list::{RenderList, Shot, Sparing};
+use crate::marks::Mark;
+use crate::picture::Picture;
+use crate::props::{Prop, PropMesh};
+use crate::renderer::{DrawnPart, Shown};
+use crate::scene::GpuWorld;
+use crate::stage::RenderStage;
+use crate::studio::{Studio, StudioPart, StudioTarget};
+
+/// A view of a space of worlds.
+#[derive(Clone, Copy)]
+pub struct SpaceShot<'a> {
+    /// The worlds, their poses and their doors.
+    pub space: &'a Space,
+    /// The part in whose frame the camera and the marks are.
+    pub frame: PartId,
+    /// The camera.
+    pub camera: Camera,
+    /// The answer to draw, to [this view](Camera::view) in the same frame; `None` draws everything of all parts.
+    pub seen: Option<SpaceSeen<'a>>,
+    /// The style.
+    pub style: Style,
+    /// Lines and polygons drawn over the picture.
+    pub marks: &'a [Mark],
+    /// Things; of parts that are not seen they are left out.
+    pub props: &'a [Prop],
+}
+
+/// The contents of a drawn picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SpaceCounts {
+    /// Drawn parts.
+    pub n_parts: usize,
+    /// Drawn triangles, without props.
+    pub n_triangles: u64,
+    /// Draws, without those of props.
+    pub n_draws: usize,
+}
+
+impl Studio {
+    /// Uploads a world that stands in the studio's. Call it once for each part of a [`Space`] but the root, in their order;
+    /// the root is the studio's own world. `sight` is [the part's](Space::sight).
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::new`].
+    pub fn add_part(&mut self, world: &World, sight: &Sight) -> Result<PartId, RenderError> {
+        self.parts.push(StudioPart {
+            world: GpuWorld::load(&self.gpu, world, sight)?,
+            stage: self.renderer.stage(&self.gpu, Light::uniform(&self.gpu)?),
+            placed: Vec::new(),
+        });
+        self.shadows_of = None;
+        Ok(PartId(self.parts.len() as u32))
+    }
+
+    /// Computes daylight in a part, as [`Studio::add_light`] does for the first world: that of a place outdoors, which
+    /// pictures dim to the light of the room in which the part stands.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::add_light`].
+    pub fn add_part_light(
+        &mut self,
+        part: PartId,
+        world: &World,
+        sight: &Sight,
+    ) -> Result<(), RenderError> {
+        let toward = self.renderer.sun.toward;
+        if let Some(own) = self.parts.get_mut((part.0 as usize).wrapping_sub(1)) {
+            let light = Light::of_world(&self.gpu, world, sight, toward)?;
+            own.stage = self.renderer.stage(&self.gpu, light);
+        }
+        Ok(())
+    }
+
+    /// Adds a mesh for [props](Prop): its triangles and its normals, if it has any.
+    pub fn add_prop_mesh(&mut self, mesh: &enfilade_geom::scene::Primitive) -> PropMesh {
+        self.renderer.props.add(&self.gpu, mesh)
+    }
+
+    /// Draws a view of a space to a texture of the studio's format. The doors are those of the space,
+    /// not [`Studio::state`].
+    ///
+    /// # Errors
+    ///
+    /// A camera without direction; a size beyond the adapter's limit.
+    ///
+    /// # Panics
+    ///
+    /// If the space has parts that were not [added](Studio::add_part).
+    pub fn draw_space(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        output: &wgpu::TextureView,
+        size: [u32; 2],
+    ) -> Result<SpaceCounts, RenderError> {
+        let lists = self.begin_space(shot, size)?;
+        let shown = self.space_shown(shot, size)?;
+        let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
+        (self.renderer).draw(&self.gpu, &mut parts, &shown, output, size)?;
+        Ok(counts(&lists))
+    }
+
+    /// Draws a view of a space to a target.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::draw_space`].
+    pub fn draw_space_to(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        target: &StudioTarget,
+    ) -> Result<SpaceCounts, RenderError> {
+        self.draw_space(shot, &target.view, target.size)
+    }
+
+    /// Draws a picture of a space.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::draw_space`]; a device that was lost.
+    pub fn space_picture(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        size: [u32; 2],
+    ) -> Result<(Picture, SpaceCounts), RenderError> {
+        let lists = self.begin_space(shot, size)?;
+        let shown = self.space_shown(shot, size)?;
+        let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
+        let picture = (self.renderer).picture(&self.gpu, &mut parts, &shown, size)?;
+        Ok((picture, counts(&lists)))
+    }
+
+    /// Moves parts and leaves as the space has them, redraws the sun's shadows if necessary, and lists the draws by part.
+    fn begin_space(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        size: [u32; 2],
+    ) -> Result<Vec<(PartId, RenderList)>, RenderError> {
+        self.place_parts(shot.space);
+        self.cast_sun(shot);
+        self.space_lists(shot, size)
+    }
+
+    fn place_parts(&mut self, space: &Space) {
+        let n = space.n_parts();
+        assert!(n <= self.parts.len() + 1, "each part of a space was added");
+        if self.placed != space.state(PartId::ROOT).shares() {
+            self.placed = space.state(PartId::ROOT).shares().to_vec();
+            self.world.place(space.state(PartId::ROOT));
+            self.shadows_of = None;
+        }
+        for i in 1..n {
+            let id = PartId(i as u32);
+            let (host, pose) = (space.host(id), *space.pose(id));
+            let [low, high] = self.parts[i - 1].world.bounds;
+            let middle = pose.point(((low + high) * 0.5).as_dvec3());
+            let brightness = self.brightness(host, middle);
+            let part = &mut self.parts[i - 1];
+            part.stage.pose = pose;
+            part.stage.surroundings = brightness;
+            if part.placed != space.state(id).shares() {
+                part.placed = space.state(id).shares().to_vec();
+                part.world.place(space.state(id));
+                self.shadows_of = None;
+            }
+        }
+    }
+
+    /// Returns the brightness in a part at a point of the root's frame, relative to the outdoors.
+    fn brightness(&self, part: PartId, p: DVec3) -> f32 {
+        let stage = self.stage_of(part);
+        let own = stage.pose.point_back(p).as_vec3();
+        let inside = stage.light.brightness_at(own);
+        inside.map_or(1.0, |b| b.min(1.0)) * stage.surroundings
+    }
+
+    fn stage_of(&self, part: PartId) -> &RenderStage {
+        match part.0 as usize {
+            0 => &self.stage,
+            i => &self.parts[i - 1].stage,
+        }
+    }
+
+    /// Draws the map of the sun's shadows unless it is current. Parts in rooms cast none.
+    fn cast_sun(&mut self, shot: &SpaceShot<'_>) {
+        if !shot.style.shadows {
+            return;
+        }
+        let casts = |p: &StudioPart| (p.stage.surroundings >= 1.0).then_some(p.stage.pose);
+        let n_beside = shot.space.n_parts() - 1;
+        let cast: Vec<Option<Pose>> = std::iter::once(Some(Pose::IDENTITY))
+            .chain(self.parts[..n_beside].iter().map(casts))
+            .collect();
+        if self.shadows_of.as_ref() == Some(&cast) {
+            return;
+        }
+        let casting = (0..).map(PartId).zip(&cast);
+        let casting = casting.filter(|(_, pose)| pose.is_some());
+        let lists: Vec<_> = casting
+            .map(|(id, _)| (id, self.everything_of(shot.space, id)))
+            .collect();
+        let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
+        self.renderer.draw_shadows(&self.gpu, &mut parts);
+        self.shadows_of = Some(cast);
+    }
+
+    /// Lists everything of a part.
+    fn everything_of(&mut self, space: &Space, id: PartId) -> RenderList {
+        let world = match id.0 as usize {
+            0 => &self.world,
+            i => &self.parts[i - 1].world,
+        };
+        let (sight, state) = (space.sight(id), space.state(id));
+        self.lister.everything(world, sight, state, [0.0; 3]);
+        self.lister.take()
+    }
+
+    /// Lists the draws of each part in view.
+    fn space_lists(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        size: [u32; 2],
+    ) -> Result<Vec<(PartId, RenderList)>, RenderError> {
+        let view = shot.camera.view(size[0] as f32 / size[1] as f32)?;
+        let space = shot.space;
+        let Some(answer) = shot.seen else {
+            let ids = (0..space.n_parts() as u32).map(PartId);
+            return Ok(ids.map(|id| (id, self.everything_of(space, id))).collect());
+        };
+        let sparing = Sparing {
+            stop_below: 0.0,
+            ..self.sparing
+        };
+        let lists = answer.parts().map(|(id, seen)| {
+            let world = match id.0 as usize {
+                0 => &self.world,
+                i => &self.parts[i - 1].world,
+            };
+            let own = view_in(space, id, shot.frame, &view);
+            let of_part = Shot {
+                view: &own,
+                state: space.state(id),
+                size,
+                has_scissors: true,
+            };
+            (self.lister).seen(world, space.sight(id), &seen, &of_part, &sparing);
+            (id, self.lister.take())
+        });
+        Ok(lists.collect())
+    }
+
+    /// Returns the frame apart from its worlds.
+    fn space_shown<'s>(
+        &self,
+        shot: &SpaceShot<'s>,
+        size: [u32; 2],
+    ) -> Result<Shown<'s>, RenderError> {
+        let projection = shot.camera.projection(size[0] as f32 / size[1] as f32)?;
+        let pose = *shot.space.pose(shot.frame);
+        let eye = Vec3::from(shot.camera.eye).as_dvec3();
+        let place = shot.space.locate(shot.frame, eye);
+        let at = place.map_or(shot.frame, |p| p.part);
+        let stage = self.stage_of(at);
+        let own = stage.pose.point_back(pose.point(eye)).as_vec3();
+        let exposure = if shot.style.daylight {
+            stage.light.exposure(own, stage.surroundings)
+        } else {
+            1.0
+        };
+        Ok(Shown {
+            projection,
+            pose,
+            style: shot.style,
+            marks: shot.marks,
+            props: shot.props,
+            exposure,
+        })
+    }
+}
+
+/// Returns a view of a part's frame, given in another's.
+fn view_in(space: &Space, part: PartId, frame: PartId, view: &View) -> View {
+    let to_frame = space.between(part, frame);
+    view.in_frame(&to_frame.matrix3(), to_frame.at)
+}
+
+/// Returns the worlds of `lists`, whose parts ascend.
+fn drawn_parts<'a>(
+    root: &'a GpuWorld,
+    root_stage: &'a mut RenderStage,
+    others: &'a mut [StudioPart],
+    lists: &'a [(PartId, RenderList)],
+) -> Vec<DrawnPart<'a>> {
+    let others = others.iter_mut().map(|p| (&p.world, &mut p.stage));
+    let worlds = std::iter::once((root, root_stage)).chain(others);
+    let mut lists = lists.iter().peekable();
+    let drawn = (0..).map(PartId).zip(worlds).filter_map(|(id, part)| {
+        let (_, list) = lists.next_if(|l| l.0 == id)?;
+        let (world, stage) = part;
+        Some(DrawnPart {
+            id,
+            world,
+            stage,
+            list,
+        })
+    });
+    drawn.collect()
+}
+
+fn counts(lists: &[(PartId, RenderList)]) -> SpaceCounts {
+    let mut counts = SpaceCounts {
+        n_parts: lists.len(),
+        ..SpaceCounts::default()
+    };
+    for (_, list) in lists {
+        counts.n_triangles += list.n_triangles();
+        counts.n_draws += list.n_draws();
+    }
+    counts
+}
