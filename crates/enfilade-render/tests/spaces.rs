@@ -90,8 +90,8 @@ fn a_room_in_a_room_is_drawn_as_one_world_would_be() {
     for (k, pose) in poses.iter().enumerate() {
         let whole = merged(&host, &guest, pose);
         let mut one = Studio::new(gpu(), &whole).unwrap();
-        let mut space = Space::new(&host).unwrap();
-        let part = space.add_part(&guest, PartId::ROOT, *pose).unwrap();
+        let mut space = Space::new(host.clone()).unwrap();
+        let part = space.add_part(guest.clone(), PartId::ROOT, *pose).unwrap();
         let mut studio = Studio::new(gpu(), &host).unwrap();
         assert_eq!(studio.add_part(&guest, space.sight(part)).unwrap(), part);
         let mut viewer = SpaceViewer::new(&space);
@@ -149,8 +149,8 @@ fn a_far_room_looks_as_a_near_one_in_its_own_frame_and_in_the_root_s() {
             turn: DQuat::from_rotation_y(0.5),
             at,
         };
-        let mut space = Space::new(&host).unwrap();
-        let part = space.add_part(&guest, PartId::ROOT, pose).unwrap();
+        let mut space = Space::new(host.clone()).unwrap();
+        let part = space.add_part(guest.clone(), PartId::ROOT, pose).unwrap();
         let mut studio = Studio::new(gpu(), &host).unwrap();
         studio.add_part(&guest, space.sight(part)).unwrap();
         let mut viewer = SpaceViewer::new(&space);
@@ -195,8 +195,8 @@ fn a_far_room_looks_as_a_near_one_in_its_own_frame_and_in_the_root_s() {
 #[test]
 fn props_are_hidden_by_walls_and_stand_in_rooms() {
     let (host, guest, poses) = rooms();
-    let mut space = Space::new(&host).unwrap();
-    let part = space.add_part(&guest, PartId::ROOT, poses[1]).unwrap();
+    let mut space = Space::new(host.clone()).unwrap();
+    let part = space.add_part(guest.clone(), PartId::ROOT, poses[1]).unwrap();
     let mut studio = Studio::new(gpu(), &host).unwrap();
     studio.add_part(&guest, space.sight(part)).unwrap();
     let mut viewer = SpaceViewer::new(&space);
