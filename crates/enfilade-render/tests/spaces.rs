@@ -196,7 +196,9 @@ fn a_far_room_looks_as_a_near_one_in_its_own_frame_and_in_the_root_s() {
 fn props_are_hidden_by_walls_and_stand_in_rooms() {
     let (host, guest, poses) = rooms();
     let mut space = Space::new(host.clone()).unwrap();
-    let part = space.add_part(guest.clone(), PartId::ROOT, poses[1]).unwrap();
+    let part = space
+        .add_part(guest.clone(), PartId::ROOT, poses[1])
+        .unwrap();
     let mut studio = Studio::new(gpu(), &host).unwrap();
     studio.add_part(&guest, space.sight(part)).unwrap();
     let mut viewer = SpaceViewer::new(&space);
