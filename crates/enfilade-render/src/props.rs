@@ -35,6 +35,8 @@ pub struct Prop {
     pub size: [f32; 3],
     /// Linear color, 0 to 1.
     pub color: [f32; 3],
+    /// Share of its color that it emits, 0 to 1: a bulb, a display.
+    pub glow: f32,
 }
 
 impl Default for Prop {
@@ -45,6 +47,7 @@ impl Default for Prop {
             pose: Pose::IDENTITY,
             size: [1.0; 3],
             color: [0.8; 3],
+            glow: 0.0,
         }
     }
 }
@@ -54,7 +57,7 @@ impl Prop {
         let turn = self.pose.turn.as_quat();
         let at = self.pose.at.as_vec3();
         let placed = Mat4::from_scale_rotation_translation(self.size.into(), turn, at);
-        Instance::of_prop(&placed, self.color)
+        Instance::of_prop(&placed, self.color, self.glow)
     }
 }
 
