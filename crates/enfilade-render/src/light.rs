@@ -8,7 +8,7 @@ mod field;
 mod form;
 mod probes;
 
-use enfilade_cpg::World;
+use enfilade_cpg::{CellId, World};
 use enfilade_runtime::Sight;
 use glam::{DVec3, UVec3, Vec3};
 use wgpu::util::DeviceExt;
@@ -51,6 +51,8 @@ pub(crate) struct Light {
     pub(crate) starts: wgpu::TextureView,
     pub(crate) probes: wgpu::TextureView,
     pub(crate) sampler: wgpu::Sampler,
+    /// The lamps that reach each cell, where cells are known.
+    pub(crate) lit: LitCells,
 }
 
 fn volume(
@@ -93,6 +95,15 @@ pub(crate) fn table(
     what: &'static str,
     texels: &[[u32; 4]],
 ) -> Result<wgpu::TextureView, RenderError> {
+    let texture = table_texture(gpu, what, texels)?;
+    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+}
+
+fn table_texture(
+    gpu: &Gpu,
+    what: &'static str,
+    texels: &[[u32; 4]],
+) -> Result<wgpu::Texture, RenderError> {
     let rows = (texels.len() as u32).div_ceil(ROW).max(1);
     Gpu::check(
         what,
@@ -101,7 +112,7 @@ pub(crate) fn table(
     )?;
     let mut texels = texels.to_vec();
     texels.resize((rows * ROW) as usize, [0; 4]);
-    let texture = gpu.device.create_texture_with_data(
+    Ok(gpu.device.create_texture_with_data(
         &gpu.queue,
         &wgpu::TextureDescriptor {
             label: Some(what),
@@ -114,13 +125,63 @@ pub(crate) fn table(
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::Rgba32Uint,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         },
         wgpu::util::TextureDataOrder::LayerMajor,
         bytemuck::cast_slice(&texels),
-    );
-    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+    ))
+}
+
+/// Texels of a cell in a table of lamps: a bit for each.
+const LIT_TEXELS: usize = 2;
+
+/// A table of the lamps that reach each cell.
+pub(crate) struct LitCells {
+    texture: wgpu::Texture,
+    texels: Vec<[u32; 4]>,
+}
+
+impl LitCells {
+    fn new(gpu: &Gpu, n_cells: usize) -> Result<Self, RenderError> {
+        let n = (LIT_TEXELS * n_cells).next_multiple_of(ROW as usize);
+        let texels = vec![[0; 4]; n.max(ROW as usize)];
+        Ok(Self {
+            texture: table_texture(gpu, "the lamps of cells", &texels)?,
+            texels,
+        })
+    }
+
+    /// Writes the lamps, each with its cells.
+    pub(crate) fn write<'c>(&mut self, gpu: &Gpu, lamps: impl Iterator<Item = &'c [CellId]>) {
+        let mut texels = vec![[0; 4]; self.texels.len()];
+        for (lamp, cells) in lamps.enumerate() {
+            for cell in cells {
+                let at = LIT_TEXELS * cell.idx() + lamp / 128;
+                if let Some(texel) = texels.get_mut(at) {
+                    texel[lamp / 32 % 4] |= 1_u32 << (lamp % 32);
+                }
+            }
+        }
+        if texels == self.texels {
+            return;
+        }
+        self.texels = texels;
+        gpu.queue.write_texture(
+            self.texture.as_image_copy(),
+            bytemuck::cast_slice(&self.texels),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(16 * ROW),
+                rows_per_image: None,
+            },
+            self.texture.size(),
+        );
+    }
+
+    pub(crate) fn view(&self) -> wgpu::TextureView {
+        (self.texture).create_view(&wgpu::TextureViewDescriptor::default())
+    }
 }
 
 impl Light {
@@ -166,6 +227,7 @@ impl Light {
             }),
             field,
             brightness: probes.brightness,
+            lit: LitCells::new(gpu, n_cells)?,
         })
     }
 
@@ -196,7 +258,7 @@ impl Light {
         let first = texels.len();
         for (id, (cell, grid)) in (0..).zip(world.graph.cells.iter().zip(&probes.grids)) {
             let words = |v: Vec3, w: u32| [v.x.to_bits(), v.y.to_bits(), v.z.to_bits(), w];
-            let color = packed_cell_color(enfilade_cpg::CellId(id));
+            let color = packed_cell_color(CellId(id));
             let entry: [[u32; 4]; CELL_TEXELS] = match grid {
                 Some(g) => {
                     let low = (g.low.as_dvec3() - field.origin).as_vec3();

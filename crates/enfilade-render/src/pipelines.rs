@@ -10,7 +10,7 @@ use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
 pub(crate) struct Layouts {
-    /// Globals; shadow map and its sampler; the locator and the light of places.
+    /// Globals; shadow map and its sampler; the locator and the light of places; lamps and their maps.
     pub(crate) world: wgpu::BindGroupLayout,
     /// A base color texture.
     texture: wgpu::BindGroupLayout,
@@ -47,6 +47,7 @@ pub(crate) struct Variant {
     pub(crate) explains: bool,
     /// True if the color is that of the instance.
     pub(crate) is_prop: bool,
+    pub(crate) has_lamps: bool,
     /// True if it draws to the output, not to the intermediate target of the post pass.
     pub(crate) is_last: bool,
 }
@@ -57,6 +58,8 @@ pub(crate) struct Pipelines {
     surfaces: BTreeMap<Variant, wgpu::RenderPipeline>,
     pub(crate) id: wgpu::RenderPipeline,
     pub(crate) shadow: wgpu::RenderPipeline,
+    /// Surfaces from a lamp, depth only.
+    pub(crate) lamp: wgpu::RenderPipeline,
     /// Surfaces from the camera, depth only.
     pub(crate) depth: wgpu::RenderPipeline,
     /// Outlines of portals for occlusion queries.
@@ -120,6 +123,15 @@ fn volume(binding: u32, sample_type: wgpu::TextureSampleType) -> wgpu::BindGroup
     entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
 }
 
+fn layers(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Depth,
+        view_dimension: wgpu::TextureViewDimension::D2Array,
+        multisampled: false,
+    };
+    entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
+}
+
 impl Layouts {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
@@ -145,6 +157,9 @@ impl Layouts {
                     volume(5, wgpu::TextureSampleType::Float { filterable: true }),
                     entry(6, wgpu::ShaderStages::FRAGMENT, filtering),
                     texture(7, wgpu::TextureSampleType::Uint),
+                    uniform(8),
+                    layers(9),
+                    texture(10, wgpu::TextureSampleType::Uint),
                 ],
             ),
             texture: texture_layout(gpu),
@@ -268,7 +283,8 @@ impl Modules {
         let sky = include_str!("shaders/sky.wgsl");
         let light = include_str!("shaders/light.wgsl");
         let surface = include_str!("shaders/surface.wgsl");
-        let surface = module("surface", &[sky, light, surface]);
+        let lamps = include_str!("shaders/lamps.wgsl");
+        let surface = module("surface", &[sky, light, lamps, surface]);
         let corner = if gpu.fetches() {
             include_str!("shaders/ids_fetched.wgsl")
         } else {
@@ -356,6 +372,12 @@ impl Pipelines {
                 depth: Some((true, wgpu::CompareFunction::Less)),
                 ..base
             }),
+            lamp: make(Kind {
+                label: "lamp",
+                fragment: None,
+                depth: Some((true, wgpu::CompareFunction::Less)),
+                ..base
+            }),
             outline: make(Kind {
                 label: "outline",
                 vertex: "outline",
@@ -437,6 +459,7 @@ impl Pipelines {
                     ("IS_SMOOTH", number(variant.is_smooth)),
                     ("EXPLAINS", number(variant.explains)),
                     ("IS_PROP", number(variant.is_prop)),
+                    ("HAS_LAMPS", number(variant.has_lamps)),
                 ],
             },
         );

@@ -9,6 +9,7 @@ use crate::camera::Projection;
 use crate::formats::{COLOR, DEPTH};
 use crate::frame::{Paint, Style};
 use crate::gpu::{Gpu, RenderError};
+use crate::lamps::{ActiveLamp, LampMaps};
 use crate::light::Light;
 use crate::list::{RenderList, Run};
 use crate::marks::Mark;
@@ -18,7 +19,7 @@ use crate::props::{Prop, PropDraw, PropMeshes};
 use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
 use crate::shadings::{Shadings, draw_runs, set_buffers};
-use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage, Sunlight};
+use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage, Sunlight, lamp_buffer};
 
 /// Side of the shadow map. [Units: texels]
 const SHADOW_SIDE: u32 = 4096;
@@ -49,7 +50,10 @@ pub(crate) struct Shown<'a> {
     pub(crate) style: Style,
     pub(crate) marks: &'a [Mark],
     pub(crate) props: &'a [Prop],
+    pub(crate) lamps: &'a [ActiveLamp],
     pub(crate) exposure: f32,
+    /// Share of the daylight that is left, 0 to 1.
+    pub(crate) day: f32,
 }
 
 impl Shown<'_> {
@@ -71,6 +75,7 @@ pub(crate) struct Renderer {
     pub(crate) camera: GlobalsBuffer,
     pub(crate) marks: Grown,
     pub(crate) props: PropMeshes,
+    pub(crate) lamps: LampMaps,
     pub(crate) targets: Option<Targets>,
     shadow_map: wgpu::TextureView,
     shadow_sampler: wgpu::Sampler,
@@ -103,6 +108,7 @@ impl Renderer {
             pipelines,
             marks: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
             props: PropMeshes::new(gpu),
+            lamps: LampMaps::none(gpu),
             targets: None,
             shadow_map: shadow_map.create_view(&wgpu::TextureViewDescriptor::default()),
             shadow_sampler,
@@ -122,14 +128,15 @@ impl Renderer {
     /// Prepares a world with its light for this renderer.
     pub(crate) fn stage(&self, gpu: &Gpu, light: Light) -> RenderStage {
         let globals = GlobalsBuffer::new(gpu, &self.layouts);
-        let world = self.world_group(gpu, &globals, &light, None);
-        RenderStage::new(gpu, world, globals, light)
+        let lamps = lamp_buffer(gpu);
+        let world = self.world_group(gpu, [&globals.buffer, &lamps], &light, None);
+        RenderStage::new(gpu, world, globals, lamps, light)
     }
 
     fn world_group(
         &self,
         gpu: &Gpu,
-        globals: &GlobalsBuffer,
+        [globals, lamps]: [&wgpu::Buffer; 2],
         light: &Light,
         explanation: Option<&wgpu::TextureView>,
     ) -> wgpu::BindGroup {
@@ -145,7 +152,7 @@ impl Renderer {
             label: Some("world"),
             layout: &self.layouts.world,
             entries: &[
-                bound(0, &globals.buffer),
+                bound(0, globals),
                 view(1, &self.shadow_map),
                 sampler(2, &self.shadow_sampler),
                 view(3, &light.table),
@@ -154,6 +161,9 @@ impl Renderer {
                 sampler(6, &light.sampler),
                 // Without an explanation, bind a table of the same type that shaders ignore.
                 view(7, explanation.unwrap_or(&light.table)),
+                bound(8, lamps),
+                view(9, &self.lamps.array),
+                view(10, &light.lit.view()),
             ],
         })
     }
@@ -166,8 +176,14 @@ impl Renderer {
         explanation: Option<wgpu::TextureView>,
     ) {
         stage.explanation = explanation;
-        let RenderStage { globals, light, .. } = &*stage;
-        stage.world = self.world_group(gpu, globals, light, stage.explanation.as_ref());
+        self.bind(gpu, stage);
+    }
+
+    /// Binds the renderer's textures to a stage anew.
+    pub(crate) fn bind(&self, gpu: &Gpu, stage: &mut RenderStage) {
+        let buffers = [&stage.globals.buffer, &stage.lamps];
+        let explanation = stage.explanation.as_ref();
+        stage.world = self.world_group(gpu, buffers, &stage.light, explanation);
     }
 
     /// Points the shadow map's view along the sun, parallel, over all worlds.
@@ -200,6 +216,8 @@ impl Renderer {
             size: [1, 1],
             sun: self.sun,
             exposure: 1.0,
+            day: 1.0,
+            lamps: &[],
         };
         for part in &mut *parts {
             part.stage.write_globals(gpu, &projection, &exposed);
@@ -233,6 +251,8 @@ impl Renderer {
             size,
             sun: self.sun,
             exposure: 1.0,
+            day: 1.0,
+            lamps: &[],
         };
         let globals = Globals::new(projection, &Pose::IDENTITY, &exposed);
         self.camera.write(gpu, &globals);
@@ -288,6 +308,8 @@ impl Renderer {
             size,
             sun: self.sun,
             exposure: shown.exposure,
+            day: shown.day,
+            lamps: shown.lamps,
         };
         let globals = Globals::new(&shown.projection, &shown.pose, &exposed);
         self.camera.write(gpu, &globals);
@@ -295,10 +317,12 @@ impl Renderer {
             let projection = shown.projection_in(part.stage);
             part.stage.write_globals(gpu, &projection, &exposed);
             part.stage.write_instances(gpu, part.world, part.list);
+            self.lamps
+                .write_lit(gpu, part.id, shown.lamps, &mut part.stage.light);
         }
         let marks = self.write_marks(gpu, parts, shown, size);
         let shadings: Vec<Shadings> = (parts.iter())
-            .map(|p| Shadings::of(&shown.style, p.list, p.stage))
+            .map(|p| Shadings::of(&shown.style, p.list, p.stage, shown.lamps.len()))
             .collect();
         let ids = parts.iter().map(|p| p.id);
         let props = self.props.write(gpu, shown.props, ids);

@@ -179,6 +179,12 @@ impl GpuWorld {
         }
     }
 
+    /// Returns the cells that a leaf stands in, by its position in [`SightState::shares`].
+    pub(crate) fn cells_of_leaf(&self, leaf: usize) -> &[CellId] {
+        let detail = self.moving.get(leaf).map(|m| m.detail.0 as usize);
+        detail.map_or(&[], |d| &self.details[d].cells)
+    }
+
     /// Returns the level at which an object is drawn to be off by at most `lod` pixels. `pixels` returns the
     /// pixels per meter.
     pub(crate) fn level(&self, placed: &Placed, lod: f32, pixels: impl FnOnce() -> f32) -> u32 {

@@ -22,12 +22,18 @@ pub(crate) struct Shadings {
     /// True if light is known by place.
     has_light: bool,
     explains: bool,
+    has_lamps: bool,
     /// True if a cut makes holes in everything.
     has_cut: bool,
 }
 
 impl Shadings {
-    pub(crate) fn of(style: &Style, list: &RenderList, stage: &RenderStage) -> Self {
+    pub(crate) fn of(
+        style: &Style,
+        list: &RenderList,
+        stage: &RenderStage,
+        n_lamps: usize,
+    ) -> Self {
         let is_count = style.paint == Paint::Overdraw;
         let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
         Self {
@@ -38,6 +44,7 @@ impl Shadings {
             explains: stage.explanation.is_some()
                 || style.paint == Paint::Cells
                 || list.instances.iter().any(is_reasoned),
+            has_lamps: n_lamps > 0,
             has_cut: style.cut_above < f32::INFINITY,
         }
     }
@@ -51,6 +58,7 @@ impl Shadings {
                 has_light: false,
                 explains: false,
                 is_prop: false,
+                has_lamps: false,
                 is_last: false,
             };
         }
@@ -61,6 +69,7 @@ impl Shadings {
             has_light: self.has_light,
             explains: self.explains,
             is_prop: false,
+            has_lamps: self.has_lamps,
             is_last,
         }
     }

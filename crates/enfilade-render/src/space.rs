@@ -11,15 +11,15 @@ use glam::{DVec3, Vec3};
 use crate::camera::Camera;
 use crate::frame::Style;
 use crate::gpu::RenderError;
+use crate::lamps::ActiveLamp;
 use crate::light::Light;
 use crate::list::{RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::props::{Prop, PropMesh};
-use crate::renderer::{DrawnPart, Shown};
+use crate::renderer::Shown;
 use crate::scene::GpuWorld;
-use crate::stage::RenderStage;
-use crate::studio::{Studio, StudioPart, StudioTarget};
+use crate::studio::{Studio, StudioPart, StudioTarget, drawn_parts, world_of};
 
 /// A view of a space of worlds.
 #[derive(Clone, Copy)]
@@ -38,6 +38,9 @@ pub struct SpaceShot<'a> {
     pub marks: &'a [Mark],
     /// Things; of parts that are not seen they are left out.
     pub props: &'a [Prop],
+    /// Indices of the lamps that shine, for example those [that matter](enfilade_world::Lights::that_matter); `None` for
+    /// the brightest at the eye.
+    pub lamps: Option<&'a [u32]>,
 }
 
 /// The contents of a drawn picture.
@@ -110,7 +113,8 @@ impl Studio {
         size: [u32; 2],
     ) -> Result<SpaceCounts, RenderError> {
         let lists = self.begin_space(shot, size)?;
-        let shown = self.space_shown(shot, size)?;
+        let lamps = self.space_lamps(shot);
+        let shown = self.space_shown(shot, &lamps, size)?;
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
         (self.renderer).draw(&self.gpu, &mut parts, &shown, output, size)?;
         Ok(counts(&lists))
@@ -140,7 +144,8 @@ impl Studio {
         size: [u32; 2],
     ) -> Result<(Picture, SpaceCounts), RenderError> {
         let lists = self.begin_space(shot, size)?;
-        let shown = self.space_shown(shot, size)?;
+        let lamps = self.space_lamps(shot);
+        let shown = self.space_shown(shot, &lamps, size)?;
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
         let picture = (self.renderer).picture(&self.gpu, &mut parts, &shown, size)?;
         Ok((picture, counts(&lists)))
@@ -190,13 +195,6 @@ impl Studio {
         inside.map_or(1.0, |b| b.min(1.0)) * stage.surroundings
     }
 
-    fn stage_of(&self, part: PartId) -> &RenderStage {
-        match part.0 as usize {
-            0 => &self.stage,
-            i => &self.parts[i - 1].stage,
-        }
-    }
-
     /// Draws the map of the sun's shadows unless it is current. Parts in rooms cast none.
     fn cast_sun(&mut self, shot: &SpaceShot<'_>) {
         if !shot.style.shadows {
@@ -213,22 +211,11 @@ impl Studio {
         let casting = (0..).map(PartId).zip(&cast);
         let casting = casting.filter(|(_, pose)| pose.is_some());
         let lists: Vec<_> = casting
-            .map(|(id, _)| (id, self.everything_of(shot.space, id)))
+            .map(|(id, _)| (id, self.everything_of(Some(shot.space), id)))
             .collect();
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
         self.renderer.draw_shadows(&self.gpu, &mut parts);
         self.shadows_of = Some(cast);
-    }
-
-    /// Lists everything of a part.
-    fn everything_of(&mut self, space: &Space, id: PartId) -> RenderList {
-        let world = match id.0 as usize {
-            0 => &self.world,
-            i => &self.parts[i - 1].world,
-        };
-        let (sight, state) = (space.sight(id), space.state(id));
-        self.lister.everything(world, sight, state, [0.0; 3]);
-        self.lister.take()
     }
 
     /// Lists the draws of each part in view.
@@ -241,17 +228,16 @@ impl Studio {
         let space = shot.space;
         let Some(answer) = shot.seen else {
             let ids = (0..space.n_parts() as u32).map(PartId);
-            return Ok(ids.map(|id| (id, self.everything_of(space, id))).collect());
+            return Ok(ids
+                .map(|id| (id, self.everything_of(Some(space), id)))
+                .collect());
         };
         let sparing = Sparing {
             stop_below: 0.0,
             ..self.sparing
         };
         let lists = answer.parts().map(|(id, seen)| {
-            let world = match id.0 as usize {
-                0 => &self.world,
-                i => &self.parts[i - 1].world,
-            };
+            let world = world_of(&self.world, &self.parts, id);
             let own = view_in(space, id, shot.frame, &view);
             let of_part = Shot {
                 view: &own,
@@ -265,10 +251,17 @@ impl Studio {
         Ok(lists.collect())
     }
 
+    fn space_lamps(&mut self, shot: &SpaceShot<'_>) -> Vec<ActiveLamp> {
+        let eye = Vec3::from(shot.camera.eye).as_dvec3();
+        let eye = shot.space.pose(shot.frame).point(eye);
+        self.active_lamps(Some(shot.space), &shot.style, eye, shot.lamps)
+    }
+
     /// Returns the frame apart from its worlds.
     fn space_shown<'s>(
         &self,
         shot: &SpaceShot<'s>,
+        lamps: &'s [ActiveLamp],
         size: [u32; 2],
     ) -> Result<Shown<'s>, RenderError> {
         let projection = shot.camera.projection(size[0] as f32 / size[1] as f32)?;
@@ -289,6 +282,8 @@ impl Studio {
             style: shot.style,
             marks: shot.marks,
             props: shot.props,
+            lamps,
+            day: self.day,
             exposure,
         })
     }
@@ -298,29 +293,6 @@ impl Studio {
 fn view_in(space: &Space, part: PartId, frame: PartId, view: &View) -> View {
     let to_frame = space.between(part, frame);
     view.in_frame(&to_frame.matrix3(), to_frame.at)
-}
-
-/// Returns the worlds of `lists`, whose parts ascend.
-fn drawn_parts<'a>(
-    root: &'a GpuWorld,
-    root_stage: &'a mut RenderStage,
-    others: &'a mut [StudioPart],
-    lists: &'a [(PartId, RenderList)],
-) -> Vec<DrawnPart<'a>> {
-    let others = others.iter_mut().map(|p| (&p.world, &mut p.stage));
-    let worlds = std::iter::once((root, root_stage)).chain(others);
-    let mut lists = lists.iter().peekable();
-    let drawn = (0..).map(PartId).zip(worlds).filter_map(|(id, part)| {
-        let (_, list) = lists.next_if(|l| l.0 == id)?;
-        let (world, stage) = part;
-        Some(DrawnPart {
-            id,
-            world,
-            stage,
-            list,
-        })
-    });
-    drawn.collect()
 }
 
 fn counts(lists: &[(PartId, RenderList)]) -> SpaceCounts {

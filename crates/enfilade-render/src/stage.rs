@@ -6,6 +6,7 @@ use glam::{Mat4, Vec3};
 use crate::camera::Projection;
 use crate::frame::{Paint, Style};
 use crate::gpu::Gpu;
+use crate::lamps::{ActiveLamp, LampGlobals, MOST_LAMPS};
 use crate::light::{Light, LightGlobals};
 use crate::list::RenderList;
 use crate::pipelines::Layouts;
@@ -46,6 +47,9 @@ pub(crate) struct Exposed<'a> {
     pub(crate) size: [u32; 2],
     pub(crate) sun: Sunlight,
     pub(crate) exposure: f32,
+    /// Share of the daylight that is left, 0 to 1.
+    pub(crate) day: f32,
+    pub(crate) lamps: &'a [ActiveLamp],
 }
 
 /// A buffer of [`Globals`] with a bind group of its own.
@@ -80,6 +84,8 @@ impl GlobalsBuffer {
 pub(crate) struct RenderStage {
     pub(crate) world: wgpu::BindGroup,
     pub(crate) globals: GlobalsBuffer,
+    /// The lamps of the frame.
+    pub(crate) lamps: wgpu::Buffer,
     pub(crate) instances: Grown,
     /// Instances of the last list, reused from frame to frame.
     drawn: Vec<Instance>,
@@ -98,11 +104,13 @@ impl RenderStage {
         gpu: &Gpu,
         world: wgpu::BindGroup,
         globals: GlobalsBuffer,
+        lamps: wgpu::Buffer,
         light: Light,
     ) -> Self {
         Self {
             world,
             globals,
+            lamps,
             instances: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
             drawn: Vec::new(),
             light,
@@ -130,7 +138,27 @@ impl RenderStage {
         globals.style[1] = u32::from(self.explanation.is_some());
         globals.origin_low[3] = self.surroundings;
         self.globals.write(gpu, &globals);
+        if exposed.lamps.is_empty() {
+            return;
+        }
+        let n = exposed.lamps.len().min(MOST_LAMPS);
+        let lamps: Vec<LampGlobals> = (exposed.lamps[..n].iter())
+            .map(|lamp| LampGlobals::new(lamp, &self.pose, projection))
+            .collect();
+        let head = [n as u32, 0, 0, 0];
+        let bytes = [bytemuck::bytes_of(&head), bytemuck::cast_slice(&lamps)].concat();
+        gpu.queue.write_buffer(&self.lamps, 0, &bytes);
     }
+}
+
+/// Makes a buffer of the lamps of a frame.
+pub(crate) fn lamp_buffer(gpu: &Gpu) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("lamps"),
+        size: 16 + (MOST_LAMPS * size_of::<LampGlobals>()) as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }
 
 impl Globals {
@@ -141,6 +169,8 @@ impl Globals {
             size,
             sun,
             exposure,
+            day,
+            ..
         } = *exposed;
         let [w, h] = size.map(|n| n as f32);
         let turn = pose.matrix3().as_mat3();
@@ -168,7 +198,7 @@ impl Globals {
             style: [u32::from(style.paint == Paint::Cells), 0, 0, 0],
             light,
             origin_low: projection.origin_low.extend(1.0).to_array(),
-            root_rows: [row(0, 0.0), row(1, height), row(2, 0.0)],
+            root_rows: [row(0, 0.0), row(1, height), row(2, day)],
         }
     }
 }

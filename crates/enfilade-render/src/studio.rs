@@ -2,13 +2,14 @@
 
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
-use enfilade_world::{PartId, Pose};
+use enfilade_world::{PartId, Pose, Space};
 
 use crate::camera::Camera;
 use crate::explain::Explanation;
 use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::ids::IdPicture;
+use crate::lamps::{ActiveLamp, LampState};
 use crate::light::{Light, sun_of};
 use crate::list::{Lister, RenderList, Shot, Sparing};
 use crate::marks::Mark;
@@ -64,6 +65,10 @@ pub struct Studio {
     pub(crate) placed: Vec<Option<f32>>,
     /// Worlds beside the first, by [`PartId`] less one.
     pub(crate) parts: Vec<StudioPart>,
+    /// The lamps.
+    pub(crate) lamps: LampState,
+    /// Share of the daylight that is left, from night (0) to day (1).
+    pub day: f32,
     /// Poses of the worlds that cast the shadows in the sun's map; `None` if it is out of date.
     pub(crate) shadows_of: Option<Vec<Option<Pose>>>,
 }
@@ -105,6 +110,8 @@ impl Studio {
             stage,
             lister: Lister::new(),
             parts: Vec::new(),
+            lamps: LampState::default(),
+            day: 1.0,
             shadows_of: None,
         })
     }
@@ -158,20 +165,13 @@ impl Studio {
             return;
         }
         self.shadows_of = Some(alone);
-        let all = Lister::new()
-            .everything(&self.world, &self.sight, &self.state, [0.0; 3])
-            .clone();
-        let part = DrawnPart {
-            id: PartId::ROOT,
-            world: &self.world,
-            stage: &mut self.stage,
-            list: &all,
-        };
-        self.renderer.draw_shadows(&self.gpu, &mut [part]);
+        let all = [(PartId::ROOT, self.everything_of(None, PartId::ROOT))];
+        let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &all);
+        self.renderer.draw_shadows(&self.gpu, &mut parts);
     }
 
     /// Returns the frame apart from the world.
-    fn shown<'f>(&self, frame: &'f Frame<'_>) -> Shown<'f> {
+    fn shown<'f>(&self, frame: &'f Frame<'_>, lamps: &'f [ActiveLamp]) -> Shown<'f> {
         let (style, projection) = (frame.style, frame.projection);
         // Parallel pictures have one exposure for all rooms.
         let is_eye = !projection.is_parallel && style.daylight;
@@ -181,6 +181,8 @@ impl Studio {
             style,
             marks: frame.marks,
             props: &[],
+            lamps,
+            day: self.day,
             exposure: if is_eye {
                 self.stage.light.exposure(projection.origin, 1.0)
             } else {
@@ -312,8 +314,11 @@ impl Studio {
         frame: &Frame<'_>,
         size: [u32; 2],
     ) -> Result<Picture, RenderError> {
+        self.follow_state();
         self.follow_sun(&frame.style);
-        let shown = self.shown(frame);
+        let eye = frame.projection.origin.as_dvec3();
+        let lamps = self.active_lamps(None, &frame.style, eye, None);
+        let shown = self.shown(frame, &lamps);
         let part = DrawnPart {
             id: PartId::ROOT,
             world: &self.world,
@@ -334,8 +339,11 @@ impl Studio {
         output: &wgpu::TextureView,
         size: [u32; 2],
     ) -> Result<(), RenderError> {
+        self.follow_state();
         self.follow_sun(&frame.style);
-        let shown = self.shown(frame);
+        let eye = frame.projection.origin.as_dvec3();
+        let lamps = self.active_lamps(None, &frame.style, eye, None);
+        let shown = self.shown(frame, &lamps);
         let part = DrawnPart {
             id: PartId::ROOT,
             world: &self.world,
@@ -446,4 +454,56 @@ impl Studio {
             .everything(&self.world, &self.sight, &self.state, [0.0; 3])
             .clone()
     }
+
+    pub(crate) fn stage_of(&self, part: PartId) -> &RenderStage {
+        match part.0 as usize {
+            0 => &self.stage,
+            i => &self.parts[i - 1].stage,
+        }
+    }
+
+    /// Lists everything of a part, with the doors of the space, or of the studio without one.
+    pub(crate) fn everything_of(&mut self, space: Option<&Space>, id: PartId) -> RenderList {
+        let world = world_of(&self.world, &self.parts, id);
+        let (sight, state) = match space {
+            Some(space) => (space.sight(id), space.state(id)),
+            None => (&self.sight, &self.state),
+        };
+        self.lister.everything(world, sight, state, [0.0; 3]);
+        self.lister.take()
+    }
+}
+
+pub(crate) fn world_of<'a>(
+    root: &'a GpuWorld,
+    others: &'a [StudioPart],
+    id: PartId,
+) -> &'a GpuWorld {
+    match id.0 as usize {
+        0 => root,
+        i => &others[i - 1].world,
+    }
+}
+
+/// Returns the worlds of `lists`, whose parts ascend.
+pub(crate) fn drawn_parts<'a>(
+    root: &'a GpuWorld,
+    root_stage: &'a mut RenderStage,
+    others: &'a mut [StudioPart],
+    lists: &'a [(PartId, RenderList)],
+) -> Vec<DrawnPart<'a>> {
+    let others = others.iter_mut().map(|p| (&p.world, &mut p.stage));
+    let worlds = std::iter::once((root, root_stage)).chain(others);
+    let mut lists = lists.iter().peekable();
+    let drawn = (0..).map(PartId).zip(worlds).filter_map(|(id, part)| {
+        let (_, list) = lists.next_if(|l| l.0 == id)?;
+        let (world, stage) = part;
+        Some(DrawnPart {
+            id,
+            world,
+            stage,
+            list,
+        })
+    });
+    drawn.collect()
 }

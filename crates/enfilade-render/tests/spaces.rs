@@ -122,6 +122,7 @@ fn a_room_in_a_room_is_drawn_as_one_world_would_be() {
                     style,
                     marks: &[],
                     props: &[],
+                    lamps: None,
                 };
                 let (picture, counts) = studio.space_picture(&shot, SIZE).unwrap();
                 show(&format!("rooms-{k}-{i}-{culls}"), &picture);
@@ -175,6 +176,7 @@ fn a_far_room_looks_as_a_near_one_in_its_own_frame_and_in_the_root_s() {
                     },
                     marks: &[],
                     props: &[],
+                    lamps: None,
                 };
                 let (picture, counts) = studio.space_picture(&shot, SIZE).unwrap();
                 show(&format!("far-{}", pictures.len()), &picture);
@@ -214,6 +216,7 @@ fn props_are_hidden_by_walls_and_stand_in_rooms() {
         pose: Pose::from_translation(at),
         size: [0.5; 3],
         color: [1.0, 0.0, 0.0],
+        glow: 0.0,
     };
     let mut n_red = |props: &[Prop], name: &str| {
         let shot = SpaceShot {
@@ -224,6 +227,7 @@ fn props_are_hidden_by_walls_and_stand_in_rooms() {
             style: Style::default(),
             marks: &[],
             props,
+            lamps: None,
         };
         let (picture, _) = studio.space_picture(&shot, SIZE).unwrap();
         show(name, &picture);

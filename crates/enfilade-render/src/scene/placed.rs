@@ -18,13 +18,15 @@ pub(crate) struct Instance {
 }
 
 impl Instance {
-    /// Returns the transform of a prop of a linear color.
-    pub(crate) fn of_prop(placed: &Mat4, color: [f32; 3]) -> Self {
+    /// Returns the transform of a prop of a linear color that emits a share of it.
+    pub(crate) fn of_prop(placed: &Mat4, color: [f32; 3], glow: f32) -> Self {
+        let glow = (glow.clamp(0.0, 1.0) * 255.0) as u32;
+        let color = packed(color.map(|c| c.clamp(0.0, 1.0).powf(1.0 / 2.2)));
         Self {
             rows: rows(placed),
             // Not structure.
             key: 1,
-            color: packed(color.map(|c| c.clamp(0.0, 1.0).powf(1.0 / 2.2))),
+            color: color & 0x00ff_ffff | glow << 24,
         }
     }
 

@@ -23,7 +23,8 @@ struct Globals {
     light: vec4<i32>,
     // Remainder of the origin beyond floats; w: brightness of the surroundings, 1 outdoors.
     origin_low: vec4<f32>,
-    // Rows of the rotation to the frame of the first world, whose +y is up; w of the second: height of the origin.
+    // Rows of the rotation to the frame of the first world, whose +y is up; w of the second: height of the origin;
+    // of the third: share of the daylight that is left.
     root_x: vec4<f32>,
     root_y: vec4<f32>,
     root_z: vec4<f32>,

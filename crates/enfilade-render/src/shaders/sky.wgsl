@@ -19,7 +19,8 @@ fn sky_along(ray: vec3<f32>) -> vec3<f32> {
     let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.66, 0.70, 0.74), min(-t / 0.12, 1.0));
     let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
     // Overexposed for an eye in a room.
-    return min(select(above, below, t < 0.0) * (0.7 + 0.3 * globals.field_shift.w), vec3(1.0));
+    return min(select(above, below, t < 0.0) * (0.7 + 0.3 * globals.field_shift.w), vec3(1.0))
+        * globals.root_z.w;
 }
 
 fn sky(p: vec2<i32>) -> vec3<f32> {

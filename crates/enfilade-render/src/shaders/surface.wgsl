@@ -13,6 +13,8 @@ override IS_SMOOTH: bool = false;
 override EXPLAINS: bool = false;
 // True for copies of a mesh that have the color of their instance.
 override IS_PROP: bool = false;
+// True if lamps shine.
+override HAS_LAMPS: bool = false;
 
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
@@ -69,6 +71,9 @@ fn corner(in: Corner) -> Surface {
         out.color = vec4(unpacked(in.key.y), 1.0);
     }
     out.emissive = in.emissive;
+    if IS_PROP {
+        out.emissive = vec4(out.color.rgb * unpack4x8unorm(in.key.y).a, 0.0);
+    }
     if EXPLAINS {
         let is_structure = (in.key.x & INSTANCE_MASK) == 0u;
         let cell = select(in.key.y, in.cell, is_structure);
@@ -156,7 +161,13 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     if CASTS_SHADOWS {
         sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
-    var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * globals.field_shift.w;
+    // At night, less of both.
+    var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * (globals.field_shift.w * globals.root_z.w);
+    if HAS_LAMPS {
+        var lit_cell = -1;
+        if HAS_LIGHT { lit_cell = cell; }
+        light += lamplight(in.relative, normal, toward_eye, lit_cell);
+    }
     // Invisible surfaces get a plain color: shading would make them look real.
     if reason != 0u { light = vec3(1.0 + 0.25 * normal.y); }
     return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
@@ -213,7 +224,7 @@ fn glass(in: Surface) -> Drawn {
     if HAS_LIGHT {
         let place = in.relative + globals.field_shift.xyz;
         if s.cell >= 0 && entry(globals.light.y + s.cell * CELL_TEXELS).w == 0u {
-            let inside = light_in(s.cell, place, along) * globals.origin_low.w;
+            let inside = light_in(s.cell, place, along) * (globals.origin_low.w * globals.root_z.w);
             around = 0.7 * toned(inside * globals.field_shift.w);
         }
     }
