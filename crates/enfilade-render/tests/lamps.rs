@@ -263,8 +263,8 @@ fn a_lamp_of_a_moving_room_lights_what_it_then_reaches() {
         studio.set_lamps(lights()).unwrap();
         studio
     };
-    let mut space = Space::new(&host).unwrap();
-    let part = space.add_part(&guest, PartId::ROOT, pose(0)).unwrap();
+    let mut space = Space::new(host.clone()).unwrap();
+    let part = space.add_part(guest.clone(), PartId::ROOT, pose(0)).unwrap();
     let mut kept = make(&space, part);
     let mut before: Option<Picture> = None;
     for i in 0..4 {
