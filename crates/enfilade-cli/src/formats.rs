@@ -22,6 +22,7 @@ pub(crate) enum Format {
     Search,
     Manual,
     Sound,
+    Living,
 }
 
 struct Row {
@@ -45,7 +46,7 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 15] = [
+const TABLE: [Row; 16] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(
@@ -66,6 +67,7 @@ const TABLE: [Row; 15] = [
     row(Format::Visible, "visible sets as text", &["pvs", "txt"]),
     row(Format::Pairs, "pairs as text", &["txt"]),
     row(Format::Statistics, "statistics as JSON", &["json"]),
+    row(Format::Living, "what lives in a world, as JSON", &["json"]),
     row(Format::Evidence, "evidence", &["ev", "evidence"]),
     row(Format::Search, "a saved search", &["search", "checkpoint"]),
     row(Format::Manual, "a manual page", &["1"]),

@@ -14,6 +14,7 @@ mod exact;
 mod formats;
 mod inspect;
 mod limits;
+mod living;
 mod locate;
 mod manual;
 mod output;

@@ -264,7 +264,9 @@ fn a_lamp_of_a_moving_room_lights_what_it_then_reaches() {
         studio
     };
     let mut space = Space::new(host.clone()).unwrap();
-    let part = space.add_part(guest.clone(), PartId::ROOT, pose(0)).unwrap();
+    let part = space
+        .add_part(guest.clone(), PartId::ROOT, pose(0))
+        .unwrap();
     let mut kept = make(&space, part);
     let mut before: Option<Picture> = None;
     for i in 0..4 {

@@ -180,13 +180,13 @@ impl Build {
             .into_iter()
             .enumerate()
         {
-            let doors: Vec<Hole> = [[3.0, 3.9], [5.2, 6.1]]
+            let doors: Vec<TowerHole> = [[3.0, 3.9], [5.2, 6.1]]
                 .into_iter()
                 .enumerate()
                 .map(|(k, along)| {
                     let room = sides[2 * i + k];
                     let rooms = if i == 0 { [room, hall] } else { [hall, room] };
-                    Hole::door(along, up[0], rooms)
+                    TowerHole::door(along, up[0], rooms)
                 })
                 .collect();
             self.wall(0, x, [OUTER, DEPTH - OUTER], up, &doors);
@@ -206,7 +206,7 @@ impl Build {
     fn outer_walls(&mut self, storey: usize, up: [f64; 2], hall: Side, rooms: &[Side]) {
         let sill = [up[0] + 0.8, up[0] + 2.3];
         let out = Side::Outside;
-        let window = |along, rooms| Hole {
+        let window = |along, rooms| TowerHole {
             along,
             up: sill,
             kind: OpeningKind::Window,
@@ -229,7 +229,7 @@ impl Build {
             window([11.0, 13.0], [bedroom, out]),
         ];
         front.push(if storey == 0 {
-            Hole::door([6.6, 7.8], up[0], [hall, out])
+            TowerHole::door([6.6, 7.8], up[0], [hall, out])
         } else {
             window([6.0, 8.2], [hall, out])
         });
@@ -273,11 +273,11 @@ impl Build {
             self.site.structure("floor slab", slab);
         }
         let top_of_shaft = [0.0, top - SLAB];
-        let gates: Vec<Hole> = (0..STOREYS)
+        let gates: Vec<TowerHole> = (0..STOREYS)
             .map(|k| {
                 let floor = k as f64 * HEIGHT;
                 let x = middle(SHAFT_X);
-                Hole {
+                TowerHole {
                     along: [x - 0.5 * GATE[0], x + 0.5 * GATE[0]],
                     up: [floor, floor + GATE[1]],
                     kind: OpeningKind::Door,
@@ -310,7 +310,7 @@ impl Build {
         faces: [f64; 2],
         along: [f64; 2],
         up: [f64; 2],
-        holes: &[Hole],
+        holes: &[TowerHole],
     ) {
         let span = |a: [f64; 2], u: [f64; 2]| {
             if axis == 0 {
@@ -363,14 +363,14 @@ impl Build {
 }
 
 /// A hole in a wall: along the wall, up, its kind, and the rooms in ascending order across it.
-struct Hole {
+struct TowerHole {
     along: [f64; 2],
     up: [f64; 2],
     kind: OpeningKind,
     rooms: [Side; 2],
 }
 
-impl Hole {
+impl TowerHole {
     fn door(along: [f64; 2], floor: f64, rooms: [Side; 2]) -> Self {
         Self {
             along,

@@ -15,6 +15,7 @@ use anyhow::{Context, anyhow};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sightlines, Target};
+use enfilade::world::PartId;
 use enfilade_render::{
     AdapterChoice, Camera, FOV, Paint, Sparing, Studio, good_camera, portal_looked_at,
 };
@@ -33,6 +34,7 @@ use self::panel::{Panel, Shown};
 use self::walker::Walker;
 use crate::formats::Format;
 use crate::limits::Limits;
+use crate::living::{Lived, LivingFile, read_living};
 use crate::output::{Outputs, refuse_stream, write_whole};
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{path_text, read_path};
@@ -44,6 +46,9 @@ use enfilade_cli::world::read_world;
 pub(crate) struct View {
     /// World written by `enfilade bake`.
     world: PathBuf,
+    /// Lifts that one rides, people, lamps and sounds in it, as `demo --living` writes them.
+    #[arg(long, value_name = "JSON")]
+    living: Option<PathBuf>,
     /// Start, in meters; a place with much to see if not given.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     eye: Option<[f32; 3]>,
@@ -80,7 +85,8 @@ pub(crate) struct View {
 
 pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     args.limits.begin()?;
-    let outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
+    let inputs = [&args.world].into_iter().chain(&args.path);
+    let outputs = Outputs::reading(inputs.chain(&args.living))?;
     // Writability is tested when a key requests a file: most walks write none.
     for (option, format, path) in [
         ("--record", Format::Cameras, &args.record),
@@ -95,6 +101,13 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         .map(|p| read_path(p, FOV))
         .transpose()?;
     let world = read_world(&args.world)?;
+    let lived = match &args.living {
+        Some(path) => {
+            let (file, lifts) = read_living(path)?;
+            Lived::new(world.clone(), file, lifts)?
+        }
+        None => Lived::new(world.clone(), LivingFile::default(), Vec::new())?,
+    };
     let events = EventLoop::new()
         .context("no window can be opened here; `enfilade render` draws without one")?;
     events.set_control_flow(ControlFlow::Poll);
@@ -103,6 +116,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         lines: Sightlines::build(&world),
         world,
         path: path.map(Into::into),
+        lived: Some(lived),
         outputs,
         open: None,
         failed: None,
@@ -114,6 +128,8 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     }
 }
 
+/// Time of a camera of `--path`. [Units: s]
+const PATH_STEP: f64 = 1.0 / 30.0;
 /// Reach of a click, in lengths of the view direction.
 const CLICK: f32 = 30.0;
 
@@ -121,6 +137,8 @@ struct App<'a> {
     args: &'a View,
     world: World,
     lines: Sightlines,
+    /// Until the window opens.
+    lived: Option<Lived>,
     /// Cameras still to show.
     path: Option<VecDeque<Camera>>,
     /// Files read, and files written in this walk.
@@ -225,6 +243,7 @@ impl App<'_> {
     }
 
     fn open_window(&mut self, events: &ActiveEventLoop) -> anyhow::Result<Open> {
+        let lived = self.lived.take().context("a window opens once")?;
         let [w, h] = self.args.size;
         let attributes = Window::default_attributes()
             .with_title(format!("enfilade: {}", self.args.world.display()))
@@ -251,6 +270,7 @@ impl App<'_> {
             studio.add_levels(&self.world)?;
         }
         studio.sparing = self.sparing();
+        lived.furnish(&mut studio)?;
         let start = match self.args.eye {
             Some(eye) => Camera {
                 eye,
@@ -268,7 +288,9 @@ impl App<'_> {
             ..Shown::default()
         };
         Ok(Open {
-            walker: Walker::new(&self.world, start.eye)?,
+            walker: Walker::new(start.eye),
+            is_living: self.args.living.is_some(),
+            lived,
             window,
             surface,
             config,
@@ -288,6 +310,7 @@ impl App<'_> {
             recorded: None,
             n_shots: 0,
             last: Instant::now(),
+            props: Vec::new(),
         })
     }
 
@@ -383,7 +406,7 @@ impl App<'_> {
         } else {
             open.pointer
         };
-        let camera = open.camera();
+        let camera = open.camera_in_root();
         let [right, up, forward] = camera.axes();
         let tan = (camera.fov_y * 0.5).tan();
         let x = (at[0] / w * 2.0 - 1.0) as f32 * tan * (w / h) as f32;
@@ -419,18 +442,22 @@ impl App<'_> {
                 return Ok(());
             };
             let [x, y, z] = camera.toward;
+            open.walker.frame = PartId::ROOT;
             open.walker.eye = DVec3::from(camera.eye.map(f64::from));
+            open.lived.step(&open.walker.player(), PATH_STEP);
             (open.yaw, open.pitch) = (z.atan2(x), y.atan2(x.hypot(z)));
         } else {
             open.turn_leaves(seconds);
             let wish = open.wish();
-            open.walker.step(wish, seconds, &open.studio.state);
+            open.lived.step(&open.walker.player(), seconds);
+            open.walker.step(wish, seconds, &open.lived.space);
         }
         let camera = open.camera();
         if let Some(recorded) = &mut open.recorded {
             recorded.push(camera);
         }
-        open.shown.ahead = name_ahead(&self.world, &self.lines, &camera);
+        let outside = open.camera_in_root();
+        open.shown.ahead = name_ahead(&self.world, &self.lines, &outside);
         open.draw(&self.world, &camera, seconds)
     }
 

@@ -9,7 +9,11 @@ use std::time::Instant;
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
-use enfilade_render::{AdapterChoice, Camera, FOV, Frame, Paint, Sparing, Studio, Style};
+use enfilade::runtime::View;
+use enfilade::world::PartId;
+use enfilade_render::{
+    AdapterChoice, Camera, Culling, FOV, Frame, Paint, Prop, SpaceShot, Sparing, Studio, Style,
+};
 use winit::dpi::PhysicalSize;
 use winit::keyboard::KeyCode;
 use winit::window::{CursorGrabMode, Window};
@@ -18,6 +22,7 @@ use super::mode::Mode;
 use super::panel::{Panel, Shown};
 use super::walker::Walker;
 use crate::formats::Format;
+use crate::living::Lived;
 use crate::output::{Outputs, write_whole};
 use crate::render::{light, portal_marks};
 
@@ -29,6 +34,9 @@ pub(super) struct Open {
     pub(super) studio: Studio,
     pub(super) panel: Panel,
     pub(super) walker: Walker,
+    pub(super) lived: Lived,
+    /// `true` if something lives in the world.
+    pub(super) is_living: bool,
     pub(super) yaw: f32,
     pub(super) pitch: f32,
     pub(super) keys: BTreeSet<KeyCode>,
@@ -48,6 +56,7 @@ pub(super) struct Open {
     pub(super) recorded: Option<Vec<Camera>>,
     pub(super) n_shots: u32,
     pub(super) last: Instant,
+    pub(super) props: Vec<Prop>,
 }
 
 /// The name of the cell in the middle of the picture: of the air before the surface there.
@@ -129,6 +138,18 @@ impl Open {
         }
     }
 
+    /// The camera in the coordinates of the world.
+    pub(super) fn camera_in_root(&self) -> Camera {
+        let to_root = self.lived.space.between(self.walker.frame, PartId::ROOT);
+        let camera = self.camera();
+        let toward = DVec3::from(camera.toward.map(f64::from));
+        Camera {
+            eye: to_root.point(self.walker.eye).as_vec3().to_array(),
+            toward: to_root.direction(toward).as_vec3().to_array(),
+            ..camera
+        }
+    }
+
     /// The velocity that the pressed keys request. [Units: wu/s]
     pub(super) fn wish(&self) -> DVec3 {
         let [right, _, forward] = self.camera().axes().map(|v| v.as_dvec3());
@@ -189,6 +210,9 @@ impl Open {
             light(&mut self.studio, world)?;
         }
         self.shown.queries = None;
+        if self.is_living {
+            return self.draw_living(world, (camera, &view), target, seconds);
+        }
         let list = if self.mode == Mode::Queries {
             let (list, counts) = self.studio.list_by_queries(world, camera, size)?;
             self.shown.queries = Some([counts.n_rounds, counts.n_queries]);
@@ -238,18 +262,80 @@ impl Open {
         Ok(())
     }
 
-    /// Opens or closes a portal: its leaves begin to move; one without leaves changes at once.
+    /// Draws a world that is lived in: all of its parts, people, lamps.
+    fn draw_living(
+        &mut self,
+        world: &World,
+        (camera, view): (&Camera, &View),
+        target: wgpu::SurfaceTexture,
+        seconds: f64,
+    ) -> anyhow::Result<()> {
+        let size = [self.config.width, self.config.height];
+        let output = target
+            .texture
+            .create_view(&wgpu::TextureViewDescriptor::default());
+        let player = self.walker.player();
+        let (style, outside) = (self.style(), self.camera_in_root());
+        self.props.clear();
+        let (space, seen, lamps) = self.lived.see(&player, view, &mut self.props);
+        let cells = seen.of_part(PartId::ROOT);
+        self.shown.cells.clear();
+        (self.shown.cells).extend(cells.iter().flat_map(enfilade::Seen::cells).map(|c| c.0));
+        self.shown.cells.sort_unstable();
+        self.shown.closed = space
+            .state(PartId::ROOT)
+            .shut_portals()
+            .map(|p| p.0)
+            .collect();
+        let is_culled = self.mode.culling() == Culling::Portals;
+        let counts = self.studio.draw_space(
+            &SpaceShot {
+                space,
+                frame: player.frame,
+                camera: *camera,
+                seen: is_culled.then_some(seen),
+                style,
+                marks: &[],
+                props: &self.props,
+                lamps: Some(lamps),
+            },
+            &output,
+            size,
+        )?;
+        self.shown.seconds(seconds);
+        self.shown.counts = [
+            counts.n_triangles,
+            self.studio.world.n_triangles(),
+            counts.n_draws as u64,
+        ];
+        self.shown.camera = Some(outside);
+        self.shown.mode = self.mode;
+        self.shown.is_recording = self.recorded.is_some();
+        self.shown.flies = self.walker.flies;
+        self.shown.living = self.lived.words(&player);
+        let (gpu, window) = (&self.studio.gpu, &self.window);
+        self.panel
+            .draw(gpu, window, &output, size, world, &self.shown);
+        self.window.pre_present_notify();
+        self.studio.gpu.queue.present(target);
+        Ok(())
+    }
+
+    /// Opens or closes a portal: its leaves begin to move; one without leaves changes at once. It no longer opens by itself.
     pub(super) fn toggle(&mut self, portal: PortalId) {
-        let state = &mut self.studio.state;
+        self.lived.leave_alone(portal);
+        let state = self.lived.space.state(PartId::ROOT);
         let before = self.turning.iter().position(|(p, _)| *p == portal);
         let before = before.map(|i| self.turning.swap_remove(i).1);
         let share = before.map(|b| b[0]).or_else(|| state.leaves(portal));
         let Some(share) = share else {
             let is_open = state.is_open(portal);
             if is_open {
-                state.close(portal);
+                self.studio.state.close(portal);
+                self.lived.space.close(PartId::ROOT, portal);
             } else {
-                state.open(portal);
+                self.studio.state.open(portal);
+                self.lived.space.open(PartId::ROOT, portal);
             }
             let now = if is_open { "closed" } else { "open" };
             self.say(format!("{portal} is {now}"));
@@ -276,6 +362,7 @@ impl Open {
                 (*share - by).max(*to)
             };
             self.studio.state.set_leaves(*portal, *share);
+            self.lived.space.set_leaves(PartId::ROOT, *portal, *share);
         }
         self.turning.retain(|(_, [share, to])| share != to);
     }
@@ -303,7 +390,28 @@ impl Open {
             light(&mut studio, world)?;
         }
         let size = [self.config.width, self.config.height];
-        let picture = studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?;
+        let picture = if self.is_living {
+            self.lived.furnish(&mut studio)?;
+            let style = self.style();
+            let aspect = size[0] as f32 / size[1] as f32;
+            let view = camera.view(aspect)?;
+            let mut props = Vec::new();
+            let player = self.walker.player();
+            let (space, seen, lamps) = self.lived.see(&player, &view, &mut props);
+            let shot = SpaceShot {
+                space,
+                frame: player.frame,
+                camera,
+                seen: Some(seen),
+                style,
+                marks: &[],
+                props: &props,
+                lamps: Some(lamps),
+            };
+            studio.space_picture(&shot, size)?.0
+        } else {
+            studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?
+        };
         let png = picture.to_png()?;
         outputs.write("--screenshot", Format::Picture, &to)?;
         write_whole(&to, &png)?;

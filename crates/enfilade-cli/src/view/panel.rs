@@ -35,6 +35,8 @@ pub(super) struct Shown {
     pub(super) is_recording: bool,
     pub(super) flies: bool,
     pub(super) message: String,
+    /// Counters and sounds of what lives there, in lines.
+    pub(super) living: String,
     pub(super) times: VecDeque<f32>,
 }
 
@@ -189,9 +191,11 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
             text += words;
         }
     }
-    if !shown.message.is_empty() {
-        text += "\n";
-        text += &shown.message;
+    for line in [&shown.living, &shown.message] {
+        if !line.is_empty() {
+            text += "\n";
+            text += line;
+        }
     }
     if !shown.help {
         text += "\nF1: help";

@@ -1,65 +1,65 @@
 //! A person who walks in the window, or flies: the walker of the living world, with an eye of its own.
 
-use enfilade::cpg::World;
 use enfilade::geom::DVec3;
-use enfilade::runtime::SightState;
-use enfilade::world::{Build, PartId, Space, SpaceError, Walker as Body};
+use enfilade::world::{Build, PartId, Space, Walker as Body};
 
 use enfilade_render::EYE_HEIGHT;
 
-/// A body in a world or, when it flies, an eye.
+use crate::living::Player;
+
+/// A body in a space or, when it flies, an eye.
 pub(super) struct Walker {
-    space: Space,
     body: Body,
+    /// The part that carries it.
+    pub(super) frame: PartId,
+    /// Position of the eye in the frame of its part.
     pub(super) eye: DVec3,
     pub(super) flies: bool,
 }
 
 impl Walker {
-    pub(super) fn new(world: &World, eye: [f32; 3]) -> Result<Self, SpaceError> {
+    pub(super) fn new(eye: [f32; 3]) -> Self {
         let build = Build {
             eye: EYE_HEIGHT.into(),
             ..Build::default()
         };
         let eye = DVec3::from(eye.map(f64::from));
-        Ok(Self {
-            space: Space::new(world.clone())?,
+        Self {
             body: Body::new(build, PartId::ROOT, eye),
+            frame: PartId::ROOT,
             eye,
             flies: false,
-        })
+        }
     }
 
-    /// Moves by `wish` (meters per second) for `seconds`; walls, furniture, leaves of doors as in `state`, and
-    /// portals closed there stop it.
-    pub(super) fn step(&mut self, wish: DVec3, seconds: f64, state: &SightState) {
+    pub(super) fn player(&self) -> Player {
+        Player {
+            frame: self.frame,
+            eye: self.eye,
+        }
+    }
+
+    /// Moves by `wish` (meters per second) for `seconds`; walls, furniture, leaves of doors and shut portals stop it.
+    pub(super) fn step(&mut self, wish: DVec3, seconds: f64, space: &Space) {
         if self.flies {
+            self.eye = space.between(self.frame, PartId::ROOT).point(self.eye);
+            self.frame = PartId::ROOT;
             self.eye += wish * seconds.clamp(0.0, 0.1);
             return;
         }
-        self.body.eye = self.eye;
-        if self.space.state(PartId::ROOT).shares() != state.shares()
-            || !self
-                .space
-                .state(PartId::ROOT)
-                .shut_portals()
-                .eq(state.shut_portals())
-        {
-            self.space.set_state(PartId::ROOT, state.clone());
-        }
-        self.body.step(&self.space, wish, seconds);
-        self.eye = self.body.eye;
+        (self.body.eye, self.body.frame) = (self.eye, self.frame);
+        self.body.step(space, wish, seconds);
+        (self.eye, self.frame) = (self.body.eye, self.body.frame);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade::cpg::{DetailObject, PortalId};
+    use enfilade::cpg::{DetailObject, PortalId, World};
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
     use enfilade::geom::Aabb;
     use enfilade::geom::scene::{Mesh, Primitive};
-    use enfilade::runtime::Sight;
     use enfilade_testkit::{GridParams, room_grid};
 
     /// Rooms in a row, and a person in the middle of the first.
@@ -73,11 +73,10 @@ mod tests {
         })
     }
 
-    fn walker(world: &World) -> (Walker, SightState) {
-        let sight = Sight::build(world).unwrap();
+    fn walker(world: &World) -> (Walker, Space) {
         let [low, high] = world.graph.cells[0].aabb;
         let eye = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
-        (Walker::new(world, eye).unwrap(), SightState::new(&sight))
+        (Walker::new(eye), Space::new(world.clone()).unwrap())
     }
 
     /// A box as an object.
@@ -109,18 +108,18 @@ mod tests {
     }
 
     /// Walks for two seconds.
-    fn walk(walker: &mut Walker, state: &SightState, wish: DVec3) {
+    fn walk(walker: &mut Walker, space: &Space, wish: DVec3) {
         for _ in 0..100 {
-            walker.step(wish, 0.02, state);
+            walker.step(wish, 0.02, space);
         }
     }
 
     #[test]
     fn who_falls_comes_to_stand_and_walls_hold() {
         let world = rooms(1);
-        let (mut walker, state) = walker(&world);
+        let (mut walker, space) = walker(&world);
         let cell = &world.graph.cells[0];
-        walk(&mut walker, &state, DVec3::new(6.0, 0.0, 2.0));
+        walk(&mut walker, &space, DVec3::new(6.0, 0.0, 2.0));
         let floor = f64::from(cell.aabb[0][1]);
         assert!(
             (walker.eye.y - floor - f64::from(EYE_HEIGHT)).abs() < 0.02,
@@ -135,10 +134,10 @@ mod tests {
     #[test]
     fn who_flies_goes_through() {
         let world = rooms(1);
-        let (mut walker, state) = walker(&world);
+        let (mut walker, space) = walker(&world);
         walker.flies = true;
         for _ in 0..200 {
-            walker.step(DVec3::new(10.0, 0.0, 0.0), 0.05, &state);
+            walker.step(DVec3::new(10.0, 0.0, 0.0), 0.05, &space);
         }
         assert!(walker.eye.x > f64::from(world.graph.cells[0].aabb[1][0]));
     }
@@ -151,9 +150,9 @@ mod tests {
             let x = (low[0] + high[0]) * 0.5 + 0.6;
             let top = [x + 0.4, low[1] + height, high[2]];
             add_block(&mut world, [x, low[1], low[2]], top);
-            let (mut walker, state) = walker(&world);
-            walk(&mut walker, &state, DVec3::ZERO);
-            walk(&mut walker, &state, DVec3::X);
+            let (mut walker, space) = walker(&world);
+            walk(&mut walker, &space, DVec3::ZERO);
+            walk(&mut walker, &space, DVec3::X);
             assert_eq!(walker.eye.x < x, is_stopped, "{height}: {} {x}", walker.eye);
         }
     }
@@ -173,12 +172,12 @@ mod tests {
                 [x + 0.23 * 5.0, low[1] + 0.19 * n, high[2]],
             );
         }
-        let (mut walker, state) = walker(&world);
-        walk(&mut walker, &state, DVec3::ZERO);
+        let (mut walker, space) = walker(&world);
+        walk(&mut walker, &space, DVec3::ZERO);
         let floor = walker.eye.y;
         let mut highest = floor;
         for _ in 0..200 {
-            walker.step(DVec3::X, 0.01, &state);
+            walker.step(DVec3::X, 0.01, &space);
             highest = highest.max(walker.eye.y);
         }
         assert!((highest - floor - 0.76).abs() < 0.03, "{}", highest - floor);
@@ -212,16 +211,16 @@ mod tests {
             }),
         });
         let reached = |world: &World, share: Option<f32>, is_closed: bool| {
-            let (mut walker, mut state) = walker(world);
+            let (mut walker, mut space) = walker(world);
             if let Some(share) = share {
-                state.set_leaves(door, share);
+                space.set_leaves(PartId::ROOT, door, share);
             }
             if is_closed {
-                state.close(door);
+                space.close(PartId::ROOT, door);
             }
             walker.eye.z = (hole.min.z + hole.max.z) * 0.5;
-            walk(&mut walker, &state, DVec3::ZERO);
-            walk(&mut walker, &state, DVec3::X * 3.0);
+            walk(&mut walker, &space, DVec3::ZERO);
+            walk(&mut walker, &space, DVec3::X * 3.0);
             walker.eye.x
         };
         let wall = hole.min.x;

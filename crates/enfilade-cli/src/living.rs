@@ -1,0 +1,10 @@
+//! Worlds that are lived in: a file says which lifts, lamps, people and sounds a world has, and [`Lived`] plays it.
+
+mod doors;
+mod file;
+mod lift;
+mod lived;
+mod people;
+
+pub(crate) use file::{LampEntry, LiftEntry, LivingFile, PeopleEntry, SoundEntry, read_living};
+pub(crate) use lived::{Lived, Player};

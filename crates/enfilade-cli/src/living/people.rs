@@ -1,0 +1,105 @@
+//! People on errands: each walks from place to place by the shortest path, whether anybody looks or not.
+
+use enfilade::cpg::PortalId;
+use enfilade::geom::DVec3;
+use enfilade::world::{
+    ActorEvent, ActorId, Actors, Agent, Chance, Errands, Layout, PartId, Path, PathSearch,
+    PlanDraft, Space, WalkMap, WayPoint,
+};
+
+use super::file::PeopleEntry;
+
+/// The people of a world.
+pub(super) struct People {
+    pub(super) actors: Actors,
+    errands: Errands,
+    places: Vec<DVec3>,
+    map: Option<WalkMap>,
+    search: PathSearch,
+    path: Path,
+}
+
+impl People {
+    /// Makes people at their places in turn. Makes a map of the floors if there are any, which takes seconds in large buildings.
+    pub(super) fn new(space: &Space, entry: &PeopleEntry) -> Self {
+        let layout = space.layout(PartId::ROOT);
+        let mut errands = Errands::default();
+        errands.stay = entry.stay;
+        let mut people = Self {
+            actors: Actors::new(layout.n_cells(), entry.seed),
+            errands,
+            places: entry.places.iter().map(|p| DVec3::from_array(*p)).collect(),
+            map: None,
+            search: PathSearch::new(),
+            path: Path::default(),
+        };
+        if entry.count > 0 {
+            let world = space.world(PartId::ROOT);
+            people.map = Some(WalkMap::new(layout, world, Agent::default()));
+        }
+        people
+    }
+
+    /// Adds those who are missing, each at a place in turn.
+    pub(super) fn fill(&mut self, space: &Space, n: u32, is_way: impl Fn(PortalId) -> bool) {
+        for i in self.actors.len() as u32..n {
+            let at = self.places[i as usize % self.places.len()];
+            let up = DVec3::Y * 0.5;
+            if let Some(cell) = space.layout(PartId::ROOT).locate(at + up) {
+                let mut actors = std::mem::replace(&mut self.actors, Actors::new(0, 0));
+                let mut plan = self.planner(space.layout(PartId::ROOT), &is_way);
+                actors.add(at, cell, &mut plan);
+                drop(plan);
+                self.actors = actors;
+            }
+        }
+    }
+
+    /// Plays until a time. Doors open for people, so all but those that `is_way` excludes are ways. [Units: s]
+    pub(super) fn advance(&mut self, space: &Space, now: f64, is_way: impl Fn(PortalId) -> bool) {
+        let mut actors = std::mem::replace(&mut self.actors, Actors::new(0, 0));
+        actors.advance(now, self.planner(space.layout(PartId::ROOT), &is_way));
+        self.actors = actors;
+    }
+
+    /// Returns a planner of errands.
+    fn planner<'a, F: Fn(PortalId) -> bool>(
+        &'a mut self,
+        layout: &'a Layout,
+        is_way: &'a F,
+    ) -> impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>) + use<'a, F> {
+        let Self {
+            errands,
+            places,
+            map,
+            search,
+            path,
+            ..
+        } = self;
+        move |event, chance, plan| {
+            let n = places.len() as u32;
+            errands.plan(chance, plan, n, |place, way| {
+                let Some(map) = map else { return };
+                let ends = [event.at, places[place as usize]];
+                if search.find(map, layout, ends, is_way, path).is_err() {
+                    return;
+                }
+                for leg in path.points.windows(2) {
+                    let middle = (leg[0] + leg[1]) * 0.5 + DVec3::Y * 0.5;
+                    let cell = layout.locate(middle).unwrap_or(event.cell);
+                    way.push(WayPoint { at: leg[1], cell });
+                }
+            });
+        }
+    }
+
+    /// Returns the feet of a person and the direction that it faces.
+    pub(super) fn pose(&self, id: ActorId) -> Option<(DVec3, DVec3)> {
+        let place = self.actors.place(id)?;
+        // At rest, each faces another way.
+        let angle = f64::from(id.0) * 2.4;
+        let rest = DVec3::new(angle.cos(), 0.0, angle.sin());
+        let ahead = place.velocity.with_y(0.0).try_normalize().unwrap_or(rest);
+        Some((place.at, ahead))
+    }
+}
