@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
+use enfilade::world::PartId;
 use enfilade_render::{
     AdapterChoice, Camera, Culling, FOV, Frame, Mark, MarkShape, Paint, Picture, Projection,
-    Sparing, Studio, Style, good_camera, walk_cameras,
+    Sparing, Studio, Style, good_camera, lamp_lights, walk_cameras,
 };
 use serde_json::json;
 
@@ -86,9 +87,15 @@ pub(crate) struct Render {
     /// Draw objects with fewer triangles if that moves their surface by at most this many pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     lod: f32,
-    /// No shadows, no ambient occlusion, the same daylight everywhere: faster.
+    /// No shadows, no ambient occlusion, no lamps, the same daylight everywhere: faster.
     #[arg(long)]
     plain: bool,
+    /// Leave the lamps of the world dark: its point and spot lights.
+    #[arg(long)]
+    no_lamps: bool,
+    /// Share of the daylight that is left, from night (0) to day (1).
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
+    daylight: f32,
     /// Adapter to draw with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
@@ -131,6 +138,13 @@ fn angle(text: &str) -> Result<f32, String> {
     }
 }
 
+fn share(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
+        _ => Err("a number from 0 to 1 is needed".into()),
+    }
+}
+
 /// Reads a world and loads it on an adapter.
 pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
     let world = read_world(path)?;
@@ -163,6 +177,15 @@ pub(crate) fn tell_of_pictures(studio: &Studio) -> anyhow::Result<()> {
 pub(crate) fn light(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
     if let Err(error) = studio.add_light(world) {
         writeln!(Warned, "enfilade: all rooms are lit alike: {error}")?;
+    }
+    Ok(())
+}
+
+/// Lights the lamps of a world; if the adapter cannot hold their maps, warns, and they stay dark.
+pub(crate) fn light_lamps(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
+    let lamps = lamp_lights(world, PartId::ROOT);
+    if let Err(error) = studio.set_lamps(lamps) {
+        writeln!(Warned, "enfilade: the lamps stay dark: {error}")?;
     }
     Ok(())
 }
@@ -220,6 +243,10 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     if !args.plain || args.above || args.paint == Colors::Cells {
         light(&mut studio, &world)?;
     }
+    if !args.plain && !args.no_lamps {
+        light_lamps(&mut studio, &world)?;
+    }
+    studio.day = args.daylight;
     let style = style_of(args);
     let mut out = outputs.printed();
     let mut all = Vec::new();

@@ -3,10 +3,66 @@
 //! Load a world once ([`Studio`]). Each frame, a [`Lister`] turns the run-time's answer into a short list of draws,
 //! which the studio draws. Any adapter that wgpu supports works, software included.
 //!
+//! # Worlds in worlds
+//!
+//! A lift in a tower, a person, and a lamp in the lift:
+//!
+//! ```no_run
+//! use enfilade_cpg::World;
+//! use enfilade_geom::DVec3;
+//! use enfilade_render::{
+//!     AdapterChoice, Camera, Gpu, LampLight, Picture, Prop, PropMesh, SpaceShot, Studio, Style,
+//! };
+//! use enfilade_world::{PartId, Pose, Space, SpaceViewer};
+//!
+//! fn ride(tower: &World, cabin: &World, camera: Camera) -> Result<Picture, Box<dyn std::error::Error>> {
+//!     let mut space = Space::new(tower)?;
+//!     let lift = space.add_part(cabin, PartId::ROOT, Pose::IDENTITY)?;
+//!     let mut viewer = SpaceViewer::new(&space);
+//!     let mut studio = Studio::new(Gpu::open(&AdapterChoice::Best)?, tower)?;
+//!     studio.add_light(tower)?;
+//!     // Once for each part, in their order.
+//!     studio.add_part(cabin, space.sight(lift))?;
+//!     studio.add_part_light(lift, cabin, space.sight(lift))?;
+//!     studio.set_lamps(vec![LampLight {
+//!         part: lift,
+//!         at: [0.0, 2.2, 0.0],
+//!         color: [2.0, 1.8, 1.5],
+//!         range: 8.0,
+//!         cone: None,
+//!     }])?;
+//!
+//!     // Each frame:
+//!     space.set_pose(lift, Pose::from_translation(DVec3::Y * 3.0))?;
+//!     let size = [1280, 720];
+//!     let view = camera.view(size[0] as f32 / size[1] as f32)?;
+//!     let person = Prop {
+//!         mesh: PropMesh::PERSON,
+//!         part: lift,
+//!         color: [0.2, 0.3, 0.7],
+//!         ..Prop::default()
+//!     };
+//!     let shot = SpaceShot {
+//!         space: &space,
+//!         frame: PartId::ROOT,
+//!         camera,
+//!         seen: Some(viewer.see(&space, PartId::ROOT, &view)),
+//!         style: Style::default(),
+//!         marks: &[],
+//!         props: &[person],
+//!         lamps: None,
+//!     };
+//!     // Or `draw_space`, to a window.
+//!     let (picture, _) = studio.space_picture(&shot, size)?;
+//!     Ok(picture)
+//! }
+//! ```
+//!
 //! # Limits
 //!
 //! Shading aims to be clear, not physical: base color, emission, alpha, one sun with shadows, daylight through portals
-//! ([`Studio::add_light`]), ambient occlusion, and glass. Metalness, roughness and normal maps are ignored.
+//! ([`Studio::add_light`]), lamps with shadows ([`Studio::set_lamps`]), ambient occlusion, and glass. Lamps light
+//! surfaces directly only, and props cast no shadows. Metalness, roughness and normal maps are ignored.
 
 mod camera;
 mod explain;

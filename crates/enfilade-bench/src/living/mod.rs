@@ -5,6 +5,7 @@
 mod actors;
 mod bodies;
 mod graphs;
+mod lamps;
 mod levels;
 mod parts;
 mod paths;
@@ -40,6 +41,7 @@ pub(crate) const ROWS: &[Row] = &[
     made("docking", &["cabins"], parts::docking),
     made("maze with movers", &["maze"], things::maze),
     made("lights", &["offices-1000"], rooms::lamps),
+    baked("lamps", LIVED_IN, lamps::pictures),
     made("cost", &["offices-10000"], rooms::cost),
     made("bodies: missed", &["offices-1000"], bodies::missed_in),
     baked("bodies: missed", &["institute"], bodies::missed),

@@ -1,0 +1,162 @@
+//! Lamps in pictures: those that matter, with maps of what they reach, against all lamps with maps of everything.
+
+use std::time::{Duration, Instant};
+
+use anyhow::ensure;
+use enfilade::geom::DVec3;
+use enfilade::world::{Lamp, LampId, Lights, PartId, Place, Space, SpaceSeen, SpaceViewer};
+use enfilade::{PortalId, World};
+use enfilade_render::{
+    AdapterChoice, Camera, Gpu, LampLight, LampOptions, Picture, SpaceShot, Studio, Style,
+};
+use enfilade_testkit::Rng;
+
+use super::rooms::point;
+use crate::rows::Figure;
+
+const VIEWS: usize = 200;
+const SIZE: [u32; 2] = [160, 120];
+/// Height of lamps above the floor. [Units: wu]
+const HEIGHT: f64 = 2.2;
+const RANGE: f32 = 9.0;
+/// Coarse maps: more of their texels show both sides of a wall.
+const SIDE: u32 = 128;
+
+/// Counts pixels that differ from brute force.
+pub(super) fn pictures(world: &World) -> anyhow::Result<Figure> {
+    let mut space = Space::new(world)?;
+    let mut rng = Rng::new(11);
+    for portal in (0..space.sight(PartId::ROOT).n_portals() as u32).map(PortalId) {
+        let share = rng.range(-0.5, 1.0).max(0.0) as f32;
+        space.state_mut(PartId::ROOT).set_leaves(portal, share);
+    }
+    let lamps = lamps_of(world, &space);
+    ensure!(!lamps.is_empty(), "no room has a place for a lamp");
+    let mut lights = Lights::new(&space);
+    for lamp in &lamps {
+        let (frame, at, range) = (lamp.part, lamp.at, lamp.range);
+        lights.add(&space, Lamp { frame, at, range })?;
+    }
+    lights.update(&space);
+    let mut culled = studio(world, &lamps, true)?;
+    let mut whole = studio(world, &lamps, false)?;
+    let mut viewer = SpaceViewer::new(&space);
+    let rooms: Vec<_> = world.graph.indoor_cells().collect();
+    let (mut n_differing, mut n_lit, mut n_lamps) = (0, 0, 0);
+    let mut times = [Duration::ZERO; 2];
+    let mut n_views = 0;
+    while n_views < VIEWS {
+        let [low, high] = rooms[rng.below(rooms.len())].1.aabb.map(point);
+        let eye = DVec3::from_array([0, 1, 2].map(|k| rng.range(low[k], high[k])));
+        if space.locate(PartId::ROOT, eye).is_none() {
+            continue;
+        }
+        n_views += 1;
+        let angle = rng.range(0.0, std::f64::consts::TAU);
+        let toward = DVec3::new(angle.cos(), rng.range(-0.5, 0.3), angle.sin());
+        let camera = Camera {
+            eye: eye.as_vec3().to_array(),
+            toward: toward.as_vec3().to_array(),
+            fov_y: 1.2,
+        };
+        let view = camera.view(SIZE[0] as f32 / SIZE[1] as f32)?;
+        let seen = viewer.see(&space, PartId::ROOT, &view);
+        let matter: Vec<u32> = lights
+            .that_matter(&space, &seen)
+            .iter()
+            .map(number)
+            .collect();
+        n_lamps += matter.len();
+        let mut draw = |studio: &mut Studio, k: usize, chosen: Option<&[u32]>| {
+            let start = Instant::now();
+            let picture = draw(studio, &space, camera, seen, chosen);
+            times[k] += start.elapsed();
+            picture
+        };
+        let found = draw(&mut culled, 0, Some(&matter))?;
+        let expected = draw(&mut whole, 1, None)?;
+        let pixels = found
+            .rgba
+            .chunks_exact(4)
+            .zip(expected.rgba.chunks_exact(4));
+        n_differing += pixels.filter(|(a, b)| a != b).count();
+        let pixels = expected.rgba.chunks_exact(4);
+        n_lit += pixels.filter(|p| p[..3] != [0; 3]).count();
+    }
+    ensure!(n_lit > 0, "no pixel was lit");
+    let [fast, slow] = times.map(|t| t.as_secs_f64() * 1e3 / VIEWS as f64);
+    Ok(Figure {
+        value: n_differing as f64,
+        most: 0.0,
+        note: format!(
+            "of {} pixels of {VIEWS} views, {n_lit} of them lit by {} lamps; {:.1} lamps a view, {fast:.0} ms, not {slow:.0}, \
+             in software, maps included",
+            VIEWS * (SIZE[0] * SIZE[1]) as usize,
+            lamps.len(),
+            n_lamps as f64 / VIEWS as f64
+        ),
+    })
+}
+
+fn number(id: &LampId) -> u32 {
+    id.0
+}
+
+/// Returns a lamp for each room whose middle is in its air.
+fn lamps_of(world: &World, space: &Space) -> Vec<LampLight> {
+    let mut lamps = Vec::new();
+    for (cell, room) in world.graph.indoor_cells() {
+        let [low, high] = room.aabb.map(point);
+        let mut at = (low + high) * 0.5;
+        at.y = (low.y + HEIGHT).min(high.y - 0.1);
+        let part = PartId::ROOT;
+        if space.locate(part, at) == Some(Place { part, cell }) {
+            lamps.push(LampLight {
+                part,
+                at: at.as_vec3().to_array(),
+                color: [2.0, 1.8, 1.5],
+                range: RANGE,
+                cone: None,
+            });
+        }
+    }
+    lamps
+}
+
+fn studio(world: &World, lamps: &[LampLight], is_culled: bool) -> anyhow::Result<Studio> {
+    let mut studio = Studio::new(Gpu::open(&AdapterChoice::Software)?, world)?;
+    studio.add_light(world)?;
+    // At night, so that each lit pixel shows it.
+    studio.day = 0.0;
+    studio.set_lamp_options(LampOptions {
+        most: lamps.len(),
+        side: SIDE,
+        is_culled,
+    })?;
+    studio.set_lamps(lamps.to_vec())?;
+    Ok(studio)
+}
+
+fn draw(
+    studio: &mut Studio,
+    space: &Space,
+    camera: Camera,
+    seen: SpaceSeen<'_>,
+    lamps: Option<&[u32]>,
+) -> anyhow::Result<Picture> {
+    let shot = SpaceShot {
+        space,
+        frame: PartId::ROOT,
+        camera,
+        seen: Some(seen),
+        style: Style {
+            shadows: false,
+            dark_corners: false,
+            ..Style::default()
+        },
+        marks: &[],
+        props: &[],
+        lamps,
+    };
+    Ok(studio.space_picture(&shot, SIZE)?.0)
+}
