@@ -7,4 +7,4 @@ mod lived;
 mod people;
 
 pub(crate) use file::{LampEntry, LiftEntry, LivingFile, PeopleEntry, SoundEntry, read_living};
-pub(crate) use lived::{Lived, Player};
+pub(crate) use lived::{Lived, Player, STEP};

@@ -16,6 +16,7 @@ use serde_json::json;
 
 use crate::formats::Format;
 use crate::limits::Limits;
+use crate::living::{Lived, Player, STEP, read_living};
 use crate::output::{Outputs, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json};
 use enfilade_cli::cameras::{path_text, read_path};
@@ -72,6 +73,13 @@ pub(crate) struct Render {
     /// Portals to close, by number: their leaves are shut, and a panel fills those without leaves.
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     close: Vec<u32>,
+    /// Lifts, people, lamps and sounds in the world, as `demo --living` writes them; pictures of a path are a 30th of a
+    /// second apart.
+    #[arg(long, value_name = "JSON", conflicts_with_all = ["above", "portals", "close", "door", "stop", "objects", "lod", "mode"])]
+    living: Option<PathBuf>,
+    /// Time of the first picture of --living, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, requires = "living", value_parser = time)]
+    time: f64,
     /// How far the leaves of a portal are open, from shut (0) to open (1); as in the model if not given.
     #[arg(long, value_name = "ID=SHARE", value_delimiter = ',', value_parser = door)]
     door: Vec<(u32, f32)>,
@@ -129,6 +137,13 @@ enum Colors {
     Lit,
     Cells,
     Overdraw,
+}
+
+fn time(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (0.0..=3600.0).contains(&x) => Ok(x),
+        _ => Err("a time between 0 and 3600 seconds is needed".into()),
+    }
 }
 
 fn angle(text: &str) -> Result<f32, String> {
@@ -206,7 +221,8 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     args.limits.begin()?;
     let fov = args.fov.to_radians();
     let is_path = args.path.is_some() || args.walk.is_some();
-    let mut outputs = Outputs::reading([&args.world].into_iter().chain(&args.path))?;
+    let inputs = [&args.world].into_iter().chain(&args.path);
+    let mut outputs = Outputs::reading(inputs.chain(&args.living))?;
     if let Some(record) = &args.record {
         outputs.write("--record", Format::Cameras, record)?;
     }
@@ -247,11 +263,19 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         light_lamps(&mut studio, &world)?;
     }
     studio.day = args.daylight;
+    let mut lived = match &args.living {
+        Some(path) => Some(live(path, &world, &mut studio)?),
+        None => None,
+    };
     let style = style_of(args);
     let mut out = outputs.printed();
     let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
         let mut drawn_size = args.size;
+        if let Some(lived) = &mut lived {
+            let seconds = if i == 0 { args.time } else { STEP };
+            lived.play(&Player::at(camera.eye), seconds);
+        }
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
             // In pixels of the larger picture.
@@ -263,7 +287,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
                 // A length, so it scales with the picture's edge.
                 lod: args.lod * scale.sqrt(),
             };
-            if args.above {
+            if let Some(lived) = &mut lived {
+                lived.picture(&mut studio, PartId::ROOT, camera, style, size)
+            } else if args.above {
                 above(&mut studio, &world, camera, args.cut, size)
             } else {
                 let marks = if args.portals {
@@ -298,6 +324,14 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         [one] if !is_path => print_json(out, one),
         all => print_json(out, &json!({ "pictures": all })),
     }
+}
+
+/// Reads what lives in a world, and adds it to the studio.
+fn live(path: &Path, world: &World, studio: &mut Studio) -> anyhow::Result<Lived> {
+    let (file, lifts) = read_living(path)?;
+    let lived = Lived::new(world.clone(), file, lifts)?;
+    lived.furnish(studio)?;
+    Ok(lived)
 }
 
 /// Closes portals and moves leaves.

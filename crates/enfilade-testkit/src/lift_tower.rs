@@ -30,6 +30,8 @@ const SHAFT_Z: [f64; 2] = [OUTER, 2.2];
 const FRONT: [f64; 2] = [2.2, 2.4];
 /// Width and height of the doors of the shaft and the cabin. [Units: wu]
 const GATE: [f64; 2] = [1.0, 2.1];
+/// Angle of the shaft's doors, which shows where they open to. [Units: degrees]
+const AJAR: f64 = 4.0;
 /// Thickness of the cabin's walls, and the gap between its front and the shaft's. [Units: wu]
 const SHEET: f64 = 0.05;
 const GAP: f64 = 0.02;
@@ -211,6 +213,7 @@ impl Build {
             up: sill,
             kind: OpeningKind::Window,
             rooms,
+            swing: 0.0,
         };
         let [studio, office, lounge, bedroom] = [0, 1, 2, 3].map(|k| rooms[k]);
         self.wall(
@@ -282,6 +285,8 @@ impl Build {
                     up: [floor, floor + GATE[1]],
                     kind: OpeningKind::Door,
                     rooms: [self.shaft, self.halls[k]],
+                    // Towards the hall, or it would hit the cabin.
+                    swing: AJAR,
                 }
             })
             .collect();
@@ -328,7 +333,7 @@ impl Build {
             if hole.kind == OpeningKind::Window {
                 glaze(&mut self.site, &self.palette, void, axis);
             } else {
-                hang_door(&mut self.site, &self.palette, void, axis, 0.0);
+                hang_door(&mut self.site, &self.palette, void, axis, hole.swing);
             }
         }
     }
@@ -368,6 +373,8 @@ struct TowerHole {
     up: [f64; 2],
     kind: OpeningKind,
     rooms: [Side; 2],
+    /// Opening angle of a leaf towards its second side; 0 is shut. [Units: degrees]
+    swing: f64,
 }
 
 impl TowerHole {
@@ -377,6 +384,7 @@ impl TowerHole {
             up: [floor, floor + 2.1],
             kind: OpeningKind::Door,
             rooms,
+            swing: 0.0,
         }
     }
 }

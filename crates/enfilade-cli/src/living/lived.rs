@@ -7,7 +7,9 @@ use enfilade::world::{
     Acoustics, ActorId, AwakeCells, Lamp, LampId, Lights, Listener, PartId, Pose, Space, SpaceSeen,
     SpaceViewer, Transmission,
 };
-use enfilade_render::{LampLight, Prop, PropMesh, RenderError, Studio};
+use enfilade_render::{
+    Camera, LampLight, Picture, Prop, PropMesh, RenderError, SpaceShot, Studio, Style,
+};
 
 use super::doors::AutoDoors;
 use super::file::{LivingFile, SoundEntry};
@@ -18,6 +20,8 @@ use super::people::People;
 const LINGER: f64 = 5.0;
 /// Longest step in which doors move. [Units: s]
 const LONGEST: f64 = 0.1;
+/// Step of a recorded walk. [Units: s]
+pub(crate) const STEP: f64 = 1.0 / 30.0;
 /// Radius of a bulb. [Units: wu]
 const BULB: f32 = 0.06;
 
@@ -26,6 +30,16 @@ const BULB: f32 = 0.06;
 pub(crate) struct Player {
     pub(crate) frame: PartId,
     pub(crate) eye: DVec3,
+}
+
+impl Player {
+    /// Places a player in the world itself.
+    pub(crate) fn at(eye: [f32; 3]) -> Self {
+        Self {
+            frame: PartId::ROOT,
+            eye: DVec3::from(eye.map(f64::from)),
+        }
+    }
 }
 
 /// A sound as the player hears it.
@@ -146,6 +160,44 @@ impl Lived {
             studio.add_part_light(lift.part, world, sight)?;
         }
         studio.set_lamps(self.lamps())
+    }
+
+    /// Plays until a time with nobody there. Small steps, in which doors move as in a window. [Units: s]
+    pub(crate) fn play(&mut self, player: &Player, seconds: f64) {
+        let n = (seconds / STEP).round() as u64;
+        for _ in 0..n {
+            self.step(player, STEP);
+        }
+    }
+
+    /// Draws a picture of what a player sees.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::space_picture`], and if the camera has no direction.
+    pub(crate) fn picture(
+        &mut self,
+        studio: &mut Studio,
+        frame: PartId,
+        camera: &Camera,
+        style: Style,
+        size: [u32; 2],
+    ) -> anyhow::Result<Picture> {
+        let view = camera.view(size[0] as f32 / size[1] as f32)?;
+        let eye = DVec3::from(camera.eye.map(f64::from));
+        let mut props = Vec::new();
+        let (space, seen, lamps) = self.see(&Player { frame, eye }, &view, &mut props);
+        let shot = SpaceShot {
+            space,
+            frame,
+            camera: *camera,
+            seen: Some(seen),
+            style,
+            marks: &[],
+            props: &props,
+            lamps: Some(lamps),
+        };
+        Ok(studio.space_picture(&shot, size)?.0)
     }
 
     /// Leaves a door to whoever opens and closes it by hand.

@@ -34,7 +34,7 @@ use self::panel::{Panel, Shown};
 use self::walker::Walker;
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::living::{Lived, LivingFile, read_living};
+use crate::living::{Lived, LivingFile, STEP, read_living};
 use crate::output::{Outputs, refuse_stream, write_whole};
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{path_text, read_path};
@@ -128,8 +128,6 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     }
 }
 
-/// Time of a camera of `--path`. [Units: s]
-const PATH_STEP: f64 = 1.0 / 30.0;
 /// Reach of a click, in lengths of the view direction.
 const CLICK: f32 = 30.0;
 
@@ -444,7 +442,7 @@ impl App<'_> {
             let [x, y, z] = camera.toward;
             open.walker.frame = PartId::ROOT;
             open.walker.eye = DVec3::from(camera.eye.map(f64::from));
-            open.lived.step(&open.walker.player(), PATH_STEP);
+            open.lived.step(&open.walker.player(), STEP);
             (open.yaw, open.pitch) = (z.atan2(x), y.atan2(x.hypot(z)));
         } else {
             open.turn_leaves(seconds);
@@ -453,10 +451,10 @@ impl App<'_> {
             open.walker.step(wish, seconds, &open.lived.space);
         }
         let camera = open.camera();
-        if let Some(recorded) = &mut open.recorded {
-            recorded.push(camera);
-        }
         let outside = open.camera_in_root();
+        if let Some(recorded) = &mut open.recorded {
+            recorded.push(outside);
+        }
         open.shown.ahead = name_ahead(&self.world, &self.lines, &outside);
         open.draw(&self.world, &camera, seconds)
     }

@@ -392,23 +392,9 @@ impl Open {
         let size = [self.config.width, self.config.height];
         let picture = if self.is_living {
             self.lived.furnish(&mut studio)?;
-            let style = self.style();
-            let aspect = size[0] as f32 / size[1] as f32;
-            let view = camera.view(aspect)?;
-            let mut props = Vec::new();
-            let player = self.walker.player();
-            let (space, seen, lamps) = self.lived.see(&player, &view, &mut props);
-            let shot = SpaceShot {
-                space,
-                frame: player.frame,
-                camera,
-                seen: Some(seen),
-                style,
-                marks: &[],
-                props: &props,
-                lamps: Some(lamps),
-            };
-            studio.space_picture(&shot, size)?.0
+            let (frame, style) = (self.walker.frame, self.style());
+            self.lived
+                .picture(&mut studio, frame, &camera, style, size)?
         } else {
             studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?
         };
