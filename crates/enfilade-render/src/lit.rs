@@ -1,7 +1,7 @@
 //! The lamps of a picture: their choice, and the upkeep of their maps.
 
 use enfilade_cpg::{CellId, PortalId};
-use enfilade_runtime::{Seen, View, Viewer};
+use enfilade_runtime::{Seen, Sight, SightState, View, Viewer};
 use enfilade_world::{PartId, Pose, Space, SpaceViewer};
 use glam::DVec3;
 use wgpu::util::DeviceExt;
@@ -15,6 +15,7 @@ use crate::lamps::{
 use crate::list::{RenderList, Shot, Sparing};
 use crate::renderer::{DrawnPart, Renderer};
 use crate::resources::depth_attachment;
+use crate::scene::GpuWorld;
 use crate::shadings::set_buffers;
 use crate::stage::{Exposed, Globals};
 use crate::studio::{Studio, drawn_parts, world_of};
@@ -103,18 +104,11 @@ impl Studio {
 
     /// Draws the map of a lamp.
     fn draw_lamp(&mut self, space: Option<&Space>, lamp: &ActiveLamp, slot: usize) {
-        let (lists, reach) = if self.lamps.options.is_culled {
-            self.reached(space, &lamp.light)
-        } else {
+        let (mut lists, reach) = self.reached(space, &lamp.light);
+        if !self.lamps.options.is_culled {
             let ids = (0..space.map_or(1, Space::n_parts) as u32).map(PartId);
-            let all = |id: PartId| {
-                let world = world_of(&self.world, &self.parts, id);
-                (0..world.cell_looks.len() as u32).map(CellId).collect()
-            };
-            let reach = ids.clone().map(|id| (id, all(id))).collect();
-            let lists = ids.map(|id| (id, self.everything_of(space, id))).collect();
-            (lists, reach)
-        };
+            lists = ids.map(|id| (id, self.everything_of(space, id))).collect();
+        }
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
         self.renderer.draw_lamp(&self.gpu, &mut parts, lamp, slot);
         self.renderer.lamps.set_current(slot, reach);
@@ -144,7 +138,8 @@ impl Studio {
             };
             (self.lister).seen(&self.world, &self.sight, &seen, &shot, &sparing);
             lists.push((PartId::ROOT, self.lister.take()));
-            reach.push((PartId::ROOT, cells_of(&seen, self.sight.n_cells())));
+            let cells = cells_of(&seen, &self.world, &self.sight, &self.state);
+            reach.push((PartId::ROOT, cells));
             return (lists, reach);
         };
         let viewer = (self.lamps.space_viewer).get_or_insert_with(|| SpaceViewer::new(space));
@@ -158,7 +153,8 @@ impl Studio {
             let world = world_of(&self.world, &self.parts, id);
             (self.lister).seen(world, space.sight(id), &seen, &shot, &sparing);
             lists.push((id, self.lister.take()));
-            reach.push((id, cells_of(&seen, space.sight(id).n_cells())));
+            let cells = cells_of(&seen, world, space.sight(id), space.state(id));
+            reach.push((id, cells));
         }
         (lists, reach)
     }
@@ -231,14 +227,25 @@ impl Studio {
     }
 }
 
-/// Returns the seen cells, ascending; all for an eye in none.
-fn cells_of(seen: &Seen<'_>, n_cells: usize) -> Vec<CellId> {
+/// Returns the cells whose air or surfaces are seen, ascending; all for an eye in none.
+fn cells_of(seen: &Seen<'_>, world: &GpuWorld, sight: &Sight, state: &SightState) -> Vec<CellId> {
     let counts = seen.counts();
     if counts.is_eye_lost || counts.is_capped {
-        return (0..n_cells as u32).map(CellId).collect();
+        return (0..sight.n_cells() as u32).map(CellId).collect();
     }
     let mut cells = seen.cells().to_vec();
     cells.sort_unstable();
+    let n = cells.len();
+    // A shut leaf stands in the cells on both sides of its portal.
+    for portal in state.shut_portals() {
+        let ends = world.portal_cells[portal.0 as usize];
+        let is_beside = ends.iter().any(|c| cells[..n].binary_search(c).is_ok());
+        if is_beside && !sight.leaves(portal).is_empty() {
+            cells.extend(ends);
+        }
+    }
+    cells.sort_unstable();
+    cells.dedup();
     cells
 }
 

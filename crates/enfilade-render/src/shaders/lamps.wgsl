@@ -71,13 +71,14 @@ fn lit_word(cell: i32, texel: u32) -> vec4<u32> {
     return textureLoad(lit_cells, vec2(at % ROW, at / ROW), 0);
 }
 
-// Returns the light of all lamps on a surface of a cell, or of -1 if that is unknown. `relative` to the camera.
+// Returns the light of all lamps on a surface of a cell: -1 in no air, -2 if cells are unknown. `relative` to the camera.
 //
 // A lamp lights only cells that it reaches: along a thin wall, the texels of a map show both of its sides. For the same
 // reason, the map is read a little nearer to the eye, where there is air for certain.
 fn lamplight(relative: vec3<f32>, normal: vec3<f32>, toward_eye: vec3<f32>, cell: i32) -> vec3<f32> {
     var sum = vec3(0.0);
     var bits = array<vec4<u32>, 2>(vec4(0xffffffffu), vec4(0xffffffffu));
+    if cell == -1 { return sum; }
     if cell >= 0 {
         bits = array<vec4<u32>, 2>(lit_word(cell, 0u), lit_word(cell, 1u));
     }
@@ -101,5 +102,5 @@ fn lamplight(relative: vec3<f32>, normal: vec3<f32>, toward_eye: vec3<f32>, cell
         sum += lamp.color.rgb * (bright * reached(p, lift, lamp.at.w, i32(lamp.color.w)));
     }
     // The eye gets used to bright places near a lamp.
-    return sum / (1.0 + 0.35 * max(sum.r, max(sum.g, sum.b)));
+    return sum / (1.0 + 0.8 * max(sum.r, max(sum.g, sum.b)));
 }

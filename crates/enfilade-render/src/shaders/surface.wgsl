@@ -164,7 +164,7 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     // At night, less of both.
     var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * (globals.field_shift.w * globals.root_z.w);
     if HAS_LAMPS {
-        var lit_cell = -1;
+        var lit_cell = -2;
         if HAS_LIGHT { lit_cell = cell; }
         light += lamplight(in.relative, normal, toward_eye, lit_cell);
     }
