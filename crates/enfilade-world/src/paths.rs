@@ -12,13 +12,15 @@
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
+use enfilade_runtime::DetailId;
 
+use crate::agent::Agent;
 use crate::layout::{Exit, Layout};
 use pull::{Bend, pull_taut};
 use strides::{Strides, walk_straight};
 
 pub use edges::Corner;
-pub use floors::{Agent, Floors};
+pub use floors::Floors;
 pub use geodesics::Geodesics;
 pub use hops::Hops;
 pub use sampling::Sampling;
@@ -53,11 +55,22 @@ pub struct WalkMap {
 const SPACING: f64 = 1.0;
 
 impl WalkMap {
-    /// Prepares the structure of a world, without its objects. Takes seconds for a large building: floors are laid out in
-    /// squares of a quarter of the walker's radius, and searched in each cell from each of its portals.
+    /// Prepares a world with its objects, except leaves of doors, which walkers open. Takes seconds for a large building: floors
+    /// are laid out in squares of a quarter of the walker's radius, and searched in each cell from each of its portals.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
-        let floors = Floors::new(layout, world, walker);
+        Self::with_objects(layout, world, walker, |_| true)
+    }
+
+    /// As [`WalkMap::new`], with those objects only for which `counts` returns `true`.
+    #[must_use]
+    pub fn with_objects(
+        layout: &Layout,
+        world: &World,
+        walker: Agent,
+        counts: impl FnMut(DetailId) -> bool,
+    ) -> Self {
+        let floors = Floors::new(layout, world, walker, counts);
         let mut chosen: Vec<(PortalId, [u32; 2])> = Vec::new();
         let mut by_portal: Vec<(PortalId, u32, u32)> = Vec::new();
         for c in floors.crossings().iter().filter(|c| c.direction < 2) {

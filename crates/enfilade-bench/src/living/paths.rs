@@ -205,11 +205,20 @@ pub(super) fn search(_: &str) -> anyhow::Result<Figure> {
 const INSTITUTE: &str = include_str!("../../peers/recast-institute.csv");
 const DUNGEON: &str = include_str!("../../peers/recast-dungeon.csv");
 
+/// The walker of these pairs.
+const RECAST: Agent = Agent {
+    radius: 0.3,
+    height: 1.8,
+    eye: 1.6,
+    step: 0.4,
+    slope: std::f64::consts::FRAC_PI_4,
+};
+
 /// Compares our lengths with Recast's where both find a path: the worst pair and the mean.
 fn lengths(world: &World, pairs: &str) -> anyhow::Result<Figure> {
     let layout = Layout::new(world);
     let start = Instant::now();
-    let map = WalkMap::new(&layout, world, Agent::default());
+    let map = WalkMap::with_objects(&layout, world, RECAST, |_| false);
     let made = start.elapsed().as_secs_f64();
     let (mut search, mut path) = (PathSearch::new(), Path::default());
     let (mut ours, mut theirs, mut worst, mut n) = (0.0, 0.0, 0.0_f64, 0);

@@ -3,7 +3,7 @@
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState};
-use enfilade::world::{Build, Contacts, Layout, Walker as Body};
+use enfilade::world::{Agent, Contacts, Layout, Walker as Body};
 
 use enfilade_render::EYE_HEIGHT;
 
@@ -20,13 +20,13 @@ impl Walker {
     pub(super) fn new(world: &World, sight: &Sight, eye: [f32; 3]) -> Self {
         let layout = Layout::new(world);
         let contacts = Contacts::new(world, sight, &layout);
-        let build = Build {
+        let agent = Agent {
             eye: EYE_HEIGHT.into(),
-            ..Build::default()
+            ..Agent::default()
         };
         let eye = DVec3::from(eye.map(f64::from));
         Self {
-            body: Body::new(&contacts, build, eye),
+            body: Body::new(&contacts, agent, eye),
             layout,
             contacts,
             eye,

@@ -12,11 +12,12 @@ use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
 use enfilade_runtime::SightState;
 
+use crate::agent::Agent;
 use crate::bodies::{Body, Cast, Caster, Contacts};
 use crate::layout::Layout;
 
 /// Gap kept to walls. [Units: wu]
-const GAP: f64 = 0.005;
+pub(super) const GAP: f64 = 0.005;
 /// Maximum number of changes of direction in a step: along a wall, then along the next one where two meet.
 const SLIDES: usize = 4;
 /// Depth of the search for a floor. [Units: wu]
@@ -25,38 +26,15 @@ const FAR: f64 = 500.0;
 const LONGEST: f64 = 0.1;
 /// Acceleration. [Units: wu/s²]
 const GRAVITY: f64 = 9.81;
-
-/// Dimensions of a walker.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Build {
-    /// Half the width. [Units: wu] [Limit: > 0.01]
-    pub radius: f64,
-    /// Height of the eye above the floor. [Units: wu] [Limit: > step + radius]
-    pub eye: f64,
-    /// Greatest height stepped onto or over. [Units: wu] [Limit: >= 0]
-    pub step: f64,
-    /// Speed of rising when climbing. [Units: wu/s] [Limit: above 0]
-    pub climb: f64,
-}
-
-impl Default for Build {
-    /// An adult: 44 cm wide, eyes at 1.6 m, steps of 30 cm.
-    fn default() -> Self {
-        Self {
-            radius: 0.22,
-            eye: 1.6,
-            step: 0.3,
-            climb: 6.0,
-        }
-    }
-}
+/// Speed of rising when climbing. [Units: wu/s]
+const CLIMB: f64 = 6.0;
 
 /// A person who walks in a world. Allocates nothing once the buffers have grown.
 #[derive(Clone, Debug)]
 pub struct Walker {
     /// Position of the eye; may be set. [Units: wu]
     pub eye: DVec3,
-    build: Build,
+    agent: Agent,
     /// Downward speed. [Units: wu/s]
     falling: f64,
     /// The last cell that it was in.
@@ -67,10 +45,10 @@ pub struct Walker {
 impl Walker {
     /// Makes a walker at rest with its eye at a point.
     #[must_use]
-    pub fn new(contacts: &Contacts, build: Build, eye: DVec3) -> Self {
+    pub fn new(contacts: &Contacts, agent: Agent, eye: DVec3) -> Self {
         Self {
             eye,
-            build,
+            agent,
             falling: 0.0,
             cell: None,
             caster: Caster::new(contacts),
@@ -81,6 +59,18 @@ impl Walker {
     #[must_use]
     pub fn cell(&self) -> Option<CellId> {
         self.cell
+    }
+
+    /// Returns its size and abilities.
+    #[must_use]
+    pub fn agent(&self) -> &Agent {
+        &self.agent
+    }
+
+    /// Returns the point below its eye where it stands, or would stand after a fall of no height. [Units: wu]
+    #[must_use]
+    pub fn feet(&self) -> DVec3 {
+        self.eye - DVec3::Y * self.agent.eye
     }
 
     /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors where
@@ -108,13 +98,10 @@ impl Walker {
         self.stand(contacts, layout, state, seconds);
     }
 
-    /// Returns the capsule from a step's height up to the eye, and the depth of its center below the eye.
+    /// Returns its capsule, and the vector from the eye to the capsule's center.
     fn body(&self) -> (Body, DVec3) {
-        let Build {
-            radius, eye, step, ..
-        } = self.build;
-        let half = DVec3::Y * (0.5 * (eye - step - radius)).max(0.0);
-        (Body::Capsule { half, radius }, -half)
+        let (body, up) = self.agent.body();
+        (body, DVec3::Y * (up - self.agent.eye))
     }
 
     /// Returns the cell of a point of it; in solid matter, the last one.
@@ -185,15 +172,13 @@ impl Walker {
 
     /// Moves onto the floor, or towards it.
     fn stand(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, seconds: f64) {
-        let Build {
-            eye, step, climb, ..
-        } = self.build;
-        let knee = self.eye - DVec3::Y * (eye - step);
-        let point = Body::Sphere { radius: 0.0 };
-        let floor = self.locate(layout, knee).and_then(|cell| {
+        let step = self.agent.step;
+        let (foot, up) = self.agent.foot();
+        let from = self.feet() + DVec3::Y * up;
+        let floor = self.locate(layout, from).and_then(|cell| {
             let cast = Cast {
-                body: &point,
-                from: knee,
+                body: &foot,
+                from,
                 by: -DVec3::Y * FAR,
                 cell,
             };
@@ -205,11 +190,16 @@ impl Walker {
             return;
         };
         let above = floor.t * FAR - step;
+        if self.falling == 0.0 && above <= step {
+            // Steps are climbed, and descended, in a few frames.
+            let most = CLIMB * seconds;
+            self.eye.y -= above.clamp(-most, most);
+            return;
+        }
         self.falling += GRAVITY * seconds;
         if above <= self.falling * seconds {
             self.falling = 0.0;
-            // Steps are climbed in a few frames.
-            self.eye.y -= above.clamp(-climb * seconds, above.max(0.0));
+            self.eye.y -= above.clamp(-CLIMB * seconds, above.max(0.0));
         } else {
             self.eye.y -= self.falling * seconds;
         }
@@ -238,7 +228,7 @@ mod tests {
             let layout = Layout::new(world);
             let contacts = Contacts::new(world, &sight, &layout);
             Self {
-                walker: Walker::new(&contacts, Build::default(), eye),
+                walker: Walker::new(&contacts, Agent::default(), eye),
                 state: SightState::new(&sight),
                 layout,
                 contacts,
@@ -297,7 +287,7 @@ mod tests {
         let mut site = Site::new(&world, middle(&world));
         let room = site.layout.cell(CellId(0)).bounds;
         let mut rng = Rng::new(6);
-        let radius = Build::default().radius;
+        let radius = Agent::default().radius;
         // Not in a cupboard.
         loop {
             let share = DVec3::new(rng.unit(), 0.53, rng.unit());
@@ -366,7 +356,7 @@ mod tests {
             let mut site = Site::new(&world, from);
             site.walk(DVec3::ZERO, 2.0);
             let floor = site.walker.eye.y;
-            assert!((floor - low.y - Build::default().eye).abs() < 0.01);
+            assert!((floor - low.y - Agent::default().eye).abs() < 0.01);
             let mut highest = floor;
             for _ in 0..60 {
                 site.walk(DVec3::X, 0.02);
@@ -395,13 +385,15 @@ mod tests {
         }
         let after = site.walker.eye;
         assert!(before.distance(after) > 0.05, "{before} {after}");
-        // Out of the doorway on one side or the other, not in the shut leaf, which is 6 to 10 cm behind the opening.
-        let radius = Build::default().radius;
-        let off = after.x - door.x;
-        assert!(
-            off < 0.06 - radius + 1e-3 || off > 0.1 + radius - 1e-3,
-            "{off}"
-        );
+        // Not in the leaf, nor in the wall.
+        let (body, below) = site.walker.body();
+        let mut caster = Caster::new(&site.contacts);
+        let (contacts, state) = (&site.contacts, &site.state);
+        let mut deepest = 0.0_f64;
+        caster.for_each_contact(contacts, state, &body, after + below, CellId(1), |contact| {
+            deepest = deepest.max(contact.depth);
+        });
+        assert!(deepest < 1e-3, "{deepest} at {after}");
     }
 
     /// Covers W12: a hole in the floor leads into the room below, another cell.

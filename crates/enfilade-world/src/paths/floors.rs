@@ -12,38 +12,16 @@
 //! half a square, and fails at a doorway less than two squares wider than itself.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
-use enfilade_cpg::{CellId, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DVec3, Triangle};
+use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
+use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
+use enfilade_runtime::DetailId;
 
+use crate::agent::Agent;
+use crate::bodies::Room;
 use crate::layout::Layout;
 use crate::paths::columns::{Span, Squares, spans};
-
-/// The size and abilities of a walker.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Agent {
-    /// Distance kept from walls. [Units: wu] [Limit: above 0]
-    pub radius: f64,
-    /// Room needed above the floor. [Units: wu] [Limit: above 0]
-    pub height: f64,
-    /// The highest step, up or down. [Units: wu] [Limit: at least 0]
-    pub step: f64,
-    /// The steepest floor. [Units: rad]
-    pub slope: f64,
-}
-
-impl Default for Agent {
-    /// An adult: radius 0.3 m, 1.8 m high, steps of 0.4 m, slopes of 45°.
-    fn default() -> Self {
-        Self {
-            radius: 0.3,
-            height: 1.8,
-            step: 0.4,
-            slope: std::f64::consts::FRAC_PI_4,
-        }
-    }
-}
 
 /// Marks the absence of a floor.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -100,22 +78,26 @@ struct Ground {
 }
 
 impl Floors {
-    /// Lays out the floors of a world's structure, without its objects; outdoors, ground up to 30 m around the rooms.
+    /// Lays out the floors of a world for which `counts` returns `true` for its objects; outdoors, ground up to 30 m around the
+    /// rooms. Leaves of doors are no obstacles: walkers open them.
+    ///
     /// Squares are a quarter of the walker's radius wide, or wider if there would be more than 8 million; if there
     /// would be more than half a million, they are at least 5 cm wide, so a thinner walker gets the same floors as
     /// one with a radius of 0.2 m.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
-        let triangles = || world.batches.iter().flat_map(|b| b.primitive.triangles());
+    pub fn new(layout: &Layout, world: &World, walker: Agent, counts: impl FnMut(DetailId) -> bool) -> Self {
+        let solid = solid_of(world, counts);
+        let triangles = || solid.iter().copied();
         let bounds = bounds_of(layout, triangles().flatten());
         let squares = squares_of(&bounds, walker.radius / 4.0, triangles());
         let spans = spans(&squares, triangles(), walker.slope);
         let mut grounds = grounds(&spans, walker.height as f32);
-        drop(spans);
         let first = first_of(&squares, grounds.iter().map(|g| g.square));
         step_from_each(&squares, &first, &mut grounds, &walker);
+        let edges = edges_of(&squares, &spans, &grounds, &walker);
+        drop(spans);
         // Distances are only as exact as a square's side.
-        let is_clear = clear(&squares, &grounds, walker.radius - 0.5 * squares.side);
+        let mut is_clear = clear(&squares, &grounds, &edges, walker.radius - 0.5 * squares.side);
         let mut floors = Self {
             squares,
             first: Vec::new(),
@@ -123,6 +105,10 @@ impl Floors {
             crossings: Vec::new(),
             walker,
         };
+        let room = Room::new(&solid, &walker);
+        for (is_clear, ground) in is_clear.iter_mut().zip(&grounds) {
+            *is_clear &= room.is_free(floors.center(ground.square, ground.y.into()));
+        }
         floors.keep(layout, &grounds, &is_clear);
         // An opening that bakes call a window may have a sill on one side only: there the floor decides. Behind
         // glass, none does.
@@ -315,6 +301,27 @@ impl Floors {
     }
 }
 
+/// Returns the triangles that stop walkers: the structure, and the objects that count, except leaves of doors.
+fn solid_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> Vec<Triangle> {
+    let mut all: Vec<Triangle> = Vec::new();
+    for batch in &world.batches {
+        all.extend(batch.primitive.triangles());
+    }
+    let fittings = world.graph.portals.iter().flat_map(|p| &p.fittings);
+    let moving = fittings.filter(|f| f.part == FittingPart::Leaf && f.motion.is_some());
+    let leaves: BTreeMap<u32, DMat4> = moving.filter_map(|f| Some((f.detail, f.motion?.at(1.0)))).collect();
+    for (i, object) in (0..).zip(&world.details) {
+        let open = leaves.get(&i);
+        if open.is_some() || counts(DetailId(i)) {
+            let place = open.copied().unwrap_or(DMat4::IDENTITY) * object.placement();
+            for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+                all.extend(primitive.placed_triangles(place));
+            }
+        }
+    }
+    all
+}
+
 /// Returns a box around all vertices, but not far beyond the rooms: the model may contain a sky.
 fn bounds_of(layout: &Layout, corners: impl Iterator<Item = DVec3>) -> Aabb {
     let finite = corners.filter(|p| p.is_finite());
@@ -428,18 +435,35 @@ fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walk
     }
 }
 
-/// Marks the floors that are at least `radius` from the nearest place without a step.
-fn clear(squares: &Squares, grounds: &[Ground], radius: f64) -> Vec<bool> {
+/// Returns per floor the directions in which it ends at a drop, one bit each, rather than at something that a walker touches.
+fn edges_of(squares: &Squares, spans: &[Span], grounds: &[Ground], walker: &Agent) -> Vec<u8> {
+    let first = first_of(squares, spans.iter().map(|s| s.square));
+    let is_drop = |ground: &Ground, direction: usize| {
+        let Some(beside) = squares.beside(ground.square, direction) else {
+            return true;
+        };
+        let low = ground.y + walker.step as f32;
+        let high = ground.y + walker.height as f32;
+        let column = &spans[first[beside] as usize..first[beside + 1] as usize];
+        !column.iter().any(|s| s.high > low && s.low < high)
+    };
+    let bits = |ground: &Ground| {
+        let ends = (0..4).filter(|&d| ground.steps[d] == NONE && is_drop(ground, d));
+        ends.fold(0, |bits, d| bits | 1 << d)
+    };
+    grounds.iter().map(bits).collect()
+}
+
+/// Marks the floors that are at least `radius` from the nearest drop.
+fn clear(squares: &Squares, grounds: &[Ground], edges: &[u8], radius: f64) -> Vec<bool> {
     // Offset from each floor to the nearest border, in half squares.
     let mut offset = vec![[i16::MAX / 4; 2]; grounds.len()];
     let length = |v: [i16; 2]| i32::from(v[0]).pow(2) + i32::from(v[1]).pow(2);
     let directions: [[i16; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
     let mut heap = BinaryHeap::new();
-    for (i, ground) in grounds.iter().enumerate() {
-        if let Some(d) = ground.steps.iter().position(|&s| s == NONE) {
-            offset[i] = directions[d];
-            heap.push(Reverse((1, i as u32)));
-        }
+    for (i, edges) in edges.iter().enumerate().filter(|e| *e.1 != 0) {
+        offset[i] = directions[edges.trailing_zeros() as usize];
+        heap.push(Reverse((1, i as u32)));
     }
     let reach = (2.0 * radius / squares.side).max(0.0);
     while let Some(Reverse((far, i))) = heap.pop() {

@@ -70,8 +70,8 @@ fn catch(
         }
         let line = (b.0 - from.0).with_y(0.0);
         // A little beyond, or it would be caught there itself.
-        let t = (floors.point(last) - from.0).with_y(0.0).dot(line) / line.length_squared()
-            + 1.5 * side / line.length();
+        let passed = (floors.point(last) - from.0).with_y(0.0).dot(line) / line.length();
+        let t = (passed.max(0.0) + 1.5 * side) / line.length();
         let caught = from.0 + line * t;
         let is_between =
             t > 0.0 && t < 1.0 && caught.distance(from.0).min(caught.distance(b.0)) > side;
@@ -151,8 +151,8 @@ fn move_bend(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::agent::Agent;
     use crate::layout::Layout;
-    use crate::paths::floors::Agent;
     use enfilade_cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, World};
     use enfilade_geom::Aabb;
     use enfilade_geom::scene::Primitive;
@@ -183,7 +183,7 @@ mod tests {
             },
             ..CellPortalGraph::default()
         };
-        let floors = Floors::new(&Layout::new(&world), &world, Agent::default());
+        let floors = Floors::new(&Layout::new(&world), &world, Agent::default(), |_| true);
         let on = |x: f64, z: f64| {
             let p = DVec3::new(x, 0.0, z);
             (p, floors.below(p).unwrap())
@@ -192,8 +192,9 @@ mod tests {
         pull_taut(&floors, &mut bends, &mut |_| true);
         let length: f64 = bends.windows(2).map(|w| w[0].0.distance(w[1].0)).sum();
         // Tangents to circles about both wall ends, short arcs, and the side between.
+        let (r, d) = (Agent::default().radius, 8.0_f64.sqrt());
         let least =
-            2.0 * (8.0_f64 - 0.09).sqrt() + 2.0 + 2.0 * 0.3 * (45.0_f64.to_radians() + 0.106);
+            2.0 * (d * d - r * r).sqrt() + 2.0 + 2.0 * r * (45.0_f64.to_radians() + (r / d).asin());
         assert!(
             length > least - 0.06 && length < least + 0.1,
             "{length} {least}"

@@ -1,0 +1,218 @@
+//! Walks of paths: the share of walkers that reach the end of the path planned for them, in furnished buildings, opening
+//! doors on the way.
+//!
+//! Ends are places where a body can stand, chosen without the map: uniform over the cells, then over the box of each.
+
+use enfilade::cpg::{CellId, World};
+use enfilade::geom::DVec3;
+use enfilade::runtime::{Sight, SightState, Target};
+use enfilade::world::{
+    Agent, Body, Cast, Caster, Contacts, Layout, NoPath, Path, PathFollower, PathSearch, Progress,
+    WalkMap, Walker,
+};
+use enfilade_testkit::Rng;
+
+use crate::rows::Figure;
+
+/// Number of paths walked.
+const PATHS: usize = 100;
+/// Most pairs of places tried for each.
+const TRIES: usize = 20;
+/// Speed of walking. [Units: wu/s]
+const SPEED: f64 = 1.4;
+/// Time step. [Units: s]
+const SECONDS: f64 = 1.0 / 60.0;
+/// Shortest path walked. [Units: wu]
+const SHORTEST: f64 = 2.0;
+
+/// A walk of a path.
+pub(super) struct Walk {
+    pub(super) path: Path,
+    pub(super) progress: Progress,
+    /// Where it ended.
+    pub(super) at: DVec3,
+    /// Length of the path passed. [Units: wu]
+    pub(super) passed: f64,
+    /// What it touches there.
+    pub(super) touched: Vec<String>,
+}
+
+/// All walks of a building.
+#[derive(Default)]
+pub(super) struct Walks {
+    pub(super) walks: Vec<Walk>,
+    /// Pairs without a way.
+    pub(super) n_no_way: usize,
+    /// Pairs of which one has no floor on the map.
+    pub(super) n_no_floor: usize,
+}
+
+/// Plans paths between random places of a building and walks them.
+pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
+    let sight = Sight::build(world)?;
+    let layout = Layout::new(world);
+    let contacts = Contacts::new(world, &sight, &layout);
+    let agent = Agent::default();
+    let map = WalkMap::new(&layout, world, agent);
+    let mut places = Places {
+        contacts: &contacts,
+        layout: &layout,
+        state: SightState::new(&sight),
+        caster: Caster::new(&contacts),
+        rng: Rng::new(1),
+        agent,
+    };
+    let (mut search, mut all) = (PathSearch::new(), Walks::default());
+    for _ in 0..PATHS * TRIES {
+        if all.walks.len() == PATHS {
+            break;
+        }
+        let (Some(from), Some(to)) = (places.any(), places.any()) else {
+            break;
+        };
+        let mut path = Path::default();
+        match search.find(&map, &layout, [from, to], |_| true, &mut path) {
+            Ok(()) if path.length < SHORTEST => continue,
+            Ok(()) => {}
+            Err(NoPath::NoWay) => {
+                all.n_no_way += 1;
+                continue;
+            }
+            Err(NoPath::NoFloorAtStart | NoPath::NoFloorAtEnd) => {
+                all.n_no_floor += 1;
+                continue;
+            }
+        }
+        let mut state = SightState::new(&sight);
+        let eye = path.points[0] + DVec3::Y * agent.eye;
+        let mut walker = Walker::new(&contacts, agent, eye);
+        let mut follower = PathFollower::new(path.clone(), SPEED);
+        // A walker that follows its path takes no longer, whatever it slides along.
+        let most = (10.0 + 2.0 * path.length / SPEED) / SECONDS;
+        let mut progress = Progress::Walking;
+        for _ in 0..most as usize {
+            progress = follower.step(&mut walker, &contacts, &layout, &mut state, SECONDS);
+            if progress != Progress::Walking {
+                break;
+            }
+        }
+        let at = walker.feet();
+        let mut touched = Vec::new();
+        if progress != Progress::Arrived {
+            places.state = state;
+            touched = places.touched_at(at, world);
+            places.state = SightState::new(&sight);
+        }
+        all.walks.push(Walk {
+            path,
+            progress,
+            at,
+            passed: follower.passed(),
+            touched,
+        });
+    }
+    Ok(all)
+}
+
+/// Places where a body can stand.
+struct Places<'a> {
+    contacts: &'a Contacts,
+    layout: &'a Layout,
+    state: SightState,
+    caster: Caster,
+    rng: Rng,
+    agent: Agent,
+}
+
+impl Places<'_> {
+    /// Returns what a body a little wider than the walker touches, by name.
+    fn touched_at(&mut self, feet: DVec3, world: &World) -> Vec<String> {
+        let Agent {
+            radius,
+            height,
+            step,
+            ..
+        } = self.agent;
+        let body = Body::upright(height - step + 0.06, radius + 0.03);
+        let middle = feet + DVec3::Y * 0.5 * (height + step);
+        let mut names = Vec::new();
+        if let Some(cell) = self.layout.locate(middle) {
+            self.caster
+                .for_each_contact(self.contacts, &self.state, &body, middle, cell, |contact| {
+                    let [x, _, z] = contact.normal.to_array();
+                    names.push(match contact.target {
+                        Target::Detail { detail, .. } => format!("{} ({x:.1} {z:.1})", world[detail].name),
+                        Target::Wall { .. } => format!("wall ({x:.1} {z:.1})"),
+                        Target::Portal(p) => format!("{p} ({x:.1} {z:.1})"),
+                    });
+                });
+        }
+        names.sort();
+        names.dedup();
+        names
+    }
+
+    /// Returns a place where the body stands free, with doors as in the model.
+    fn any(&mut self) -> Option<DVec3> {
+        let Agent {
+            radius,
+            height,
+            step,
+            ..
+        } = self.agent;
+        let body = Body::upright(height - step, radius);
+        let point = Body::Sphere { radius: 0.0 };
+        for _ in 0..100_000 {
+            let cell = CellId(self.rng.below(self.layout.n_cells()) as u32);
+            let bounds = self.layout.cell(cell).bounds;
+            let rng = &mut self.rng;
+            let share = DVec3::new(rng.unit(), rng.unit(), rng.unit());
+            let from = bounds.min + bounds.size() * share;
+            if self.layout.locate(from) != Some(cell) {
+                continue;
+            }
+            let cast = Cast {
+                body: &point,
+                from,
+                by: DVec3::Y * -20.0,
+                cell,
+            };
+            let floor = self.caster.cast(self.contacts, &self.state, &cast);
+            let Some(floor) = floor.filter(|f| f.normal.y >= self.agent.slope.cos()) else {
+                continue;
+            };
+            let middle = floor.point + DVec3::Y * 0.5 * (height + step);
+            let Some(cell) = self.layout.locate(middle) else {
+                continue;
+            };
+            let mut is_free = true;
+            self.caster
+                .for_each_contact(self.contacts, &self.state, &body, middle, cell, |_| {
+                    is_free = false;
+                });
+            if is_free {
+                return Some(floor.point);
+            }
+        }
+        None
+    }
+}
+
+/// Measures the share of walkers that do not reach the end of their path.
+pub(super) fn walk(world: &World) -> anyhow::Result<Figure> {
+    let all = walks(world)?;
+    let n = all.walks.len();
+    let lost = all.walks.iter().filter(|w| w.progress != Progress::Arrived);
+    let n_lost = lost.count();
+    let meters: f64 = all.walks.iter().map(|w| w.path.length).sum();
+    let doors: usize = all.walks.iter().map(|w| w.path.portals.len()).sum();
+    Ok(Figure {
+        value: if n == 0 { 1.0 } else { n_lost as f64 / n as f64 },
+        most: 0.01,
+        note: format!(
+            "of walkers, {n_lost} of {n}, do not reach the end; {meters:.0} m, {doors} portals; {} pairs of places have no \
+             way, {} no floor on the map",
+            all.n_no_way, all.n_no_floor
+        ),
+    })
+}
