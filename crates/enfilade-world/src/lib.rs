@@ -26,12 +26,15 @@ pub use actors::{
     WayPoint,
 };
 pub use agent::Agent;
-pub use bodies::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs, PathFollower, Progress, Walker};
+pub use bodies::{
+    Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs, PathFollower, Progress,
+    Walker,
+};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{
-    Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path,
-    PathSearch, Sampling, WalkMap, Ways,
+    Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path, PathSearch,
+    Sampling, WalkMap, Ways,
 };
 pub use pose::Pose;
 pub use shape::{Shape, ShapeError};

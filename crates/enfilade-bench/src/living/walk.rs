@@ -86,7 +86,7 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
         let mut state = SightState::new(&sight);
         let eye = path.points[0] + DVec3::Y * agent.eye;
         let mut walker = Walker::new(&contacts, agent, eye);
-        let mut follower = PathFollower::new(path.clone(), SPEED);
+        let mut follower = PathFollower::new(&sight, path.clone(), SPEED);
         // A walker that follows its path takes no longer, whatever it slides along.
         let most = (10.0 + 2.0 * path.length / SPEED) / SECONDS;
         let mut progress = Progress::Walking;
@@ -137,15 +137,23 @@ impl Places<'_> {
         let middle = feet + DVec3::Y * 0.5 * (height + step);
         let mut names = Vec::new();
         if let Some(cell) = self.layout.locate(middle) {
-            self.caster
-                .for_each_contact(self.contacts, &self.state, &body, middle, cell, |contact| {
+            self.caster.for_each_contact(
+                self.contacts,
+                &self.state,
+                &body,
+                middle,
+                cell,
+                |contact| {
                     let [x, _, z] = contact.normal.to_array();
                     names.push(match contact.target {
-                        Target::Detail { detail, .. } => format!("{} ({x:.1} {z:.1})", world[detail].name),
+                        Target::Detail { detail, .. } => {
+                            format!("{} ({x:.1} {z:.1})", world[detail].name)
+                        }
                         Target::Wall { .. } => format!("wall ({x:.1} {z:.1})"),
                         Target::Portal(p) => format!("{p} ({x:.1} {z:.1})"),
                     });
-                });
+                },
+            );
         }
         names.sort();
         names.dedup();
@@ -207,7 +215,11 @@ pub(super) fn walk(world: &World) -> anyhow::Result<Figure> {
     let meters: f64 = all.walks.iter().map(|w| w.path.length).sum();
     let doors: usize = all.walks.iter().map(|w| w.path.portals.len()).sum();
     Ok(Figure {
-        value: if n == 0 { 1.0 } else { n_lost as f64 / n as f64 },
+        value: if n == 0 {
+            1.0
+        } else {
+            n_lost as f64 / n as f64
+        },
         most: 0.01,
         note: format!(
             "of walkers, {n_lost} of {n}, do not reach the end; {meters:.0} m, {doors} portals; {} pairs of places have no \

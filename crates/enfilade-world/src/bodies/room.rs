@@ -31,9 +31,8 @@ impl Room {
         }
     }
 
-    /// Returns `true` if a walker that stands there touches nothing. `p` may be above or below the floor by up to a step.
-    pub(crate) fn is_free(&self, p: DVec3) -> bool {
-        let middle = self.floor(p) + DVec3::Y * self.agent.body().1;
+    /// Returns `true` if a walker with its middle at a point touches nothing.
+    pub(crate) fn is_free(&self, middle: DVec3) -> bool {
         let reach = DVec3::Y * self.body.axes[0].y;
         let around = self.bvh.for_each_around_segment(
             middle - reach,
@@ -47,7 +46,11 @@ impl Room {
         around.is_continue()
     }
 
-    /// Returns the point where the foot of a walker stands, from a step above to a step below a point.
+    /// Returns the middle of a walker that stands at a point, or up to a step above or below.
+    pub(crate) fn standing(&self, p: DVec3) -> DVec3 {
+        self.floor(p) + DVec3::Y * self.agent.body().1
+    }
+
     fn floor(&self, p: DVec3) -> DVec3 {
         let from = p + DVec3::Y * self.agent.foot().1;
         let far = 2.0 * self.agent.step;

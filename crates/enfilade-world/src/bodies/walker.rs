@@ -10,7 +10,7 @@
 
 use enfilade_cpg::CellId;
 use enfilade_geom::DVec3;
-use enfilade_runtime::SightState;
+use enfilade_runtime::{DetailId, SightState, Target};
 
 use crate::agent::Agent;
 use crate::bodies::{Body, Cast, Caster, Contacts};
@@ -29,6 +29,13 @@ const GRAVITY: f64 = 9.81;
 /// Speed of rising when climbing. [Units: wu/s]
 const CLIMB: f64 = 6.0;
 
+/// The surroundings of a walker.
+pub(super) struct Site<'a> {
+    pub(super) contacts: &'a Contacts,
+    pub(super) layout: &'a Layout,
+    pub(super) state: &'a SightState,
+}
+
 /// A person who walks in a world. Allocates nothing once the buffers have grown.
 #[derive(Clone, Debug)]
 pub struct Walker {
@@ -39,6 +46,8 @@ pub struct Walker {
     falling: f64,
     /// The last cell that it was in.
     cell: Option<CellId>,
+    /// The last obstacle in its way in the last step.
+    obstacle: Option<Target>,
     caster: Caster,
 }
 
@@ -51,6 +60,7 @@ impl Walker {
             agent,
             falling: 0.0,
             cell: None,
+            obstacle: None,
             caster: Caster::new(contacts),
         }
     }
@@ -73,6 +83,12 @@ impl Walker {
         self.eye - DVec3::Y * self.agent.eye
     }
 
+    /// Returns the last obstacle that was in its way in the last step, if any.
+    #[must_use]
+    pub fn obstacle(&self) -> Option<Target> {
+        self.obstacle
+    }
+
     /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors where
     /// `state` puts them and openings that `state` shuts; falls, and climbs up to the height of a step. In no cell, nothing
     /// stops it and it does not fall. [Units: wu/s, s]
@@ -88,14 +104,47 @@ impl Walker {
         wish: DVec3,
         seconds: f64,
     ) {
+        let site = Site {
+            contacts,
+            layout,
+            state,
+        };
+        self.step_where(&site, wish, seconds, |_| true);
+    }
+
+    /// As [`Walker::step`], ignoring objects for which `counts` returns `false`.
+    pub(super) fn step_where(
+        &mut self,
+        site: &Site<'_>,
+        wish: DVec3,
+        seconds: f64,
+        counts: impl Fn(DetailId) -> bool,
+    ) {
         let seconds = seconds.clamp(0.0, LONGEST);
         let flat = DVec3::new(wish.x, 0.0, wish.z) * seconds;
         if !(flat.is_finite() && self.eye.is_finite()) {
             return;
         }
-        self.slide(contacts, layout, state, flat);
-        self.push_out(contacts, layout, state);
-        self.stand(contacts, layout, state, seconds);
+        self.slide(site, flat, &counts);
+        self.push_out(site, &counts);
+        self.stand(site, seconds, &counts);
+    }
+
+    /// Returns `true` if it touches an object for which `counts` returns `true`.
+    pub(super) fn touches(&mut self, site: &Site<'_>, counts: impl Fn(DetailId) -> bool) -> bool {
+        let (body, below) = self.body();
+        let at = self.eye + below;
+        let Some(cell) = self.locate(site.layout, at) else {
+            return false;
+        };
+        let mut is_touched = false;
+        self.caster
+            .for_each_contact(site.contacts, site.state, &body, at, cell, |contact| {
+                if let Target::Detail { detail, .. } = contact.target {
+                    is_touched |= counts(detail);
+                }
+            });
+        is_touched
     }
 
     /// Returns its capsule, and the vector from the eye to the capsule's center.
@@ -110,13 +159,14 @@ impl Walker {
         self.cell
     }
 
-    fn slide(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, flat: DVec3) {
+    fn slide(&mut self, site: &Site<'_>, flat: DVec3, counts: &impl Fn(DetailId) -> bool) {
         let (body, below) = self.body();
+        self.obstacle = None;
         let mut left = flat;
         for _ in 0..SLIDES {
             let length = left.length();
             let from = self.eye + below;
-            let Some(cell) = self.locate(layout, from).filter(|_| length > 1e-9) else {
+            let Some(cell) = self.locate(site.layout, from).filter(|_| length > 1e-9) else {
                 self.eye += left;
                 return;
             };
@@ -128,10 +178,12 @@ impl Walker {
                 by: direction * (length + GAP),
                 cell,
             };
-            let Some(impact) = self.caster.cast(contacts, state, &cast) else {
+            let hit = (self.caster).cast_where(site.contacts, site.state, &cast, counts);
+            let Some(impact) = hit else {
                 self.eye += left;
                 return;
             };
+            self.obstacle = Some(impact.target);
             let level = DVec3::new(impact.normal.x, 0.0, impact.normal.z);
             let Some(normal) = level.try_normalize() else {
                 return;
@@ -145,18 +197,21 @@ impl Walker {
     }
 
     /// Moves out of obstacles, deepest first.
-    fn push_out(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState) {
+    fn push_out(&mut self, site: &Site<'_>, counts: &impl Fn(DetailId) -> bool) {
         let (body, below) = self.body();
         for _ in 0..SLIDES {
             let at = self.eye + below;
-            let Some(cell) = self.locate(layout, at) else {
+            let Some(cell) = self.locate(site.layout, at) else {
                 return;
             };
             let mut deepest = (0.0, DVec3::ZERO);
             self.caster
-                .for_each_contact(contacts, state, &body, at, cell, |contact| {
+                .for_each_contact(site.contacts, site.state, &body, at, cell, |contact| {
                     let level = DVec3::new(contact.normal.x, 0.0, contact.normal.z);
+                    let is_ignored =
+                        matches!(contact.target, Target::Detail { detail, .. } if !counts(detail));
                     if contact.depth > deepest.0
+                        && !is_ignored
                         && let Some(normal) = level.try_normalize()
                     {
                         deepest = (contact.depth, normal);
@@ -171,18 +226,18 @@ impl Walker {
     }
 
     /// Moves onto the floor, or towards it.
-    fn stand(&mut self, contacts: &Contacts, layout: &Layout, state: &SightState, seconds: f64) {
+    fn stand(&mut self, site: &Site<'_>, seconds: f64, counts: &impl Fn(DetailId) -> bool) {
         let step = self.agent.step;
         let (foot, up) = self.agent.foot();
         let from = self.feet() + DVec3::Y * up;
-        let floor = self.locate(layout, from).and_then(|cell| {
+        let floor = self.locate(site.layout, from).and_then(|cell| {
             let cast = Cast {
                 body: &foot,
                 from,
                 by: -DVec3::Y * FAR,
                 cell,
             };
-            self.caster.cast(contacts, state, &cast)
+            (self.caster).cast_where(site.contacts, site.state, &cast, counts)
         });
         let Some(floor) = floor else {
             // No floor below: do not fall.
@@ -215,14 +270,14 @@ mod tests {
     use enfilade_runtime::Sight;
     use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
-    struct Site {
+    struct Scene {
         contacts: Contacts,
         layout: Layout,
         state: SightState,
         walker: Walker,
     }
 
-    impl Site {
+    impl Scene {
         fn new(world: &World, eye: DVec3) -> Self {
             let sight = Sight::build(world).unwrap();
             let layout = Layout::new(world);
@@ -284,7 +339,7 @@ mod tests {
             holes: 0.0,
             ..GridParams::offices(9, 5)
         });
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         let room = site.layout.cell(CellId(0)).bounds;
         let mut rng = Rng::new(6);
         let radius = Agent::default().radius;
@@ -324,7 +379,7 @@ mod tests {
             furniture: 0,
             ..GridParams::offices(1, 1)
         });
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         site.walk(DVec3::X * 5.0, 2.0);
         let from = site.walker.eye;
         site.walk(DVec3::new(1.0, 0.0, 1.0), 0.5);
@@ -353,7 +408,7 @@ mod tests {
             let edge = DVec3::new(from.x + 0.6, low.y, low.z);
             let far = DVec3::new(from.x + 0.9, low.y + height, high.z);
             add_box(&mut world, edge, far);
-            let mut site = Site::new(&world, from);
+            let mut site = Scene::new(&world, from);
             site.walk(DVec3::ZERO, 2.0);
             let floor = site.walker.eye.y;
             assert!((floor - low.y - Agent::default().eye).abs() < 0.01);
@@ -374,7 +429,7 @@ mod tests {
     fn a_leaf_pushes_a_walker_in_its_way() {
         let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
         let door = Layout::new(&world).opening(PortalId(0)).center();
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         site.state.set_leaves(PortalId(0), 1.0);
         site.walker.eye = DVec3::new(door.x + 0.4, 1.6, door.z);
         site.walk(DVec3::ZERO, 1.0);
@@ -390,9 +445,16 @@ mod tests {
         let mut caster = Caster::new(&site.contacts);
         let (contacts, state) = (&site.contacts, &site.state);
         let mut deepest = 0.0_f64;
-        caster.for_each_contact(contacts, state, &body, after + below, CellId(1), |contact| {
-            deepest = deepest.max(contact.depth);
-        });
+        caster.for_each_contact(
+            contacts,
+            state,
+            &body,
+            after + below,
+            CellId(1),
+            |contact| {
+                deepest = deepest.max(contact.depth);
+            },
+        );
         assert!(deepest < 1e-3, "{deepest} at {after}");
     }
 
@@ -407,7 +469,7 @@ mod tests {
             ..GridParams::offices(1, 3)
         });
         let hole = Layout::new(&world).opening(PortalId(0)).center();
-        let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
+        let mut site = Scene::new(&world, hole + DVec3::Y * 2.0);
         site.walk(DVec3::ZERO, 3.0);
         assert!(
             (site.walker.eye.y - 1.6).abs() < 0.01,
@@ -416,7 +478,7 @@ mod tests {
         );
         assert_eq!(site.walker.cell(), Some(CellId(0)));
         // Shut, it holds.
-        let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
+        let mut site = Scene::new(&world, hole + DVec3::Y * 2.0);
         site.state.close(PortalId(0));
         site.walk(DVec3::ZERO, 3.0);
         assert!((site.walker.eye.y - hole.y - 1.6).abs() < 0.01);
@@ -426,7 +488,7 @@ mod tests {
     #[test]
     fn walking_allocates_nothing_once_warm() {
         let world = with_doors(room_grid(&GridParams::offices(20, 2)), |_| false);
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         for portal in world.graph.portal_ids() {
             site.state.open(portal);
         }

@@ -12,7 +12,7 @@
 //! half a square, and fails at a doorway less than two squares wider than itself.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BinaryHeap;
 
 use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
 use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
@@ -48,6 +48,8 @@ pub struct Floors {
     floors: Vec<Floor>,
     /// Steps between cells, sorted.
     crossings: Vec<Crossing>,
+    /// Floors in the way of leaves, each with the portal that they open, sorted.
+    swung: Vec<(u32, PortalId)>,
     walker: Agent,
 }
 
@@ -57,6 +59,8 @@ pub(crate) struct Floor {
     pub(crate) square: u32,
     pub(crate) y: f32,
     pub(crate) cell: CellId,
+    /// True if an open leaf may stand there.
+    is_swung: bool,
     /// The floors beside it: to +x, +z, −x, −z.
     pub(crate) steps: [u32; 4],
 }
@@ -69,6 +73,15 @@ pub(crate) struct Crossing {
     pub(crate) portal: PortalId,
 }
 
+/// What a step depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Hindrance {
+    /// A portal to pass.
+    Portal(PortalId),
+    /// The place of a portal's leaf when it is open.
+    Leaf(PortalId),
+}
+
 /// A floor in construction.
 struct Ground {
     square: u32,
@@ -78,15 +91,20 @@ struct Ground {
 }
 
 impl Floors {
-    /// Lays out the floors of a world for which `counts` returns `true` for its objects; outdoors, ground up to 30 m around the
-    /// rooms. Leaves of doors are no obstacles: walkers open them.
+    /// Lays out the floors of a world with those objects for which `counts` returns `true`; outdoors, ground up to 30 m around
+    /// the rooms. Leaves of doors are obstacles in their open pose, to walkers that open them.
     ///
     /// Squares are a quarter of the walker's radius wide, or wider if there would be more than 8 million; if there
     /// would be more than half a million, they are at least 5 cm wide, so a thinner walker gets the same floors as
     /// one with a radius of 0.2 m.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, walker: Agent, counts: impl FnMut(DetailId) -> bool) -> Self {
-        let solid = solid_of(world, counts);
+    pub fn new(
+        layout: &Layout,
+        world: &World,
+        walker: Agent,
+        counts: impl FnMut(DetailId) -> bool,
+    ) -> Self {
+        let (solid, leaves) = solid_of(world, counts);
         let triangles = || solid.iter().copied();
         let bounds = bounds_of(layout, triangles().flatten());
         let squares = squares_of(&bounds, walker.radius / 4.0, triangles());
@@ -97,19 +115,31 @@ impl Floors {
         let edges = edges_of(&squares, &spans, &grounds, &walker);
         drop(spans);
         // Distances are only as exact as a square's side.
-        let mut is_clear = clear(&squares, &grounds, &edges, walker.radius - 0.5 * squares.side);
+        let mut is_clear = clear(
+            &squares,
+            &grounds,
+            &edges,
+            walker.radius - 0.5 * squares.side,
+        );
         let mut floors = Self {
             squares,
             first: Vec::new(),
             floors: Vec::new(),
             crossings: Vec::new(),
+            swung: Vec::new(),
             walker,
         };
         let room = Room::new(&solid, &walker);
         for (is_clear, ground) in is_clear.iter_mut().zip(&grounds) {
-            *is_clear &= room.is_free(floors.center(ground.square, ground.y.into()));
+            let at = floors.center(ground.square, ground.y.into());
+            *is_clear = *is_clear && room.is_free(room.standing(at));
         }
         floors.keep(layout, &grounds, &is_clear);
+        for (portal, leaf) in &leaves {
+            floors.swing(*portal, leaf, &room);
+        }
+        floors.swung.sort_unstable();
+        floors.swung.dedup();
         // An opening that bakes call a window may have a sill on one side only: there the floor decides. Behind
         // glass, none does.
         let is_open = |p: PortalId| match layout.opening(p).kind() {
@@ -134,6 +164,7 @@ impl Floors {
                     square: ground.square,
                     y: ground.y,
                     cell,
+                    is_swung: false,
                     steps: ground.steps,
                 });
             }
@@ -143,6 +174,34 @@ impl Floors {
             floor.steps = floor.steps.map(to);
         }
         self.first = first_of(&self.squares, self.floors.iter().map(|f| f.square));
+    }
+
+    /// Marks the floors where an open leaf of a portal is in the way.
+    fn swing(&mut self, portal: PortalId, leaf: &[Triangle], room: &Room) {
+        let own = Room::new(leaf, &self.walker);
+        let reach = self.walker.radius + self.squares.side;
+        let bounds = Aabb::of_points(leaf.as_flattened()).expanded(reach);
+        let n = self.squares.n.map(|n| n as f64 - 1.0);
+        let [low, high] = [bounds.min, bounds.max].map(|p| {
+            let at = self.squares.along(p);
+            [0, 1].map(|k| at[k].clamp(0.0, n[k]) as usize)
+        });
+        for z in low[1]..=high[1] {
+            let row = [low[0], high[0]].map(|x| self.squares.number([x, z]));
+            for floor in self.first[row[0]]..self.first[row[1] + 1] {
+                if !own.is_free(room.standing(self.point(floor))) {
+                    self.floors[floor as usize].is_swung = true;
+                    self.swung.push((floor, portal));
+                }
+            }
+        }
+    }
+
+    /// Returns the portals whose open leaves are in the way on a floor.
+    pub(crate) fn leaves_at(&self, floor: u32) -> impl Iterator<Item = PortalId> {
+        let first = self.swung.partition_point(|s| s.0 < floor);
+        let own = self.swung[first..].iter().take_while(move |s| s.0 == floor);
+        own.map(|s| s.1)
     }
 
     /// Finds the portals of steps between cells; removes steps without one.
@@ -282,44 +341,73 @@ impl Floors {
         ((crossing.from, crossing.direction) == key).then_some(crossing.portal)
     }
 
-    /// Returns the floor beside one, if a step leads there; calls `may_pass` if the cell changes.
+    /// Returns the floor beside one, if a step leads there and nothing that it depends on hinders it.
     #[inline]
     pub(crate) fn step(
         &self,
         from: u32,
         direction: usize,
-        may_pass: &mut impl FnMut(PortalId) -> bool,
+        may: &mut impl FnMut(Hindrance) -> bool,
     ) -> Option<u32> {
         let floor = self.floor(from);
         let to = floor.steps[direction];
         if to == NONE {
             return None;
         }
-        let is_open = self.floor(to).cell == floor.cell
-            || self.portal_of(from, direction).is_some_and(may_pass);
-        is_open.then_some(to)
+        let other = self.floor(to);
+        let is_in_way = |p| floor.is_swung && self.leaves_at(from).any(|q| q == p);
+        let is_open = other.cell == floor.cell
+            || (self.portal_of(from, direction))
+                .is_some_and(|p| !is_in_way(p) && may(Hindrance::Portal(p)));
+        // Who is in the way of a leaf may go on there, before it opens.
+        let is_free = !other.is_swung
+            || self
+                .leaves_at(to)
+                .all(|p| is_in_way(p) || may(Hindrance::Leaf(p)));
+        (is_open && is_free).then_some(to)
     }
 }
 
-/// Returns the triangles that stop walkers: the structure, and the objects that count, except leaves of doors.
-fn solid_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> Vec<Triangle> {
-    let mut all: Vec<Triangle> = Vec::new();
+type Leaves = Vec<(PortalId, Vec<Triangle>)>;
+
+/// Returns the triangles that stop walkers, of the structure and the objects that count, and apart those of leaves in their open
+/// pose.
+fn solid_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> (Vec<Triangle>, Leaves) {
+    let mut solid: Vec<Triangle> = Vec::new();
     for batch in &world.batches {
-        all.extend(batch.primitive.triangles());
+        solid.extend(batch.primitive.triangles());
     }
-    let fittings = world.graph.portals.iter().flat_map(|p| &p.fittings);
-    let moving = fittings.filter(|f| f.part == FittingPart::Leaf && f.motion.is_some());
-    let leaves: BTreeMap<u32, DMat4> = moving.filter_map(|f| Some((f.detail, f.motion?.at(1.0)))).collect();
-    for (i, object) in (0..).zip(&world.details) {
-        let open = leaves.get(&i);
-        if open.is_some() || counts(DetailId(i)) {
-            let place = open.copied().unwrap_or(DMat4::IDENTITY) * object.placement();
-            for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-                all.extend(primitive.placed_triangles(place));
-            }
+    let counts: Vec<bool> = (0..world.details.len() as u32)
+        .map(|i| counts(DetailId(i)))
+        .collect();
+    let mut moves = vec![false; counts.len()];
+    let mut leaves = Vec::new();
+    for (i, portal) in (0..).zip(&world.graph.portals) {
+        let parts = portal.fittings.iter();
+        for part in parts.filter(|f| f.part == FittingPart::Leaf && counts[f.detail as usize]) {
+            let Some(motion) = part.motion else {
+                continue;
+            };
+            moves[part.detail as usize] = true;
+            let mut leaf = Vec::new();
+            add_object(world, part.detail, motion.at(1.0), &mut leaf);
+            leaves.push((PortalId(i), leaf));
         }
     }
-    all
+    for i in (0..).take(counts.len()) {
+        if counts[i as usize] && !moves[i as usize] {
+            add_object(world, i, DMat4::IDENTITY, &mut solid);
+        }
+    }
+    (solid, leaves)
+}
+
+/// Adds the triangles of an object after a motion.
+fn add_object(world: &World, detail: u32, motion: DMat4, triangles: &mut Vec<Triangle>) {
+    let object = &world.details[detail as usize];
+    for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+        triangles.extend(primitive.placed_triangles(motion * object.placement()));
+    }
 }
 
 /// Returns a box around all vertices, but not far beyond the rooms: the model may contain a sky.
