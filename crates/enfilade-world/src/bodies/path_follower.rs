@@ -23,6 +23,8 @@ const SWING: f64 = 0.7;
 const SHUT: f64 = 0.5;
 /// Time without progress after which it is stuck. [Units: s]
 const PATIENCE: f64 = 4.0;
+type Place<'a> = (&'a Contacts, &'a Layout);
+
 /// Least progress that counts. [Units: wu]
 const PROGRESS: f64 = 0.05;
 
@@ -160,7 +162,7 @@ impl PathFollower {
         if in_plan(feet, end) <= agent.radius && (feet.y - end.y).abs() <= agent.step {
             return Progress::Arrived;
         }
-        self.open_doors(walker, contacts, layout, state, seconds);
+        self.open_doors(walker, (contacts, layout), state, seconds);
         let way = (self.at(self.passed + AHEAD) - feet).with_y(0.0);
         let speed = self.speed.min(way.length() / seconds.max(1e-9));
         let site = Site {
@@ -182,7 +184,7 @@ impl PathFollower {
         if let Some(Target::Detail { detail, .. }) = walker.obstacle()
             && self.idle > SHUT
         {
-            self.shut_leaf(detail, agent.radius, state);
+            self.shut_leaf(detail, walker, (contacts, layout), state);
         }
         if self.idle > PATIENCE {
             Progress::Stuck
@@ -195,55 +197,69 @@ impl PathFollower {
     fn open_doors(
         &mut self,
         walker: &mut Walker,
-        contacts: &Contacts,
-        layout: &Layout,
+        site: Place<'_>,
         state: &mut SightState,
         seconds: f64,
     ) {
         for i in 0..self.doors.len() {
-            let DoorAhead {
-                portal,
-                at,
-                opening,
-            } = self.doors[i];
-            let begins = opening == Opening::Ahead && (0.0..DOOR).contains(&(at - self.passed));
-            let Some(share) = state.leaves(portal) else {
+            let door = self.doors[i];
+            let Some(share) = state.leaves(door.portal) else {
                 continue;
             };
-            if begins {
-                state.set_leaves(portal, 1.0);
-                let site = Site {
-                    contacts,
-                    layout,
-                    state,
+            let begins = door.opening == Opening::Ahead
+                && (0.0..DOOR).contains(&(door.at - self.passed))
+                // One that does not get out of its way is pushed.
+                && (self.idle > SHUT || self.is_clear(walker, site, state, (door.portal, 1.0)));
+            if begins || door.opening == Opening::Moves {
+                let share = share + (seconds / SWING) as f32;
+                state.set_leaves(door.portal, share);
+                self.doors[i].opening = if share < 1.0 {
+                    Opening::Moves
+                } else {
+                    Opening::Done
                 };
-                let is_in_way = walker.touches(&site, |detail| self.is_leaf(detail, portal));
-                state.set_leaves(portal, share);
-                // One that cannot get out of its way is pushed.
-                if is_in_way && self.idle <= SHUT {
-                    continue;
-                }
-            } else if opening != Opening::Moves {
-                continue;
             }
-            let share = share + (seconds / SWING) as f32;
-            state.set_leaves(portal, share);
-            self.doors[i].opening = if share < 1.0 {
-                Opening::Moves
-            } else {
-                Opening::Done
-            };
         }
     }
 
-    /// Shuts a leaf unless it opens a doorway that is ahead or around the walker.
-    fn shut_leaf(&self, detail: DetailId, radius: f64, state: &mut SightState) {
-        let ahead = (self.doors.iter()).filter(|d| d.at + 2.0 * radius > self.passed);
-        let is_needed = ahead.into_iter().any(|d| self.is_leaf(detail, d.portal));
+    /// Shuts a leaf unless the path needs it open, or the walker is in its doorway.
+    fn shut_leaf(
+        &self,
+        detail: DetailId,
+        walker: &mut Walker,
+        site: Place<'_>,
+        state: &mut SightState,
+    ) {
+        let mut ahead = self.doors.iter().filter(|d| d.at > self.passed);
         let known = self.leaves.iter().find(|l| l.0 == detail);
-        if let Some(&(_, portal)) = known.filter(|_| !is_needed) {
+        if let Some(&(_, portal)) = known
+            && ahead.all(|d| !self.is_leaf(detail, d.portal))
+            && self.is_clear(walker, site, state, (portal, 0.0))
+        {
             state.set_leaves(portal, 0.0);
         }
+    }
+
+    /// Returns `true` if a walker touches no leaf of a portal at a share of their way.
+    fn is_clear(
+        &self,
+        walker: &mut Walker,
+        (contacts, layout): Place<'_>,
+        state: &mut SightState,
+        (portal, share): (PortalId, f32),
+    ) -> bool {
+        let Some(before) = state.leaves(portal) else {
+            return true;
+        };
+        state.set_leaves(portal, share);
+        let site = Site {
+            contacts,
+            layout,
+            state,
+        };
+        let is_touched = walker.touches(&site, |detail| self.is_leaf(detail, portal));
+        state.set_leaves(portal, before);
+        !is_touched
     }
 
     fn is_leaf(&self, detail: DetailId, portal: PortalId) -> bool {
