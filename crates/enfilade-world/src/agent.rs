@@ -1,11 +1,13 @@
 //! The size and abilities of a walker, for its paths and for its body.
 
+use enfilade_geom::{DQuat, DVec3};
+
 use crate::bodies::Body;
 
 /// The size and abilities of a walker: paths are planned for it, and its body walks them.
 ///
 /// Both have the same rule: an upright capsule of this radius, from the height of a step above the floor up to the walker's
-/// height, touches nothing. What is lower is stepped onto or over.
+/// height, touches nothing; for one that is wider than that, such as a robot, a box. What is lower is stepped onto or over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agent {
     /// Half the width: distance kept from walls. [Units: wu] [Limit: above 0.01]
@@ -34,18 +36,26 @@ impl Default for Agent {
 }
 
 impl Agent {
-    /// Returns its capsule, and the height of the capsule's center above the floor. [Units: wu]
+    /// Returns its body, and the height of the body's center above the floor. [Units: wu]
     pub(crate) fn body(&self) -> (Body, f64) {
-        let body = Body::upright(self.height - self.step, self.radius);
-        (body, 0.5 * (self.height + self.step))
+        let (radius, half) = (self.radius, 0.5 * (self.height - self.step).max(0.0));
+        let body = if radius <= half {
+            Body::upright(2.0 * half, radius)
+        } else {
+            Body::Box {
+                half: DVec3::new(radius, half, radius),
+                turn: DQuat::IDENTITY,
+            }
+        };
+        (body, self.step + half)
     }
 
     /// Returns the foot that finds the floor, and the height of its center above the ground before it is lowered: it is within
-    /// the capsule. [Units: wu]
+    /// the body. [Units: wu]
     ///
     /// On winding stairs, a walker that stood on a point would still be on the tread below with the next two risers in its way.
     pub(crate) fn foot(&self) -> (Body, f64) {
-        let radius = 0.5 * self.radius;
+        let radius = 0.5 * self.radius.min((self.height - self.step).max(0.0));
         (Body::Sphere { radius }, self.step + radius)
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! Ends are places where a body can stand, chosen without the map: uniform over the cells, then over the box of each.
 
+use anyhow::ensure;
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState, Target};
@@ -17,7 +18,7 @@ use crate::rows::Figure;
 /// Number of paths walked.
 const PATHS: usize = 100;
 /// Most pairs of places tried for each.
-const TRIES: usize = 20;
+const TRIES: usize = 50;
 /// Speed of walking. [Units: wu/s]
 const SPEED: f64 = 1.4;
 /// Time step. [Units: s]
@@ -210,21 +211,29 @@ impl Places<'_> {
 pub(super) fn walk(world: &World) -> anyhow::Result<Figure> {
     let all = walks(world)?;
     let n = all.walks.len();
-    let lost = all.walks.iter().filter(|w| w.progress != Progress::Arrived);
-    let n_lost = lost.count();
+    ensure!(n >= PATHS / 2, "only {n} paths in {} pairs", PATHS * TRIES);
+    let is_lost = |walk: &&Walk| walk.progress != Progress::Arrived;
+    let lost: Vec<String> = (all.walks.iter().filter(is_lost))
+        .map(|w| {
+            let [passed, length] = [w.passed, w.path.length_in_plan];
+            let touched = w.touched.join(", ");
+            format!(
+                "; lost at {:.2} after {passed:.1} of {length:.1} m, touches {touched}",
+                w.at
+            )
+        })
+        .collect();
     let meters: f64 = all.walks.iter().map(|w| w.path.length).sum();
-    let doors: usize = all.walks.iter().map(|w| w.path.portals.len()).sum();
+    let n_portals: usize = all.walks.iter().map(|w| w.path.portals.len()).sum();
     Ok(Figure {
-        value: if n == 0 {
-            1.0
-        } else {
-            n_lost as f64 / n as f64
-        },
+        value: lost.len() as f64 / n as f64,
         most: 0.01,
         note: format!(
-            "of walkers, {n_lost} of {n}, do not reach the end; {meters:.0} m, {doors} portals; {} pairs of places have no \
-             way, {} no floor on the map",
-            all.n_no_way, all.n_no_floor
+            "of {n} walkers, the share that does not reach the end; {meters:.0} m through {n_portals} portals; {} pairs of \
+             places have no way, {} no floor on the map{}",
+            all.n_no_way,
+            all.n_no_floor,
+            lost.concat()
         ),
     })
 }

@@ -33,11 +33,12 @@ impl Room {
 
     /// Returns `true` if a walker with its middle at a point touches nothing.
     pub(crate) fn is_free(&self, middle: DVec3) -> bool {
-        let reach = DVec3::Y * self.body.axes[0].y;
+        let reach = self.body.reach();
+        let half = DVec3::Y * (reach.y - self.body.radius);
         let around = self.bvh.for_each_around_segment(
-            middle - reach,
-            middle + reach,
-            self.body.radius,
+            middle - half,
+            middle + half,
+            self.body.radius.max(reach.x),
             |_, t| match depth(&self.body, &t.map(|p| p - middle)) {
                 Some(_) => ControlFlow::Break(()),
                 None => ControlFlow::Continue(()),

@@ -424,6 +424,47 @@ mod tests {
         }
     }
 
+    /// Covers W12: stairs are climbed and descended at the height of their steps, also those with narrow treads, as winding ones
+    /// have near their middle, and those with a low ceiling.
+    #[test]
+    fn narrow_treads_are_walked_up_and_down() {
+        let mut world = room_grid(&GridParams {
+            size: [1, 1, 1],
+            windows: 0.0,
+            furniture: 0,
+            ..GridParams::offices(1, 1)
+        });
+        let from = middle(&world);
+        let [low, high] = world.graph.cells[0]
+            .aabb
+            .map(|p| DVec3::from(p.map(f64::from)));
+        let (rise, run) = (0.19, 0.14);
+        let at = |i: i32| from.x + 0.4 + run * f64::from(i);
+        let top = |i: i32| low.y + rise * f64::from(i + 1);
+        for i in 0..4 {
+            let edge = DVec3::new(at(i), low.y, low.z);
+            add_box(&mut world, edge, DVec3::new(high.x, top(i), high.z));
+        }
+        let mut site = Scene::new(&world, from);
+        site.walk(DVec3::ZERO, 2.0);
+        site.walk(DVec3::X, 1.2);
+        assert!(
+            (site.walker.feet().y - top(3)).abs() < 0.01,
+            "{}",
+            site.walker.feet()
+        );
+        // On the way down it is never above the step before.
+        for _ in 0..60 {
+            site.walk(-DVec3::X, 0.02);
+            let feet = site.walker.feet();
+            let foot = 0.5 * Agent::default().radius;
+            let passed = (0..4).filter(|&i| feet.x + foot > at(i) - 0.03).count();
+            let floor = low.y + rise * passed as f64;
+            assert!(feet.y < floor + 0.1, "{feet} {floor}");
+        }
+        assert!((site.walker.feet().y - low.y).abs() < 0.01);
+    }
+
     /// Covers W12: a leaf that swings shut pushes a walker in its way along, and does not pass it.
     #[test]
     fn a_leaf_pushes_a_walker_in_its_way() {
