@@ -1,15 +1,19 @@
 //! Floors: the places where a walker can stand, and the steps between them.
 //!
-//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009):
-//! a floor is the top of matter that is flat enough and has room for the walker above; a step leads to the floor
-//! beside it that is not too much higher or lower, with room on the path. Floors closer to a wall or an edge than the
-//! walker's radius are left out, by distances along the floors (Danielsson, "Euclidean distance mapping", 1980). Each
-//! floor stores its cell, and a step between cells its portal. Walkers cannot pass cracks, windows with anything in
-//! them, or openings that are too narrow, too low, or above a sill too high for a step.
+//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009): a floor is
+//! the top of matter that is flat enough and has room for the walker above; a step leads to the floor beside it that is not
+//! too much higher or lower, with room on the path. Recast leaves out the floors closer to a wall than the walker's radius, by
+//! distances in squares; here the walker's own body must stand free there ([`Room`]), so a wall is as thick as it is. Only drops
+//! are kept away from by distances along the floors (Danielsson, "Euclidean distance mapping", 1980). Each floor stores its cell,
+//! and a step between cells its portal. Walkers cannot pass cracks, windows with anything in them, or openings that are too
+//! narrow, too low, or above a sill too high for a step.
 //!
-//! O(squares covered) memory, about 40 bytes a floor; time grows by the logarithm of a heap more. Walls are up to one
-//! square too thick, and distances up to half a square wrong: a walker may come closer to a wall than its radius by
-//! half a square, and fails at a doorway less than two squares wider than itself.
+//! An open leaf is in the way of a path through its own door only: floors where it would touch the walker are marked with its
+//! portals. Who stands there may walk away, but not through that portal: the door opens afterwards.
+//!
+//! O(squares covered) memory, about 40 bytes a floor; time grows by the logarithm of a heap more. The middle of a square is free,
+//! so a path may come closer to a wall than the radius by 0.7 squares, where a walker slides along it; a gap less than a square
+//! and 2 cm wider than the walker may be lost.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
