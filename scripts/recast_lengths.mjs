@@ -6,7 +6,7 @@
 //
 // Takes the structure of the world (no furniture), as `enfilade path` does, and the same walker: 0.3 m around, 1.8 m high, steps of
 // 0.4 m, slopes of 45°, in voxels of a quarter of the radius. Prints pairs of points by chance on Recast's mesh, with the length of
-// its straight path in plan and in space. Pairs that it finds no way between are left out.
+// its straight path in plan and in space; without lengths, pairs that it finds no way between.
 
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -71,11 +71,15 @@ for (let n = 0, tries = 0; n < Number(count) && tries < 20 * Number(count); trie
   const found = query.computePath(a, b, { maxPathPolys: 4096, maxStraightPathPoints: 4096 });
   const path = found.path ?? [];
   const last = path.at(-1);
+  const ends = [a.x, a.y, a.z, b.x, b.y, b.z].map((x) => x.toFixed(4)).join();
   // Where it cannot reach the end, Detour goes as near as it can.
-  if (!found.success || path.length < 2 || inPlan(last, b) > 0.01 || Math.abs(last.y - b.y) > 0.5) continue;
+  if (!found.success || path.length < 2 || inPlan(last, b) > 0.01 || Math.abs(last.y - b.y) > 0.5) {
+    console.log(`${ends},,`);
+    continue;
+  }
   const plan = sum(path, inPlan);
   if (plan < 2) continue;
   const space = sum(path, (p, q) => Math.hypot(p.x - q.x, p.y - q.y, p.z - q.z));
-  console.log([a.x, a.y, a.z, b.x, b.y, b.z, plan, space].map((x) => x.toFixed(4)).join());
+  console.log(`${ends},${plan.toFixed(4)},${space.toFixed(4)}`);
   n++;
 }

@@ -10,7 +10,7 @@ use enfilade::import::{ImportOptions, import};
 use serde_json::json;
 
 use crate::measure::files_of;
-use crate::process::scenes;
+use crate::process::{scenes, scenes_dir, scenes_in};
 
 /// A figure and its scenes.
 pub(crate) struct Row {
@@ -42,7 +42,7 @@ pub(crate) struct Chosen {
     #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
     pub(crate) rows: Vec<String>,
     /// Only scenes whose names begin with one of these. Scenes are folders of $ENFILADE_SCENES, or of
-    /// ../shared/scenes.
+    /// ../shared/scenes, and of scenes2 beside it.
     #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
     pub(crate) scenes: Vec<String>,
 }
@@ -158,7 +158,11 @@ pub(crate) fn bench_rows(all: &[Row], is_json: bool, chosen: &Chosen) -> anyhow:
 
 /// Returns the world of a scene; `None` if the scene is missing.
 fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
-    let Some(dir) = scenes().into_iter().find(|dir| dir.ends_with(name)) else {
+    let beside = scenes_dir().map(|dir| dir.with_file_name("scenes2"));
+    let all = scenes()
+        .into_iter()
+        .chain(beside.iter().flat_map(|dir| scenes_in(dir)));
+    let Some(dir) = all.into_iter().find(|dir| dir.ends_with(name)) else {
         return Ok(None);
     };
     let (files, detail) = files_of(&dir);

@@ -15,8 +15,8 @@ use enfilade_cli::world::read_world;
 
 /// Prints the walk from one point to another: its length, the portals it passes, and the points where it bends.
 ///
-/// Leads over floors, stairs and ramps, around walls; through doors, which are open except for `--closed`, not
-/// through windows. Ignores furniture.
+/// Leads over floors, stairs and ramps, around walls and furniture; through doors, which the walker opens except for
+/// `--closed`, not through windows.
 #[derive(clap::Args)]
 pub(crate) struct WalkedPath {
     /// World written by `enfilade bake`; `-` for standard input.
@@ -27,18 +27,21 @@ pub(crate) struct WalkedPath {
     /// End, in meters.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     to: [f32; 3],
-    /// Distance that the walker keeps from walls, in meters.
-    #[arg(long, value_name = "METERS", default_value_t = 0.3)]
+    /// Distance that the walker keeps from walls and furniture, in meters.
+    #[arg(long, value_name = "METERS", default_value_t = 0.25)]
     radius: f64,
     /// The walker's height, in meters.
     #[arg(long, value_name = "METERS", default_value_t = 1.8)]
     height: f64,
     /// The highest step, up or down, in meters.
-    #[arg(long, value_name = "METERS", default_value_t = 0.4)]
+    #[arg(long, value_name = "METERS", default_value_t = 0.3)]
     step: f64,
     /// Closed portals, by number.
     #[arg(long, value_name = "PORTAL,…", value_delimiter = ',')]
     closed: Vec<u32>,
+    /// Walk through objects, such as furniture.
+    #[arg(long)]
+    no_objects: bool,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -78,7 +81,7 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         step: args.step,
         ..Agent::default()
     };
-    let map = WalkMap::new(&layout, &world, walker);
+    let map = WalkMap::with_objects(&layout, &world, walker, |_| !args.no_objects);
     let ends = [args.from, args.to].map(|p| DVec3::from_array(p.map(f64::from)));
     let mut path = Path::default();
     let is_open = |portal: PortalId| !args.closed.contains(&portal.0);

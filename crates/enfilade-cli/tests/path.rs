@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use enfilade_cpg::wire::encode_glb;
+use enfilade_cpg::{CellId, DetailObject, World};
+use enfilade_geom::scene::{Mesh, Primitive};
+use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::{GridParams, room_grid};
 use serde_json::Value;
 
@@ -21,9 +24,12 @@ fn text(bytes: &[u8]) -> &str {
 
 /// Two rooms with a doorway between them, and a point on the floor of each.
 fn two_rooms(name: &str) -> (String, [String; 2]) {
-    let world = room_grid(&GridParams::two_rooms());
+    write(name, &room_grid(&GridParams::two_rooms()))
+}
+
+fn write(name: &str, world: &World) -> (String, [String; 2]) {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::write(&path, encode_glb(&world).unwrap()).unwrap();
+    fs::write(&path, encode_glb(world).unwrap()).unwrap();
     let points = [0, 1].map(|c| {
         let [low, high] = world.graph.cells[c].aabb;
         format!(
@@ -80,4 +86,42 @@ fn no_path_is_an_error_that_says_why() {
         );
         assert!(done.stdout.is_empty());
     }
+}
+
+#[test]
+fn furniture_is_in_the_way_unless_it_is_left_out() {
+    let mut world = room_grid(&GridParams::two_rooms());
+    let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
+    // A counter across the first room, in front of the doorway.
+    let end = DVec3::new(high[0] - 0.2, low[1] + 1.0, high[2]);
+    let counter = Aabb::new(DVec3::new(high[0] - 0.6, low[1], low[2]), end);
+    let corners = counter.triangles().concat();
+    let primitive = Primitive {
+        positions: corners.iter().map(|p| p.as_vec3().to_array()).collect(),
+        indices: (0..corners.len() as u32).collect(),
+        ..Primitive::default()
+    };
+    world.details.push(DetailObject {
+        name: "counter".into(),
+        mesh: world.detail_meshes.len() as u32,
+        transform: std::array::from_fn(|i| f32::from(u8::from(i % 5 == 0))),
+        cells: vec![CellId(0)],
+        source: None,
+        part_of: None,
+    });
+    world.detail_meshes.push(Mesh {
+        primitives: vec![primitive],
+        ..Mesh::default()
+    });
+    let (world, [from, to]) = write("counter.glb", &world);
+    let args = ["path", &world, "--from", &from, "--to", &to];
+    let done = enfilade(&args);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(
+        text(&done.stderr).contains("no way"),
+        "{}",
+        text(&done.stderr)
+    );
+    let done = enfilade(&[&args[..], &["--no-objects"]].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
 }

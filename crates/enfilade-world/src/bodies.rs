@@ -11,13 +11,17 @@
 //! | `flood.rs` | the cells and triangles on a body's way |
 //! | `caster.rs` | casts and contacts |
 //! | `pairs.rs` | bodies that may touch each other |
+//! | `room.rs` | room for a walker, for maps of paths |
 //! | `walker.rs` | a walker with gravity and steps |
+//! | `path_follower.rs` | a walker that follows a path and opens doors |
 
 mod body;
 mod caster;
 mod flood;
 mod kernel;
 mod pairs;
+mod path_follower;
+mod room;
 #[cfg(test)]
 mod tests;
 mod walker;
@@ -26,4 +30,6 @@ pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
-pub use walker::{Build, Walker};
+pub use path_follower::{PathFollower, Progress};
+pub(crate) use room::Room;
+pub use walker::Walker;

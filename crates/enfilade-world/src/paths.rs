@@ -12,13 +12,16 @@
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
+use enfilade_runtime::DetailId;
 
+use crate::agent::Agent;
 use crate::layout::{Exit, Layout};
+use floors::Hindrance;
 use pull::{Bend, pull_taut};
 use strides::{Strides, walk_straight};
 
 pub use edges::Corner;
-pub use floors::{Agent, Floors};
+pub use floors::Floors;
 pub use geodesics::Geodesics;
 pub use hops::Hops;
 pub use sampling::Sampling;
@@ -53,16 +56,31 @@ pub struct WalkMap {
 const SPACING: f64 = 1.0;
 
 impl WalkMap {
-    /// Prepares the structure of a world, without its objects. Takes seconds for a large building: floors are laid out in
-    /// squares of a quarter of the walker's radius, and searched in each cell from each of its portals.
+    /// Prepares a world with its objects, except leaves of doors, which walkers open. Takes seconds for a large building: floors
+    /// are laid out in squares of a quarter of the walker's radius, and searched in each cell from each of its portals.
     #[must_use]
     pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
-        let floors = Floors::new(layout, world, walker);
+        Self::with_objects(layout, world, walker, |_| true)
+    }
+
+    /// As [`WalkMap::new`], with those objects only for which `counts` returns `true`.
+    #[must_use]
+    pub fn with_objects(
+        layout: &Layout,
+        world: &World,
+        walker: Agent,
+        counts: impl FnMut(DetailId) -> bool,
+    ) -> Self {
+        let floors = Floors::new(layout, world, walker, counts);
         let mut chosen: Vec<(PortalId, [u32; 2])> = Vec::new();
         let mut by_portal: Vec<(PortalId, u32, u32)> = Vec::new();
         for c in floors.crossings().iter().filter(|c| c.direction < 2) {
             let to = floors.floor(c.from).steps[c.direction as usize];
-            by_portal.push((c.portal, c.from, to));
+            // Not where its own leaf stands.
+            let is_free = |floor| floors.leaves_at(floor).all(|p| p != c.portal);
+            if is_free(c.from) && is_free(to) {
+                by_portal.push((c.portal, c.from, to));
+            }
         }
         by_portal.sort_unstable();
         for all in by_portal.chunk_by(|a, b| a.0 == b.0) {
@@ -87,24 +105,30 @@ impl WalkMap {
         let mut strides = Strides::default();
         for cell in (0..layout.n_cells() as u32).map(CellId) {
             let mut lengths = Vec::new();
-            map.each_point(layout, cell, |from| {
-                strides.spread(&map.floors, from, None);
-                map.each_point(layout, cell, |to| {
+            map.each_point(layout, cell, |portal, from| {
+                strides.spread(&map.floors, from, None, &[portal]);
+                map.each_point(layout, cell, |_, to| {
                     lengths.push(strides.length(to) + map.floors.squares().side);
                 });
             });
+            // The leaves at both ends may be in the way.
+            let n = lengths.len().isqrt();
+            for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))) {
+                let longest = lengths[i * n + j].max(lengths[j * n + i]);
+                (lengths[i * n + j], lengths[j * n + i]) = (longest, longest);
+            }
             ways.set_lengths(cell, lengths);
         }
         map.ways = ways;
         map
     }
 
-    /// Calls `visit` with the floors on a cell's side of its points, in the order of its ways.
-    fn each_point(&self, layout: &Layout, cell: CellId, mut visit: impl FnMut(u32)) {
+    /// Calls `visit` with each point of a cell: its portal, and the floor on the cell's side, in the order of its ways.
+    fn each_point(&self, layout: &Layout, cell: CellId, mut visit: impl FnMut(PortalId, u32)) {
         for exit in layout.exits(cell) {
             let side = usize::from(layout.opening(exit.portal).cells()[1] == cell);
             for k in self.ways.range(exit.portal) {
-                visit(self.sides[k as usize][side]);
+                visit(exit.portal, self.sides[k as usize][side]);
             }
         }
     }
@@ -170,6 +194,8 @@ pub struct Path {
     pub points: Vec<DVec3>,
     /// The portals that it passes, each with the cell entered.
     pub portals: Vec<Exit>,
+    /// Where it passes each of them: on the floor. [Units: wu]
+    pub passages: Vec<DVec3>,
     /// Length of the line through the points. [Units: wu]
     pub length: f64,
     /// Its length in plan. [Units: wu]
@@ -199,6 +225,8 @@ pub struct PathSearch {
     /// Per point of a cell.
     lengths: Vec<f64>,
     legs: Vec<(u32, u32)>,
+    /// Portals of the path whose leaves are in the way.
+    opened: Vec<PortalId>,
     floors: Vec<u32>,
     bends: Vec<Bend>,
     best: Vec<Bend>,
@@ -234,6 +262,7 @@ impl PathSearch {
     ) -> Result<(), NoPath> {
         path.points.clear();
         path.portals.clear();
+        path.passages.clear();
         (path.length, path.length_in_plan) = (0.0, 0.0);
         let floors = &map.floors;
         let start = self.within(map, layout, from, f64::INFINITY, &mut may_pass)?;
@@ -242,9 +271,16 @@ impl PathSearch {
         let mut least = f64::INFINITY;
         for i in 0..self.arrivals.len() {
             let arrival = self.arrivals[i];
-            self.lay_out(map, layout, start, goal, &arrival);
+            if !self.lay_out(map, layout, start, goal, &arrival) {
+                continue;
+            }
             self.set_bends(floors, [(from, start), (to, goal)]);
-            pull_taut(floors, &mut self.bends, &mut may_pass);
+            let opened = &self.opened;
+            let mut may = |hindrance| match hindrance {
+                Hindrance::Portal(portal) => may_pass(portal),
+                Hindrance::Leaf(portal) => !opened.contains(&portal),
+            };
+            pull_taut(floors, &mut self.bends, &mut may);
             let legs = self.bends.windows(2);
             let length: f64 = legs.map(|w| w[0].0.distance(w[1].0)).sum();
             if length < least {
@@ -255,7 +291,7 @@ impl PathSearch {
         if least == f64::INFINITY {
             return Err(NoPath::NoWay);
         }
-        self.write(floors, &mut may_pass, path);
+        self.write(floors, path);
         Ok(())
     }
 
@@ -318,9 +354,9 @@ impl PathSearch {
     /// Computes lengths from a floor to the points of its cell.
     fn measure(&mut self, map: &WalkMap, layout: &Layout, from: u32) {
         let half = 0.5 * map.floors.squares().side;
-        self.strides.spread(&map.floors, from, None);
+        self.strides.spread(&map.floors, from, None, &[]);
         self.lengths.clear();
-        map.each_point(layout, map.floors.floor(from).cell, |floor| {
+        map.each_point(layout, map.floors.floor(from).cell, |_, floor| {
             self.lengths.push(self.strides.length(floor) + half);
         });
     }
@@ -343,7 +379,7 @@ impl PathSearch {
         );
     }
 
-    /// Finds the floors of a path, square by square.
+    /// Finds the floors of a path, square by square; returns `false` if leaves of its own doors are in its way.
     fn lay_out(
         &mut self,
         map: &WalkMap,
@@ -351,12 +387,17 @@ impl PathSearch {
         start: u32,
         goal: u32,
         arrival: &Arrival,
-    ) {
+    ) -> bool {
         self.legs.clear();
+        self.opened.clear();
         for (exit, k) in self.search.back(&map.ways, arrival) {
             let into = usize::from(layout.opening(exit.portal).cells()[1] == exit.to);
             let sides = map.sides[k as usize];
             self.legs.push((sides[1 - into], sides[into]));
+            // Who ends behind a door shuts it.
+            if map.floors.leaves_at(goal).all(|p| p != exit.portal) {
+                self.opened.push(exit.portal);
+            }
         }
         self.legs.reverse();
         self.floors.clear();
@@ -364,7 +405,11 @@ impl PathSearch {
         let mut at = start;
         for i in 0..=self.legs.len() {
             let (end, next) = self.legs.get(i).copied().unwrap_or((goal, goal));
-            self.strides.spread(&map.floors, at, Some(end));
+            self.strides
+                .spread(&map.floors, at, Some(end), &self.opened);
+            if self.strides.length(end) == f64::INFINITY {
+                return false;
+            }
             let first = self.floors.len();
             self.floors.extend(self.strides.back(end));
             self.floors[first..].reverse();
@@ -373,6 +418,7 @@ impl PathSearch {
             }
             at = next;
         }
+        true
     }
 
     /// Sets the bends of the path: all of its floors, except those that straight lines can skip.
@@ -393,12 +439,7 @@ impl PathSearch {
     }
 
     /// Writes the best path with its portals, and with bends where the floor rises or falls.
-    fn write(
-        &mut self,
-        floors: &Floors,
-        may_pass: &mut impl FnMut(PortalId) -> bool,
-        path: &mut Path,
-    ) {
+    fn write(&mut self, floors: &Floors, path: &mut Path) {
         let up = |p: DVec3, floor: u32| p.with_y(f64::from(floors.floor(floor).y));
         path.points.push(self.best[0].0);
         for i in 1..self.best.len() {
@@ -407,14 +448,17 @@ impl PathSearch {
             let along = (b - a).with_y(0.0);
             self.profile.clear();
             self.profile.push(a);
-            walk_straight(floors, start, b, may_pass, |from, direction, to| {
+            let end = walk_straight(floors, start, b, &mut |_| true, |from, direction, to| {
                 let middle = (floors.point(from) + floors.point(to)) * 0.5 - a;
                 let t = middle.with_y(0.0).dot(along) / along.length_squared();
                 self.profile.push(up(a + along * t.clamp(0.0, 1.0), to));
-                let (portal, cell) = (floors.portal_of(from, direction), floors.floor(to).cell);
-                path.portals
-                    .extend(portal.map(|portal| Exit { portal, to: cell }));
+                let cell = floors.floor(to).cell;
+                if let Some(portal) = floors.portal_of(from, direction) {
+                    path.portals.push(Exit { portal, to: cell });
+                    path.passages.extend(self.profile.last());
+                }
             });
+            debug_assert!(end.is_some(), "{a} {b}");
             self.profile.push(b);
             self.keep_profile(0.5 * floors.walker().step, &mut path.points);
         }

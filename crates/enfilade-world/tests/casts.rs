@@ -3,7 +3,7 @@
 use enfilade_cpg::World;
 use enfilade_geom::{DQuat, DVec3, Triangle, closest_point_on_triangle};
 use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
-use enfilade_world::{Body, Build, Cast, Caster, PartId, Pose, Space, Walker};
+use enfilade_world::{Agent, Body, Cast, Caster, PartId, Pose, Space, Walker};
 
 /// All triangles of all parts where they are now, in the frame of the root.
 fn model(space: &Space) -> Vec<Triangle> {
@@ -199,13 +199,14 @@ fn a_walker_rides_a_lift() {
     let at = room.center().with_y(room.min.y) - own.center().with_y(own.min.y - 0.01);
     space.set_pose(lift, Pose::from_translation(at)).unwrap();
     let eye = own.center().with_y(own.min.y + 1.0);
-    let build = Build {
+    let agent = Agent {
         eye: 1.0,
+        height: 1.1,
         radius: 0.1,
-        ..Build::default()
+        ..Agent::default()
     };
     let mut walker = Walker::new(
-        build,
+        agent,
         PartId::ROOT,
         space.between(lift, PartId::ROOT).point(eye),
     );

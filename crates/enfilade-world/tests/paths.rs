@@ -10,8 +10,11 @@ use enfilade_cpg::{
 };
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
-use enfilade_testkit::{GridParams, Rng, room_grid};
-use enfilade_world::{Agent, Layout, NoPath, Path, PathSearch, WalkMap};
+use enfilade_runtime::SightState;
+use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
+use enfilade_world::{
+    Agent, Layout, NoPath, PartId, Path, PathFollower, PathSearch, Progress, Space, WalkMap, Walker,
+};
 
 /// One storey of rooms, some of them concave, with doorways and no windows.
 fn rooms(seed: u64) -> (World, Layout, WalkMap) {
@@ -219,7 +222,7 @@ fn what_is_near_is_as_far_as_one_walks() {
             .unwrap();
         n_far += layout.n_cells() - cells.len();
         assert!(cells.is_sorted_by(|a, b| a.1 <= b.1) && cells.iter().all(|c| c.1 <= 8.0));
-        for _ in 0..40 {
+        for _ in 0..80 {
             let to = point_on_floor(&layout, &mut rng);
             let found = paths.find(&map, &layout, [from, to], |_| true, &mut path);
             if let Some(far) = search.distance(&map, &layout, to) {
@@ -496,4 +499,155 @@ fn a_thin_walker_finds_a_way_on_no_finer_floors() {
         assert!(thin < length + 1e-6 && thin > ends[0].distance(ends[1]) - 1e-6);
         assert!(n < 600_000, "{radius}: {n} floors");
     }
+}
+
+/// A world to walk in.
+struct Scene {
+    space: Space,
+}
+
+impl Scene {
+    fn new(world: &World) -> Self {
+        let space = Space::new(world.clone()).unwrap();
+        Self { space }
+    }
+
+    fn layout(&self) -> &Layout {
+        self.space.layout(PartId::ROOT)
+    }
+
+    /// Walks a path; returns the end of the walk.
+    fn walk(&mut self, path: &Path, agent: Agent) -> (Progress, DVec3) {
+        let eye = path.points[0] + DVec3::Y * agent.eye;
+        let mut walker = Walker::new(agent, PartId::ROOT, eye);
+        let mut follower = PathFollower::new(&self.space, PartId::ROOT, path.clone(), 1.4);
+        for _ in 0..(60.0 * (5.0 + path.length)) as usize {
+            let progress = follower.step(&mut walker, &mut self.space, 1.0 / 60.0);
+            if progress != Progress::Walking {
+                return (progress, walker.feet());
+            }
+        }
+        (Progress::Walking, walker.feet())
+    }
+}
+
+/// W10, W12: what a path says can be walked, among furniture, through doors that the walker opens.
+#[test]
+fn paths_are_walked_to_their_end() {
+    let (mut path, mut search) = (Path::default(), PathSearch::new());
+    let agent = Agent::default();
+    let (mut n_walked, mut n_doors) = (0, 0);
+    for seed in 0..3 {
+        let world = with_doors(room_grid(&GridParams::offices(12, seed)), |_| false);
+        let mut scene = Scene::new(&world);
+        let map = WalkMap::new(scene.layout(), &world, agent);
+        let mut rng = Rng::new(seed);
+        for _ in 0..80 {
+            let ends = [(); 2].map(|()| point_on_floor(scene.layout(), &mut rng));
+            let found = search.find(&map, scene.layout(), ends, |_| true, &mut path);
+            if found.is_err() {
+                continue;
+            }
+            // Nobody stands in a shut door.
+            let near = |p: u32| {
+                let bounds = scene.layout().opening(PortalId(p)).bounds();
+                ends.iter().any(|e| bounds.distance_squared(*e) < 0.25)
+            };
+            if (0..scene.layout().n_portals() as u32).any(near) {
+                continue;
+            }
+            let state = SightState::new(scene.space.sight(PartId::ROOT));
+            scene.space.set_state(PartId::ROOT, state);
+            let (progress, at) = scene.walk(&path, agent);
+            assert_eq!(
+                progress,
+                Progress::Arrived,
+                "seed {seed}, {ends:?}: {at} {path:?}"
+            );
+            n_walked += 1;
+            n_doors += path.portals.len();
+        }
+    }
+    assert!(n_walked > 50 && n_doors > 100, "{n_walked} {n_doors}");
+}
+
+/// W10, W12: an obstacle that the path does not know of stops the walker, who says so; an open leaf is shut.
+#[test]
+fn a_walker_that_is_stopped_is_stuck() {
+    let agent = Agent::default();
+    let (world, layout) = hall(&[block([5.0, 0.0, 0.0], [5.2, 3.0, 4.0])]);
+    let (free, _) = hall(&[]);
+    let map = WalkMap::new(&layout, &free, agent);
+    let mut path = Path::default();
+    let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, 0.0, 2.0)];
+    PathSearch::new()
+        .find(&map, &layout, ends, |_| true, &mut path)
+        .unwrap();
+    let mut scene = Scene::new(&world);
+    let (progress, at) = scene.walk(&path, agent);
+    assert_eq!(progress, Progress::Stuck);
+    assert!(at.x > 4.6 && at.x < 5.0 - agent.radius, "{at}");
+}
+
+/// W10: an open leaf is in the way of paths through its own door, and of no other.
+#[test]
+fn an_open_leaf_is_in_the_way_of_its_own_door_only() {
+    let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
+    let layout = Layout::new(&world);
+    let map = WalkMap::new(&layout, &world, Agent::default());
+    let door = layout.opening(PortalId(0));
+    let (middle, size) = (door.center(), door.bounds().size());
+    // Its leaf turns into the second room, about a jamb; both corners are as far from the doorway.
+    let beyond =
+        |side: f64| middle + DVec3::new(0.35, 0.0, side * (0.5 * size.z + 0.4)).with_y(0.0);
+    let from = middle - DVec3::X * 1.5;
+    let mut path = Path::default();
+    let mut length = |from: DVec3, to: DVec3| {
+        let mut search = PathSearch::new();
+        let floor = |p: DVec3| p.with_y(0.0);
+        search
+            .find(&map, &layout, [floor(from), floor(to)], |_| true, &mut path)
+            .unwrap();
+        path.length
+    };
+    let [a, b] = [-1.0, 1.0].map(|side| length(from, beyond(side)));
+    let (around, direct) = (a.max(b), a.min(b));
+    // Around the leaf's end, which is as far from its hinge as the doorway is wide.
+    assert!(around > direct + 0.5, "{a} {b}");
+    let across = length(beyond(-1.0), beyond(1.0));
+    assert!(across < size.z + 0.8 + 0.01, "{across}");
+}
+
+/// W10: one that is wider than it is high, such as a robot, goes below a table, and through no gap narrower than itself.
+#[test]
+fn a_flat_robot_goes_below_a_table() {
+    let robot = Agent {
+        radius: 0.35,
+        height: 0.3,
+        eye: 0.2,
+        step: 0.02,
+        ..Agent::default()
+    };
+    let found = |boxes: &[Aabb]| {
+        let (world, layout) = hall(boxes);
+        let map = WalkMap::new(&layout, &world, robot);
+        let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, 0.0, 2.0)];
+        let mut path = Path::default();
+        let found = PathSearch::new().find(&map, &layout, ends, |_| true, &mut path);
+        found.map(|()| {
+            let (progress, at) = Scene::new(&world).walk(&path, robot);
+            assert_eq!(progress, Progress::Arrived, "{at}");
+            path.length
+        })
+    };
+    let table = block([4.0, 0.7, 0.0], [6.0, 0.75, 4.0]);
+    assert!(found(&[table]).is_ok_and(|length| length < 8.01));
+    let gap = |width: f64| {
+        [
+            block([4.0, 0.0, 0.0], [4.2, 3.0, 2.0]),
+            block([4.0, 0.0, 2.0 + width], [4.2, 3.0, 4.0]),
+        ]
+    };
+    assert!(found(&gap(0.9)).is_ok());
+    assert_eq!(found(&gap(0.65)).unwrap_err(), NoPath::NoWay);
 }

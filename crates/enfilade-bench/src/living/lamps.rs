@@ -26,11 +26,11 @@ const SIDE: u32 = 512;
 
 /// Counts pixels that differ from brute force.
 pub(super) fn pictures(world: &World) -> anyhow::Result<Figure> {
-    let mut space = Space::new(world)?;
+    let mut space = Space::new(world.clone())?;
     let mut rng = Rng::new(11);
     for portal in (0..space.sight(PartId::ROOT).n_portals() as u32).map(PortalId) {
         let share = rng.range(-0.5, 1.0).max(0.0) as f32;
-        space.state_mut(PartId::ROOT).set_leaves(portal, share);
+        space.set_leaves(PartId::ROOT, portal, share);
     }
     let (rooms, lamps) = lamps_of(world, &space);
     ensure!(!lamps.is_empty(), "no room has a place for a lamp");
@@ -39,7 +39,6 @@ pub(super) fn pictures(world: &World) -> anyhow::Result<Figure> {
         let (frame, at, range) = (lamp.part, lamp.at, lamp.range);
         lights.add(&space, Lamp { frame, at, range })?;
     }
-    lights.update(&space);
     let mut culled = studio(world, &lamps, true)?;
     let mut whole = studio(world, &lamps, false)?;
     let mut maps_only = bare(world, &lamps)?;

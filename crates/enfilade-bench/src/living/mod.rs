@@ -12,6 +12,7 @@ mod paths;
 mod rooms;
 mod sound;
 mod things;
+mod walk;
 mod walls;
 
 use enfilade::cpg::World;
@@ -22,6 +23,21 @@ use crate::rows::{Figure, Measure, Row};
 const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
 /// Real buildings with doors.
 const LIVED_IN: &[&str] = &["duplex", "institute", "fzk-haus"];
+/// Real buildings to walk in.
+const WALKED_IN: &[&str] = &[
+    "duplex",
+    "institute",
+    "fzk-haus",
+    "samplehouse4",
+    "kit-edc",
+    "jasmin-sun",
+    "aws-small-house",
+    "clearpath-office",
+    "recast-dungeon",
+    "procthor4",
+    "janesville",
+    "smiley-west",
+];
 /// Those of the graphs that contract.
 const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
@@ -63,6 +79,7 @@ pub(crate) const ROWS: &[Row] = &[
     made("paths: search", &["offices-1000"], paths::search),
     baked("paths: length", &["institute"], paths::institute),
     baked("paths: length", &["recast-dungeon"], paths::dungeon),
+    baked("walk", WALKED_IN, walk::walk),
     made("sound: length", &["offices-16"], sound::length),
     made("sound: direction", &["offices-16"], sound::direction),
     made("levels", &["offices-100"], levels::level_in),

@@ -1,7 +1,7 @@
 //! A person who walks in the window, or flies: the walker of the living world, with an eye of its own.
 
 use enfilade::geom::DVec3;
-use enfilade::world::{Build, PartId, Space, Walker as Body};
+use enfilade::world::{Agent, PartId, Space, Walker as Body};
 
 use enfilade_render::EYE_HEIGHT;
 
@@ -19,13 +19,13 @@ pub(super) struct Walker {
 
 impl Walker {
     pub(super) fn new(eye: [f32; 3]) -> Self {
-        let build = Build {
+        let agent = Agent {
             eye: EYE_HEIGHT.into(),
-            ..Build::default()
+            ..Agent::default()
         };
         let eye = DVec3::from(eye.map(f64::from));
         Self {
-            body: Body::new(build, PartId::ROOT, eye),
+            body: Body::new(agent, PartId::ROOT, eye),
             frame: PartId::ROOT,
             eye,
             flies: false,

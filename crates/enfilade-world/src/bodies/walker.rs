@@ -11,12 +11,14 @@
 //! It is in the frame of the part whose floor it stands on, so a lift or a ship carries it along.
 
 use enfilade_geom::DVec3;
+use enfilade_runtime::{DetailId, Target};
 
+use crate::agent::Agent;
 use crate::bodies::{Body, Cast, Caster};
 use crate::space::{PartId, Place, Space};
 
 /// Gap kept to walls. [Units: wu]
-const GAP: f64 = 0.005;
+pub(super) const GAP: f64 = 0.005;
 /// Maximum number of changes of direction in a step: along a wall, then along the next one where two meet.
 const SLIDES: usize = 4;
 /// Depth of the search for a floor. [Units: wu]
@@ -25,31 +27,8 @@ const FAR: f64 = 500.0;
 const LONGEST: f64 = 0.1;
 /// Acceleration. [Units: wu/s²]
 const GRAVITY: f64 = 9.81;
-
-/// Dimensions of a walker.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Build {
-    /// Half the width. [Units: wu] [Limit: > 0.01]
-    pub radius: f64,
-    /// Height of the eye above the floor. [Units: wu] [Limit: > step + radius]
-    pub eye: f64,
-    /// Greatest height stepped onto or over. [Units: wu] [Limit: >= 0]
-    pub step: f64,
-    /// Speed of rising when climbing. [Units: wu/s] [Limit: above 0]
-    pub climb: f64,
-}
-
-impl Default for Build {
-    /// An adult: 44 cm wide, eyes at 1.6 m, steps of 30 cm.
-    fn default() -> Self {
-        Self {
-            radius: 0.22,
-            eye: 1.6,
-            step: 0.3,
-            climb: 6.0,
-        }
-    }
-}
+/// Speed of rising when climbing. [Units: wu/s]
+const CLIMB: f64 = 6.0;
 
 /// A person who walks in a world. Allocates nothing once the buffers have grown.
 #[derive(Clone, Debug)]
@@ -58,24 +37,27 @@ pub struct Walker {
     pub eye: DVec3,
     /// The part whose floor it stands on; may be set.
     pub frame: PartId,
-    build: Build,
+    agent: Agent,
     /// Downward speed. [Units: wu/s]
     falling: f64,
     /// The last place that it was in.
     place: Option<Place>,
+    /// The last obstacle in its way in the last step, and its part.
+    obstacle: Option<(PartId, Target)>,
     caster: Caster,
 }
 
 impl Walker {
     /// Makes a walker at rest with its eye at a point of a part's frame.
     #[must_use]
-    pub fn new(build: Build, frame: PartId, eye: DVec3) -> Self {
+    pub fn new(agent: Agent, frame: PartId, eye: DVec3) -> Self {
         Self {
             eye,
             frame,
-            build,
+            agent,
             falling: 0.0,
             place: None,
+            obstacle: None,
             caster: Caster::new(),
         }
     }
@@ -86,6 +68,24 @@ impl Walker {
         self.place
     }
 
+    /// Returns its size and abilities.
+    #[must_use]
+    pub fn agent(&self) -> &Agent {
+        &self.agent
+    }
+
+    /// Returns the point below its eye where it stands, or would stand after a fall of no height. [Units: wu]
+    #[must_use]
+    pub fn feet(&self) -> DVec3 {
+        self.eye - DVec3::Y * self.agent.eye
+    }
+
+    /// Returns the last obstacle that was in its way in the last step, if any, and its part.
+    #[must_use]
+    pub fn obstacle(&self) -> Option<(PartId, Target)> {
+        self.obstacle
+    }
+
     /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors in
     /// their current pose and shut openings; falls, and climbs up to the height of a step. In no cell, nothing stops it and it
     /// does not fall. Enters and leaves parts through their doors; `wish` is in the frame of its part. [Units: wu/s, s]
@@ -94,23 +94,52 @@ impl Walker {
     ///
     /// If its part is not of `space`.
     pub fn step(&mut self, space: &Space, wish: DVec3, seconds: f64) {
+        self.step_where(space, wish, seconds, |_, _| true);
+    }
+
+    /// As [`Walker::step`], ignoring objects for which `counts` returns `false`.
+    pub(super) fn step_where(
+        &mut self,
+        space: &Space,
+        wish: DVec3,
+        seconds: f64,
+        counts: impl Fn(PartId, DetailId) -> bool,
+    ) {
         let seconds = seconds.clamp(0.0, LONGEST);
         let flat = DVec3::new(wish.x, 0.0, wish.z) * seconds;
         if !(flat.is_finite() && self.eye.is_finite()) {
             return;
         }
-        self.slide(space, flat);
-        self.push_out(space);
-        self.stand(space, seconds);
+        self.slide(space, flat, &counts);
+        self.push_out(space, &counts);
+        self.stand(space, seconds, &counts);
     }
 
-    /// Returns the capsule from a step's height up to the eye, and the depth of its center below the eye.
+    /// Returns `true` if it touches an object for which `counts` returns `true`.
+    pub(super) fn touches(
+        &mut self,
+        space: &Space,
+        counts: impl Fn(PartId, DetailId) -> bool,
+    ) -> bool {
+        let (body, below) = self.body();
+        let at = self.eye + below;
+        let Some(place) = self.locate(space, at) else {
+            return false;
+        };
+        let mut is_touched = false;
+        self.caster
+            .for_each_contact(space, &body, (self.frame, at), place, |contact| {
+                if let Target::Detail { detail, .. } = contact.target {
+                    is_touched |= counts(contact.place.part, detail);
+                }
+            });
+        is_touched
+    }
+
+    /// Returns its capsule, and the vector from the eye to the capsule's center.
     fn body(&self) -> (Body, DVec3) {
-        let Build {
-            radius, eye, step, ..
-        } = self.build;
-        let half = DVec3::Y * (0.5 * (eye - step - radius)).max(0.0);
-        (Body::Capsule { half, radius }, -half)
+        let (body, up) = self.agent.body();
+        (body, DVec3::Y * (up - self.agent.eye))
     }
 
     /// Returns the place of a point of it; in solid matter, the last one.
@@ -119,8 +148,9 @@ impl Walker {
         self.place
     }
 
-    fn slide(&mut self, space: &Space, flat: DVec3) {
+    fn slide(&mut self, space: &Space, flat: DVec3, counts: &impl Fn(PartId, DetailId) -> bool) {
         let (body, below) = self.body();
+        self.obstacle = None;
         let mut left = flat;
         for _ in 0..SLIDES {
             let length = left.length();
@@ -138,10 +168,12 @@ impl Walker {
                 by: direction * (length + GAP),
                 place,
             };
-            let Some(impact) = self.caster.cast(space, &cast) else {
+            let hit = (self.caster).cast_where(space, &cast, counts);
+            let Some(impact) = hit else {
                 self.eye += left;
                 return;
             };
+            self.obstacle = Some((impact.place.part, impact.target));
             let level = DVec3::new(impact.normal.x, 0.0, impact.normal.z);
             let Some(normal) = level.try_normalize() else {
                 return;
@@ -155,7 +187,7 @@ impl Walker {
     }
 
     /// Moves out of obstacles, deepest first.
-    fn push_out(&mut self, space: &Space) {
+    fn push_out(&mut self, space: &Space, counts: &impl Fn(PartId, DetailId) -> bool) {
         let (body, below) = self.body();
         for _ in 0..SLIDES {
             let at = self.eye + below;
@@ -166,7 +198,10 @@ impl Walker {
             self.caster
                 .for_each_contact(space, &body, (self.frame, at), place, |contact| {
                     let level = DVec3::new(contact.normal.x, 0.0, contact.normal.z);
+                    let is_ignored =
+                        matches!(contact.target, Target::Detail { detail, .. } if !counts(contact.place.part, detail));
                     if contact.depth > deepest.0
+                        && !is_ignored
                         && let Some(normal) = level.try_normalize()
                     {
                         deepest = (contact.depth, normal);
@@ -181,22 +216,19 @@ impl Walker {
     }
 
     /// Moves onto the floor, or towards it.
-    fn stand(&mut self, space: &Space, seconds: f64) {
-        let Build {
-            eye, step, climb, ..
-        } = self.build;
-        let knee = self.eye - DVec3::Y * (eye - step);
-        let point = Body::Sphere { radius: 0.0 };
-        let place = self.locate(space, knee);
-        let floor = place.and_then(|place| {
+    fn stand(&mut self, space: &Space, seconds: f64, counts: &impl Fn(PartId, DetailId) -> bool) {
+        let step = self.agent.step;
+        let (foot, up) = self.agent.foot();
+        let from = self.feet() + DVec3::Y * up;
+        let floor = self.locate(space, from).and_then(|place| {
             let cast = Cast {
-                body: &point,
+                body: &foot,
                 frame: self.frame,
-                from: knee,
+                from,
                 by: -DVec3::Y * FAR,
                 place,
             };
-            self.caster.cast(space, &cast)
+            (self.caster).cast_where(space, &cast, counts)
         });
         let Some(floor) = floor else {
             // No floor below: do not fall.
@@ -204,16 +236,20 @@ impl Walker {
             return;
         };
         let above = floor.t * FAR - step;
+        if self.falling == 0.0 && above <= step {
+            // Steps are climbed, and descended, in a few frames.
+            let most = CLIMB * seconds;
+            self.eye.y -= above.clamp(-most, most);
+            self.board(space, floor.place.part);
+            return;
+        }
         self.falling += GRAVITY * seconds;
         if above <= self.falling * seconds {
             self.falling = 0.0;
-            // Steps are climbed in a few frames.
-            self.eye.y -= above.clamp(-climb * seconds, above.max(0.0));
+            self.eye.y -= above.clamp(-CLIMB * seconds, above.max(0.0));
+            self.board(space, floor.place.part);
         } else {
             self.eye.y -= self.falling * seconds;
-        }
-        if self.falling == 0.0 {
-            self.board(space, floor.place.part);
         }
     }
 
@@ -235,15 +271,15 @@ mod tests {
     use enfilade_geom::{Aabb, DMat4};
     use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
-    struct Site {
+    struct Scene {
         space: Space,
         walker: Walker,
     }
 
-    impl Site {
+    impl Scene {
         fn new(world: &World, eye: DVec3) -> Self {
             Self {
-                walker: Walker::new(Build::default(), PartId::ROOT, eye),
+                walker: Walker::new(Agent::default(), PartId::ROOT, eye),
                 space: Space::new(world.clone()).unwrap(),
             }
         }
@@ -296,10 +332,10 @@ mod tests {
             holes: 0.0,
             ..GridParams::offices(9, 5)
         });
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         let room = site.space.layout(PartId::ROOT).cell(CellId(0)).bounds;
         let mut rng = Rng::new(6);
-        let radius = Build::default().radius;
+        let radius = Agent::default().radius;
         // Not in a cupboard.
         loop {
             let share = DVec3::new(rng.unit(), 0.53, rng.unit());
@@ -336,7 +372,7 @@ mod tests {
             furniture: 0,
             ..GridParams::offices(1, 1)
         });
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         site.walk(DVec3::X * 5.0, 2.0);
         let from = site.walker.eye;
         site.walk(DVec3::new(1.0, 0.0, 1.0), 0.5);
@@ -365,10 +401,10 @@ mod tests {
             let edge = DVec3::new(from.x + 0.6, low.y, low.z);
             let far = DVec3::new(from.x + 0.9, low.y + height, high.z);
             add_box(&mut world, edge, far);
-            let mut site = Site::new(&world, from);
+            let mut site = Scene::new(&world, from);
             site.walk(DVec3::ZERO, 2.0);
             let floor = site.walker.eye.y;
-            assert!((floor - low.y - Build::default().eye).abs() < 0.01);
+            assert!((floor - low.y - Agent::default().eye).abs() < 0.01);
             let mut highest = floor;
             for _ in 0..60 {
                 site.walk(DVec3::X, 0.02);
@@ -381,12 +417,53 @@ mod tests {
         }
     }
 
+    /// Covers W12: stairs are climbed and descended at the height of their steps, also those with narrow treads, as winding ones
+    /// have near their middle, and those with a low ceiling.
+    #[test]
+    fn narrow_treads_are_walked_up_and_down() {
+        let mut world = room_grid(&GridParams {
+            size: [1, 1, 1],
+            windows: 0.0,
+            furniture: 0,
+            ..GridParams::offices(1, 1)
+        });
+        let from = middle(&world);
+        let [low, high] = world.graph.cells[0]
+            .aabb
+            .map(|p| DVec3::from(p.map(f64::from)));
+        let (rise, run) = (0.19, 0.14);
+        let at = |i: i32| from.x + 0.4 + run * f64::from(i);
+        let top = |i: i32| low.y + rise * f64::from(i + 1);
+        for i in 0..4 {
+            let edge = DVec3::new(at(i), low.y, low.z);
+            add_box(&mut world, edge, DVec3::new(high.x, top(i), high.z));
+        }
+        let mut site = Scene::new(&world, from);
+        site.walk(DVec3::ZERO, 2.0);
+        site.walk(DVec3::X, 1.2);
+        assert!(
+            (site.walker.feet().y - top(3)).abs() < 0.01,
+            "{}",
+            site.walker.feet()
+        );
+        // On the way down it is never above the step before.
+        for _ in 0..60 {
+            site.walk(-DVec3::X, 0.02);
+            let feet = site.walker.feet();
+            let foot = 0.5 * Agent::default().radius;
+            let passed = (0..4).filter(|&i| feet.x + foot > at(i) - 0.03).count();
+            let floor = low.y + rise * passed as f64;
+            assert!(feet.y < floor + 0.1, "{feet} {floor}");
+        }
+        assert!((site.walker.feet().y - low.y).abs() < 0.01);
+    }
+
     /// Covers W12: a leaf that swings shut pushes a walker in its way along, and does not pass it.
     #[test]
     fn a_leaf_pushes_a_walker_in_its_way() {
         let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
         let door = Layout::new(&world).opening(PortalId(0)).center();
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         site.space.set_leaves(PartId::ROOT, PortalId(0), 1.0);
         site.walker.eye = DVec3::new(door.x + 0.4, 1.6, door.z);
         site.walk(DVec3::ZERO, 1.0);
@@ -398,13 +475,23 @@ mod tests {
         }
         let after = site.walker.eye;
         assert!(before.distance(after) > 0.05, "{before} {after}");
-        // Out of the doorway on one side or the other, not in the shut leaf, which is 6 to 10 cm behind the opening.
-        let radius = Build::default().radius;
-        let off = after.x - door.x;
-        assert!(
-            off < 0.06 - radius + 1e-3 || off > 0.1 + radius - 1e-3,
-            "{off}"
+        // Not in the leaf, nor in the wall.
+        let (body, below) = site.walker.body();
+        let mut caster = Caster::new();
+        let mut deepest = 0.0_f64;
+        caster.for_each_contact(
+            &site.space,
+            &body,
+            (PartId::ROOT, after + below),
+            Place {
+                part: PartId::ROOT,
+                cell: CellId(1),
+            },
+            |contact| {
+                deepest = deepest.max(contact.depth);
+            },
         );
+        assert!(deepest < 1e-3, "{deepest} at {after}");
     }
 
     /// Covers W12: a hole in the floor leads into the room below, another cell.
@@ -418,7 +505,7 @@ mod tests {
             ..GridParams::offices(1, 3)
         });
         let hole = Layout::new(&world).opening(PortalId(0)).center();
-        let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
+        let mut site = Scene::new(&world, hole + DVec3::Y * 2.0);
         site.walk(DVec3::ZERO, 3.0);
         assert!(
             (site.walker.eye.y - 1.6).abs() < 0.01,
@@ -427,7 +514,7 @@ mod tests {
         );
         assert_eq!(site.walker.place().map(|p| p.cell), Some(CellId(0)));
         // Shut, it holds.
-        let mut site = Site::new(&world, hole + DVec3::Y * 2.0);
+        let mut site = Scene::new(&world, hole + DVec3::Y * 2.0);
         site.space.close(PartId::ROOT, PortalId(0));
         site.walk(DVec3::ZERO, 3.0);
         assert!((site.walker.eye.y - hole.y - 1.6).abs() < 0.01);
@@ -437,7 +524,7 @@ mod tests {
     #[test]
     fn walking_allocates_nothing_once_warm() {
         let world = with_doors(room_grid(&GridParams::offices(20, 2)), |_| false);
-        let mut site = Site::new(&world, middle(&world));
+        let mut site = Scene::new(&world, middle(&world));
         for portal in world.graph.portal_ids() {
             site.space.open(PartId::ROOT, portal);
         }

@@ -33,6 +33,18 @@ impl Squares {
         ]
     }
 
+    /// Returns the square beside one: to +x, +z, −x or −z; `None` at the border.
+    pub(crate) fn beside(&self, square: u32, direction: usize) -> Option<usize> {
+        let axis = direction % 2;
+        let mut at = [square as usize % self.n[0], square as usize / self.n[0]];
+        if direction < 2 {
+            at[axis] += 1;
+        } else {
+            at[axis] = at[axis].checked_sub(1)?;
+        }
+        (at[axis] < self.n[axis]).then(|| self.number(at))
+    }
+
     pub(crate) fn number(&self, at: [usize; 2]) -> usize {
         at[1] * self.n[0] + at[0]
     }

@@ -1,49 +1,31 @@
 //! Floors: the places where a walker can stand, and the steps between them.
 //!
-//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009):
-//! a floor is the top of matter that is flat enough and has room for the walker above; a step leads to the floor
-//! beside it that is not too much higher or lower, with room on the path. Floors closer to a wall or an edge than the
-//! walker's radius are left out, by distances along the floors (Danielsson, "Euclidean distance mapping", 1980). Each
-//! floor stores its cell, and a step between cells its portal. Walkers cannot pass cracks, windows with anything in
-//! them, or openings that are too narrow, too low, or above a sill too high for a step.
+//! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009): a floor is
+//! the top of matter that is flat enough and has room for the walker above; a step leads to the floor beside it that is not
+//! too much higher or lower, with room on the path. Recast leaves out the floors closer to a wall than the walker's radius, by
+//! distances in squares; here the walker's own body must stand free there ([`Room`]), so a wall is as thick as it is. Only drops
+//! are kept away from by distances along the floors (Danielsson, "Euclidean distance mapping", 1980). Each floor stores its cell,
+//! and a step between cells its portal. Walkers cannot pass cracks, windows with anything in them, or openings that are too
+//! narrow, too low, or above a sill too high for a step.
 //!
-//! O(squares covered) memory, about 40 bytes a floor; time grows by the logarithm of a heap more. Walls are up to one
-//! square too thick, and distances up to half a square wrong: a walker may come closer to a wall than its radius by
-//! half a square, and fails at a doorway less than two squares wider than itself.
+//! An open leaf is in the way of a path through its own door only: floors where it would touch the walker are marked with its
+//! portals. Who stands there may walk away, but not through that portal: the door opens afterwards.
+//!
+//! O(squares covered) memory, about 40 bytes a floor; time grows by the logarithm of a heap more. The middle of a square is free,
+//! so a path may come closer to a wall than the radius by 0.7 squares, where a walker slides along it; a gap less than a square
+//! and 2 cm wider than the walker may be lost.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use enfilade_cpg::{CellId, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DVec3, Triangle};
+use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
+use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
+use enfilade_runtime::DetailId;
 
+use crate::agent::Agent;
+use crate::bodies::Room;
 use crate::layout::Layout;
 use crate::paths::columns::{Span, Squares, spans};
-
-/// The size and abilities of a walker.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Agent {
-    /// Distance kept from walls. [Units: wu] [Limit: above 0]
-    pub radius: f64,
-    /// Room needed above the floor. [Units: wu] [Limit: above 0]
-    pub height: f64,
-    /// The highest step, up or down. [Units: wu] [Limit: at least 0]
-    pub step: f64,
-    /// The steepest floor. [Units: rad]
-    pub slope: f64,
-}
-
-impl Default for Agent {
-    /// An adult: radius 0.3 m, 1.8 m high, steps of 0.4 m, slopes of 45°.
-    fn default() -> Self {
-        Self {
-            radius: 0.3,
-            height: 1.8,
-            step: 0.4,
-            slope: std::f64::consts::FRAC_PI_4,
-        }
-    }
-}
 
 /// Marks the absence of a floor.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -70,6 +52,8 @@ pub struct Floors {
     floors: Vec<Floor>,
     /// Steps between cells, sorted.
     crossings: Vec<Crossing>,
+    /// Floors in the way of leaves, each with the portal that they open, sorted.
+    swung: Vec<(u32, PortalId)>,
     walker: Agent,
 }
 
@@ -79,6 +63,8 @@ pub(crate) struct Floor {
     pub(crate) square: u32,
     pub(crate) y: f32,
     pub(crate) cell: CellId,
+    /// True if an open leaf may stand there.
+    is_swung: bool,
     /// The floors beside it: to +x, +z, −x, −z.
     pub(crate) steps: [u32; 4],
 }
@@ -91,6 +77,15 @@ pub(crate) struct Crossing {
     pub(crate) portal: PortalId,
 }
 
+/// What a step depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Hindrance {
+    /// A portal to pass.
+    Portal(PortalId),
+    /// The place of a portal's leaf when it is open.
+    Leaf(PortalId),
+}
+
 /// A floor in construction.
 struct Ground {
     square: u32,
@@ -100,30 +95,55 @@ struct Ground {
 }
 
 impl Floors {
-    /// Lays out the floors of a world's structure, without its objects; outdoors, ground up to 30 m around the rooms.
+    /// Lays out the floors of a world with those objects for which `counts` returns `true`; outdoors, ground up to 30 m around
+    /// the rooms. Leaves of doors are obstacles in their open pose, to walkers that open them.
+    ///
     /// Squares are a quarter of the walker's radius wide, or wider if there would be more than 8 million; if there
     /// would be more than half a million, they are at least 5 cm wide, so a thinner walker gets the same floors as
     /// one with a radius of 0.2 m.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, walker: Agent) -> Self {
-        let triangles = || world.batches.iter().flat_map(|b| b.primitive.triangles());
+    pub fn new(
+        layout: &Layout,
+        world: &World,
+        walker: Agent,
+        counts: impl FnMut(DetailId) -> bool,
+    ) -> Self {
+        let (solid, leaves) = solid_of(world, counts);
+        let triangles = || solid.iter().copied();
         let bounds = bounds_of(layout, triangles().flatten());
         let squares = squares_of(&bounds, walker.radius / 4.0, triangles());
         let spans = spans(&squares, triangles(), walker.slope);
         let mut grounds = grounds(&spans, walker.height as f32);
-        drop(spans);
         let first = first_of(&squares, grounds.iter().map(|g| g.square));
         step_from_each(&squares, &first, &mut grounds, &walker);
+        let edges = edges_of(&squares, &spans, &grounds, &walker);
+        drop(spans);
         // Distances are only as exact as a square's side.
-        let is_clear = clear(&squares, &grounds, walker.radius - 0.5 * squares.side);
+        let mut is_clear = clear(
+            &squares,
+            &grounds,
+            &edges,
+            walker.radius - 0.5 * squares.side,
+        );
         let mut floors = Self {
             squares,
             first: Vec::new(),
             floors: Vec::new(),
             crossings: Vec::new(),
+            swung: Vec::new(),
             walker,
         };
+        let room = Room::new(&solid, &walker);
+        for (is_clear, ground) in is_clear.iter_mut().zip(&grounds) {
+            let at = floors.center(ground.square, ground.y.into());
+            *is_clear = *is_clear && room.is_free(room.standing(at));
+        }
         floors.keep(layout, &grounds, &is_clear);
+        for (portal, leaf) in &leaves {
+            floors.swing(*portal, leaf, &room);
+        }
+        floors.swung.sort_unstable();
+        floors.swung.dedup();
         // An opening that bakes call a window may have a sill on one side only: there the floor decides. Behind
         // glass, none does.
         let is_open = |p: PortalId| match layout.opening(p).kind() {
@@ -148,6 +168,7 @@ impl Floors {
                     square: ground.square,
                     y: ground.y,
                     cell,
+                    is_swung: false,
                     steps: ground.steps,
                 });
             }
@@ -157,6 +178,34 @@ impl Floors {
             floor.steps = floor.steps.map(to);
         }
         self.first = first_of(&self.squares, self.floors.iter().map(|f| f.square));
+    }
+
+    /// Marks the floors where an open leaf of a portal is in the way.
+    fn swing(&mut self, portal: PortalId, leaf: &[Triangle], room: &Room) {
+        let own = Room::new(leaf, &self.walker);
+        let reach = self.walker.radius + self.squares.side;
+        let bounds = Aabb::of_points(leaf.as_flattened()).expanded(reach);
+        let n = self.squares.n.map(|n| n as f64 - 1.0);
+        let [low, high] = [bounds.min, bounds.max].map(|p| {
+            let at = self.squares.along(p);
+            [0, 1].map(|k| at[k].clamp(0.0, n[k]) as usize)
+        });
+        for z in low[1]..=high[1] {
+            let row = [low[0], high[0]].map(|x| self.squares.number([x, z]));
+            for floor in self.first[row[0]]..self.first[row[1] + 1] {
+                if !own.is_free(room.standing(self.point(floor))) {
+                    self.floors[floor as usize].is_swung = true;
+                    self.swung.push((floor, portal));
+                }
+            }
+        }
+    }
+
+    /// Returns the portals whose open leaves are in the way on a floor.
+    pub(crate) fn leaves_at(&self, floor: u32) -> impl Iterator<Item = PortalId> {
+        let first = self.swung.partition_point(|s| s.0 < floor);
+        let own = self.swung[first..].iter().take_while(move |s| s.0 == floor);
+        own.map(|s| s.1)
     }
 
     /// Finds the portals of steps between cells; removes steps without one.
@@ -296,22 +345,72 @@ impl Floors {
         ((crossing.from, crossing.direction) == key).then_some(crossing.portal)
     }
 
-    /// Returns the floor beside one, if a step leads there; calls `may_pass` if the cell changes.
+    /// Returns the floor beside one, if a step leads there and nothing that it depends on hinders it.
     #[inline]
     pub(crate) fn step(
         &self,
         from: u32,
         direction: usize,
-        may_pass: &mut impl FnMut(PortalId) -> bool,
+        may: &mut impl FnMut(Hindrance) -> bool,
     ) -> Option<u32> {
         let floor = self.floor(from);
         let to = floor.steps[direction];
         if to == NONE {
             return None;
         }
-        let is_open = self.floor(to).cell == floor.cell
-            || self.portal_of(from, direction).is_some_and(may_pass);
-        is_open.then_some(to)
+        let other = self.floor(to);
+        let is_in_way = |p| floor.is_swung && self.leaves_at(from).any(|q| q == p);
+        let is_open = other.cell == floor.cell
+            || (self.portal_of(from, direction))
+                .is_some_and(|p| !is_in_way(p) && may(Hindrance::Portal(p)));
+        // Who is in the way of a leaf may go on there, before it opens.
+        let is_free = !other.is_swung
+            || self
+                .leaves_at(to)
+                .all(|p| is_in_way(p) || may(Hindrance::Leaf(p)));
+        (is_open && is_free).then_some(to)
+    }
+}
+
+type Leaves = Vec<(PortalId, Vec<Triangle>)>;
+
+/// Returns the triangles that stop walkers, of the structure and the objects that count, and apart those of leaves in their open
+/// pose.
+fn solid_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> (Vec<Triangle>, Leaves) {
+    let mut solid: Vec<Triangle> = Vec::new();
+    for batch in &world.batches {
+        solid.extend(batch.primitive.triangles());
+    }
+    let counts: Vec<bool> = (0..world.details.len() as u32)
+        .map(|i| counts(DetailId(i)))
+        .collect();
+    let mut moves = vec![false; counts.len()];
+    let mut leaves = Vec::new();
+    for (i, portal) in (0..).zip(&world.graph.portals) {
+        let parts = portal.fittings.iter();
+        for part in parts.filter(|f| f.part == FittingPart::Leaf && counts[f.detail as usize]) {
+            let Some(motion) = part.motion else {
+                continue;
+            };
+            moves[part.detail as usize] = true;
+            let mut leaf = Vec::new();
+            add_object(world, part.detail, motion.at(1.0), &mut leaf);
+            leaves.push((PortalId(i), leaf));
+        }
+    }
+    for i in (0..).take(counts.len()) {
+        if counts[i as usize] && !moves[i as usize] {
+            add_object(world, i, DMat4::IDENTITY, &mut solid);
+        }
+    }
+    (solid, leaves)
+}
+
+/// Adds the triangles of an object after a motion.
+fn add_object(world: &World, detail: u32, motion: DMat4, triangles: &mut Vec<Triangle>) {
+    let object = &world.details[detail as usize];
+    for primitive in &world.detail_meshes[object.mesh as usize].primitives {
+        triangles.extend(primitive.placed_triangles(motion * object.placement()));
     }
 }
 
@@ -428,18 +527,35 @@ fn step_from_each(squares: &Squares, first: &[u32], grounds: &mut [Ground], walk
     }
 }
 
-/// Marks the floors that are at least `radius` from the nearest place without a step.
-fn clear(squares: &Squares, grounds: &[Ground], radius: f64) -> Vec<bool> {
+/// Returns per floor the directions in which it ends at a drop, one bit each, rather than at something that a walker touches.
+fn edges_of(squares: &Squares, spans: &[Span], grounds: &[Ground], walker: &Agent) -> Vec<u8> {
+    let first = first_of(squares, spans.iter().map(|s| s.square));
+    let is_drop = |ground: &Ground, direction: usize| {
+        let Some(beside) = squares.beside(ground.square, direction) else {
+            return true;
+        };
+        let low = ground.y + walker.step as f32;
+        let high = ground.y + walker.height as f32;
+        let column = &spans[first[beside] as usize..first[beside + 1] as usize];
+        !column.iter().any(|s| s.high > low && s.low < high)
+    };
+    let bits = |ground: &Ground| {
+        let ends = (0..4).filter(|&d| ground.steps[d] == NONE && is_drop(ground, d));
+        ends.fold(0, |bits, d| bits | 1 << d)
+    };
+    grounds.iter().map(bits).collect()
+}
+
+/// Marks the floors that are at least `radius` from the nearest drop.
+fn clear(squares: &Squares, grounds: &[Ground], edges: &[u8], radius: f64) -> Vec<bool> {
     // Offset from each floor to the nearest border, in half squares.
     let mut offset = vec![[i16::MAX / 4; 2]; grounds.len()];
     let length = |v: [i16; 2]| i32::from(v[0]).pow(2) + i32::from(v[1]).pow(2);
     let directions: [[i16; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
     let mut heap = BinaryHeap::new();
-    for (i, ground) in grounds.iter().enumerate() {
-        if let Some(d) = ground.steps.iter().position(|&s| s == NONE) {
-            offset[i] = directions[d];
-            heap.push(Reverse((1, i as u32)));
-        }
+    for (i, edges) in edges.iter().enumerate().filter(|e| *e.1 != 0) {
+        offset[i] = directions[edges.trailing_zeros() as usize];
+        heap.push(Reverse((1, i as u32)));
     }
     let reach = (2.0 * radius / squares.side).max(0.0);
     while let Some(Reverse((far, i))) = heap.pop() {

@@ -5,10 +5,9 @@
 //! can skip are removed. No step makes the path longer, so the process ends, at a path that is the shortest of those it can be
 //! pulled to without leaving the floors. O(rounds · bends · squares along them).
 
-use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 
-use crate::paths::floors::Floors;
+use crate::paths::floors::{Floors, Hindrance};
 use crate::paths::strides::walk_straight;
 
 /// A point of a path, and its floor.
@@ -24,21 +23,21 @@ const MAX_BENDS: usize = 256;
 pub(crate) fn pull_taut(
     floors: &Floors,
     bends: &mut Vec<Bend>,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
+    may: &mut impl FnMut(Hindrance) -> bool,
 ) {
-    drop_bends(floors, bends, may_pass);
+    drop_bends(floors, bends, may);
     for _ in 0..ROUNDS {
         let mut shorter = 0.0;
         let mut i = 1;
         while i + 1 < bends.len() {
-            shorter += move_bend(floors, bends, i, may_pass);
-            i += 1 + catch(floors, bends, i, may_pass);
+            shorter += move_bend(floors, bends, i, may);
+            i += 1 + catch(floors, bends, i, may);
         }
         // Between catches, bends come free.
         for i in 1..bends.len().saturating_sub(1) {
-            shorter += move_bend(floors, bends, i, may_pass);
+            shorter += move_bend(floors, bends, i, may);
         }
-        drop_bends(floors, bends, may_pass);
+        drop_bends(floors, bends, may);
         if shorter < 1e-4 {
             break;
         }
@@ -50,7 +49,7 @@ fn catch(
     floors: &Floors,
     bends: &mut Vec<Bend>,
     i: usize,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
+    may: &mut impl FnMut(Hindrance) -> bool,
 ) -> usize {
     let [a, b, c] = [bends[i - 1], bends[i], bends[i + 1]];
     let target = toward(a.0, b.0, c.0);
@@ -62,20 +61,26 @@ fn catch(
     let p = b.0.lerp(target, (side / far).min(1.0));
     let mut n = 0;
     // From either neighbor: the last floor before the obstacle, and the line that passes it.
-    for (from, at) in [(c, i + 1), (a, i)] {
+    for (from, leg, at) in [(c, [b, c], i + 1), (a, [a, b], i)] {
         let mut last = from.1;
-        let end = walk_straight(floors, from, p, may_pass, |_, _, to| last = to);
+        let end = walk_straight(floors, from, p, may, |_, _, to| last = to);
         if end.is_some() {
             continue;
         }
         let line = (b.0 - from.0).with_y(0.0);
         // A little beyond, or it would be caught there itself.
-        let t = (floors.point(last) - from.0).with_y(0.0).dot(line) / line.length_squared()
-            + 1.5 * side / line.length();
+        let passed = (floors.point(last) - from.0).with_y(0.0).dot(line) / line.length();
+        let t = (passed.max(0.0) + 1.5 * side) / line.length();
         let caught = from.0 + line * t;
         let is_between =
             t > 0.0 && t < 1.0 && caught.distance(from.0).min(caught.distance(b.0)) > side;
-        if is_between && let Some(floor) = straight(floors, from, caught, may_pass) {
+        if !is_between {
+            continue;
+        }
+        // A line along the border of two squares may be caught where the whole is not.
+        let reached = straight(floors, leg[0], caught, may)
+            .filter(|&floor| straight(floors, (caught, floor), leg[1].0, may) == Some(leg[1].1));
+        if let Some(floor) = reached {
             bends.insert(at, (caught.with_y(floors.point(floor).y), floor));
             n += 1;
         }
@@ -94,19 +99,18 @@ fn straight(
     floors: &Floors,
     from: Bend,
     to: DVec3,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
+    may: &mut impl FnMut(Hindrance) -> bool,
 ) -> Option<u32> {
-    walk_straight(floors, from, to, may_pass, |_, _, _| {})
+    walk_straight(floors, from, to, may, |_, _, _| {})
 }
 
 /// Removes all bends that a straight line can skip, from the start on.
-fn drop_bends(floors: &Floors, bends: &mut Vec<Bend>, may_pass: &mut impl FnMut(PortalId) -> bool) {
+fn drop_bends(floors: &Floors, bends: &mut Vec<Bend>, may: &mut impl FnMut(Hindrance) -> bool) {
     let mut n_kept = 1;
     for i in 1..bends.len() {
         let next = bends.get(i + 1).copied();
-        let can_skip = next.is_some_and(|next| {
-            straight(floors, bends[n_kept - 1], next.0, may_pass) == Some(next.1)
-        });
+        let can_skip = next
+            .is_some_and(|next| straight(floors, bends[n_kept - 1], next.0, may) == Some(next.1));
         if !can_skip {
             bends[n_kept] = bends[i];
             n_kept += 1;
@@ -120,7 +124,7 @@ fn move_bend(
     floors: &Floors,
     bends: &mut [Bend],
     i: usize,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
+    may: &mut impl FnMut(Hindrance) -> bool,
 ) -> f64 {
     let [a, b, c] = [bends[i - 1], bends[i], bends[i + 1]];
     let target = toward(a.0, b.0, c.0);
@@ -129,8 +133,8 @@ fn move_bend(
     let mut share = 1.0;
     for _ in 0..8 {
         let p = b.0.lerp(target, share);
-        let floor = straight(floors, a, p, may_pass);
-        let fits = floor.filter(|&f| straight(floors, (p, f), c.0, may_pass) == Some(c.1));
+        let floor = straight(floors, a, p, may);
+        let fits = floor.filter(|&f| straight(floors, (p, f), c.0, may) == Some(c.1));
         match fits {
             Some(floor) => {
                 best = (p.with_y(floors.point(floor).y), floor);
@@ -151,8 +155,8 @@ fn move_bend(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::agent::Agent;
     use crate::layout::Layout;
-    use crate::paths::floors::Agent;
     use enfilade_cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, World};
     use enfilade_geom::Aabb;
     use enfilade_geom::scene::Primitive;
@@ -183,7 +187,7 @@ mod tests {
             },
             ..CellPortalGraph::default()
         };
-        let floors = Floors::new(&Layout::new(&world), &world, Agent::default());
+        let floors = Floors::new(&Layout::new(&world), &world, Agent::default(), |_| true);
         let on = |x: f64, z: f64| {
             let p = DVec3::new(x, 0.0, z);
             (p, floors.below(p).unwrap())
@@ -192,8 +196,9 @@ mod tests {
         pull_taut(&floors, &mut bends, &mut |_| true);
         let length: f64 = bends.windows(2).map(|w| w[0].0.distance(w[1].0)).sum();
         // Tangents to circles about both wall ends, short arcs, and the side between.
+        let (r, d) = (Agent::default().radius, 8.0_f64.sqrt());
         let least =
-            2.0 * (8.0_f64 - 0.09).sqrt() + 2.0 + 2.0 * 0.3 * (45.0_f64.to_radians() + 0.106);
+            2.0 * (d * d - r * r).sqrt() + 2.0 + 2.0 * r * (45.0_f64.to_radians() + (r / d).asin());
         assert!(
             length > least - 0.06 && length < least + 0.1,
             "{length} {least}"

@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 
-use crate::paths::floors::{Floors, NONE};
+use crate::paths::floors::{Floors, Hindrance, NONE};
 
 /// A search over the floors of one cell, with reusable buffers.
 #[derive(Clone, Debug, Default)]
@@ -29,8 +29,15 @@ struct Footprint {
 }
 
 impl Strides {
-    /// Finds the paths from a floor to all others of its cell, or until `goal` is reached. Passes no portal.
-    pub(crate) fn spread(&mut self, floors: &Floors, start: u32, goal: Option<u32>) {
+    /// Finds the paths from a floor to all others of its cell, or until `goal` is reached. Passes no portal, nor the open leaves
+    /// of those `opened`.
+    pub(crate) fn spread(
+        &mut self,
+        floors: &Floors,
+        start: u32,
+        goal: Option<u32>,
+        opened: &[PortalId],
+    ) {
         self.stamp = self.stamp.wrapping_add(1);
         if self.stamp == 0 {
             self.labels.clear();
@@ -58,7 +65,7 @@ impl Strides {
                 continue;
             }
             let from = floors.point(at);
-            each_move(floors, at, |to| {
+            each_move(floors, at, opened, |to| {
                 let through = length + floors.point(to).distance(from) as f32;
                 let label = &mut self.labels[to as usize];
                 if label.stamp != self.stamp || through < label.length {
@@ -94,8 +101,12 @@ impl Strides {
 }
 
 /// Calls `visit` with the floors around one that are in its cell.
-fn each_move(floors: &Floors, at: u32, mut visit: impl FnMut(u32)) {
-    let step = |from: u32, direction: usize| floors.step(from, direction % 4, &mut |_| false);
+fn each_move(floors: &Floors, at: u32, opened: &[PortalId], mut visit: impl FnMut(u32)) {
+    let mut may = |hindrance| match hindrance {
+        Hindrance::Portal(_) => false,
+        Hindrance::Leaf(portal) => !opened.contains(&portal),
+    };
+    let mut step = |from: u32, direction: usize| floors.step(from, direction % 4, &mut may);
     let beside: [Option<u32>; 4] = std::array::from_fn(|d| step(at, d));
     for d in 0..4 {
         let (Some(a), Some(b)) = (beside[d], beside[(d + 1) % 4]) else {
@@ -117,12 +128,12 @@ fn each_move(floors: &Floors, at: u32, mut visit: impl FnMut(u32)) {
 }
 
 /// Walks straight, in plan, from a point of a floor to another point. Calls `visit` with each floor stepped on, and the portal if
-/// it is in another cell. Returns the floor at the end; `None` if blocked, or at a portal that `may_pass` rejects.
+/// it is in another cell. Returns the floor at the end; `None` if blocked, or by something for which `may` returns `false`.
 pub(crate) fn walk_straight(
     floors: &Floors,
     (from, start): (DVec3, u32),
     to: DVec3,
-    may_pass: &mut impl FnMut(PortalId) -> bool,
+    may: &mut impl FnMut(Hindrance) -> bool,
     mut visit: impl FnMut(u32, usize, u32),
 ) -> Option<u32> {
     let squares = floors.squares();
@@ -142,7 +153,7 @@ pub(crate) fn walk_straight(
     while t[0] < f64::INFINITY || t[1] < f64::INFINITY {
         let axis = usize::from(t[1] < t[0]);
         let direction = if sign[axis] > 0.0 { axis } else { axis + 2 };
-        let to = floors.step(floor, direction, may_pass)?;
+        let to = floors.step(floor, direction, may)?;
         visit(floor, direction, to);
         floor = to;
         at[axis] += sign[axis];

@@ -35,6 +35,23 @@ impl Space {
         self.door_changed(part, portal);
     }
 
+    /// Answers a question with the leaves of a portal elsewhere; they stay where they are.
+    pub(crate) fn with_leaves<T>(
+        &mut self,
+        part: PartId,
+        portal: PortalId,
+        share: f32,
+        question: impl FnOnce(&Self) -> T,
+    ) -> T {
+        let before = self.state(part).leaves(portal);
+        self.parts[part.idx()].state.set_leaves(portal, share);
+        let answer = question(self);
+        if let Some(before) = before {
+            self.parts[part.idx()].state.set_leaves(portal, before);
+        }
+        answer
+    }
+
     /// Narrows a portal to one side of a plane. As [`SightState::narrow`](enfilade_runtime::SightState::narrow).
     pub fn narrow(&mut self, part: PartId, portal: PortalId, normal: [f32; 3], through: [f32; 3]) {
         self.parts[part.idx()].state.narrow(portal, normal, through);
