@@ -6,5 +6,5 @@ mod lift;
 mod lived;
 mod people;
 
-pub(crate) use file::{LampEntry, LiftEntry, LivingFile, PeopleEntry, SoundEntry, read_living};
+pub(crate) use file::{LampEntry, LiftEntry, LivingFile, PeopleEntry, SoundEntry};
 pub(crate) use lived::{Lived, Player, STEP};

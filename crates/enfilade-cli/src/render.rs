@@ -9,20 +9,24 @@ use clap::ValueEnum;
 use enfilade::cpg::{PortalId, World};
 use enfilade::world::PartId;
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, FOV, Frame, Mark, MarkShape, Paint, Picture, Projection,
-    Sparing, Studio, Style, good_camera, lamp_lights, walk_cameras,
+    AdapterChoice, Camera, Culling, FOV, Mark, MarkShape, Paint, Picture, Sparing, Studio, Style,
+    good_camera, lamp_lights, walk_cameras,
 };
 use serde_json::json;
 
+mod above;
+
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::living::{Lived, Player, STEP, read_living};
+use crate::living::{Lived, Player, STEP};
 use crate::output::{Outputs, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json};
 use enfilade_cli::cameras::{path_text, read_path};
 use enfilade_cli::input::name_of;
 use enfilade_cli::values::{door, point, size};
 use enfilade_cli::world::read_world;
+
+pub(crate) use above::above;
 
 /// Draws a picture of a world, or one for each camera of a path, to PNG files; does not need a display.
 #[derive(clap::Args)]
@@ -264,10 +268,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     }
     studio.day = args.daylight;
     let mut lived = match &args.living {
-        Some(path) => Some(live(path, &world, &mut studio)?),
+        Some(path) => {
+            let lived = Lived::read(path, &world)?;
+            lived.furnish(&mut studio)?;
+            Some(lived)
+        }
         None => None,
     };
-    let style = style_of(args);
     let mut out = outputs.printed();
     let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
@@ -278,27 +285,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
-            // In pixels of the larger picture.
-            let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
-            studio.sparing = Sparing {
-                stop_below: args.stop * scale,
-                stop_at_nothing: args.stop_at_nothing,
-                objects_below: args.objects * scale,
-                // A length, so it scales with the picture's edge.
-                lod: args.lod * scale.sqrt(),
-            };
-            if let Some(lived) = &mut lived {
-                lived.picture(&mut studio, PartId::ROOT, camera, style, size)
-            } else if args.above {
-                above(&mut studio, &world, camera, args.cut, size)
-            } else {
-                let marks = if args.portals {
-                    portal_marks(&mut studio, &world, camera, size)?
-                } else {
-                    Vec::new()
-                };
-                Ok(studio.picture(camera, args.mode.culling(), style, &marks, size)?)
-            }
+            draw(args, (&world, &mut studio, lived.as_mut()), camera, size)
         })?;
         let to = if is_path {
             numbered(&args.output, i + 1)
@@ -326,12 +313,34 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     }
 }
 
-/// Reads what lives in a world, and adds it to the studio.
-fn live(path: &Path, world: &World, studio: &mut Studio) -> anyhow::Result<Lived> {
-    let (file, lifts) = read_living(path)?;
-    let lived = Lived::new(world.clone(), file, lifts)?;
-    lived.furnish(studio)?;
-    Ok(lived)
+/// Draws a picture of a size, which may be a multiple of the requested one.
+fn draw(
+    args: &Render,
+    (world, studio, lived): (&World, &mut Studio, Option<&mut Lived>),
+    camera: &Camera,
+    size: [u32; 2],
+) -> anyhow::Result<Picture> {
+    let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
+    studio.sparing = Sparing {
+        stop_below: args.stop * scale,
+        stop_at_nothing: args.stop_at_nothing,
+        objects_below: args.objects * scale,
+        // A length, so it scales with the picture's edge.
+        lod: args.lod * scale.sqrt(),
+    };
+    let style = style_of(args);
+    if let Some(lived) = lived {
+        return lived.picture(studio, PartId::ROOT, camera, style, size);
+    }
+    if args.above {
+        return above(studio, world, camera, args.cut, size);
+    }
+    let marks = if args.portals {
+        portal_marks(studio, world, camera, size)?
+    } else {
+        Vec::new()
+    };
+    Ok(studio.picture(camera, args.mode.culling(), style, &marks, size)?)
 }
 
 /// Closes portals and moves leaves.
@@ -499,122 +508,4 @@ pub(crate) fn portal_marks(
         });
     }
     Ok(marks)
-}
-
-/// Draws the world from above with the view frozen: what is drawn, and what is culled and why.
-pub(crate) fn above(
-    studio: &mut Studio,
-    world: &World,
-    camera: &Camera,
-    cut: Option<f32>,
-    size: [u32; 2],
-) -> anyhow::Result<Picture> {
-    let aspect = size[0] as f32 / size[1] as f32;
-    let view = camera.view(aspect.max(1.0))?;
-    light(studio, world)?;
-    let list = studio.everything();
-    let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
-    let cut = cut.unwrap_or(camera.eye[1] + 0.5);
-    let width = size[1] as f32 / 260.0;
-    let line = |shape, color, width| Mark {
-        shape,
-        color,
-        width,
-        on_top: true,
-    };
-    let mut marks = Vec::new();
-    // Walls along the view have no visible side: draw their edges at the cut.
-    for segment in section(world, cut) {
-        marks.push(line(
-            MarkShape::Line(segment),
-            [0.03, 0.03, 0.04, 1.0],
-            width * 0.6,
-        ));
-    }
-    for p in seen.portals() {
-        let outline = world.graph[*p].outline.clone();
-        marks.push(line(
-            MarkShape::Outline(outline),
-            [1.0, 0.42, 0.0, 1.0],
-            width,
-        ));
-    }
-    // Pictures from above show rooms, not the ground around them.
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for (_, cell) in world.graph.indoor_cells() {
-        for k in 0..3 {
-            low[k] = low[k].min(cell.aabb[0][k]);
-            high[k] = high[k].max(cell.aabb[1][k]);
-        }
-    }
-    if low[0] > high[0] {
-        [low, high] = studio.world.bounds();
-    }
-    let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
-    let [x, z] = [high[0] - low[0], high[2] - low[2]];
-    let reach = x.hypot(z);
-    for corner in camera.corners(aspect.max(1.0)) {
-        let d = corner.to_array();
-        let flat = d[0].hypot(d[2]).max(1e-6);
-        let end = [0, 1, 2].map(|k| camera.eye[k] + d[k] / flat * reach * [1.0, 0.0, 1.0][k]);
-        marks.push(line(
-            MarkShape::Line([camera.eye, end]),
-            [0.02, 0.30, 0.85, 0.9],
-            width,
-        ));
-    }
-    let ring: Vec<[f32; 3]> = (0..24)
-        .map(|i| {
-            let a = i as f32 / 24.0 * std::f32::consts::TAU;
-            let r = reach * 0.008;
-            [
-                camera.eye[0] + a.cos() * r,
-                camera.eye[1],
-                camera.eye[2] + a.sin() * r,
-            ]
-        })
-        .collect();
-    marks.push(line(MarkShape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));
-    // Slightly oblique, so that walls have a side.
-    let toward = [0.0, -1.0, -0.38];
-    let height = (z * 0.94 + (high[1] - low[1]) * 0.38).max(x / aspect) * 1.06;
-    let projection = Projection::parallel(center, toward, height, aspect, reach.max(50.0) * 2.0);
-    let style = Style {
-        shadows: false,
-        daylight: false,
-        cut_above: cut,
-        ..Style::default()
-    };
-    let frame = Frame {
-        projection,
-        list: &list,
-        // Drawn parts keep their look; a floor of many rooms has no single cell's color.
-        style,
-        marks: &marks,
-    };
-    Ok(studio.explained(&view, &frame, size)?)
-}
-
-/// The segments where a level plane cuts the structure.
-fn section(world: &World, height: f32) -> Vec<[[f32; 3]; 2]> {
-    let mut out = Vec::new();
-    for batch in &world.batches {
-        let p = &batch.primitive;
-        for t in p.triples() {
-            let corners = t.map(|i| p.positions[i as usize]);
-            let mut ends = Vec::new();
-            for k in 0..3 {
-                let (a, b) = (corners[k], corners[(k + 1) % 3]);
-                if (a[1] < height) != (b[1] < height) {
-                    let s = (height - a[1]) / (b[1] - a[1]);
-                    ends.push([0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * s));
-                }
-            }
-            if let [a, b] = ends[..] {
-                out.push([a, b]);
-            }
-        }
-    }
-    out
 }

@@ -6,6 +6,7 @@
 //!
 //! | file | holds |
 //! | --- | --- |
+//! | `agent.rs` | the size of walkers |
 //! | `body.rs` | spheres, capsules, boxes |
 //! | `kernel.rs` | one body, one triangle: contact, and time of first contact |
 //! | `flood.rs` | the cells and triangles on a body's way |
@@ -13,23 +14,22 @@
 //! | `pairs.rs` | bodies that may touch each other |
 //! | `room.rs` | room for a walker, for maps of paths |
 //! | `walker.rs` | a walker with gravity and steps |
-//! | `path_follower.rs` | a walker that follows a path and opens doors |
 
+mod agent;
 mod body;
 mod caster;
 mod flood;
 mod kernel;
 mod pairs;
-mod path_follower;
 mod room;
 #[cfg(test)]
 mod tests;
 mod walker;
 
+pub use agent::Agent;
 pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
-pub use path_follower::{PathFollower, Progress};
-pub(crate) use room::Room;
+pub(crate) use room::WalkerRoom;
 pub use walker::Walker;

@@ -10,7 +10,6 @@
 //! - **No clock, no threads, no files**: equal queries in equal order give equal answers.
 
 mod actors;
-mod agent;
 mod bodies;
 mod layout;
 mod lights;
@@ -25,15 +24,12 @@ pub use actors::{
     ActorEvent, ActorId, ActorPlace, Actors, AwakeCells, Cause, Chance, Errands, PlanDraft,
     WayPoint,
 };
-pub use agent::Agent;
-pub use bodies::{
-    Body, Cast, CastCounts, Caster, Contact, Impact, Pairs, PathFollower, Progress, Walker,
-};
+pub use bodies::{Agent, Body, Cast, CastCounts, Caster, Contact, Impact, Pairs, Walker};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{
-    Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path, PathSearch,
-    Sampling, WalkMap, Ways,
+    Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path,
+    PathFollower, PathSearch, Progress, Sampling, WalkMap, Ways,
 };
 pub use pose::Pose;
 pub use shape::{Shape, ShapeError};

@@ -14,7 +14,7 @@ use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 use enfilade_runtime::DetailId;
 
-use crate::agent::Agent;
+use crate::bodies::Agent;
 use crate::layout::{Exit, Layout};
 use floors::Hindrance;
 use pull::{Bend, pull_taut};
@@ -24,6 +24,7 @@ pub use edges::Corner;
 pub use floors::Floors;
 pub use geodesics::Geodesics;
 pub use hops::Hops;
+pub use path_follower::{PathFollower, Progress};
 pub use sampling::Sampling;
 pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
 pub(crate) use sequences::{Limit, Sequences};
@@ -34,6 +35,7 @@ mod edges;
 mod floors;
 mod geodesics;
 mod hops;
+mod path_follower;
 mod pull;
 mod sampling;
 mod search;
@@ -394,7 +396,7 @@ impl PathSearch {
             let into = usize::from(layout.opening(exit.portal).cells()[1] == exit.to);
             let sides = map.sides[k as usize];
             self.legs.push((sides[1 - into], sides[into]));
-            // Who ends behind a door shuts it.
+            // A walker that ends behind a door shuts it.
             if map.floors.leaves_at(goal).all(|p| p != exit.portal) {
                 self.opened.push(exit.portal);
             }

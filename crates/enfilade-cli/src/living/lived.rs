@@ -1,5 +1,7 @@
 //! A world that is lived in, played by the clock.
 
+use std::path::Path;
+
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::{DVec3, shown};
 use enfilade::runtime::View;
@@ -12,7 +14,7 @@ use enfilade_render::{
 };
 
 use super::doors::AutoDoors;
-use super::file::{LivingFile, SoundEntry};
+use super::file::{LivingFile, SoundEntry, read_living};
 use super::lift::{Lift, LiftPlace};
 use super::people::People;
 
@@ -84,6 +86,16 @@ pub(crate) struct Lived {
 }
 
 impl Lived {
+    /// Reads a file that says what lives in a world, and prepares it.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_living`] and [`Lived::new`].
+    pub(crate) fn read(path: &Path, world: &World) -> anyhow::Result<Self> {
+        let (file, lifts) = read_living(path)?;
+        Self::new(world.clone(), file, lifts)
+    }
+
     /// Prepares a world and what lives in it, at time 0.
     ///
     /// # Errors

@@ -34,7 +34,7 @@ use self::panel::{Panel, Shown};
 use self::walker::Walker;
 use crate::formats::Format;
 use crate::limits::Limits;
-use crate::living::{Lived, LivingFile, STEP, read_living};
+use crate::living::{Lived, LivingFile, STEP};
 use crate::output::{Outputs, refuse_stream, write_whole};
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{path_text, read_path};
@@ -102,10 +102,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         .transpose()?;
     let world = read_world(&args.world)?;
     let lived = match &args.living {
-        Some(path) => {
-            let (file, lifts) = read_living(path)?;
-            Lived::new(world.clone(), file, lifts)?
-        }
+        Some(path) => Lived::read(path, &world)?,
         None => Lived::new(world.clone(), LivingFile::default(), Vec::new())?,
     };
     let events = EventLoop::new()

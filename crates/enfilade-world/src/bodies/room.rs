@@ -1,4 +1,4 @@
-//! Room for a walker at a place, among plain triangles: for maps of paths.
+//! WalkerRoom for a walker at a place, among plain triangles: for maps of paths.
 //!
 //! The rule is that of [`Walker`](crate::Walker): the same capsule, the same foot.
 
@@ -6,20 +6,20 @@ use std::ops::ControlFlow;
 
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
 
+use super::agent::Agent;
 use super::body::BodyCore;
 use super::kernel::{depth, sweep};
 use super::walker::GAP;
-use crate::agent::Agent;
 
 /// Obstacles of a walker.
-pub(crate) struct Room {
+pub(crate) struct WalkerRoom {
     bvh: Bvh,
     agent: Agent,
     body: BodyCore,
     foot: BodyCore,
 }
 
-impl Room {
+impl WalkerRoom {
     pub(crate) fn new(solid: &[Triangle], agent: &Agent) -> Self {
         // The gap that walkers keep, and as much again for what lies between the middles of squares.
         let body = agent.body().0.grown(2.0 * GAP);

@@ -13,7 +13,7 @@
 use enfilade_geom::DVec3;
 use enfilade_runtime::{DetailId, Target};
 
-use crate::agent::Agent;
+use super::agent::Agent;
 use crate::bodies::{Body, Cast, Caster};
 use crate::space::{PartId, Place, Space};
 
@@ -98,7 +98,7 @@ impl Walker {
     }
 
     /// As [`Walker::step`], ignoring objects for which `counts` returns `false`.
-    pub(super) fn step_where(
+    pub(crate) fn step_where(
         &mut self,
         space: &Space,
         wish: DVec3,
@@ -116,7 +116,7 @@ impl Walker {
     }
 
     /// Returns `true` if it touches an object for which `counts` returns `true`.
-    pub(super) fn touches(
+    pub(crate) fn touches(
         &mut self,
         space: &Space,
         counts: impl Fn(PartId, DetailId) -> bool,

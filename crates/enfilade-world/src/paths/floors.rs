@@ -22,8 +22,8 @@ use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
 use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
 use enfilade_runtime::DetailId;
 
-use crate::agent::Agent;
-use crate::bodies::Room;
+use crate::bodies::Agent;
+use crate::bodies::WalkerRoom;
 use crate::layout::Layout;
 use crate::paths::columns::{Span, Squares, spans};
 
@@ -77,7 +77,7 @@ pub(crate) struct Crossing {
     pub(crate) portal: PortalId,
 }
 
-/// What a step depends on.
+/// Condition of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Hindrance {
     /// A portal to pass.
@@ -133,7 +133,7 @@ impl Floors {
             swung: Vec::new(),
             walker,
         };
-        let room = Room::new(&solid, &walker);
+        let room = WalkerRoom::new(&solid, &walker);
         for (is_clear, ground) in is_clear.iter_mut().zip(&grounds) {
             let at = floors.center(ground.square, ground.y.into());
             *is_clear = *is_clear && room.is_free(room.standing(at));
@@ -181,8 +181,8 @@ impl Floors {
     }
 
     /// Marks the floors where an open leaf of a portal is in the way.
-    fn swing(&mut self, portal: PortalId, leaf: &[Triangle], room: &Room) {
-        let own = Room::new(leaf, &self.walker);
+    fn swing(&mut self, portal: PortalId, leaf: &[Triangle], room: &WalkerRoom) {
+        let own = WalkerRoom::new(leaf, &self.walker);
         let reach = self.walker.radius + self.squares.side;
         let bounds = Aabb::of_points(leaf.as_flattened()).expanded(reach);
         let n = self.squares.n.map(|n| n as f64 - 1.0);
@@ -363,7 +363,7 @@ impl Floors {
         let is_open = other.cell == floor.cell
             || (self.portal_of(from, direction))
                 .is_some_and(|p| !is_in_way(p) && may(Hindrance::Portal(p)));
-        // Who is in the way of a leaf may go on there, before it opens.
+        // A walker in the way of a leaf may go on there, before it opens.
         let is_free = !other.is_swung
             || self
                 .leaves_at(to)

@@ -155,7 +155,7 @@ fn move_bend(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::agent::Agent;
+    use crate::bodies::Agent;
     use crate::layout::Layout;
     use enfilade_cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, World};
     use enfilade_geom::Aabb;

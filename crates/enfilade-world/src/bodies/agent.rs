@@ -2,7 +2,7 @@
 
 use enfilade_geom::{DQuat, DVec3};
 
-use crate::bodies::Body;
+use super::body::Body;
 
 /// The size and abilities of a walker: paths are planned for it, and its body walks them.
 ///

@@ -89,11 +89,11 @@ struct DoorAhead {
     portal: PortalId,
     /// Length of the path after which it is passed.
     at: f64,
-    opening: Opening,
+    opening: DoorTurn,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Opening {
+enum DoorTurn {
     Ahead,
     /// Its leaves move.
     Moves,
@@ -129,7 +129,7 @@ impl PathFollower {
             follower.doors.push(DoorAhead {
                 portal: exit.portal,
                 at: from,
-                opening: Opening::Ahead,
+                opening: DoorTurn::Ahead,
             });
         }
         follower
@@ -159,7 +159,7 @@ impl PathFollower {
         let speed = self.speed.min(way.length() / seconds.max(1e-9));
         // Leaves pass through the walker while they open: where they come to stand, it is not.
         let opens = |detail| {
-            let mut moving = self.doors.iter().filter(|d| d.opening == Opening::Moves);
+            let mut moving = self.doors.iter().filter(|d| d.opening == DoorTurn::Moves);
             moving.any(|d| self.is_leaf(detail, d.portal))
         };
         let wish = way.normalize_or_zero() * speed;
@@ -191,17 +191,17 @@ impl PathFollower {
             let Some(share) = space.state(self.part).leaves(door.portal) else {
                 continue;
             };
-            let begins = door.opening == Opening::Ahead
+            let begins = door.opening == DoorTurn::Ahead
                 && (0.0..DOOR).contains(&(door.at - self.passed))
                 // One that does not get out of its way is pushed.
                 && (self.idle > SHUT || self.is_clear(walker, space, (door.portal, 1.0)));
-            if begins || door.opening == Opening::Moves {
+            if begins || door.opening == DoorTurn::Moves {
                 let share = share + (seconds / SWING) as f32;
                 space.set_leaves(self.part, door.portal, share);
                 self.doors[i].opening = if share < 1.0 {
-                    Opening::Moves
+                    DoorTurn::Moves
                 } else {
-                    Opening::Done
+                    DoorTurn::Done
                 };
             }
         }
