@@ -227,7 +227,8 @@ pub struct PathSearch {
     /// Per point of a cell.
     lengths: Vec<f64>,
     legs: Vec<(u32, u32)>,
-    /// Portals of the path whose leaves are in the way.
+    /// Portals of the path, and those of them whose leaves are in the way.
+    sequence: Vec<PortalId>,
     opened: Vec<PortalId>,
     floors: Vec<u32>,
     bends: Vec<Bend>,
@@ -277,9 +278,12 @@ impl PathSearch {
                 continue;
             }
             self.set_bends(floors, [(from, start), (to, goal)]);
-            let opened = &self.opened;
+            let (sequence, opened) = (&self.sequence, &self.opened);
             let mut may = |hindrance| match hindrance {
-                Hindrance::Portal(portal) => may_pass(portal),
+                // The leaf of a door beside would be in the way, too.
+                Hindrance::Portal(portal) => {
+                    may_pass(portal) && (sequence.contains(&portal) || !floors.has_leaves(portal))
+                }
                 Hindrance::Leaf(portal) => !opened.contains(&portal),
             };
             pull_taut(floors, &mut self.bends, &mut may);
@@ -391,11 +395,13 @@ impl PathSearch {
         arrival: &Arrival,
     ) -> bool {
         self.legs.clear();
+        self.sequence.clear();
         self.opened.clear();
         for (exit, k) in self.search.back(&map.ways, arrival) {
             let into = usize::from(layout.opening(exit.portal).cells()[1] == exit.to);
             let sides = map.sides[k as usize];
             self.legs.push((sides[1 - into], sides[into]));
+            self.sequence.push(exit.portal);
             // A walker that ends behind a door shuts it.
             if map.floors.leaves_at(goal).all(|p| p != exit.portal) {
                 self.opened.push(exit.portal);

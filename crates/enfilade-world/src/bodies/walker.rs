@@ -2,8 +2,8 @@
 //!
 //! Collide and slide (Fauerby, *Improved collision detection and response*, 2003), with a capsule that begins above the height
 //! of a step: it moves by casts, loses the component of its motion into an obstacle, and goes on, a few times. So it passes over
-//! low obstacles, and the floor is found separately, straight below. Objects that have moved into it meanwhile, such as leaves of
-//! doors, push it out. Two to five casts per step.
+//! low obstacles, and a foot, a ball of half its radius, finds the floor below. Objects that have moved into it meanwhile, such
+//! as leaves of doors, push it out. Two to five casts per step.
 //!
 //! It keeps a gap to all obstacles ([`GAP`]); without it, rounding decides at seams of walls. Motion is level, so only the level
 //! parts of normals count.

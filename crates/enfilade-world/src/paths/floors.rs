@@ -54,6 +54,8 @@ pub struct Floors {
     crossings: Vec<Crossing>,
     /// Floors in the way of leaves, each with the portal that they open, sorted.
     swung: Vec<(u32, PortalId)>,
+    /// Portals with leaves, sorted.
+    doors: Vec<PortalId>,
     walker: Agent,
 }
 
@@ -131,6 +133,7 @@ impl Floors {
             floors: Vec::new(),
             crossings: Vec::new(),
             swung: Vec::new(),
+            doors: leaves.iter().map(|l| l.0).collect(),
             walker,
         };
         let room = WalkerRoom::new(&solid, &walker);
@@ -199,6 +202,11 @@ impl Floors {
                 }
             }
         }
+    }
+
+    /// Returns `true` if a portal has leaves that open it.
+    pub(crate) fn has_leaves(&self, portal: PortalId) -> bool {
+        self.doors.binary_search(&portal).is_ok()
     }
 
     /// Returns the portals whose open leaves are in the way on a floor.
