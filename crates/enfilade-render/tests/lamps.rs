@@ -288,6 +288,12 @@ fn a_lamp_of_a_moving_room_lights_what_it_then_reaches() {
         let mut fresh = make(&space, part);
         let (expected, _) = fresh.space_picture(&shot, SIZE).unwrap();
         assert_eq!(picture, expected, "step {i}");
+        let every = SpaceShot {
+            lamps: Some(&[0, 1]),
+            ..shot
+        };
+        let (picture, _) = kept.space_picture(&every, SIZE).unwrap();
+        assert_eq!(picture, expected, "step {i}, every lamp");
         if let Some(before) = before.replace(picture.clone()) {
             assert_ne!(before, picture, "step {i} changes the picture");
         }
