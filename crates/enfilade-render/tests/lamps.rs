@@ -162,8 +162,7 @@ fn a_surface_is_lit_if_nothing_is_between_it_and_a_lamp() {
             n_wrong[1] += usize::from(!is_lit && clear.iter().all(|c| *c));
         }
     }
-    println!("{n} pixels, {n_lit} lit; lit in shadow and dark in light: {n_wrong:?}");
-    assert!(n > 50_000 && n_lit > 10_000);
+    assert!(n > 50_000 && n_lit > 10_000, "{n} pixels, {n_lit} lit");
     // Where triangles meet without a common vertex, rasterizers leave single texels open.
     assert!(n_wrong[0] <= 2, "{} are lit behind a wall", n_wrong[0]);
     // Surfaces that the light grazes.
