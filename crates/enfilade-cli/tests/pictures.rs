@@ -122,6 +122,70 @@ fn counts_are_those_of_the_picture() {
 }
 
 #[test]
+fn lamps_of_the_world_are_lit() {
+    use enfilade_geom::scene::{Fixture, FixtureKind};
+    use enfilade_geom::{DMat4, DVec3};
+    let mut world = room_grid(&GridParams::offices(24, 1));
+    let (_, cell) = world.graph.indoor_cells().next().unwrap();
+    let [low, high] = cell.aabb;
+    let at = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
+    world.fixtures.push(Fixture {
+        kind: FixtureKind::Light,
+        name: "bulb".into(),
+        transform: DMat4::from_translation(DVec3::from_array(at.map(f64::from))),
+        gltf: r#"{"type":"point","intensity":80}"#.into(),
+        extras: String::new(),
+    });
+    let path = place("lamps.glb");
+    fs::write(&path, encode_glb(&world).unwrap()).unwrap();
+    let words = |p: [f32; 3]| p.map(|x| x.to_string()).join(",");
+    let (eye, look) = (
+        words([at[0], at[1], at[2] + 0.5]),
+        words([at[0] + 1.0, at[1], at[2]]),
+    );
+    let draw = |extra: &[&str]| {
+        let out = place("lamps.png");
+        let mut args = vec![
+            "render",
+            path.to_str().unwrap(),
+            "-o",
+            out.to_str().unwrap(),
+            "--eye",
+            &eye,
+            "--look",
+            &look,
+            "--size",
+            "64x36",
+            "--adapter",
+            "software",
+        ];
+        args.extend(extra);
+        let done = enfilade(&args);
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        fs::read(&out).unwrap()
+    };
+    let [lit, dark, night, black] = [
+        &[][..],
+        &["--no-lamps"],
+        &["--daylight", "0"],
+        &["--no-lamps", "--daylight", "0"],
+    ]
+    .map(draw);
+    assert_ne!(lit, dark);
+    assert_ne!(night, black);
+    assert_ne!(lit, night);
+    let bad = enfilade(&[
+        "render",
+        path.to_str().unwrap(),
+        "-o",
+        "x.png",
+        "--daylight",
+        "2",
+    ]);
+    assert_eq!(bad.status.code(), Some(2));
+}
+
+#[test]
 fn overdraw_has_a_scale() {
     let world = grid("overdraw.glb");
     let out = place("overdraw.png");

@@ -3,7 +3,7 @@
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_runtime::{Seen, Sight, SightState, View, Viewer};
 use enfilade_world::{PartId, Pose, Space, SpaceViewer};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt;
 
 use crate::frame::{Paint, Style};
@@ -17,6 +17,7 @@ use crate::renderer::{DrawnPart, Renderer};
 use crate::resources::depth_attachment;
 use crate::scene::GpuWorld;
 use crate::shadings::set_buffers;
+use crate::space::SpaceShot;
 use crate::stage::{Exposed, Globals};
 use crate::studio::{Studio, drawn_parts, world_of};
 
@@ -100,6 +101,26 @@ impl Studio {
             out.push(lamp);
         }
         out
+    }
+
+    /// Returns the lamps of a view of a space: those that the caller chooses, or of the brightest at the eye those that reach
+    /// a cell in view.
+    pub(crate) fn space_lamps(&mut self, shot: &SpaceShot<'_>) -> Vec<ActiveLamp> {
+        let eye = Vec3::from(shot.camera.eye).as_dvec3();
+        let eye = shot.space.pose(shot.frame).point(eye);
+        let mut lamps = self.active_lamps(Some(shot.space), &shot.style, eye, shot.lamps);
+        let Some(seen) = shot.seen.filter(|_| shot.lamps.is_none()) else {
+            return lamps;
+        };
+        let visible: LampReach = (seen.parts())
+            .map(|(id, seen)| {
+                let (world, space) = (world_of(&self.world, &self.parts, id), shot.space);
+                let cells = cells_of(&seen, world, space.sight(id), space.state(id));
+                (id, cells)
+            })
+            .collect();
+        lamps.retain(|lamp| self.renderer.lamps.reaches(lamp, &visible));
+        lamps
     }
 
     /// Draws the map of a lamp.

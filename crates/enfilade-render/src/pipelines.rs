@@ -304,6 +304,26 @@ impl Modules {
     }
 }
 
+/// Makes the pipeline of id pictures.
+fn id_pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, layouts: &Layouts) -> wgpu::RenderPipeline {
+    let kind = Kind {
+        label: "id",
+        module,
+        vertex: "corner",
+        fragment: Some("id"),
+        layouts: &[&layouts.ids],
+        buffers: if gpu.fetches() {
+            &[INSTANCE_LAYOUT]
+        } else {
+            &[INSTANCE_LAYOUT, LISTED_LAYOUT]
+        },
+        target: Some((ID, None)),
+        depth: Some((true, NEARER)),
+        constants: &[],
+    };
+    pipeline(gpu, &kind)
+}
+
 impl Pipelines {
     pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, output: wgpu::TextureFormat) -> Self {
         let writes_depth = gpu.writes_depth();
@@ -350,20 +370,7 @@ impl Pipelines {
         };
         let make = |kind| pipeline(gpu, &kind);
         Self {
-            id: make(Kind {
-                label: "id",
-                module: &ids,
-                vertex: "corner",
-                fragment: Some("id"),
-                layouts: &[&layouts.ids],
-                buffers: if gpu.fetches() {
-                    &[INSTANCE_LAYOUT]
-                } else {
-                    &[INSTANCE_LAYOUT, LISTED_LAYOUT]
-                },
-                target: Some((ID, None)),
-                ..base
-            }),
+            id: id_pipeline(gpu, &ids, layouts),
             shadow: make(Kind {
                 label: "shadow",
                 vertex: "from_sun",

@@ -39,7 +39,7 @@ pub struct SpaceShot<'a> {
     /// Things; of parts that are not seen they are left out.
     pub props: &'a [Prop],
     /// Indices of the lamps that shine, for example those [that matter](enfilade_world::Lights::that_matter); `None` for
-    /// the brightest at the eye.
+    /// those of the brightest at the eye that reach a cell in view.
     pub lamps: Option<&'a [u32]>,
 }
 
@@ -249,12 +249,6 @@ impl Studio {
             (id, self.lister.take())
         });
         Ok(lists.collect())
-    }
-
-    fn space_lamps(&mut self, shot: &SpaceShot<'_>) -> Vec<ActiveLamp> {
-        let eye = Vec3::from(shot.camera.eye).as_dvec3();
-        let eye = shot.space.pose(shot.frame).point(eye);
-        self.active_lamps(Some(shot.space), &shot.style, eye, shot.lamps)
     }
 
     /// Returns the frame apart from its worlds.

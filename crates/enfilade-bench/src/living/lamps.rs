@@ -42,6 +42,7 @@ pub(super) fn pictures(world: &World) -> anyhow::Result<Figure> {
     let mut culled = studio(world, &lamps, true)?;
     let mut whole = studio(world, &lamps, false)?;
     let mut maps_only = bare(world, &lamps)?;
+    let all: Vec<u32> = (0..lamps.len() as u32).collect();
     let mut viewer = SpaceViewer::new(&space);
     let (mut n_differing, mut n_lit, mut n_lamps, mut n_seeping) = (0, 0, 0, 0);
     let mut times = [Duration::ZERO; 2];
@@ -78,9 +79,9 @@ pub(super) fn pictures(world: &World) -> anyhow::Result<Figure> {
             picture
         };
         let found = draw(&mut culled, 0, Some(&matter))?;
-        let expected = draw(&mut whole, 1, None)?;
+        let expected = draw(&mut whole, 1, Some(&all))?;
         n_differing += n_unequal(&found, &expected);
-        let seeping = draw_lit(&mut maps_only, &space, camera, seen, None)?;
+        let seeping = draw_lit(&mut maps_only, &space, camera, seen, Some(&all))?;
         n_seeping += n_unequal(&found, &seeping);
         let pixels = expected.rgba.chunks_exact(4);
         n_lit += pixels.filter(|p| p[..3] != [0; 3]).count();

@@ -149,6 +149,15 @@ impl LampMaps {
         light.lit.write(gpu, cells);
     }
 
+    /// Returns `true` if a lamp of the frame reaches any of some cells.
+    pub(crate) fn reaches(&self, lamp: &ActiveLamp, cells: &LampReach) -> bool {
+        let reach = &self.slots[lamp.layer as usize / 6].reach;
+        reach.iter().any(|(part, own)| {
+            let others = cells.iter().find(|c| c.0 == *part);
+            others.is_some_and(|(_, others)| own.iter().any(|c| others.binary_search(c).is_ok()))
+        })
+    }
+
     /// Marks the maps that an event may have changed. `pose` of parts now.
     pub(crate) fn follow(&mut self, event: &LampEvent<'_>, pose: impl Fn(PartId) -> Pose) {
         for slot in &mut self.slots {
