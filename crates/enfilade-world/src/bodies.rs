@@ -14,14 +14,12 @@
 //! | `pairs.rs` | bodies that may touch each other |
 //! | `room.rs` | room for a walker, for maps of paths |
 //! | `walker.rs` | a walker with gravity and steps |
-//! | `path_follower.rs` | a walker that follows a path and opens doors |
 
 mod body;
 mod caster;
 mod flood;
 mod kernel;
 mod pairs;
-mod path_follower;
 mod room;
 #[cfg(test)]
 mod tests;
@@ -32,7 +30,7 @@ pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
-pub use path_follower::{PathFollower, Progress};
-pub(crate) use room::Room;
+pub(crate) use room::StandingRoom;
+pub(crate) use walker::Site;
 pub use walker::Walker;
 pub use walls::Contacts;

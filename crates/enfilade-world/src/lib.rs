@@ -14,6 +14,7 @@ mod agent;
 mod bodies;
 mod layout;
 mod lights;
+mod path_follower;
 mod paths;
 mod pose;
 mod shape;
@@ -26,12 +27,10 @@ pub use actors::{
     WayPoint,
 };
 pub use agent::Agent;
-pub use bodies::{
-    Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs, PathFollower, Progress,
-    Walker,
-};
+pub use bodies::{Body, Cast, CastCounts, Caster, Contact, Contacts, Impact, Pairs, Walker};
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
+pub use path_follower::{PathFollower, Progress};
 pub use paths::{
     Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path, PathSearch,
     Sampling, WalkMap, Ways,

@@ -400,7 +400,7 @@ impl PathSearch {
             let sides = map.sides[k as usize];
             self.legs.push((sides[1 - into], sides[into]));
             self.sequence.push(exit.portal);
-            // Who ends behind a door shuts it.
+            // A walker that ends behind a door shuts it.
             if map.floors.leaves_at(goal).all(|p| p != exit.portal) {
                 self.opened.push(exit.portal);
             }

@@ -600,7 +600,7 @@ fn an_open_leaf_is_in_the_way_of_its_own_door_only() {
     let map = WalkMap::new(&layout, &world, Agent::default());
     let door = layout.opening(PortalId(0));
     let (middle, size) = (door.center(), door.bounds().size());
-    // Its leaf turns into the second room, about a jamb; both corners are as far from the doorway.
+    // Its leaf turns into the second room, about a jamb; both places are as far from the doorway.
     let beyond =
         |side: f64| middle + DVec3::new(0.35, 0.0, side * (0.5 * size.z + 0.4)).with_y(0.0);
     let from = middle - DVec3::X * 1.5;

@@ -34,7 +34,7 @@ pub(super) struct Walk {
     pub(super) at: DVec3,
     /// Length of the path passed. [Units: wu]
     pub(super) passed: f64,
-    /// What it touches there.
+    /// Names of the obstacles that it touches there.
     pub(super) touched: Vec<String>,
 }
 

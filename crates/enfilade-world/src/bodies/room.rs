@@ -8,26 +8,26 @@ use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
 
 use super::body::BodyCore;
 use super::kernel::{depth, sweep};
-use super::walker::GAP;
+use super::walker::{GAP, body_of, foot_of};
 use crate::agent::Agent;
 
 /// Obstacles of a walker.
-pub(crate) struct Room {
+pub(crate) struct StandingRoom {
     bvh: Bvh,
     agent: Agent,
     body: BodyCore,
     foot: BodyCore,
 }
 
-impl Room {
+impl StandingRoom {
     pub(crate) fn new(solid: &[Triangle], agent: &Agent) -> Self {
         // The gap that walkers keep, and as much again for what lies between the middles of squares.
-        let body = agent.body().0.grown(2.0 * GAP);
+        let body = body_of(agent).0.grown(2.0 * GAP);
         Self {
             bvh: Bvh::build(solid),
             agent: *agent,
             body: BodyCore::of(&body),
-            foot: BodyCore::of(&agent.foot().0),
+            foot: BodyCore::of(&foot_of(agent).0),
         }
     }
 
@@ -49,11 +49,11 @@ impl Room {
 
     /// Returns the middle of a walker that stands at a point, or up to a step above or below.
     pub(crate) fn standing(&self, p: DVec3) -> DVec3 {
-        self.floor(p) + DVec3::Y * self.agent.body().1
+        self.floor(p) + DVec3::Y * body_of(&self.agent).1
     }
 
     fn floor(&self, p: DVec3) -> DVec3 {
-        let from = p + DVec3::Y * self.agent.foot().1;
+        let from = p + DVec3::Y * foot_of(&self.agent).1;
         let far = 2.0 * self.agent.step;
         let down = Ray {
             origin: from,

@@ -9,7 +9,7 @@
 //! parts of normals count.
 
 use enfilade_cpg::CellId;
-use enfilade_geom::DVec3;
+use enfilade_geom::{DQuat, DVec3};
 use enfilade_runtime::{DetailId, SightState, Target};
 
 use crate::agent::Agent;
@@ -29,11 +29,34 @@ const GRAVITY: f64 = 9.81;
 /// Speed of rising when climbing. [Units: wu/s]
 const CLIMB: f64 = 6.0;
 
+/// Returns the body of a walker, and the height of the body's center above the floor. [Units: wu]
+pub(super) fn body_of(agent: &Agent) -> (Body, f64) {
+    let (radius, half) = (agent.radius, 0.5 * (agent.height - agent.step).max(0.0));
+    let body = if radius <= half {
+        Body::upright(2.0 * half, radius)
+    } else {
+        Body::Box {
+            half: DVec3::new(radius, half, radius),
+            turn: DQuat::IDENTITY,
+        }
+    };
+    (body, agent.step + half)
+}
+
+/// Returns the foot of a walker that finds the floor, and the height of its center above the ground before it is lowered: it is within
+/// the body. [Units: wu]
+///
+/// On winding stairs, a walker that stood on a point would still be on the tread below with the next two risers in its way.
+pub(super) fn foot_of(agent: &Agent) -> (Body, f64) {
+    let radius = 0.5 * agent.radius.min((agent.height - agent.step).max(0.0));
+    (Body::Sphere { radius }, agent.step + radius)
+}
+
 /// The surroundings of a walker.
-pub(super) struct Site<'a> {
-    pub(super) contacts: &'a Contacts,
-    pub(super) layout: &'a Layout,
-    pub(super) state: &'a SightState,
+pub(crate) struct Site<'a> {
+    pub(crate) contacts: &'a Contacts,
+    pub(crate) layout: &'a Layout,
+    pub(crate) state: &'a SightState,
 }
 
 /// A person who walks in a world. Allocates nothing once the buffers have grown.
@@ -113,7 +136,7 @@ impl Walker {
     }
 
     /// As [`Walker::step`], ignoring objects for which `counts` returns `false`.
-    pub(super) fn step_where(
+    pub(crate) fn step_where(
         &mut self,
         site: &Site<'_>,
         wish: DVec3,
@@ -131,7 +154,7 @@ impl Walker {
     }
 
     /// Returns `true` if it touches an object for which `counts` returns `true`.
-    pub(super) fn touches(&mut self, site: &Site<'_>, counts: impl Fn(DetailId) -> bool) -> bool {
+    pub(crate) fn touches(&mut self, site: &Site<'_>, counts: impl Fn(DetailId) -> bool) -> bool {
         let (body, below) = self.body();
         let at = self.eye + below;
         let Some(cell) = self.locate(site.layout, at) else {
@@ -149,7 +172,7 @@ impl Walker {
 
     /// Returns its capsule, and the vector from the eye to the capsule's center.
     fn body(&self) -> (Body, DVec3) {
-        let (body, up) = self.agent.body();
+        let (body, up) = body_of(&self.agent);
         (body, DVec3::Y * (up - self.agent.eye))
     }
 
@@ -228,7 +251,7 @@ impl Walker {
     /// Moves onto the floor, or towards it.
     fn stand(&mut self, site: &Site<'_>, seconds: f64, counts: &impl Fn(DetailId) -> bool) {
         let step = self.agent.step;
-        let (foot, up) = self.agent.foot();
+        let (foot, up) = foot_of(&self.agent);
         let from = self.feet() + DVec3::Y * up;
         let floor = self.locate(site.layout, from).and_then(|cell| {
             let cast = Cast {

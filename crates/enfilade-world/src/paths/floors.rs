@@ -3,7 +3,7 @@
 //! Squares in plan, each with the floors above one another in it, after Recast (Mononen, "Recast Navigation", 2009): a floor is
 //! the top of matter that is flat enough and has room for the walker above; a step leads to the floor beside it that is not
 //! too much higher or lower, with room on the path. Recast leaves out the floors closer to a wall than the walker's radius, by
-//! distances in squares; here the walker's own body must stand free there ([`Room`]), so a wall is as thick as it is. Only drops
+//! distances in squares; here the walker's own body must stand free there ([`StandingRoom`]), so a wall is as thick as it is. Only drops
 //! are kept away from by distances along the floors (Danielsson, "Euclidean distance mapping", 1980). Each floor stores its cell,
 //! and a step between cells its portal. Walkers cannot pass cracks, windows with anything in them, or openings that are too
 //! narrow, too low, or above a sill too high for a step.
@@ -23,7 +23,7 @@ use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
 use enfilade_runtime::DetailId;
 
 use crate::agent::Agent;
-use crate::bodies::Room;
+use crate::bodies::StandingRoom;
 use crate::layout::Layout;
 use crate::paths::columns::{Span, Squares, spans};
 
@@ -79,7 +79,7 @@ pub(crate) struct Crossing {
     pub(crate) portal: PortalId,
 }
 
-/// What a step depends on.
+/// Condition of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Hindrance {
     /// A portal to pass.
@@ -136,7 +136,7 @@ impl Floors {
             doors: leaves.iter().map(|l| l.0).collect(),
             walker,
         };
-        let room = Room::new(&solid, &walker);
+        let room = StandingRoom::new(&solid, &walker);
         for (is_clear, ground) in is_clear.iter_mut().zip(&grounds) {
             let at = floors.center(ground.square, ground.y.into());
             *is_clear = *is_clear && room.is_free(room.standing(at));
@@ -184,8 +184,8 @@ impl Floors {
     }
 
     /// Marks the floors where an open leaf of a portal is in the way.
-    fn swing(&mut self, portal: PortalId, leaf: &[Triangle], room: &Room) {
-        let own = Room::new(leaf, &self.walker);
+    fn swing(&mut self, portal: PortalId, leaf: &[Triangle], room: &StandingRoom) {
+        let own = StandingRoom::new(leaf, &self.walker);
         let reach = self.walker.radius + self.squares.side;
         let bounds = Aabb::of_points(leaf.as_flattened()).expanded(reach);
         let n = self.squares.n.map(|n| n as f64 - 1.0);
@@ -371,7 +371,7 @@ impl Floors {
         let is_open = other.cell == floor.cell
             || (self.portal_of(from, direction))
                 .is_some_and(|p| !is_in_way(p) && may(Hindrance::Portal(p)));
-        // Who is in the way of a leaf may go on there, before it opens.
+        // A walker in the way of a leaf may go on there, before it opens.
         let is_free = !other.is_swung
             || self
                 .leaves_at(to)

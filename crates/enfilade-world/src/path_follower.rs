@@ -8,8 +8,7 @@ use enfilade_cpg::PortalId;
 use enfilade_geom::{DVec3, closest_point_on_segment};
 use enfilade_runtime::{DetailId, Sight, SightState, Target};
 
-use crate::bodies::walker::Site;
-use crate::bodies::{Contacts, Walker};
+use crate::bodies::{Contacts, Site, Walker};
 use crate::layout::Layout;
 use crate::paths::Path;
 
@@ -23,7 +22,7 @@ const SWING: f64 = 0.7;
 const SHUT: f64 = 0.5;
 /// Time without progress after which it is stuck. [Units: s]
 const PATIENCE: f64 = 4.0;
-type Place<'a> = (&'a Contacts, &'a Layout);
+type Around<'a> = (&'a Contacts, &'a Layout);
 
 /// Least progress that counts. [Units: wu]
 const PROGRESS: f64 = 0.05;
@@ -91,11 +90,11 @@ struct DoorAhead {
     portal: PortalId,
     /// Length of the path after which it is passed.
     at: f64,
-    opening: Opening,
+    opening: Swing,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Opening {
+enum Swing {
     Ahead,
     /// Its leaves move.
     Moves,
@@ -129,7 +128,7 @@ impl PathFollower {
             follower.doors.push(DoorAhead {
                 portal: exit.portal,
                 at: from,
-                opening: Opening::Ahead,
+                opening: Swing::Ahead,
             });
         }
         follower
@@ -172,7 +171,7 @@ impl PathFollower {
         };
         // Leaves pass through the walker while they open: where they come to stand, it is not.
         let opens = |detail| {
-            let mut moving = self.doors.iter().filter(|d| d.opening == Opening::Moves);
+            let mut moving = self.doors.iter().filter(|d| d.opening == Swing::Moves);
             moving.any(|d| self.is_leaf(detail, d.portal))
         };
         let wish = way.normalize_or_zero() * speed;
@@ -197,7 +196,7 @@ impl PathFollower {
     fn open_doors(
         &mut self,
         walker: &mut Walker,
-        site: Place<'_>,
+        site: Around<'_>,
         state: &mut SightState,
         seconds: f64,
     ) {
@@ -206,17 +205,17 @@ impl PathFollower {
             let Some(share) = state.leaves(door.portal) else {
                 continue;
             };
-            let begins = door.opening == Opening::Ahead
+            let begins = door.opening == Swing::Ahead
                 && (0.0..DOOR).contains(&(door.at - self.passed))
                 // One that does not get out of its way is pushed.
                 && (self.idle > SHUT || self.is_clear(walker, site, state, (door.portal, 1.0)));
-            if begins || door.opening == Opening::Moves {
+            if begins || door.opening == Swing::Moves {
                 let share = share + (seconds / SWING) as f32;
                 state.set_leaves(door.portal, share);
                 self.doors[i].opening = if share < 1.0 {
-                    Opening::Moves
+                    Swing::Moves
                 } else {
-                    Opening::Done
+                    Swing::Done
                 };
             }
         }
@@ -227,7 +226,7 @@ impl PathFollower {
         &self,
         detail: DetailId,
         walker: &mut Walker,
-        site: Place<'_>,
+        site: Around<'_>,
         state: &mut SightState,
     ) {
         let mut ahead = self.doors.iter().filter(|d| d.at > self.passed);
@@ -244,7 +243,7 @@ impl PathFollower {
     fn is_clear(
         &self,
         walker: &mut Walker,
-        (contacts, layout): Place<'_>,
+        (contacts, layout): Around<'_>,
         state: &mut SightState,
         (portal, share): (PortalId, f32),
     ) -> bool {
