@@ -44,8 +44,8 @@ const STEPS: Steps = Steps {
     going: 0.26,
     waist: 0.18,
 };
-/// Where the stairs stand along x, and their upper end along z. [Units: wu]
-const STAIRS_X: [f64; 2] = [8.5, 9.55];
+/// Where the stairs stand along x, with room on both sides, and their upper end along z. [Units: wu]
+const STAIRS_X: [f64; 2] = [7.15, 8.2];
 const STAIRS_Z: f64 = 3.2;
 
 /// A tower with a lift, as two scenes.
@@ -75,13 +75,19 @@ pub fn lift_tower() -> LiftTower {
     for storey in 0..STOREYS {
         build.storey(storey);
         let floor = storey as f64 * HEIGHT;
-        let hall = DVec3::new(7.4, floor, 4.4);
-        let middles = rooms().map(|[x, z]| DVec3::new(middle(x), floor, middle(z)));
-        for p in [hall].into_iter().chain(middles) {
-            // Beside the furniture in the middle of each room.
-            places.push(p + DVec3::new(0.0, 0.0, 1.2));
-            lamps.push(p + DVec3::Y * (HEIGHT - SLAB - 0.35));
-        }
+        let at = |x: f64, z: f64| DVec3::new(x, floor, z);
+        let [studio, office, lounge, bedroom] = rooms().map(|[x, z]| at(middle(x), middle(z)));
+        let hall = at(6.1, 4.6);
+        // Beside the furniture in the middle of each room.
+        places.extend([
+            hall + DVec3::Z,
+            studio + DVec3::Z,
+            office + DVec3::Z,
+            lounge - DVec3::X * 1.5,
+            bedroom - DVec3::X * 1.5,
+        ]);
+        let ceiling = DVec3::Y * (HEIGHT - SLAB - 0.35);
+        lamps.extend([hall, studio, office, lounge, bedroom].map(|p| p + ceiling));
     }
     build.finish_walls();
     let cabin = cabin();
@@ -264,7 +270,7 @@ impl Build {
             let mut holes = Vec::new();
             if (1..STOREYS).contains(&k) {
                 holes.push(well(low, high));
-                let end = STAIRS_Z + 0.7 * STEPS.run();
+                let end = STAIRS_Z + 0.85 * STEPS.run();
                 let hole = aabb([STAIRS_X[0], low, STAIRS_Z], [STAIRS_X[1], high, end]);
                 holes.push(hole);
                 let halls = [self.halls[k - 1], self.halls[k]];

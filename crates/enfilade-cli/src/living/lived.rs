@@ -10,7 +10,7 @@ use enfilade::world::{
     SpaceViewer, Transmission,
 };
 use enfilade_render::{
-    Camera, LampLight, Picture, Prop, PropMesh, RenderError, SpaceShot, Studio, Style,
+    Camera, LampLight, Picture, Prop, PropMesh, RenderError, SpaceShot, Studio, Style, lamp_lights,
 };
 
 use super::doors::AutoDoors;
@@ -73,6 +73,8 @@ pub(crate) struct Lived {
     lift_places: Vec<LiftPlace>,
     doors: AutoDoors,
     people: People,
+    /// Those of the world, then those of the file; as in `lights`.
+    lamps: Vec<LampLight>,
     lights: Lights,
     viewer: SpaceViewer,
     awake: AwakeCells,
@@ -119,13 +121,13 @@ impl Lived {
             AutoDoors::default()
         };
         doors.shut(&mut space);
+        let lamps = lamps_of(&space, &file, &lifts);
         let mut lights = Lights::new(&space);
-        for lamp in &file.lamps {
-            let frame = lamp.lift.map_or(PartId::ROOT, |l| lifts[l].part);
+        for lamp in &lamps {
             lights.add(
                 &space,
                 Lamp {
-                    frame,
+                    frame: lamp.part,
                     at: lamp.at,
                     range: lamp.range,
                 },
@@ -146,6 +148,7 @@ impl Lived {
             near: Vec::new(),
             seen_lamps: Vec::new(),
             counts: LivedCounts::default(),
+            lamps,
             lights,
             doors,
             lifts,
@@ -171,7 +174,7 @@ impl Lived {
             studio.add_part(world, sight)?;
             studio.add_part_light(lift.part, world, sight)?;
         }
-        studio.set_lamps(self.lamps())
+        studio.set_lamps(self.lamps.clone())
     }
 
     /// Plays until a time with nobody there. Small steps, in which doors move as in a window. [Units: s]
@@ -240,19 +243,6 @@ impl Lived {
         text
     }
 
-    /// Returns the lamps as drawn.
-    fn lamps(&self) -> Vec<LampLight> {
-        let lamps = self.file.lamps.iter();
-        let lamps = lamps.map(|lamp| LampLight {
-            part: lamp.lift.map_or(PartId::ROOT, |l| self.lifts[l].part),
-            at: lamp.at,
-            color: lamp.color,
-            range: lamp.range,
-            cone: None,
-        });
-        lamps.collect()
-    }
-
     /// Plays some seconds: lifts, people, and the doors that they and the player open.
     pub(crate) fn step(&mut self, player: &Player, seconds: f64) {
         self.time += seconds.max(0.0);
@@ -312,21 +302,18 @@ impl Lived {
         let matter = lights.that_matter(space, &seen);
         self.seen_lamps.clear();
         self.seen_lamps.extend(matter.iter().map(|LampId(i)| *i));
-        for (i, lamp) in self.file.lamps.iter().enumerate() {
-            if self.seen_lamps.contains(&(i as u32)) {
-                props.push(bulb(
-                    lamp.lift.map_or(PartId::ROOT, |l| self.lifts[l].part),
-                    lamp,
-                ));
-            }
-        }
+        let n_of_world = self.lamps.len() - self.file.lamps.len();
+        let own = self.seen_lamps.iter().map(|i| *i as usize);
+        // The world has bulbs of its own.
+        let own = own.filter(|i| *i >= n_of_world);
+        props.extend(own.map(|i| bulb(&self.lamps[i])));
         props.extend(self.file.sounds.iter().map(radio));
         let n_awake = |cell: &CellId| people.actors.in_cell(*cell).count();
         self.counts = LivedCounts {
             n_people: people.actors.len(),
             n_awake: awake.cells().iter().map(n_awake).sum(),
             n_awake_cells: awake.cells().len(),
-            n_lamps: self.file.lamps.len(),
+            n_lamps: self.lamps.len(),
             n_lamps_seen: self.seen_lamps.len(),
         };
         (space, seen, &self.seen_lamps)
@@ -386,11 +373,26 @@ fn person(people: &People, id: ActorId) -> Option<Prop> {
     })
 }
 
-fn bulb(part: PartId, lamp: &super::file::LampEntry) -> Prop {
+/// Returns the lamps of a world and of what lives in it, as drawn.
+fn lamps_of(space: &Space, file: &LivingFile, lifts: &[Lift]) -> Vec<LampLight> {
+    let mut lamps = lamp_lights(space.world(PartId::ROOT), PartId::ROOT);
+    // The program cannot draw others.
+    lamps.retain(|lamp| lamp.range > 0.0 && lamp.range.is_finite());
+    lamps.extend(file.lamps.iter().map(|lamp| LampLight {
+        part: lamp.lift.map_or(PartId::ROOT, |l| lifts[l].part),
+        at: lamp.at,
+        color: lamp.color,
+        range: lamp.range,
+        cone: None,
+    }));
+    lamps
+}
+
+fn bulb(lamp: &LampLight) -> Prop {
     let brightest = lamp.color.iter().fold(0.0, |a: f32, b| a.max(*b));
     Prop {
         mesh: PropMesh::BALL,
-        part,
+        part: lamp.part,
         pose: Pose::from_translation(DVec3::from_array(lamp.at.map(f64::from))),
         size: [BULB; 3],
         color: lamp.color.map(|c| c / brightest.max(1e-6)),

@@ -265,7 +265,10 @@ impl App<'_> {
             studio.add_levels(&self.world)?;
         }
         studio.sparing = self.sparing();
-        lived.furnish(&mut studio)?;
+        // A lamp takes the software adapter many milliseconds a frame.
+        if self.args.living.is_some() || !studio.gpu.is_software() {
+            lived.furnish(&mut studio)?;
+        }
         let start = match self.args.eye {
             Some(eye) => Camera {
                 eye,

@@ -297,7 +297,7 @@ impl Open {
                 style,
                 marks: &[],
                 props: &self.props,
-                lamps: Some(lamps),
+                lamps: Some(if self.shown.plain { &[] } else { lamps }),
             },
             &output,
             size,
