@@ -35,6 +35,7 @@ pub struct TautString {
     /// Both ends, and a point in each opening between.
     points: Vec<DVec3>,
     next: Vec<DVec3>,
+    kept: Vec<DVec3>,
     /// Per inner point, the directions in which it may move: zero vectors if it may not.
     axes: Vec<[DVec3; 2]>,
     blocks: Vec<Block>,
@@ -42,6 +43,8 @@ pub struct TautString {
     directions: Vec<DVec3>,
     length: f64,
     bound: f64,
+    /// A lower bound of the length through the pieces passed.
+    own_bound: f64,
 }
 
 impl TautString {
@@ -52,7 +55,7 @@ impl TautString {
     }
 
     /// Pulls the string taut from `from` through `n` openings to `to`, and returns its length. `pieces(i)` returns the convex
-    /// planar polygons of opening `i`, at least one, each with an area. [Units: wu]
+    /// planar polygons of opening `i`, at least one, each with an area, or an edge of two points. [Units: wu]
     ///
     /// Starts at the middles of openings; O(vertices) per step, about ten steps, rarely a hundred. If the pieces of an opening
     /// together are not convex, the result is a local optimum, and [`TautString::bound`] is that of its hull.
@@ -141,7 +144,7 @@ impl TautString {
         self.next.reserve(n + 2);
         self.directions.clear();
         self.directions.reserve(n + 1);
-        self.bound = 0.0;
+        (self.bound, self.own_bound) = (0.0, 0.0);
         // From the first round on, points are in their openings.
         self.sweep(n, &pieces, true);
         for _ in 0..ROUNDS {
@@ -151,11 +154,18 @@ impl TautString {
             }
             self.newton(&pieces);
         }
+        let before = self.length;
+        self.kept.clone_from(&self.points);
         self.interior(&pieces);
         for _ in 0..2 {
             self.sweep(n, &pieces, true);
         }
-        self.is_short(&pieces);
+        if !self.is_short(&pieces) && self.length > before {
+            // Through pieces that are not the best, or past edges, which it leaves where they were.
+            self.points.clone_from(&self.kept);
+            self.sweep(n, &pieces, true);
+            self.is_short(&pieces);
+        }
         self.length
     }
 
@@ -193,8 +203,9 @@ impl TautString {
         let legs = self.points.windows(2);
         self.directions
             .extend(legs.map(|p| (p[1] - p[0]).normalize_or_zero()));
+        self.own_bound = 0.0;
         self.lift_bound(pieces);
-        self.length - self.bound <= GAP * self.length
+        self.length - self.own_bound <= GAP * self.length
     }
 
     /// Raises the bound to that of the current directions.
@@ -205,13 +216,24 @@ impl TautString {
         let n = self.points.len() - 2;
         // Relative to the start, for precision.
         let from = self.points[0];
-        let mut bound = self.directions[n].dot(self.points[n + 1] - from);
+        let last = self.directions[n].dot(self.points[n + 1] - from);
+        let (mut bound, mut own_bound) = (last, last);
         for i in 0..n {
             let turn = self.directions[i] - self.directions[i + 1];
-            let corners = pieces(i).flatten().map(|p| turn.dot(*p - from));
-            bound += corners.fold(f64::INFINITY, f64::min);
+            let (mut least, mut own) = (f64::INFINITY, f64::INFINITY);
+            for (k, piece) in pieces(i).enumerate() {
+                let corners = piece.iter().map(|p| turn.dot(*p - from));
+                let nearest = corners.fold(f64::INFINITY, f64::min);
+                least = least.min(nearest);
+                if k as u32 == self.pieces[i] {
+                    own = nearest;
+                }
+            }
+            bound += least;
+            own_bound += own;
         }
         self.bound = self.bound.max(bound);
+        self.own_bound = self.own_bound.max(own_bound);
     }
 
     /// Takes a step of Newton's method along the faces at which points are caught, as far as it shortens.
@@ -225,12 +247,22 @@ impl TautString {
             return;
         }
         let mut share: f64 = 1.0;
+        // First each as far as its own opening lets it: where many are caught anew, the least share of all would make little way.
+        self.next.clear();
+        self.next.push(self.points[0]);
         for i in 0..n {
             let step = self.step(i);
             let piece = pieces(i).nth(self.pieces[i] as usize).unwrap_or_default();
-            share = share.min(room(self.points[i + 1], step, piece));
+            let room = room(self.points[i + 1], step, piece);
+            self.next.push(self.points[i + 1] + step * room);
+            share = share.min(room);
         }
+        self.next.push(self.points[n + 1]);
         let before = length_of(&self.points);
+        if length_of(&self.next) < before {
+            std::mem::swap(&mut self.points, &mut self.next);
+            return;
+        }
         for _ in 0..6 {
             self.try_step(share);
             if length_of(&self.next) < before {
@@ -267,7 +299,10 @@ impl TautString {
         for i in 0..n {
             let corners = piece(&self.pieces, i);
             self.axes[i] = plane_axes(corners);
-            self.points[i + 1] = middle(corners);
+            // On an edge it stays, which has no inside.
+            if corners.len() > 2 {
+                self.points[i + 1] = middle(corners);
+            }
         }
         let n_edges: usize = (0..n).map(|i| piece(&self.pieces, i).len()).sum();
         let (mut weight, least) = (0.1 * self.length, 0.02 * GAP * self.length);
@@ -312,7 +347,7 @@ impl TautString {
                 }
                 share *= 0.5;
             }
-            let gap = length_of(&self.points) - self.bound;
+            let gap = length_of(&self.points) - self.own_bound;
             if weight < least || gap <= 0.5 * GAP * self.length {
                 break;
             }
@@ -386,6 +421,10 @@ fn edges(corners: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
 
 /// Returns the point of a polygon whose distances from `a` and `b` have the least sum, and the directions in which it may move.
 fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
+    if let [from, to] = *corners {
+        let (place, axis) = best_on_edge(a, b, from, to);
+        return (place, [axis, DVec3::ZERO]);
+    }
     let normal = area_normal(corners).normalize_or_zero();
     let Some(&first) = corners.first() else {
         return (a, [DVec3::ZERO; 2]);
@@ -450,6 +489,10 @@ fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
 
 /// Returns the fraction of a step, at most 1, that keeps a point within a polygon.
 fn room(at: DVec3, step: DVec3, corners: &[DVec3]) -> f64 {
+    if let [from, to] = *corners {
+        let end = if step.dot(to - from) > 0.0 { to } else { from };
+        return (end.distance(at) / step.length().max(1e-300)).min(1.0);
+    }
     let normal = area_normal(corners).normalize_or_zero();
     let mut share: f64 = 1.0;
     for (from, to) in edges(corners) {
@@ -499,20 +542,30 @@ fn assemble(points: &[DVec3], axes: &[[DVec3; 2]], round: f64, blocks: &mut [Blo
 
 /// Returns minus the sum of logarithms of the distances from a polygon's edges; infinite on them and outside.
 fn barrier(at: DVec3, corners: &[DVec3]) -> f64 {
+    if corners.len() < 3 {
+        return 0.0;
+    }
     let normal = area_normal(corners).normalize_or_zero();
     let depths = edges(corners).map(|(a, b)| normal.cross(b - a).normalize_or_zero().dot(at - a));
-    depths
-        .map(|depth| {
-            if depth > 0.0 {
-                -depth.ln()
-            } else {
-                f64::INFINITY
-            }
-        })
-        .sum()
+    // The logarithm of the product, unless that vanishes: logarithms take most of the time.
+    let (mut sum, mut product) = (0.0, 1.0);
+    for depth in depths {
+        if depth <= 0.0 {
+            return f64::INFINITY;
+        }
+        product *= depth;
+        if !(1e-200..1e200).contains(&product) {
+            sum -= product.ln();
+            product = 1.0;
+        }
+    }
+    sum - product.ln()
 }
 
 fn add_barrier(at: DVec3, corners: &[DVec3], weight: f64, axes: &[DVec3; 2], block: &mut Block) {
+    if corners.len() < 3 {
+        return;
+    }
     let normal = area_normal(corners).normalize_or_zero();
     for (a, b) in edges(corners) {
         let inward = normal.cross(b - a).normalize_or_zero();
