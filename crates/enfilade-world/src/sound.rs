@@ -24,6 +24,7 @@ mod blocks;
 mod ears;
 mod edge;
 mod listener;
+mod materials;
 mod reverb;
 mod route;
 mod taut;
@@ -38,7 +39,8 @@ use crate::paths::{Geodesics, Sampling, Ways};
 pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
 pub use ears::at_ears;
 pub use listener::Listener;
-pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND, absorption_of_name};
+pub use materials::Assumed;
+pub use reverb::{DecayLaw, DiffuseFields, Reverb, SPEED_OF_SOUND};
 pub use taut::TautString;
 
 /// Transmission loss of shut openings. [Units: dB] [Limit: ≥ 0]

@@ -9,10 +9,13 @@
 //! Rooms are assumed to be diffuse: within about a tenth for rooms that are not very long or very dead. The system is singular
 //! only if nothing absorbs; absorption is at least a thousandth of the walls.
 
+use std::collections::BTreeMap;
+
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Triangle, triangle_area_normal};
 
 use crate::layout::Layout;
+use crate::sound::N_BANDS;
 
 /// Speed of sound in air at 20 °C. [Units: wu/s]
 pub const SPEED_OF_SOUND: f64 = 343.2;
@@ -26,38 +29,14 @@ pub enum DecayLaw {
     Eyring,
 }
 
-/// Returns the absorption coefficient of a material at 500 Hz, 0 to 1, from words in its name; 0.1 if none matches.
-///
-/// After the tables of Kuttruff and of Cox & D'Antonio ("Acoustic Absorbers and Diffusers"): mean values of a class.
-#[must_use]
-pub fn absorption_of_name(name: &str) -> f64 {
-    const CLASSES: [(&[&str], f64); 8] = [
-        (&["carpet", "rug", "teppich"], 0.30),
-        (&["curtain", "fabric", "textile", "cloth"], 0.45),
-        (&["acoustic", "foam", "absorb"], 0.80),
-        (&["ceiling", "gypsum", "drywall", "board"], 0.10),
-        (&["wood", "parquet", "timber", "oak"], 0.08),
-        (&["glass", "window", "pane"], 0.06),
-        (&["grass", "soil", "ground", "snow"], 0.60),
-        (
-            &[
-                "concrete", "brick", "stone", "tile", "marble", "plaster", "metal", "steel",
-            ],
-            0.03,
-        ),
-    ];
-    let name = name.to_lowercase();
-    let fits = |words: &[&str]| words.iter().any(|w| name.contains(w));
-    let class = CLASSES.iter().find(|(words, _)| fits(words));
-    class.map_or(0.1, |c| c.1)
-}
-
 /// Volume and absorption of each cell. Made once.
 #[derive(Clone, Debug)]
 pub struct Reverb {
     rooms: Vec<Room>,
     portals: Vec<Coupling>,
     law: DecayLaw,
+    /// Per material, the area of walls indoors.
+    surfaces: BTreeMap<Option<u32>, f64>,
 }
 
 /// The walls of a cell.
@@ -65,8 +44,8 @@ pub struct Reverb {
 struct Room {
     volume: f64,
     area: f64,
-    /// Sum of area times coefficient.
-    absorbed: f64,
+    /// Sum of area times coefficient, in octave bands.
+    absorbed: [f64; N_BANDS],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -76,25 +55,38 @@ struct Coupling {
 }
 
 impl Reverb {
-    /// Computes the rooms of a world's structure. `absorption` returns the coefficient of a material, `None` for triangles
-    /// without one. A wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
+    /// Computes the rooms of a world's structure. `absorption` returns the coefficients of a material in
+    /// [octave bands](crate::OCTAVES), such as [those assumed](crate::Assumed) for its name; `None` for triangles without one. A wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
     /// O(area) in pieces of a quarter of a meter, at most some thousands a triangle.
     #[must_use]
     pub fn new(
         layout: &Layout,
         world: &World,
         law: DecayLaw,
-        absorption: impl Fn(Option<u32>) -> f64,
+        absorption: impl Fn(Option<u32>) -> [f64; N_BANDS],
     ) -> Self {
         let mut rooms = vec![Room::default(); layout.n_cells()];
         for (i, room) in rooms.iter_mut().enumerate() {
             room.volume = layout.cell(CellId(i as u32)).volume;
         }
+        let mut surfaces = BTreeMap::new();
         for batch in world.batches.iter().filter(|b| !b.cells.is_empty()) {
-            let alpha = absorption(batch.primitive.material).clamp(0.0, 1.0);
+            let material = batch.primitive.material;
+            let alpha = absorption(material).map(|a| a.clamp(0.0, 1.0));
+            let mut indoors = 0.0;
             for triangle in batch.primitive.triangles() {
-                add_pieces(layout, &batch.cells, triangle, alpha, &mut rooms);
+                each_piece(layout, &batch.cells, triangle, |cell, area| {
+                    let room = &mut rooms[cell.idx()];
+                    room.area += area;
+                    for (sum, a) in room.absorbed.iter_mut().zip(alpha) {
+                        *sum += area * a;
+                    }
+                    if !layout.cell(cell).is_outdoor {
+                        indoors += area;
+                    }
+                });
             }
+            *surfaces.entry(material).or_insert(0.0) += indoors;
         }
         let portals = (0..layout.n_portals() as u32).map(|p| {
             let opening = layout.opening(PortalId(p));
@@ -105,13 +97,14 @@ impl Reverb {
         });
         for (i, room) in rooms.iter_mut().enumerate() {
             if layout.cell(CellId(i as u32)).is_outdoor {
-                room.absorbed = OPEN_AIR;
+                room.absorbed = [OPEN_AIR; N_BANDS];
             }
         }
         Self {
             rooms,
             portals: portals.collect(),
             law,
+            surfaces,
         }
     }
 
@@ -123,12 +116,12 @@ impl Reverb {
     #[must_use]
     pub fn of_rooms(layout: &Layout, law: DecayLaw, rooms: &[(f64, f64, f64)]) -> Self {
         assert_eq!(rooms.len(), layout.n_cells(), "one for each cell");
-        let mut reverb = Self::new(layout, &World::default(), law, |_| 0.1);
+        let mut reverb = Self::new(layout, &World::default(), law, |_| [0.1; N_BANDS]);
         for (room, &(volume, area, alpha)) in reverb.rooms.iter_mut().zip(rooms) {
             *room = Room {
                 volume,
                 area,
-                absorbed: area * alpha,
+                absorbed: [area * alpha; N_BANDS],
             };
         }
         reverb
@@ -144,21 +137,30 @@ impl Reverb {
         self.rooms[cell.idx()].area
     }
 
-    /// Returns the fully absorbing area equivalent to the cell's walls. [Units: wu²]
+    /// Returns the area of walls indoors of each material, `None` for those without one. [Units: wu²]
+    pub fn surfaces(&self) -> impl Iterator<Item = (Option<u32>, f64)> {
+        self.surfaces
+            .iter()
+            .map(|(material, area)| (*material, *area))
+    }
+
+    /// Returns the fully absorbing area equivalent to the cell's walls, in octave bands. [Units: wu²]
     ///
     /// # Panics
     ///
     /// If there is no such cell.
     #[must_use]
-    pub fn absorbing_area(&self, cell: CellId) -> f64 {
+    pub fn absorbing_area(&self, cell: CellId) -> [f64; N_BANDS] {
         let room = &self.rooms[cell.idx()];
-        let mean = (room.absorbed / room.area.max(1e-9)).clamp(1e-3, 0.999);
         let least = room.area.max(1e-9);
-        match self.law {
-            _ if room.absorbed >= OPEN_AIR => OPEN_AIR,
-            DecayLaw::Sabine => mean * least,
-            DecayLaw::Eyring => -(1.0 - mean).ln() * least,
-        }
+        room.absorbed.map(|absorbed| {
+            let mean = (absorbed / least).clamp(1e-3, 0.999);
+            match self.law {
+                _ if absorbed >= OPEN_AIR => OPEN_AIR,
+                DecayLaw::Sabine => mean * least,
+                DecayLaw::Eyring => -(1.0 - mean).ln() * least,
+            }
+        })
     }
 
     /// Returns the number of cells.
@@ -168,9 +170,9 @@ impl Reverb {
     }
 
     /// Writes the total loss per second of each cell's field, divided by its energy density. [Units: wu³/s]
-    fn losses(&self, open: &[f64], w: &[f64], out: &mut [f64]) {
+    fn losses(&self, absorbing: &[f64], open: &[f64], w: &[f64], out: &mut [f64]) {
         for (i, out) in out.iter_mut().enumerate() {
-            *out = self.absorbing_area(CellId(i as u32)) * w[i];
+            *out = absorbing[i] * w[i];
         }
         for (p, share) in self.portals.iter().zip(open) {
             let [a, b] = p.cells.map(CellId::idx);
@@ -181,14 +183,13 @@ impl Reverb {
     }
 }
 
-/// Adds the area of a triangle to the rooms in front of it: cut into halves as small as [`PIECE`], or a share of its
+/// Calls `add` with the area of a triangle in front of each of the cells: cut into halves as small as [`PIECE`], or a share of its
 /// longest edge, [`FINEST`], each judged by its middle. O(pieces).
-fn add_pieces(
+fn each_piece(
     layout: &Layout,
     cells: &[CellId],
     triangle: Triangle,
-    alpha: f64,
-    rooms: &mut [Room],
+    mut add: impl FnMut(CellId, f64),
 ) {
     let [a, b, c] = triangle;
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -215,8 +216,7 @@ fn add_pieces(
         for (k, cell) in sides.into_iter().enumerate() {
             let is_other = k == 0 || sides[0] != sides[1];
             if let Some(cell) = cell.filter(|c| is_other && cells.contains(c)) {
-                rooms[cell.idx()].area += area;
-                rooms[cell.idx()].absorbed += area * alpha;
+                add(cell, area);
             }
         }
     }
@@ -236,9 +236,13 @@ const OPEN_AIR: f64 = 1e6;
 #[derive(Clone, Debug, Default)]
 pub struct DiffuseFields {
     open: Vec<f64>,
+    /// Absorbing area of each cell in the band that is solved.
+    absorbing: Vec<f64>,
     right: Vec<f64>,
     level: Vec<f64>,
-    steady: Vec<f64>,
+    /// Per cell, in octave bands: the field, and the integral of its decay.
+    steady: Vec<[f64; N_BANDS]>,
+    decay: Vec<[f64; N_BANDS]>,
     residue: Vec<f64>,
     direction: Vec<f64>,
     product: Vec<f64>,
@@ -262,22 +266,35 @@ impl DiffuseFields {
         self.open.clear();
         let portals = (0..reverb.portals.len() as u32).map(PortalId);
         self.open.extend(portals.map(|p| open(p).clamp(0.0, 1.0)));
-        self.right.clear();
-        self.right.resize(n, 0.0);
-        self.right[cell.idx()] = 1.0;
-        self.balance(reverb);
-        std::mem::swap(&mut self.steady, &mut self.level);
-        // The integral of the decay after the source stops solves the same system.
-        for (i, room) in reverb.rooms.iter().enumerate() {
-            self.right[i] = room.volume * self.steady[i];
+        for field in [&mut self.steady, &mut self.decay] {
+            field.clear();
+            field.resize(n, [0.0; N_BANDS]);
         }
-        self.balance(reverb);
+        for band in 0..N_BANDS {
+            self.absorbing.clear();
+            let cells = (0..n as u32).map(CellId);
+            (self.absorbing).extend(cells.map(|c| reverb.absorbing_area(c)[band]));
+            self.right.clear();
+            self.right.resize(n, 0.0);
+            self.right[cell.idx()] = 1.0;
+            self.balance(reverb);
+            // The integral of the decay after the source stops solves the same system.
+            for (i, room) in reverb.rooms.iter().enumerate() {
+                self.steady[i][band] = self.level[i];
+                self.right[i] = room.volume * self.level[i];
+            }
+            self.balance(reverb);
+            for (decay, level) in self.decay.iter_mut().zip(&self.level) {
+                decay[band] = *level;
+            }
+        }
     }
 
     /// Conjugate gradients (Hestenes & Stiefel 1952), scaled by the diagonal, since areas vary widely.
     fn balance(&mut self, reverb: &Reverb) {
         let n = reverb.n_cells();
-        let scale = |i: usize| 1.0 / reverb.absorbing_area(CellId(i as u32)).max(1e-6).sqrt();
+        let absorbing = &self.absorbing;
+        let scale = |i: usize| 1.0 / absorbing[i].max(1e-6).sqrt();
         for buffer in [&mut self.level, &mut self.product] {
             buffer.clear();
             buffer.resize(n, 0.0);
@@ -295,7 +312,7 @@ impl DiffuseFields {
             for (i, x) in self.direction.iter_mut().enumerate() {
                 *x *= scale(i);
             }
-            reverb.losses(&self.open, &self.direction, &mut self.product);
+            reverb.losses(absorbing, &self.open, &self.direction, &mut self.product);
             for i in 0..n {
                 self.direction[i] /= scale(i);
                 self.product[i] *= scale(i);
@@ -316,41 +333,56 @@ impl DiffuseFields {
         }
     }
 
-    /// Returns the time in which a cell's field falls by 60 dB after the source has stopped, from its mean decay time, including
-    /// the energy that other rooms return. 0 if no sound reaches it. [Units: s]
+    /// Returns the time in which a cell's field falls by 60 dB after the source has stopped, at mid frequencies: the mean of the
+    /// bands of 500 and 1,000 Hz (ISO 3382-2). From its mean decay time, including the energy that other rooms return. 0 if no
+    /// sound reaches it. [Units: s]
     ///
     /// # Panics
     ///
     /// If there is no such cell, or nothing was solved.
     #[must_use]
     pub fn rt60(&self, cell: CellId) -> f64 {
-        let steady = self.steady[cell.idx()];
-        if steady <= 0.0 {
-            return 0.0;
+        let bands = self.rt60_bands(cell);
+        0.5 * (bands[2] + bands[3])
+    }
+
+    /// Returns the same in each [octave band](crate::OCTAVES). Air absorbs nothing, which matters at 4 kHz in halls. [Units: s]
+    ///
+    /// # Panics
+    ///
+    /// If there is no such cell, or nothing was solved.
+    #[must_use]
+    pub fn rt60_bands(&self, cell: CellId) -> [f64; N_BANDS] {
+        let mut times = [0.0; N_BANDS];
+        let bands = self.steady[cell.idx()].iter().zip(&self.decay[cell.idx()]);
+        for (time, (steady, decay)) in times.iter_mut().zip(bands) {
+            if *steady > 0.0 {
+                let mean = 4.0 / SPEED_OF_SOUND * decay / steady;
+                *time = 6.0 * std::f64::consts::LN_10 * mean.max(0.0);
+            }
         }
-        let mean = 4.0 / SPEED_OF_SOUND * self.level[cell.idx()] / steady;
-        6.0 * std::f64::consts::LN_10 * mean.max(0.0)
+        times
     }
 
     /// Returns the amplitude of a cell's field, relative to the source's free field at a distance of 1: its energy is `16 π`
-    /// times this. Above 0 if any sound reaches it.
+    /// times this, the mean over the bands. Above 0 if any sound reaches it.
     ///
     /// # Panics
     ///
     /// If there is no such cell, or nothing was solved.
     #[must_use]
     pub fn gain(&self, cell: CellId) -> f64 {
-        (16.0 * std::f64::consts::PI * self.steady[cell.idx()].max(0.0)).sqrt()
+        (16.0 * std::f64::consts::PI * self.density(cell).max(0.0)).sqrt()
     }
 
-    /// Returns the energy density divided by 4 / c times the source's power. [Units: 1/wu²]
+    /// Returns the energy density divided by 4 / c times the source's power, the mean over the bands. [Units: 1/wu²]
     ///
     /// # Panics
     ///
     /// If there is no such cell, or nothing was solved.
     #[must_use]
     pub fn density(&self, cell: CellId) -> f64 {
-        self.steady[cell.idx()]
+        self.steady[cell.idx()].iter().sum::<f64>() / N_BANDS as f64
     }
 }
 
@@ -419,7 +451,7 @@ mod tests {
     fn a_rooms_walls_are_its_box_less_its_doors() {
         let world = room_grid(&GridParams::two_rooms());
         let layout = Layout::new(&world);
-        let reverb = Reverb::new(&layout, &world, DecayLaw::Eyring, |_| 0.2);
+        let reverb = Reverb::new(&layout, &world, DecayLaw::Eyring, |_| [0.2; N_BANDS]);
         for c in [CellId(0), CellId(1)] {
             let size = layout.cell(c).bounds.max - layout.cell(c).bounds.min;
             let all = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
@@ -430,7 +462,7 @@ mod tests {
                 reverb.area(c)
             );
             let eyring = -0.8f64.ln() * reverb.area(c);
-            assert!((reverb.absorbing_area(c) - eyring).abs() < 1e-6 * eyring);
+            assert!((reverb.absorbing_area(c)[2] - eyring).abs() < 1e-6 * eyring);
         }
     }
 }
