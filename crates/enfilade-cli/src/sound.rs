@@ -146,7 +146,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     print_table(out, &heard.rows)
 }
 
-/// What was heard on a walk, and the walls that were assumed.
+/// Sound along a walk, and the walls that were assumed.
 #[derive(Default)]
 struct HeardWhole {
     rows: Vec<HeardLine>,

@@ -25,6 +25,7 @@ mod ears;
 mod edge;
 mod listener;
 mod materials;
+mod pieces;
 mod reverb;
 mod route;
 mod taut;

@@ -6,7 +6,7 @@ use enfilade_runtime::SightState;
 
 use crate::layout::Layout;
 use crate::paths::{Corner, End, LengthSearch, Limit, Seen, Sequences};
-use crate::sound::route::{Gate, Place, Puller, Route};
+use crate::sound::route::{Gate, Puller, Route, Spot};
 use crate::sound::{Acoustics, Heard, N_BANDS};
 
 /// Sequences of a source that are heard. Longer ones by half, and by 5 m, count, as these are mostly more than 10 dB down in rooms;
@@ -33,11 +33,14 @@ const KEPT: f64 = 0.25;
 /// [Units: wu]
 const NEAR: f64 = 2.0;
 
+/// Greatest distance of a point of an opening from those at which searches cross it. [Units: wu]
+const APART: f64 = 0.71;
+
 #[derive(Clone, Debug, Default)]
 struct Source {
     /// The search that found the routes.
     search: u64,
-    place: Option<Place>,
+    place: Option<Spot>,
     /// From the source to the points of its cell, where it was when these were found.
     lengths: Vec<f64>,
     measured: Option<(CellId, DVec3)>,
@@ -151,7 +154,7 @@ impl Listener {
         self.searched = Some((cell, at));
         self.n_searches += 1;
         let ways = &acoustics.ways;
-        (acoustics.geodesics).lengths_from(ways, cell, at, &mut self.lengths);
+        lengths_from(acoustics, cell, at, &mut self.lengths);
         let lengths = &self.lengths;
         let first = |place: usize, _| lengths[place];
         let tolls = &self.near_tolls;
@@ -183,16 +186,16 @@ impl Listener {
         cell: CellId,
         at: DVec3,
     ) -> Option<Heard> {
-        let here = Place {
+        let here = Spot {
             cell: self.searched?.0,
             at: self.at,
         };
-        let there = Place { cell, at };
+        let there = Spot { cell, at };
         if self.sources.len() <= id {
             self.sources.resize_with(id + 1, Source::default);
         }
         let source = &self.sources[id];
-        let is_near = |p: Place| p.cell == cell && p.at.distance(at) < KEPT;
+        let is_near = |p: Spot| p.cell == cell && p.at.distance(at) < KEPT;
         let is_kept = source.search == self.n_searches && source.place.is_some_and(is_near);
         if !is_kept {
             self.choose_routes(acoustics, id, there);
@@ -209,7 +212,7 @@ impl Listener {
         heard
     }
 
-    fn choose_routes(&mut self, acoustics: &Acoustics, id: usize, there: Place) {
+    fn choose_routes(&mut self, acoustics: &Acoustics, id: usize, there: Spot) {
         let Some((cell, at)) = self.searched else {
             return;
         };
@@ -217,7 +220,7 @@ impl Listener {
         let source = &mut self.sources[id];
         if source.measured != Some((there.cell, there.at)) {
             source.measured = Some((there.cell, there.at));
-            geodesics.lengths_from(ways, there.cell, there.at, &mut source.lengths);
+            lengths_from(acoustics, there.cell, there.at, &mut source.lengths);
         }
         let mut direct = f64::INFINITY;
         if there.cell == cell {
@@ -254,7 +257,7 @@ impl Listener {
         acoustics: &Acoustics,
         layout: &Layout,
         id: usize,
-        ends: [Place; 2],
+        ends: [Spot; 2],
     ) -> Option<Heard> {
         let source = &mut self.sources[id];
         let tolls = &self.near_tolls;
@@ -295,5 +298,25 @@ impl Listener {
         heard.gain = (energy.iter().sum::<f64>() / N_BANDS as f64).sqrt();
         heard.bands = energy.map(f64::sqrt);
         Some(heard)
+    }
+}
+
+/// Writes the lengths from a place to the points of its cell. Openings close by are crossed at any point of them, not only at those,
+/// which are a meter apart: less than the distance from the opening to the nearest of them, so that sequences through an
+/// opening in which one stands do not seem longer than others.
+fn lengths_from(acoustics: &Acoustics, cell: CellId, at: DVec3, lengths: &mut Vec<f64>) {
+    let ways = &acoustics.ways;
+    (acoustics.geodesics).lengths_from(ways, cell, at, lengths);
+    for exit in ways.exits_of(cell) {
+        let distance = acoustics.bounds[exit.portal.idx()]
+            .distance_squared(at)
+            .sqrt();
+        if distance >= NEAR {
+            continue;
+        }
+        let own = &mut lengths[ways.places(exit.portal, cell)];
+        let nearest = own.iter().copied().fold(f64::INFINITY, f64::min);
+        let extra = (nearest - distance).clamp(0.0, APART) * (1.0 - distance / NEAR);
+        own.iter_mut().for_each(|length| *length -= extra);
     }
 }

@@ -15,7 +15,7 @@ use crate::sound::{Acoustics, N_BANDS, OCTAVES};
 /// Rounds of finding the bends of a string and pulling it taut; bends move the crossings, and crossings the bends.
 const ROUNDS: usize = 3;
 
-/// What a string passes: a portal, or the edge of a wall about which it bends.
+/// A portal that a string passes, or the edge of a wall about which it bends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Gate {
     Portal(PortalId),
@@ -24,7 +24,7 @@ pub(super) enum Gate {
 
 /// An end of a string.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct Spot {
     pub(super) cell: CellId,
     pub(super) at: DVec3,
 }
@@ -86,7 +86,7 @@ impl Puller {
         &mut self,
         acoustics: &Acoustics,
         layout: &Layout,
-        [from, to]: [Place; 2],
+        [from, to]: [Spot; 2],
         route: &mut Route,
     ) {
         let mut is_pulled = false;
@@ -116,7 +116,7 @@ impl Puller {
         &mut self,
         acoustics: &Acoustics,
         layout: &Layout,
-        [from, to]: [Place; 2],
+        [from, to]: [Spot; 2],
         route: &mut Route,
     ) -> bool {
         self.gates.clear();
@@ -164,7 +164,7 @@ impl Puller {
         &mut self,
         acoustics: &Acoustics,
         layout: &Layout,
-        [from, to]: [Place; 2],
+        [from, to]: [Spot; 2],
         open: &[f64],
         route: &Route,
     ) -> [f64; N_BANDS] {
@@ -198,7 +198,7 @@ impl Puller {
         energy
     }
 
-    fn set_crossings(&mut self, [from, to]: [Place; 2], route: &Route) {
+    fn set_crossings(&mut self, [from, to]: [Spot; 2], route: &Route) {
         self.crossings.clear();
         self.extra.clear();
         self.crossings.push(from.at);
