@@ -17,7 +17,7 @@ import pyroomacoustics as pra
 BOXES = [(6.0, 5.0, 3.0), (10.0, 8.0, 4.0), (4.0, 3.5, 2.5)]
 # Widths of two rooms along x, their depth and height, which is the third coordinate here.
 COUPLED = [(6.0, 4.0, 5.0, 3.0), (5.0, 8.0, 6.0, 3.0)]
-GAP, THICK = 0.6, 0.2
+GAP, THICK = 0.5, 0.2
 ABSORPTIONS = [0.03, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5]
 N_RAYS = 10000
 BIN = 0.004

@@ -13,11 +13,13 @@ use enfilade_cpg::{CellId, World};
 use enfilade_geom::{Bvh, DVec3, Triangle};
 
 use crate::layout::{Layout, Opening};
-use crate::paths::edges::{Corner, corners};
+use crate::paths::edges::{Corner, corners as corners_of};
 use crate::paths::search::Ways;
 
 /// Distance between points along an edge. [Units: wu]
 const SPACING: f64 = 1.0;
+/// Greatest distance, for cells with too many. [Units: wu]
+const SPARSEST: f64 = 4.0;
 /// Maximum number of `Corner`s of a cell; beyond, some of those near to others are left out.
 const MAX_CORNERS: usize = 1024;
 /// `Corner`s nearer to each other than this are merged at first. [Units: wu]
@@ -194,7 +196,13 @@ impl Concave {
         }
         let batches = world.batches_of(cell);
         let mut walls: Vec<Triangle> = batches.flat_map(|b| b.primitive.triangles()).collect();
-        let mut corners = corners(layout, cell, &walls, SPACING, off);
+        // Rather fewer points of each edge, along which bends slide, than fewer edges.
+        let mut spacing = SPACING;
+        let mut corners = corners_of(layout, cell, &walls, spacing, off);
+        while corners.len() > MAX_CORNERS && spacing < SPARSEST {
+            spacing *= 2.0;
+            corners = corners_of(layout, cell, &walls, spacing, off);
+        }
         if corners.is_empty() {
             return None;
         }

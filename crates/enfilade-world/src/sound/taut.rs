@@ -146,8 +146,7 @@ impl TautString {
         self.directions.clear();
         self.directions.reserve(n + 1);
         (self.bound, self.own_bound) = (0.0, 0.0);
-        // From the first round on, points are in their openings.
-        self.sweep(n, &pieces, true);
+        // From the first sweep on, points are in their openings.
         for _ in 0..ROUNDS {
             self.sweep(n, &pieces, false);
             if self.is_short(&pieces) {
