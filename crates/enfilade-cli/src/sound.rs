@@ -178,7 +178,7 @@ impl HeardWalk<'_> {
         args.closed.iter().for_each(|&p| state.close(PortalId(p)));
         let acoustics = Acoustics::new(&layout, world, &Transmission::default());
         let absorptions = Absorptions::new(world, &args.absorption)?;
-        let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |m| absorptions.of(m));
+        let reverb = Reverb::new(&layout, world, DecayLaw::Kuttruff, |m| absorptions.of(m));
         let source = self.source;
         let source_cell = layout.locate(source).context("the source is in no cell")?;
         let mut fields = DiffuseFields::new();

@@ -246,6 +246,43 @@ fn walking_through_doorways_changes_the_level_little_by_little() {
     assert!(n_checked > 5000, "{n_checked}");
 }
 
+/// W11: a walking listener hears what one without memory hears, to 0.3 dB, 1° and a millimeter.
+#[test]
+fn a_walking_listener_hears_as_a_new_one() {
+    let mut rng = Rng::new(12);
+    let (mut n, mut worst) = (0, [0.0_f64; 3]);
+    for seed in 0..3 {
+        let site = site(&rooms(16, seed));
+        for p in (0..site.layout.n_portals() as u32).map(PortalId) {
+            let opening = site.layout.opening(p);
+            let source = site.place(&mut rng);
+            let mut walker = Listener::new();
+            for k in -50..50 {
+                let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.02;
+                let Some(cell) = site.layout.locate(at) else {
+                    continue;
+                };
+                walker.listen(&site.acoustics, &site.state, cell, at);
+                let heard = walker.hear(&site.acoustics, &site.layout, 0, source.0, source.1);
+                let fresh = site.hear((cell, at), source);
+                let (Some(a), Some(b)) = (heard, fresh) else {
+                    continue;
+                };
+                n += 1;
+                let level = 20.0 * (a.gain / b.gain).log10().abs();
+                let turn = a.direction.angle_between(b.direction).to_degrees();
+                let length = (a.length - b.length).abs();
+                for (worst, x) in worst.iter_mut().zip([level, turn, length]) {
+                    *worst = worst.max(x);
+                }
+            }
+        }
+    }
+    assert!(n > 2000, "{n}");
+    let is_small = [worst[0] / 0.3, worst[1], worst[2] / 1e-3];
+    assert!(is_small.iter().all(|x| *x <= 1.0), "{worst:?}");
+}
+
 /// W11.
 #[test]
 fn a_door_that_shuts_takes_its_loss() {

@@ -33,7 +33,7 @@ pub(super) fn rt60(_: &str) -> anyhow::Result<Figure> {
         anyhow::ensure!(share < 1.01, "{opening} m² is more than the door's {door}");
         let first = room([*x, *z, *height], *opening, *absorption);
         let other = room([second.max(1.0), *z, *height], *opening, *absorption);
-        let reverb = Reverb::of_rooms(&layout, DecayLaw::Eyring, &[first, other]);
+        let reverb = Reverb::of_rooms(&layout, DecayLaw::Kuttruff, &[first, other]);
         fields.solve(&reverb, CellId(0), |_| share);
         for (cell, time) in [CellId(0), CellId(1)].into_iter().zip(times) {
             if *time == 0.0 {

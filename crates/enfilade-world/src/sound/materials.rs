@@ -275,7 +275,7 @@ impl Assumed {
         };
         let fits = |surface: &&Surface| match class {
             Some(class) => surface.classes.contains(&class),
-            None => surface.words.iter().any(|w| has_word(w)),
+            None => surface.words.iter().any(&has_word),
         };
         match SURFACES.iter().find(fits) {
             Some(surface) => Self {

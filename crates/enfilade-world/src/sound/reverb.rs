@@ -27,7 +27,13 @@ pub enum DecayLaw {
     Sabine,
     /// Each reflection loses the mean absorption of the walls: for dead rooms, too.
     Eyring,
+    /// Eyring's, corrected for the unequal lengths of free paths (Kuttruff, "Room Acoustics", §5.4), whose variance is 0.36 of
+    /// their mean squared in rooms of ordinary proportions.
+    Kuttruff,
 }
+
+/// Half the variance of free paths, by their mean squared.
+const HALF_VARIANCE: f64 = 0.18;
 
 /// Volume and absorption of each cell. Made once.
 #[derive(Clone, Debug)]
@@ -159,6 +165,11 @@ impl Reverb {
                 _ if absorbed >= OPEN_AIR => OPEN_AIR,
                 DecayLaw::Sabine => mean * least,
                 DecayLaw::Eyring => -(1.0 - mean).ln() * least,
+                DecayLaw::Kuttruff => {
+                    // As 1 − x, to the first order, but rising with absorption throughout.
+                    let exponent = -(1.0 - mean).ln();
+                    exponent / (1.0 + HALF_VARIANCE * exponent) * least
+                }
             }
         })
     }
