@@ -1,5 +1,7 @@
 //! `enfilade sound`: renders a source as a walking listener hears it.
 
+mod materials;
+
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -9,9 +11,10 @@ use enfilade::geom::{Allowance, DVec3};
 use enfilade::runtime::{Sight, SightState};
 use enfilade::world::{
     AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Layout, Listener,
-    Reverb, Transmission, absorption_of_name, at_ears, test_sound,
+    Reverb, Transmission, at_ears, test_sound,
 };
 
+use self::materials::{Absorption, Absorptions, Given, given, tell};
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, write_streamed};
@@ -41,6 +44,10 @@ pub(crate) struct Sound {
     /// Closed portals, by number; after those opened.
     #[arg(long, value_name = "PORTAL,…", value_delimiter = ',')]
     closed: Vec<u32>,
+    /// Absorption of a material, 0 to 1: one coefficient, or six, for the octave bands from 125 Hz to 4 kHz; repeatable. For other
+    /// materials it is assumed from their names, and what was assumed is told.
+    #[arg(long, value_name = "NAME=A[,…]", value_parser = given)]
+    absorption: Vec<Given>,
     /// File for the sound, a WAV file of two channels of 16 bits.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -74,6 +81,7 @@ struct HeardLine {
     direction: [f64; 3],
     gain_db: Option<f64>,
     room_db: Option<f64>,
+    /// At mid frequencies, the mean of the bands of 500 and 1,000 Hz.
     rt60: f64,
 }
 
@@ -104,15 +112,15 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
         source: exact(args.source),
         opened: &opened,
     };
-    let rows = match &args.output {
+    let heard = match &args.output {
         None => walk.hear(args, &world, &allowance, |_| Ok(()))?,
         Some(path) => {
-            let mut rows = Vec::new();
+            let mut heard = HeardWhole::default();
             let mut renderer = Auralizer::new(&source, rate);
             write_streamed(path, |out| {
                 let mut out = BufWriter::with_capacity(1 << 16, out);
                 out.write_all(&wav_head(walk.n_blocks * AUDIO_BLOCK, rate))?;
-                rows = walk.hear(args, &world, &allowance, |block| {
+                heard = walk.hear(args, &world, &allowance, |block| {
                     for sample in renderer.render(block).iter().flatten() {
                         out.write_all(&((sample * 32767.0).round() as i16).to_le_bytes())?;
                     }
@@ -120,17 +128,29 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
                 })?;
                 Ok(out.flush()?)
             })?;
-            rows
+            heard
         }
     };
+    tell(&heard.absorption)?;
     let out = outputs.printed();
     if args.json {
         return print_json(
             out,
-            &serde_json::json!({ "file": args.output.as_ref().map(|p| p.display().to_string()), "heard": rows }),
+            &serde_json::json!({
+                "file": args.output.as_ref().map(|p| p.display().to_string()),
+                "heard": heard.rows,
+                "absorption": heard.absorption,
+            }),
         );
     }
-    print_table(out, &rows)
+    print_table(out, &heard.rows)
+}
+
+/// Sound along a walk, and the walls that were assumed.
+#[derive(Default)]
+struct HeardWhole {
+    rows: Vec<HeardLine>,
+    absorption: Vec<Absorption>,
 }
 
 /// A walk, with the source to hear.
@@ -150,17 +170,15 @@ impl HeardWalk<'_> {
         world: &World,
         allowance: &Allowance,
         mut each: impl FnMut(&AudioBlock) -> anyhow::Result<()>,
-    ) -> anyhow::Result<Vec<HeardLine>> {
+    ) -> anyhow::Result<HeardWhole> {
         let layout = Layout::new(world);
         let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
         let mut state = SightState::new(&sight);
         self.opened.iter().for_each(|&p| state.open(p));
         args.closed.iter().for_each(|&p| state.close(PortalId(p)));
         let acoustics = Acoustics::new(&layout, world, &Transmission::default());
-        let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |material| {
-            let named = material.and_then(|m| world.materials.get(m as usize));
-            absorption_of_name(named.map_or("", |m| m.name.as_str()))
-        });
+        let absorptions = Absorptions::new(world, &args.absorption)?;
+        let reverb = Reverb::new(&layout, world, DecayLaw::Kuttruff, |m| absorptions.of(m));
         let source = self.source;
         let source_cell = layout.locate(source).context("the source is in no cell")?;
         let mut fields = DiffuseFields::new();
@@ -211,7 +229,8 @@ impl HeardWalk<'_> {
                 });
             }
         }
-        Ok(rows)
+        let absorption = absorptions.by_area(&reverb);
+        Ok(HeardWhole { rows, absorption })
     }
 }
 

@@ -34,9 +34,8 @@ pub use paths::{
 pub use pose::Pose;
 pub use shape::{Shape, ShapeError};
 pub use sound::{
-    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Heard, Listener,
-    OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, absorption_of_name, at_ears,
-    test_sound,
+    AUDIO_BLOCK, Acoustics, Assumed, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Heard,
+    Listener, OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, at_ears, test_sound,
 };
 pub use space::{Docking, PartId, Passing, Place, Space, SpaceError, SpaceSeen, SpaceViewer};
 pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

@@ -23,11 +23,12 @@ use strides::{Strides, walk_straight};
 pub use edges::Corner;
 pub use floors::Floors;
 pub use geodesics::Geodesics;
+pub(crate) use geodesics::{Seen, into_cell};
 pub use hops::Hops;
 pub use path_follower::{PathFollower, Progress};
 pub use sampling::Sampling;
 pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
-pub(crate) use sequences::{Limit, Sequences};
+pub(crate) use sequences::{End, Limit, Sequences};
 
 mod all_pairs;
 mod columns;

@@ -137,6 +137,76 @@ fn the_shortest_of_all_sequences_is_found() {
     assert!(n_checked > 50, "{n_checked}");
 }
 
+/// The least length of a line that bends at a point of each of two parallel edges, by trying points 5 cm apart.
+fn over_two_edges([a, b]: [DVec3; 2], edges: [[DVec3; 2]; 2]) -> f64 {
+    let n = (edges[0][0].distance(edges[0][1]) * 20.0) as usize;
+    let at = |edge: [DVec3; 2], k: usize| edge[0].lerp(edge[1], k as f64 / n as f64);
+    let mut least = f64::INFINITY;
+    for k in 0..=n {
+        let p = at(edges[0], k);
+        let rest = (0..=n).map(|j| {
+            let q = at(edges[1], j);
+            a.distance(p) + p.distance(q) + q.distance(b)
+        });
+        least = rest.fold(least, f64::min);
+    }
+    least
+}
+
+/// W11: outdoors, from one side of a building without openings to the other, sound goes around it, and its level falls as about a
+/// screen.
+#[test]
+fn sound_goes_around_a_building() {
+    let closed = site(&GridParams {
+        size: [3, 1, 2],
+        doors: 0.0,
+        windows: 0.0,
+        furniture: 0,
+        outdoors: true,
+        ..GridParams::offices(6, 1)
+    });
+    let mut walls = enfilade_geom::Aabb::EMPTY;
+    for b in &closed.world.batches {
+        for p in b.primitive.triangles().flatten() {
+            walls = walls.including(p);
+        }
+    }
+    let (low, high) = (walls.min, walls.max);
+    let mut rng = Rng::new(3);
+    let outdoors = closed.layout.outdoors().expect("there is an outdoors");
+    for _ in 0..20 {
+        let ends = [low.z - 1.5, high.z + 1.5]
+            .map(|z| DVec3::new(rng.range(low.x, high.x), rng.range(low.y, high.y), z));
+        assert!(
+            ends.iter()
+                .all(|p| closed.layout.locate(*p) == Some(outdoors))
+        );
+        let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let mut least = f64::INFINITY;
+        for x in [low.x, high.x] {
+            let edges = [low.z, high.z].map(|z| [corner(x, low.y, z), corner(x, high.y, z)]);
+            least = least.min(over_two_edges(ends, edges));
+        }
+        for y in [low.y, high.y] {
+            let edges = [low.z, high.z].map(|z| [corner(low.x, y, z), corner(high.x, y, z)]);
+            least = least.min(over_two_edges(ends, edges));
+        }
+        let heard = closed
+            .hear((outdoors, ends[0]), (outdoors, ends[1]))
+            .expect("a way around");
+        assert!(
+            (heard.length / least - 1.0).abs() < 0.005,
+            "{} {least}",
+            heard.length
+        );
+        let free = 1.0 / heard.length;
+        assert!(
+            heard.bands[0] < 0.9 * free && heard.bands[5] < 0.2 * free,
+            "{heard:?}"
+        );
+    }
+}
+
 /// W11: on a walk through each doorway the level changes by at most 0.5 dB per centimeter, the direction by 5° and the length by
 /// 2 cm, for a listener without memory.
 #[test]
@@ -174,6 +244,43 @@ fn walking_through_doorways_changes_the_level_little_by_little() {
         }
     }
     assert!(n_checked > 5000, "{n_checked}");
+}
+
+/// W11: a walking listener hears what one without memory hears, to 0.3 dB, 1° and a millimeter.
+#[test]
+fn a_walking_listener_hears_as_a_new_one() {
+    let mut rng = Rng::new(12);
+    let (mut n, mut worst) = (0, [0.0_f64; 3]);
+    for seed in 0..3 {
+        let site = site(&rooms(16, seed));
+        for p in (0..site.layout.n_portals() as u32).map(PortalId) {
+            let opening = site.layout.opening(p);
+            let source = site.place(&mut rng);
+            let mut walker = Listener::new();
+            for k in -50..50 {
+                let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.02;
+                let Some(cell) = site.layout.locate(at) else {
+                    continue;
+                };
+                walker.listen(&site.acoustics, &site.state, cell, at);
+                let heard = walker.hear(&site.acoustics, &site.layout, 0, source.0, source.1);
+                let fresh = site.hear((cell, at), source);
+                let (Some(a), Some(b)) = (heard, fresh) else {
+                    continue;
+                };
+                n += 1;
+                let level = 20.0 * (a.gain / b.gain).log10().abs();
+                let turn = a.direction.angle_between(b.direction).to_degrees();
+                let length = (a.length - b.length).abs();
+                for (worst, x) in worst.iter_mut().zip([level, turn, length]) {
+                    *worst = worst.max(x);
+                }
+            }
+        }
+    }
+    assert!(n > 2000, "{n}");
+    let is_small = [worst[0] / 0.3, worst[1], worst[2] / 1e-3];
+    assert!(is_small.iter().all(|x| *x <= 1.0), "{worst:?}");
 }
 
 /// W11.

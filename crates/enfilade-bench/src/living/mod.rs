@@ -4,8 +4,10 @@
 
 mod actors;
 mod bodies;
+mod decays;
 mod graphs;
 mod lamps;
+mod lengths;
 mod levels;
 mod parts;
 mod paths;
@@ -82,6 +84,9 @@ pub(crate) const ROWS: &[Row] = &[
     baked("walk", WALKED_IN, walk::walk),
     made("sound: length", &["offices-16"], sound::length),
     made("sound: direction", &["offices-16"], sound::direction),
+    baked("sound: lengths", &["duplex"], lengths::duplex),
+    baked("sound: lengths", &["fzk-haus"], lengths::fzk_haus),
+    baked("sound: lengths", &["institute"], lengths::institute),
     made("levels", &["offices-100"], levels::level_in),
     baked("levels", LIVED_IN, levels::level),
     made("levels: directions", &["offices-100"], levels::direction_in),
@@ -89,6 +94,7 @@ pub(crate) const ROWS: &[Row] = &[
     made("levels: lengths", &["offices-100"], levels::length_in),
     baked("levels: lengths", LIVED_IN, levels::length),
     made("sound: reverb", &["coupled-rooms"], sound::reverb),
+    made("reverberation: RT60", &["boxes"], decays::rt60),
     baked("reverberation: areas", &["institute"], walls::areas),
     made("sound: cost", &["offices-1000"], sound::cost),
 ];

@@ -41,7 +41,7 @@ pub(super) fn areas(world: &World) -> anyhow::Result<Figure> {
     let text = std::fs::read_to_string(folder.join("institute/truth.json"))?;
     let truth: Value = serde_json::from_str(&text)?;
     let layout = Layout::new(world);
-    let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |_| 0.1);
+    let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |_| [0.1; 6]);
     let mut rooms_of: Vec<Vec<&Value>> = vec![Vec::new(); layout.n_cells()];
     let rooms = truth["rooms"].as_array().context("no rooms")?;
     for room in rooms {

@@ -10,16 +10,18 @@
 //! less exact about round surfaces. `O(n³)` for `n` `Corner`s, once; a query costs a line of sight for each `Corner` of the cell.
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::{Bvh, DVec3, Triangle, Winding};
+use enfilade_geom::{Bvh, DVec3, Triangle};
 
 use crate::layout::{Layout, Opening};
-use crate::paths::edges::{Corner, corners};
+use crate::paths::edges::{Corner, corners as corners_of};
 use crate::paths::search::Ways;
 
 /// Distance between points along an edge. [Units: wu]
 const SPACING: f64 = 1.0;
+/// Greatest distance, for cells with too many. [Units: wu]
+const SPARSEST: f64 = 4.0;
 /// Maximum number of `Corner`s of a cell; beyond, some of those near to others are left out.
-const MAX_CORNERS: usize = 256;
+const MAX_CORNERS: usize = 1024;
 /// `Corner`s nearer to each other than this are merged at first. [Units: wu]
 const NEAR: f64 = 0.05;
 /// Maximum number of points of a cell's portals; with more, as about a tower of a thousand windows, lines stay straight.
@@ -35,6 +37,39 @@ pub struct Geodesics {
     /// Per cell; `None` where lines between any two points stay in the air, or are assumed to.
     cells: Vec<Option<Concave>>,
     off: f64,
+}
+
+/// Lines of sight from both ends of a query, kept for the next one with the same end.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Seen {
+    /// `Corner`s, ascending by the least length over them.
+    order: Vec<(f64, u32)>,
+    ends: [View; 2],
+}
+
+/// Lengths from a point to the `Corner`s of its cell: infinite where a wall is between, NaN where that is not known yet.
+#[derive(Clone, Debug, Default)]
+struct View {
+    from: Option<(CellId, DVec3)>,
+    lengths: Vec<f64>,
+}
+
+impl View {
+    fn begin(&mut self, cell: CellId, at: DVec3, n: usize) {
+        if self.from != Some((cell, at)) || self.lengths.len() != n {
+            self.from = Some((cell, at));
+            self.lengths.clear();
+            self.lengths.resize(n, f64::NAN);
+        }
+    }
+
+    fn length(&mut self, concave: &Concave, at: DVec3, corner: usize) -> f64 {
+        let length = &mut self.lengths[corner];
+        if length.is_nan() {
+            *length = concave.straight(at, concave.corners[corner].at);
+        }
+        *length
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -107,7 +142,8 @@ impl Geodesics {
     }
 
     /// Returns the length of the shortest path between two points of a cell, and writes its bends to `bends` (cleared first),
-    /// each with its edge; `None` if no path was found. A point on a portal is moved a little into the cell. [Units: wu]
+    /// each with its edge; `None` if no path was found. Points on walls and portals see nothing: move them
+    /// [a little](Self::off) into the cell. [Units: wu]
     ///
     /// # Panics
     ///
@@ -118,6 +154,17 @@ impl Geodesics {
         [from, to]: [DVec3; 2],
         bends: &mut Vec<Corner>,
     ) -> Option<f64> {
+        self.way_with(cell, [from, to], &mut Seen::default(), bends)
+    }
+
+    /// As [`Geodesics::way`], with a reusable buffer.
+    pub(crate) fn way_with(
+        &self,
+        cell: CellId,
+        [from, to]: [DVec3; 2],
+        seen: &mut Seen,
+        bends: &mut Vec<Corner>,
+    ) -> Option<f64> {
         bends.clear();
         let Some(concave) = &self.cells[cell.idx()] else {
             return Some(from.distance(to));
@@ -125,7 +172,9 @@ impl Geodesics {
         if concave.straight(from, to) < f64::INFINITY {
             return Some(from.distance(to));
         }
-        concave.bend(from, to, bends)?;
+        seen.ends[0].begin(cell, from, concave.corners.len());
+        seen.ends[1].begin(cell, to, concave.corners.len());
+        concave.bend(from, to, seen, bends)?;
         concave.slide(from, to, bends);
         let ends = bends.iter().map(|b| b.at).chain([to]);
         let (length, _) = ends.fold((0.0, from), |(sum, at), p| (sum + at.distance(p), p));
@@ -147,7 +196,13 @@ impl Concave {
         }
         let batches = world.batches_of(cell);
         let mut walls: Vec<Triangle> = batches.flat_map(|b| b.primitive.triangles()).collect();
-        let mut corners = corners(layout, cell, &walls, SPACING, off);
+        // Rather fewer points of each edge, along which bends slide, than fewer edges.
+        let mut spacing = SPACING;
+        let mut corners = corners_of(layout, cell, &walls, spacing, off);
+        while corners.len() > MAX_CORNERS && spacing < SPARSEST {
+            spacing *= 2.0;
+            corners = corners_of(layout, cell, &walls, spacing, off);
+        }
         if corners.is_empty() {
             return None;
         }
@@ -195,30 +250,35 @@ impl Concave {
                 self.lengths[j * n + i] = length;
             }
         }
+        let mut onward = Vec::new();
         for via in 0..n {
-            for i in 0..n {
-                let first = self.lengths[i * n + via];
-                if first == f32::INFINITY || i == via {
+            onward.clear();
+            onward.extend_from_slice(&self.lengths[via * n..][..n]);
+            let rows = self.lengths.chunks_exact_mut(n);
+            for (row, next) in rows.zip(self.next.chunks_exact_mut(n)) {
+                let (first, step) = (row[via], next[via]);
+                if first == f32::INFINITY || first == 0.0 {
                     continue;
                 }
-                for j in 0..n {
-                    let through = first + self.lengths[via * n + j];
-                    if through < self.lengths[i * n + j] {
-                        self.lengths[i * n + j] = through;
-                        self.next[i * n + j] = self.next[i * n + via];
-                    }
+                for ((length, next), rest) in row.iter_mut().zip(next).zip(&onward) {
+                    let through = first + rest;
+                    let is_less = through < *length;
+                    *length = if is_less { through } else { *length };
+                    *next = if is_less { step } else { *next };
                 }
             }
         }
         for k in 0..self.points.len() {
-            let seen: Vec<f32> = (self.corners.iter())
-                .map(|c| self.straight(self.points[k], c.at) as f32)
-                .collect();
-            let least = (0..n).map(|c| {
-                let through = (0..n).map(|s| seen[s] + self.lengths[s * n + c]);
-                through.fold(f32::INFINITY, f32::min)
-            });
-            let row: Vec<f32> = least.collect();
+            let mut row = vec![f32::INFINITY; n];
+            for (s, corner) in self.corners.iter().enumerate() {
+                let first = self.straight(self.points[k], corner.at) as f32;
+                if first < f32::INFINITY {
+                    let onward = &self.lengths[s * n..][..n];
+                    for (least, rest) in row.iter_mut().zip(onward) {
+                        *least = least.min(first + rest);
+                    }
+                }
+            }
             self.of_points.extend(row);
         }
     }
@@ -244,20 +304,22 @@ impl Concave {
     }
 
     /// Finds the `Corner`s of the shortest path through any.
-    fn bend(&self, from: DVec3, to: DVec3, bends: &mut Vec<Corner>) -> Option<()> {
+    fn bend(&self, from: DVec3, to: DVec3, seen: &mut Seen, bends: &mut Vec<Corner>) -> Option<()> {
         let n = self.corners.len();
         let mut best = (f64::INFINITY, 0, 0);
-        // One farther than the best by straight lines alone needs no line of sight.
-        for (i, a) in self.corners.iter().enumerate() {
-            if from.distance(a.at) + a.at.distance(to) >= best.0 {
-                continue;
-            }
-            let first = self.straight(from, a.at);
-            for (j, b) in self.corners.iter().enumerate() {
-                let most = first + f64::from(self.lengths[i * n + j]) + b.at.distance(to);
-                if most < best.0 && self.straight(b.at, to) < f64::INFINITY {
-                    best = (most, i, j);
-                }
+        let Seen { order, ends } = seen;
+        let [first, last] = ends;
+        // In ellipses about both ends, from narrow to wide: what is outside makes the path longer than what is found.
+        for share in [1.05, 1.2, 1.6, f64::INFINITY] {
+            let widest = share * from.distance(to);
+            order.clear();
+            let corners = self.corners.iter().enumerate();
+            let least = corners.map(|(i, c)| (from.distance(c.at) + c.at.distance(to), i as u32));
+            order.extend(least.filter(|l| l.0 < widest.min(best.0)));
+            order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            self.bend_within(from, to, order, [first, last], &mut best);
+            if best.0 <= widest {
+                break;
             }
         }
         let (length, mut at, end) = best;
@@ -270,6 +332,42 @@ impl Concave {
             bends.push(self.corners[at]);
         }
         Some(())
+    }
+
+    /// Finds the first and the last `Corner` of the shortest path over some `Corner`s, given with the least length over each,
+    /// ascending.
+    fn bend_within(
+        &self,
+        from: DVec3,
+        to: DVec3,
+        corners: &[(f64, u32)],
+        [first, last]: [&mut View; 2],
+        best: &mut (f64, usize, usize),
+    ) {
+        let n = self.corners.len();
+        for &(least, i) in corners {
+            if least >= best.0 {
+                break;
+            }
+            let i = i as usize;
+            let start = first.length(self, from, i);
+            if start == f64::INFINITY {
+                continue;
+            }
+            let row = &self.lengths[i * n..][..n];
+            for &(_, j) in corners {
+                let j = j as usize;
+                // Most are too long without what is left.
+                let most = start + f64::from(row[j]);
+                if most >= best.0 || most + self.corners[j].at.distance(to) >= best.0 {
+                    continue;
+                }
+                let whole = most + last.length(self, to, j);
+                if whole < best.0 {
+                    *best = (whole, i, j);
+                }
+            }
+        }
     }
 
     /// Slides bends along their edges to where the path is shortest, while no wall gets in between.
@@ -307,14 +405,21 @@ fn shortest_about([a, b]: [DVec3; 2], p: DVec3, q: DVec3) -> DVec3 {
 }
 
 /// Moves a point of an opening a little into a cell and off the walls at its edges.
-fn into_cell(opening: &Opening<'_>, cell: CellId, p: DVec3, off: f64) -> DVec3 {
+pub(crate) fn into_cell(opening: &Opening<'_>, cell: CellId, p: DVec3, off: f64) -> DVec3 {
     let side = if opening.cells()[1] == cell {
         1.0
     } else {
         -1.0
     };
     // Away from the edges of its own piece: the common middle may lie in a wall between two.
-    let holds = |piece: &&[DVec3]| Winding::new(piece.to_vec()).contains_in_plane(p, 0.1 * off);
+    let holds = |piece: &&[DVec3]| {
+        let edges = (0..piece.len()).map(|i| (piece[i], piece[(i + 1) % piece.len()]));
+        let depths = edges.map(|(a, b)| {
+            let inward = opening.normal().cross(b - a).normalize_or_zero();
+            inward.dot(p - a)
+        });
+        depths.fold(f64::INFINITY, f64::min) >= -0.1 * off
+    };
     let piece = opening.pieces().find(holds).unwrap_or(&[]);
     let middle = piece.iter().sum::<DVec3>() / piece.len().max(1) as f64;
     let inward = if piece.is_empty() {

@@ -123,6 +123,13 @@ impl Ways {
         self.first_point[portal.idx()]..self.first_point[portal.idx() + 1]
     }
 
+    /// Returns the indices of a portal's points among the [points of one of its cells](Self::points_of).
+    pub(crate) fn places(&self, portal: PortalId, cell: CellId) -> std::ops::Range<usize> {
+        let at = portal.idx();
+        let first = self.place[at][side(self.cells[at], cell)] as usize;
+        first..first + self.range(portal).len()
+    }
+
     pub(crate) fn exits_of(&self, cell: CellId) -> &[Exit] {
         let first = &self.first_exit[cell.idx()..];
         &self.exits[first[0] as usize..first[1] as usize]

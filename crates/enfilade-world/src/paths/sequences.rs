@@ -13,6 +13,15 @@ use enfilade_geom::DVec3;
 
 use crate::paths::search::{LengthSearch, Ways};
 
+/// An end of sequences, with lengths within its cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct End<'a> {
+    pub(crate) cell: CellId,
+    pub(crate) at: DVec3,
+    /// To the [points of the cell](Ways::points_of). [Units: wu]
+    pub(crate) lengths: &'a [f64],
+}
+
 /// Limits of an enumeration.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limit {
@@ -45,39 +54,44 @@ pub(crate) struct Sequences {
     lengths: Vec<f64>,
     heap: BinaryHeap<Reverse<(u64, u32)>>,
     found: Vec<u32>,
+    least: f64,
+    reach: f64,
 }
 
 impl Sequences {
-    /// Finds the sequences from `to` in `cell` to the start of `search`. Returns their number.
+    /// Finds the sequences between the start of `search` and an end. Returns their number. `direct` is the length between both if
+    /// they are in one cell.
     pub(crate) fn find(
         &mut self,
         search: &LengthSearch,
         ways: &Ways,
-        (cell, to): (CellId, DVec3),
+        [start, end]: [End<'_>; 2],
+        direct: f64,
         limit: Limit,
     ) -> usize {
         self.partials.clear();
         self.lengths.clear();
         self.heap.clear();
         self.found.clear();
-        let Some(start) = search.start() else {
-            return 0;
-        };
+        (self.least, self.reach) = (f64::INFINITY, f64::INFINITY);
         let mut most = f64::INFINITY;
-        if start.0 == cell {
-            self.complete(NONE, to.distance(start.1), to);
+        if start.cell == end.cell {
+            self.complete(NONE, direct, end.at);
         }
-        self.extend(search, ways, (cell, to), NONE, most);
+        self.extend(search, ways, (end.cell, end), NONE, most);
         for _ in 0..limit.steps {
             let Some(Reverse((bits, at))) = self.heap.pop() else {
+                self.reach = most;
                 break;
             };
             let length = f64::from_bits(bits);
+            self.reach = length.min(most);
             if length > most {
                 break;
             }
             let Some((portal, into)) = self.partials[at as usize].last else {
                 if self.found.is_empty() {
+                    self.least = length;
                     most = length * limit.longest[0] + limit.longest[1];
                 }
                 self.found.push(at);
@@ -86,21 +100,35 @@ impl Sequences {
                 }
                 continue;
             };
-            if into == start.0 {
+            if into == start.cell {
                 let toll = search.toll_of(ways, portal, into);
                 let first = self.partials[at as usize].first as usize;
-                let points = ways.points(portal).iter().enumerate();
-                let ends = points.map(|(k, p)| self.lengths[first + k] + p.distance(start.1));
+                let own = &start.lengths[ways.places(portal, into)];
+                let ends = own.iter().zip(&self.lengths[first..]);
+                let ends = ends.map(|(a, b)| a + b);
                 let least = ends.fold(f64::INFINITY, f64::min) + toll;
                 let point = self.partials[at as usize].point;
                 self.complete(at, least, point);
             }
-            self.extend(search, ways, (into, to), at, most);
+            self.extend(search, ways, (into, end), at, most);
         }
         self.found.len()
     }
 
+    /// Returns the length of the shortest sequence.
+    pub(crate) fn least(&self) -> f64 {
+        self.least
+    }
+
+    /// Returns the length up to which all sequences were found: the limit of lengths, unless another ended the enumeration.
+    pub(crate) fn reach(&self) -> f64 {
+        self.reach
+    }
+
     fn complete(&mut self, before: u32, length: f64, point: DVec3) {
+        if length == f64::INFINITY {
+            return;
+        }
         let whole = Partial {
             last: None,
             before,
@@ -132,7 +160,7 @@ impl Sequences {
         &mut self,
         search: &LengthSearch,
         ways: &Ways,
-        (cell, to): (CellId, DVec3),
+        (cell, end): (CellId, End<'_>),
         before: u32,
         most: f64,
     ) {
@@ -144,11 +172,12 @@ impl Sequences {
             let range = ways.range(exit.portal);
             let points = ways.points(exit.portal);
             if before == NONE {
-                self.lengths.extend(points.iter().map(|p| p.distance(to)));
+                let own = &end.lengths[ways.places(exit.portal, cell)];
+                self.lengths.extend_from_slice(own);
             } else {
                 self.add_lengths(search, ways, cell, before, exit.portal);
             }
-            let (mut least, mut point) = (f64::INFINITY, to);
+            let (mut least, mut point) = (f64::INFINITY, end.at);
             for (i, k) in range.enumerate() {
                 let rest = search.label(ways.node(k, cell));
                 let length = self.lengths[first + i] + rest;

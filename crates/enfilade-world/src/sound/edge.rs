@@ -140,6 +140,14 @@ pub(super) fn edge_loss(fresnel: f64) -> f64 {
     (5.0 + 20.0 * (x / x.tan()).log10()).max(0.0)
 }
 
+/// Returns the loss of a bend around walls within a cell, by the Fresnel number of the detour. [Units: dB]
+///
+/// As [`edge_loss`] from 0.3 on, to a decibel and a half, and nothing where the string becomes straight: a cell has many edges beside
+/// each string, and none of them shades it there as a screen does.
+pub(super) fn bend_loss(fresnel: f64) -> f64 {
+    (10.0 * (1.0 + 20.0 * fresnel).log10()).min(MOST_LOSS)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -21,6 +21,7 @@
 use enfilade_geom::DVec3;
 
 use crate::sound::blocks::{Block, solve};
+use crate::sound::pieces::{add_barrier, barrier, best_place, middle, plane_axes, room};
 
 /// Relative gap between the length and its lower bound that ends the search.
 const GAP: f64 = 1e-6;
@@ -35,6 +36,7 @@ pub struct TautString {
     /// Both ends, and a point in each opening between.
     points: Vec<DVec3>,
     next: Vec<DVec3>,
+    kept: Vec<DVec3>,
     /// Per inner point, the directions in which it may move: zero vectors if it may not.
     axes: Vec<[DVec3; 2]>,
     blocks: Vec<Block>,
@@ -42,6 +44,8 @@ pub struct TautString {
     directions: Vec<DVec3>,
     length: f64,
     bound: f64,
+    /// A lower bound of the length through the pieces passed.
+    own_bound: f64,
 }
 
 impl TautString {
@@ -52,7 +56,7 @@ impl TautString {
     }
 
     /// Pulls the string taut from `from` through `n` openings to `to`, and returns its length. `pieces(i)` returns the convex
-    /// planar polygons of opening `i`, at least one, each with an area. [Units: wu]
+    /// planar polygons of opening `i`, at least one, each with an area, or an edge of two points. [Units: wu]
     ///
     /// Starts at the middles of openings; O(vertices) per step, about ten steps, rarely a hundred. If the pieces of an opening
     /// together are not convex, the result is a local optimum, and [`TautString::bound`] is that of its hull.
@@ -141,9 +145,8 @@ impl TautString {
         self.next.reserve(n + 2);
         self.directions.clear();
         self.directions.reserve(n + 1);
-        self.bound = 0.0;
-        // From the first round on, points are in their openings.
-        self.sweep(n, &pieces, true);
+        (self.bound, self.own_bound) = (0.0, 0.0);
+        // From the first sweep on, points are in their openings.
         for _ in 0..ROUNDS {
             self.sweep(n, &pieces, false);
             if self.is_short(&pieces) {
@@ -151,11 +154,18 @@ impl TautString {
             }
             self.newton(&pieces);
         }
+        let before = self.length;
+        self.kept.clone_from(&self.points);
         self.interior(&pieces);
         for _ in 0..2 {
             self.sweep(n, &pieces, true);
         }
-        self.is_short(&pieces);
+        if !self.is_short(&pieces) && self.length > before {
+            // Through pieces that are not the best, or past edges, which it leaves where they were.
+            self.points.clone_from(&self.kept);
+            self.sweep(n, &pieces, true);
+            self.is_short(&pieces);
+        }
         self.length
     }
 
@@ -193,8 +203,9 @@ impl TautString {
         let legs = self.points.windows(2);
         self.directions
             .extend(legs.map(|p| (p[1] - p[0]).normalize_or_zero()));
+        self.own_bound = 0.0;
         self.lift_bound(pieces);
-        self.length - self.bound <= GAP * self.length
+        self.length - self.own_bound <= GAP * self.length
     }
 
     /// Raises the bound to that of the current directions.
@@ -205,13 +216,24 @@ impl TautString {
         let n = self.points.len() - 2;
         // Relative to the start, for precision.
         let from = self.points[0];
-        let mut bound = self.directions[n].dot(self.points[n + 1] - from);
+        let last = self.directions[n].dot(self.points[n + 1] - from);
+        let (mut bound, mut own_bound) = (last, last);
         for i in 0..n {
             let turn = self.directions[i] - self.directions[i + 1];
-            let corners = pieces(i).flatten().map(|p| turn.dot(*p - from));
-            bound += corners.fold(f64::INFINITY, f64::min);
+            let (mut least, mut own) = (f64::INFINITY, f64::INFINITY);
+            for (k, piece) in pieces(i).enumerate() {
+                let corners = piece.iter().map(|p| turn.dot(*p - from));
+                let nearest = corners.fold(f64::INFINITY, f64::min);
+                least = least.min(nearest);
+                if k as u32 == self.pieces[i] {
+                    own = nearest;
+                }
+            }
+            bound += least;
+            own_bound += own;
         }
         self.bound = self.bound.max(bound);
+        self.own_bound = self.own_bound.max(own_bound);
     }
 
     /// Takes a step of Newton's method along the faces at which points are caught, as far as it shortens.
@@ -225,12 +247,22 @@ impl TautString {
             return;
         }
         let mut share: f64 = 1.0;
+        // First each as far as its own opening lets it: where many are caught anew, the least share of all would make little way.
+        self.next.clear();
+        self.next.push(self.points[0]);
         for i in 0..n {
             let step = self.step(i);
             let piece = pieces(i).nth(self.pieces[i] as usize).unwrap_or_default();
-            share = share.min(room(self.points[i + 1], step, piece));
+            let room = room(self.points[i + 1], step, piece);
+            self.next.push(self.points[i + 1] + step * room);
+            share = share.min(room);
         }
+        self.next.push(self.points[n + 1]);
         let before = length_of(&self.points);
+        if length_of(&self.next) < before {
+            std::mem::swap(&mut self.points, &mut self.next);
+            return;
+        }
         for _ in 0..6 {
             self.try_step(share);
             if length_of(&self.next) < before {
@@ -267,7 +299,10 @@ impl TautString {
         for i in 0..n {
             let corners = piece(&self.pieces, i);
             self.axes[i] = plane_axes(corners);
-            self.points[i + 1] = middle(corners);
+            // On an edge it stays, which has no inside.
+            if corners.len() > 2 {
+                self.points[i + 1] = middle(corners);
+            }
         }
         let n_edges: usize = (0..n).map(|i| piece(&self.pieces, i).len()).sum();
         let (mut weight, least) = (0.1 * self.length, 0.02 * GAP * self.length);
@@ -312,7 +347,7 @@ impl TautString {
                 }
                 share *= 0.5;
             }
-            let gap = length_of(&self.points) - self.bound;
+            let gap = length_of(&self.points) - self.own_bound;
             if weight < least || gap <= 0.5 * GAP * self.length {
                 break;
             }
@@ -357,112 +392,6 @@ fn away(from: DVec3, mut points: impl Iterator<Item = DVec3>, length: f64) -> DV
     apart.map_or(DVec3::ZERO, |p| (p - from).normalize_or_zero())
 }
 
-fn middle(corners: &[DVec3]) -> DVec3 {
-    corners.iter().sum::<DVec3>() / corners.len().max(1) as f64
-}
-
-/// Returns the normal with twice the area as length.
-fn area_normal(corners: &[DVec3]) -> DVec3 {
-    let Some((&first, rest)) = corners.split_first() else {
-        return DVec3::ZERO;
-    };
-    let fan = rest.windows(2).map(|p| (p[0] - first).cross(p[1] - first));
-    fan.sum()
-}
-
-fn plane_axes(corners: &[DVec3]) -> [DVec3; 2] {
-    let normal = area_normal(corners).normalize_or_zero();
-    if normal == DVec3::ZERO {
-        return [DVec3::ZERO; 2];
-    }
-    let (u, v) = normal.any_orthonormal_pair();
-    [u, v]
-}
-
-fn edges(corners: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
-    let nexts = corners.iter().cycle().skip(1);
-    corners.iter().zip(nexts).map(|(a, b)| (*a, *b))
-}
-
-/// Returns the point of a polygon whose distances from `a` and `b` have the least sum, and the directions in which it may move.
-fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec3; 2]) {
-    let normal = area_normal(corners).normalize_or_zero();
-    let Some(&first) = corners.first() else {
-        return (a, [DVec3::ZERO; 2]);
-    };
-    // As if `b` were on the other side: distances to points of the plane are the same.
-    let (h_a, h_b) = (normal.dot(a - first), normal.dot(b - first));
-    let (p, q) = (a - normal * h_a, b - normal * h_b);
-    let (h_a, h_b) = (h_a.abs(), h_b.abs());
-    let through = if h_a + h_b > 0.0 {
-        p.lerp(q, h_a / (h_a + h_b))
-    } else {
-        p
-    };
-    let is_out = |from: DVec3, to: DVec3| normal.dot((to - from).cross(through - from)) < 0.0;
-    let mut best = (through, [DVec3::ZERO; 2]);
-    let mut least = f64::INFINITY;
-    let mut is_inside = true;
-    for (from, to) in edges(corners) {
-        // Both ends in the plane: any edge may be the nearest.
-        let is_flat = h_a + h_b == 0.0;
-        if !is_flat && !is_out(from, to) {
-            continue;
-        }
-        is_inside &= is_flat && !is_out(from, to);
-        let (place, axis) = best_on_edge(a, b, from, to);
-        let length = place.distance(a) + place.distance(b);
-        if length < least {
-            least = length;
-            best = (place, [axis, DVec3::ZERO]);
-        }
-    }
-    if is_inside {
-        let (u, v) = normal.any_orthonormal_pair();
-        return (through, [u, v]);
-    }
-    best
-}
-
-/// As [`best_place`], on an edge: unfolds the triangles of `a` and of `b` with its line into one plane.
-fn best_on_edge(a: DVec3, b: DVec3, from: DVec3, to: DVec3) -> (DVec3, DVec3) {
-    let length = from.distance(to);
-    if length == 0.0 {
-        return (from, DVec3::ZERO);
-    }
-    let along = (to - from) / length;
-    let (t_a, t_b) = (along.dot(a - from), along.dot(b - from));
-    let r_a = (a - from - along * t_a).length();
-    let r_b = (b - from - along * t_b).length();
-    let t = if r_a + r_b > 0.0 {
-        (t_a * r_b + t_b * r_a) / (r_a + r_b)
-    } else {
-        t_a
-    };
-    if t <= 0.0 {
-        (from, DVec3::ZERO)
-    } else if t >= length {
-        (to, DVec3::ZERO)
-    } else {
-        (from + along * t, along)
-    }
-}
-
-/// Returns the fraction of a step, at most 1, that keeps a point within a polygon.
-fn room(at: DVec3, step: DVec3, corners: &[DVec3]) -> f64 {
-    let normal = area_normal(corners).normalize_or_zero();
-    let mut share: f64 = 1.0;
-    for (from, to) in edges(corners) {
-        let inward = normal.cross(to - from).normalize_or_zero();
-        let (depth, toward) = (inward.dot(at - from), -inward.dot(step));
-        // Along the edge at which it is caught, rounding does not count as motion.
-        if toward > 1e-12 * step.length() && toward * share > depth {
-            share = (depth / toward).max(0.0);
-        }
-    }
-    share
-}
-
 /// Assembles the system of Newton's method for the sum of lengths, each [smoothed](rounded) at `round`.
 fn assemble(points: &[DVec3], axes: &[[DVec3; 2]], round: f64, blocks: &mut [Block]) {
     for (block, axes) in blocks.iter_mut().zip(axes) {
@@ -493,35 +422,6 @@ fn assemble(points: &[DVec3], axes: &[[DVec3; 2]], round: f64, blocks: &mut [Blo
         if leg > 0 && leg < blocks.len() {
             let (before, after) = (axes[leg - 1], axes[leg]);
             blocks[leg - 1].above = before.map(|x| after.map(|y| -curve(x, y)));
-        }
-    }
-}
-
-/// Returns minus the sum of logarithms of the distances from a polygon's edges; infinite on them and outside.
-fn barrier(at: DVec3, corners: &[DVec3]) -> f64 {
-    let normal = area_normal(corners).normalize_or_zero();
-    let depths = edges(corners).map(|(a, b)| normal.cross(b - a).normalize_or_zero().dot(at - a));
-    depths
-        .map(|depth| {
-            if depth > 0.0 {
-                -depth.ln()
-            } else {
-                f64::INFINITY
-            }
-        })
-        .sum()
-}
-
-fn add_barrier(at: DVec3, corners: &[DVec3], weight: f64, axes: &[DVec3; 2], block: &mut Block) {
-    let normal = area_normal(corners).normalize_or_zero();
-    for (a, b) in edges(corners) {
-        let inward = normal.cross(b - a).normalize_or_zero();
-        let slope = axes.map(|axis| inward.dot(axis) / inward.dot(at - a));
-        for k in 0..2 {
-            block.right[k] += weight * slope[k];
-            for l in 0..2 {
-                block.diagonal[k][l] += weight * slope[k] * slope[l];
-            }
         }
     }
 }

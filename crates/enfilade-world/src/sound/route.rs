@@ -1,0 +1,238 @@
+//! One sequence of openings between a listener and a source: its string, pulled taut around walls, and the energy along it.
+
+use enfilade_cpg::{CellId, PortalId};
+use enfilade_geom::DVec3;
+
+use crate::layout::Layout;
+use crate::paths::{Corner, Seen, into_cell};
+use crate::sound::edge::{
+    arrival_direction, bend_loss, detour, edge_loss, straight_end, through_area, wall_share,
+};
+use crate::sound::reverb::SPEED_OF_SOUND;
+use crate::sound::taut::TautString;
+use crate::sound::{Acoustics, N_BANDS, OCTAVES};
+
+/// Rounds of finding the bends of a string and pulling it taut; bends move the crossings, and crossings the bends.
+const ROUNDS: usize = 3;
+
+/// A portal that a string passes, or the edge of a wall about which it bends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Gate {
+    Portal(PortalId),
+    Edge([DVec3; 2]),
+}
+
+/// An end of a string.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub(super) cell: CellId,
+    pub(super) at: DVec3,
+}
+
+/// A sequence of portals, with its string when last pulled.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Route {
+    pub(super) gates: Vec<Gate>,
+    /// A point in each gate.
+    pub(super) points: Vec<DVec3>,
+    pub(super) length: f64,
+    /// Towards its first bend.
+    pub(super) toward: DVec3,
+    /// The direction in which it is heard.
+    pub(super) arrival: DVec3,
+    /// Energy when last heard, the sum over the bands.
+    pub(super) loudness: f64,
+    /// `false` if it is only measured.
+    pub(super) is_heard: bool,
+    /// `true` if it does not matter until the next search.
+    pub(super) is_dropped: bool,
+}
+
+impl Route {
+    /// Empties it for another sequence.
+    pub(super) fn reset(&mut self, is_heard: bool) {
+        self.gates.clear();
+        self.points.clear();
+        (self.length, self.loudness) = (0.0, 0.0);
+        (self.is_heard, self.is_dropped) = (is_heard, false);
+    }
+
+    /// Returns its portals.
+    pub(super) fn portals(&self) -> impl Iterator<Item = PortalId> {
+        self.gates.iter().filter_map(|gate| match gate {
+            Gate::Portal(portal) => Some(*portal),
+            Gate::Edge(_) => None,
+        })
+    }
+}
+
+/// Pulls routes taut and evaluates them, with reusable buffers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Puller {
+    string: TautString,
+    seen: Seen,
+    bends: Vec<Corner>,
+    gates: Vec<Gate>,
+    points: Vec<DVec3>,
+    /// The ends, and the points of portals between.
+    crossings: Vec<DVec3>,
+    /// Extra length around walls before each crossing, from the one before it.
+    extra: Vec<f64>,
+}
+
+impl Puller {
+    /// Pulls a route taut, starting from its last points.
+    pub(super) fn pull(
+        &mut self,
+        acoustics: &Acoustics,
+        layout: &Layout,
+        [from, to]: [Spot; 2],
+        route: &mut Route,
+    ) {
+        let mut is_pulled = false;
+        for _ in 0..ROUNDS {
+            let is_same = !self.bend(acoustics, layout, [from, to], route);
+            if is_same && is_pulled {
+                break;
+            }
+            is_pulled = true;
+            let gates = &route.gates;
+            let pieces = |i: usize| match &gates[i] {
+                Gate::Portal(portal) => Pieces::Portal(layout.opening(*portal).pieces()),
+                Gate::Edge(edge) => Pieces::Edge(Some(edge)),
+            };
+            let start = route.points.iter().copied();
+            route.length = self.string.pull_from(from.at, to.at, start, pieces);
+            let points = self.string.points();
+            route.points.clear();
+            route.points.extend_from_slice(&points[1..points.len() - 1]);
+        }
+        route.toward = self.string.departure();
+        route.arrival = arrival_direction(self.string.points());
+    }
+
+    /// Finds the bends around walls between the crossings of a route. Returns `true` if they are others than before.
+    fn bend(
+        &mut self,
+        acoustics: &Acoustics,
+        layout: &Layout,
+        [from, to]: [Spot; 2],
+        route: &mut Route,
+    ) -> bool {
+        self.gates.clear();
+        self.points.clear();
+        let geodesics = &acoustics.geodesics;
+        let (mut cell, mut at, mut through) = (from.cell, from.at, None);
+        let nexts = route.gates.iter().zip(&route.points);
+        let nexts = nexts.filter_map(|(gate, p)| match gate {
+            Gate::Portal(portal) => Some((Some(*portal), *p)),
+            Gate::Edge(_) => None,
+        });
+        for (portal, p) in nexts.chain([(None, to.at)]) {
+            if geodesics.is_concave(cell) {
+                let inside = |portal: Option<PortalId>, p: DVec3| match portal {
+                    Some(portal) => into_cell(&layout.opening(portal), cell, p, geodesics.off()),
+                    None => p,
+                };
+                let ends = [inside(through, at), inside(portal, p)];
+                // Without a path, as through a slit thinner than points are kept off walls, it stays straight.
+                let found = geodesics.way_with(cell, ends, &mut self.seen, &mut self.bends);
+                if found.is_some() {
+                    self.gates
+                        .extend(self.bends.iter().map(|b| Gate::Edge(b.edge)));
+                    self.points.extend(self.bends.iter().map(|b| b.at));
+                }
+            }
+            if let Some(portal) = portal {
+                self.gates.push(Gate::Portal(portal));
+                self.points.push(p);
+                let cells = layout.opening(portal).cells();
+                cell = cells[usize::from(cells[0] == cell)];
+            }
+            (at, through) = (p, portal);
+        }
+        if self.gates == route.gates {
+            return false;
+        }
+        std::mem::swap(&mut self.gates, &mut route.gates);
+        std::mem::swap(&mut self.points, &mut route.points);
+        true
+    }
+
+    /// Returns the energy along a route, by octave band. `open` has the clear share of each portal.
+    pub(super) fn energy(
+        &mut self,
+        acoustics: &Acoustics,
+        layout: &Layout,
+        [from, to]: [Spot; 2],
+        open: &[f64],
+        route: &Route,
+    ) -> [f64; N_BANDS] {
+        self.set_crossings([from, to], route);
+        let mut energy = [route.length.max(1.0).powi(-2); N_BANDS];
+        for &extra in self.extra.iter().filter(|extra| **extra > 0.0) {
+            for (energy, frequency) in energy.iter_mut().zip(OCTAVES) {
+                let loss = bend_loss(2.0 * extra * frequency / SPEED_OF_SOUND);
+                *energy *= 10f64.powf(-0.1 * loss);
+            }
+        }
+        for (i, portal) in route.portals().enumerate() {
+            let at = self.crossings[i + 1];
+            let back = self.crossings[..=i].iter().rev().copied();
+            let before = straight_end(at, back);
+            let after = straight_end(at, self.crossings[i + 2..].iter().copied());
+            let opening = layout.opening(portal);
+            let area = opening.area() * open[portal.idx()];
+            let rims = acoustics.rims(portal);
+            let beside = wall_share(&opening, rims, before) * wall_share(&opening, rims, after);
+            let detour = detour(rims, before, at, after);
+            for (energy, frequency) in energy.iter_mut().zip(OCTAVES) {
+                let wave = SPEED_OF_SOUND / frequency;
+                // Sound through the leaf passes its whole area.
+                let free = through_area(area, wave, before, at, after).powi(2);
+                let through = free + (1.0 - free) * acoustics.shut[portal.idx()];
+                let loss = beside * edge_loss(2.0 * detour / wave);
+                *energy *= through * 10f64.powf(-0.1 * loss);
+            }
+        }
+        energy
+    }
+
+    fn set_crossings(&mut self, [from, to]: [Spot; 2], route: &Route) {
+        self.crossings.clear();
+        self.extra.clear();
+        self.crossings.push(from.at);
+        let (mut start, mut at, mut length) = (from.at, from.at, 0.0);
+        let gates = route.gates.iter().zip(&route.points);
+        let gates = gates.map(|(gate, p)| (matches!(gate, Gate::Portal(_)), *p));
+        for (is_portal, p) in gates.chain([(true, to.at)]) {
+            length += at.distance(p);
+            at = p;
+            if is_portal {
+                let extra = length - start.distance(p);
+                // Less is rounding.
+                self.extra
+                    .push(if extra > 1e-9 * length { extra } else { 0.0 });
+                self.crossings.push(p);
+                (start, length) = (p, 0.0);
+            }
+        }
+    }
+}
+
+/// The convex pieces of a gate.
+enum Pieces<'a, I> {
+    Portal(I),
+    Edge(Option<&'a [DVec3; 2]>),
+}
+
+impl<'a, I: Iterator<Item = &'a [DVec3]>> Iterator for Pieces<'a, I> {
+    type Item = &'a [DVec3];
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match self {
+            Pieces::Portal(pieces) => pieces.next(),
+            Pieces::Edge(edge) => edge.take().map(<[DVec3; 2]>::as_slice),
+        }
+    }
+}
