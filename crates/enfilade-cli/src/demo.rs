@@ -156,7 +156,7 @@ fn tower() -> anyhow::Result<Made> {
                 serde_json::to_vec_pretty(&living)?,
             ),
         ],
-        hints: "  enfilade view {1} --living {4} --eye 7.5,1.6,8.5\n\
+        hints: "  enfilade view {1} --living {4} --eye 6,1.6,7.5\n\
                 and walk into the lift; F1 in the window lists all keys. {4} can be edited.",
     })
 }
