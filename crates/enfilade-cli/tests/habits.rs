@@ -40,7 +40,7 @@ const COMMANDS: [(&str, &[&str]); 18] = [
         &["pictures"],
     ),
     (
-        "path world.glb --from 2,1,2 --to 8,1,3",
+        "path world.glb --from 2,1,2 --to 8,1,3.6",
         &["length", "portals", "points"],
     ),
     (
