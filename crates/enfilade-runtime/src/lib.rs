@@ -93,5 +93,5 @@ pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};
 pub use sight::Sight;
 pub use sight_error::SightError;
 pub use sightline::{SightHit, Sightlines};
-pub use state::SightState;
+pub use state::{SavedDoors, SavedDoorsError, SightState};
 pub use view::{View, ViewError};

@@ -35,6 +35,31 @@ pub struct SightState {
     shares: Vec<Option<f32>>,
 }
 
+/// State of the doors of a world as plain values, to be saved with any format of `serde`.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SavedDoors {
+    /// Position of each leaf that moves, as [`SightState::shares`].
+    pub shares: Vec<Option<f32>>,
+    /// Closed portals, ascending.
+    pub closed: Vec<u32>,
+    /// Narrowed portals, ascending, each with its planes: open where `n · p + d >= 0`.
+    pub narrowed: Vec<(u32, Vec<[f32; 4]>)>,
+    /// Locked cells, ascending.
+    pub locked: Vec<u32>,
+}
+
+/// Reason why saved doors do not fit a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "these are the doors of another world: {saved} moving leaves, where this one has {own}, or portals or cells that it has not"
+)]
+pub struct SavedDoorsError {
+    /// Leaves in the saved state.
+    pub saved: usize,
+    /// Leaves of the world.
+    pub own: usize,
+}
+
 /// Flag of a closed portal.
 const CLOSED: u8 = 0x80;
 /// Flag of a portal blocked by its shut leaves.
@@ -63,6 +88,75 @@ impl SightState {
             doors: Arc::default(),
             shares: Vec::new(),
         }
+    }
+
+    /// Returns the state as plain values. O(portals).
+    #[must_use]
+    pub fn saved(&self) -> SavedDoors {
+        let portals = || (0..).zip(&self.portals);
+        let locked = (0..).zip(&self.is_locked).filter(|(_, is)| **is);
+        SavedDoors {
+            shares: self.shares.clone(),
+            closed: (portals().filter(|(_, f)| **f & CLOSED != 0).map(|(p, _)| p)).collect(),
+            narrowed: (portals().filter(|(_, f)| **f & N_CUTS != 0))
+                .map(|(p, _)| (p, self.cuts(p).to_vec()))
+                .collect(),
+            locked: locked.map(|(c, _)| c).collect(),
+        }
+    }
+
+    /// Restores a saved state. O(portals).
+    ///
+    /// # Errors
+    ///
+    /// If it is of another world; nothing changes then.
+    pub fn restore(&mut self, saved: &SavedDoors) -> Result<(), SavedDoorsError> {
+        let portals = saved
+            .closed
+            .iter()
+            .chain(saved.narrowed.iter().map(|n| &n.0));
+        let is_own = saved.shares.len() == self.shares.len()
+            && portals.copied().all(|p| (p as usize) < self.portals.len())
+            && saved.narrowed.iter().all(|n| n.1.len() <= MAX_CUTS)
+            && saved
+                .locked
+                .iter()
+                .all(|c| (*c as usize) < self.is_locked.len());
+        if !is_own {
+            return Err(SavedDoorsError {
+                saved: saved.shares.len(),
+                own: self.shares.len(),
+            });
+        }
+        self.portals.fill(0);
+        self.is_locked.fill(false);
+        self.shares.clone_from(&saved.shares);
+        for p in 0..self.portals.len() as u32 {
+            self.update_shut(p);
+        }
+        for &p in &saved.closed {
+            self.portals[p as usize] |= CLOSED;
+        }
+        for (p, planes) in &saved.narrowed {
+            self.portals[*p as usize] |= planes.len() as u8;
+            self.cuts[*p as usize][..planes.len()].copy_from_slice(planes);
+        }
+        for &c in &saved.locked {
+            self.is_locked[c as usize] = true;
+        }
+        Ok(())
+    }
+
+    /// Updates the flag of a portal that its leaves may block.
+    fn update_shut(&mut self, portal: u32) {
+        let own = self.doors.slots(PortalId(portal));
+        let is_shut = !own.is_empty() && own.iter().all(|&s| self.shares[s as usize] == Some(0.0));
+        let flags = &mut self.portals[portal as usize];
+        *flags = if is_shut && !self.doors.is_clear(portal) {
+            *flags | SHUT
+        } else {
+            *flags & !SHUT
+        };
     }
 
     /// Opens a portal fully, and its leaves.
@@ -95,14 +189,7 @@ impl SightState {
         }
         for &slot in doors.slots(portal) {
             for &p in doors.portals(slot) {
-                let own = doors.slots(PortalId(p));
-                let is_shut = own.iter().all(|&s| self.shares[s as usize] == Some(0.0));
-                let flags = &mut self.portals[p as usize];
-                *flags = if is_shut && !doors.is_clear(p) {
-                    *flags | SHUT
-                } else {
-                    *flags & !SHUT
-                };
+                self.update_shut(p);
             }
         }
     }

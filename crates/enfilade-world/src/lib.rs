@@ -15,6 +15,7 @@ mod layout;
 mod lights;
 mod paths;
 mod pose;
+mod saved;
 mod shape;
 mod sound;
 mod space;
@@ -32,6 +33,9 @@ pub use paths::{
     PathFollower, PathSearch, Progress, Sampling, WalkMap, Ways,
 };
 pub use pose::Pose;
+pub use saved::{
+    SavedActor, SavedActors, SavedError, SavedPose, SavedSpace, SavedThing, SavedThings, SavedTie,
+};
 pub use shape::{Shape, ShapeError};
 pub use sound::{
     AUDIO_BLOCK, Acoustics, Assumed, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Heard,

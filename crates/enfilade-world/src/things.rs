@@ -10,6 +10,7 @@
 mod flood;
 mod id;
 mod links;
+mod saved;
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;

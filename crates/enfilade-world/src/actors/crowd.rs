@@ -15,6 +15,7 @@ use enfilade_geom::DVec3;
 use crate::actors::chance::Chance;
 use crate::actors::plan::{Knot, PlanDraft, next_change, part_at, place_at};
 use crate::actors::wheel::Wheel;
+use crate::saved::{SavedActor, SavedActors, SavedError};
 
 /// Least duration of a plan, which bounds the number of events. [Units: s]
 const LEAST_PLAN: f64 = 1e-3;
@@ -150,6 +151,103 @@ impl Actors {
             n_told: 0,
             due: Vec::new(),
             n_updates: 0,
+        }
+    }
+
+    /// Returns the state of all as plain values.
+    #[must_use]
+    pub fn saved(&self) -> SavedActors {
+        let plan = |id: usize| {
+            let knots = self.members[id].knots.iter().zip(&self.points[id]);
+            let finite = |time: f64| time.is_finite().then_some(time);
+            let points = knots.map(|(k, p)| (finite(k.time), k.cell.0, p.to_array()));
+            points.collect()
+        };
+        let members = self.members.iter().enumerate();
+        let mut told: Vec<Told> = self.told.iter().map(|t| t.0).collect();
+        told.sort_unstable();
+        SavedActors {
+            seed: self.seed,
+            now: self.now,
+            members: members
+                .map(|(id, m)| SavedActor {
+                    is_removed: m.cell == NONE,
+                    n_events: m.n_events,
+                    plan: plan(id),
+                })
+                .collect(),
+            told: told
+                .iter()
+                .map(|t| (unordered(t.time), t.order, t.actor, t.what))
+                .collect(),
+            n_told: self.n_told,
+        }
+    }
+
+    /// Makes actors that play on from a saved state, in a world of `n_cells` cells.
+    ///
+    /// # Errors
+    ///
+    /// If a number is not finite, or a cell or actor does not exist.
+    pub fn restored(n_cells: usize, saved: &SavedActors) -> Result<Self, SavedError> {
+        let mut actors = Self::new(n_cells, saved.seed);
+        actors.now = saved.now;
+        actors.n_told = saved.n_told;
+        let what = "actor";
+        for (index, it) in saved.members.iter().enumerate() {
+            let times = it.plan.iter().filter_map(|k| k.0);
+            let mut numbers = it.plan.iter().flat_map(|k| k.2).chain(times);
+            let is_in_order = it.plan.is_sorted_by_key(|k| k.0.unwrap_or(f64::INFINITY));
+            if !saved.now.is_finite() || !numbers.all(f64::is_finite) {
+                return Err(SavedError::NotFinite { what, index });
+            }
+            let mut cells = it.plan.iter().map(|k| k.1 as usize);
+            let is_empty = it.plan.is_empty() && !it.is_removed;
+            if is_empty || !is_in_order || !cells.all(|c| c < n_cells) {
+                return Err(SavedError::NoSuch { what, index });
+            }
+            actors.put(it);
+        }
+        for &(time, order, actor, what) in &saved.told {
+            actors.told.push(Reverse(Told {
+                time: ordered(time),
+                order,
+                actor,
+                what,
+            }));
+        }
+        Ok(actors)
+    }
+
+    /// Adds an actor that was saved.
+    fn put(&mut self, it: &SavedActor) {
+        let id = self.members.len() as u32;
+        let knots = it.plan.iter().map(|&(time, cell, _)| Knot {
+            time: time.unwrap_or(f64::INFINITY),
+            cell: CellId(cell),
+        });
+        let knots: Vec<Knot> = knots.collect();
+        self.points
+            .push(it.plan.iter().map(|k| DVec3::from_array(k.2)).collect());
+        self.members.push(Member {
+            due: f64::INFINITY,
+            end: match &knots[..] {
+                [_, .., last] => last.time,
+                _ => f64::INFINITY,
+            },
+            knots,
+            part: 0,
+            cell: NONE,
+            before: NONE,
+            after: NONE,
+            n_events: it.n_events,
+        });
+        if !it.is_removed {
+            self.look_ahead(id, self.now);
+            let part = self.members[id as usize].part as usize;
+            let cell = self.members[id as usize].knots[part].cell;
+            self.link(id, cell.0);
+            self.list(id);
         }
     }
 

@@ -4,6 +4,7 @@ use enfilade_cpg::{CellId, PortalId};
 use enfilade_runtime::SightState;
 
 use super::{Change, PartId, Space};
+use crate::saved::{SavedError, SavedPose, SavedSpace};
 
 impl Space {
     /// Returns the changes after number `known`, oldest first, or `None` if some are no longer kept; sets `known` to the number
@@ -81,6 +82,41 @@ impl Space {
         );
         *known = state;
         self.changes.reset();
+    }
+
+    /// Returns the poses and doors of all parts as plain values.
+    #[must_use]
+    pub fn saved(&self) -> SavedSpace {
+        let parts = self.parts.iter();
+        let parts = parts.map(|p| (SavedPose::new(&p.local), p.state.saved()));
+        SavedSpace {
+            parts: parts.collect(),
+        }
+    }
+
+    /// Restores poses and doors; the parts themselves must have been added.
+    ///
+    /// # Errors
+    ///
+    /// If the state is of another space, or a pose is not a rigid motion.
+    pub fn restore(&mut self, saved: &SavedSpace) -> Result<(), SavedError> {
+        let (n, own) = (saved.parts.len(), self.parts.len());
+        if n != own {
+            return Err(SavedError::Parts { saved: n, own });
+        }
+        for (part, (pose, doors)) in (0..).zip(&saved.parts) {
+            let index = part as usize;
+            let state = &mut self.parts[index].state;
+            let known = state.restore(doors);
+            known.map_err(|source| SavedError::Doors { part, source })?;
+            let what = "part";
+            let bad = |_| SavedError::NotFinite { what, index };
+            if part > 0 {
+                self.set_pose(PartId(part), pose.pose()).map_err(bad)?;
+            }
+        }
+        self.changes.reset();
+        Ok(())
     }
 
     fn door_changed(&mut self, part: PartId, portal: PortalId) {
