@@ -131,7 +131,6 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
             heard
         }
     };
-    tell(&heard.absorption)?;
     let out = outputs.printed();
     if args.json {
         return print_json(
@@ -143,6 +142,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
             }),
         );
     }
+    tell(&heard.absorption)?;
     print_table(out, &heard.rows)
 }
 
