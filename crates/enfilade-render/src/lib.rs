@@ -8,6 +8,8 @@
 //! A lift in a tower, a person, and a lamp in the lift:
 //!
 //! ```no_run
+//! use std::sync::Arc;
+//!
 //! use enfilade_cpg::World;
 //! use enfilade_geom::DVec3;
 //! use enfilade_render::{
@@ -15,15 +17,15 @@
 //! };
 //! use enfilade_world::{PartId, Pose, Space, SpaceViewer};
 //!
-//! fn ride(tower: &World, cabin: &World, camera: Camera) -> Result<Picture, Box<dyn std::error::Error>> {
-//!     let mut space = Space::new(tower)?;
-//!     let lift = space.add_part(cabin, PartId::ROOT, Pose::IDENTITY)?;
+//! fn ride(tower: Arc<World>, cabin: Arc<World>, camera: Camera) -> Result<Picture, Box<dyn std::error::Error>> {
+//!     let mut space = Space::new(tower.clone())?;
+//!     let lift = space.add_part(cabin.clone(), PartId::ROOT, Pose::IDENTITY)?;
 //!     let mut viewer = SpaceViewer::new(&space);
-//!     let mut studio = Studio::new(Gpu::open(&AdapterChoice::Best)?, tower)?;
-//!     studio.add_light(tower)?;
+//!     let mut studio = Studio::new(Gpu::open(&AdapterChoice::Best)?, &tower)?;
+//!     studio.add_light(&tower)?;
 //!     // Once for each part, in their order.
-//!     studio.add_part(cabin, space.sight(lift))?;
-//!     studio.add_part_light(lift, cabin, space.sight(lift))?;
+//!     studio.add_part(&cabin, space.sight(lift))?;
+//!     studio.add_part_light(lift, &cabin, space.sight(lift))?;
 //!     studio.set_lamps(vec![LampLight {
 //!         part: lift,
 //!         at: [0.0, 2.2, 0.0],
