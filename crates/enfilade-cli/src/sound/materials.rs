@@ -133,7 +133,8 @@ impl Absorptions {
 pub(super) fn tell(absorptions: &[Absorption]) -> anyhow::Result<()> {
     let whole: f64 = absorptions.iter().map(|a| a.area).sum();
     let guessed = absorptions.iter().filter(|a| a.is_guess);
-    let guessed: f64 = guessed.map(|a| a.area).sum();
+    // From 0 up: an empty sum is -0, which is printed so.
+    let guessed = guessed.fold(0.0, |sum, a| sum + a.area);
     writeln!(Told, "absorption of walls indoors, at 125 Hz to 4 kHz:")?;
     for a in absorptions {
         let numbers: Vec<String> = a.bands.iter().map(|x| format!("{x:.2}")).collect();
