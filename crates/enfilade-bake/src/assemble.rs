@@ -86,6 +86,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     let (details, detail_meshes) = details(scene, &partition.locator, &mut cells, cut.allowance);
     let mut world = World {
         graph: CellPortalGraph {
+            specials: Vec::new(),
             cells,
             portals,
             locator: partition.locator.clone(),

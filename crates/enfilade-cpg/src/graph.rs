@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
-use crate::{CellId, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns};
+use crate::{CellId, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns, SpecialPortal};
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,6 +64,8 @@ pub struct CellPortalGraph {
     pub cells: Vec<Cell>,
     /// Indexed by [`PortalId`].
     pub portals: Vec<Portal>,
+    /// Mirrors, monitors, teleporters. Indexed by [`SpecialId`](crate::SpecialId).
+    pub specials: Vec<SpecialPortal>,
     /// Finds the cell of a point.
     pub locator: Locator,
     /// Origin of the graph.

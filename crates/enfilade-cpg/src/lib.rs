@@ -20,6 +20,7 @@ mod pvs;
 mod seals;
 mod sight_graph;
 mod sources;
+mod special;
 mod validate;
 pub mod wire;
 
@@ -37,4 +38,5 @@ pub use pvs::Pvs;
 pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use sources::SourceRuns;
+pub use special::{MonitorCamera, Pass, SpecialId, SpecialPortal, SpecialShape, Way};
 pub use validate::{GraphError, MAX_REPORTED};

@@ -259,6 +259,7 @@ impl<'a> Reader<'a> {
         let locator = self.locator()?;
         let p = &graph.provenance;
         Ok(CellPortalGraph {
+            specials: Vec::new(),
             cells,
             portals,
             locator,

@@ -122,6 +122,7 @@ pub(crate) fn two_rooms() -> World {
         root: 0,
     };
     let graph = CellPortalGraph {
+        specials: Vec::new(),
         cells: vec![
             cell("cell-0", [[0.0, 0.0, 0.0], [4.0, 3.0, 5.0]], &[0]),
             cell("cell-1", [[4.0, 0.0, 0.0], [8.0, 3.0, 5.0]], &[0, 1]),
