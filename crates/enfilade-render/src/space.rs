@@ -285,8 +285,7 @@ impl Studio {
 
 /// Returns a view of a part's frame, given in another's.
 fn view_in(space: &Space, part: PartId, frame: PartId, view: &View) -> View {
-    let to_frame = space.between(part, frame);
-    view.in_frame(&to_frame.matrix3(), to_frame.at)
+    view.in_frame(&space.between(part, frame).into())
 }
 
 fn counts(lists: &[(PartId, RenderList)]) -> SpaceCounts {

@@ -26,12 +26,28 @@ pub(crate) struct Exit {
     pub(crate) radius: f32,
     /// Unit normal, towards `to`.
     pub(crate) normal: [f32; 3],
+    /// The cell behind it; or [`SPECIAL`] plus the index of a special portal.
     pub(crate) to: u32,
+    /// [`NO_PORTAL`] for a special portal that is no side of a doorway.
     pub(crate) portal: u32,
     pub(crate) first_corner: u32,
     pub(crate) n_corners: u32,
     /// True if the vertices run counter-clockwise about `normal`.
     pub(crate) is_turned: bool,
+}
+
+/// Marks an exit by a special portal.
+pub(crate) const SPECIAL: u32 = 1 << 31;
+
+/// Stands for no portal: open, without planes that narrow it.
+pub(crate) const NO_PORTAL: u32 = u32::MAX;
+
+impl Exit {
+    /// Returns the index of the special portal that it leads through.
+    #[inline]
+    pub(crate) fn special(&self) -> Option<u32> {
+        (self.to & SPECIAL != 0).then_some(self.to & !SPECIAL)
+    }
 }
 
 /// A contiguous run of exits of one cell, or of groups of them. Fits one cache line.

@@ -147,7 +147,7 @@ fn next_crossing(
         let center = point(exit.center);
         let (da, db) = (normal.dot(a - center), normal.dot(b - center));
         // A step that ends on the plane has not crossed it.
-        if exit.portal == last || da > 0.0 || db <= 0.0 {
+        if exit.special().is_some() || exit.portal == last || da > 0.0 || db <= 0.0 {
             continue;
         }
         let at = da / (da - db);

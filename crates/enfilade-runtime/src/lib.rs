@@ -59,7 +59,8 @@
 //!
 //! Answers are supersets, not exact: triangles hidden by a wall of their own cell are included unless a
 //! large polygon hides the whole chunk. A chunk that two faces of an all-around view show is listed once;
-//! drawing it for both is the caller's task. Mirrors are not followed yet.
+//! drawing it for both is the caller's task. [Special portals](enfilade_cpg::SpecialPortal) in view are listed, not followed:
+//! what is seen in them is a matter of `enfilade_world::SpaceViewer`.
 
 mod boxes;
 mod chunks;
@@ -88,7 +89,7 @@ pub use follow::{Follower, Step};
 pub use options::SightOptions;
 pub use pick::{Hit, NotFinite, Target};
 pub use region::Narrowing;
-pub use see::{Crossing, SeeOptions, StepQuestion, Viewer, Window};
+pub use see::{Crossing, Gate, SeeOptions, SpecialView, StepQuestion, Viewer, Window};
 pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};
 pub use sight::Sight;
 pub use sight_error::SightError;

@@ -280,8 +280,16 @@ impl Shadows {
 
     /// Sets up the shadows of those occluders of `cell` that look largest from `eye`.
     ///
-    /// `margin` is the largest shift of a plane by rounding.
-    pub(crate) fn cast(&mut self, occluders: &Occluders, cell: u32, eye: DVec3, margin: f64) {
+    /// `margin` is the largest shift of a plane by rounding. Occluders must lie `beyond` a plane, given by its normal and its
+    /// distance from the eye.
+    pub(crate) fn cast(
+        &mut self,
+        occluders: &Occluders,
+        cell: u32,
+        eye: DVec3,
+        margin: f64,
+        beyond: Option<(DVec3, f64)>,
+    ) {
         self.len = 0;
         let c = cell as usize;
         if occluders.all.is_empty() || occluders.first[c] == occluders.first[c + 1] {
@@ -293,6 +301,13 @@ impl Shadows {
             let to_eye = eye - o.middle;
             let height = o.normal.dot(to_eye);
             if height < 0.05 && !(o.is_two_sided && height < -0.05) {
+                continue;
+            }
+            let is_before = |(n, least): (DVec3, f64)| {
+                let mut corners = o.corners[..o.n_corners].iter();
+                corners.any(|c| n.dot(c - eye) < least + margin)
+            };
+            if beyond.is_some_and(is_before) {
                 continue;
             }
             let d2 = to_eye.length_squared();

@@ -35,7 +35,7 @@ use traversal::Traversal;
 
 pub use steps::StepQuestion;
 pub use viewer::{SeeOptions, Viewer};
-pub use window::{Crossing, Window};
+pub use window::{Crossing, Gate, SpecialView, Window};
 
 impl Viewer {
     /// Returns everything in `view` that is visible in `sight` with the doors of `state`. `sight` must be the one

@@ -1,6 +1,6 @@
 //! The answer to a view: visible things in lists, near to far.
 
-use enfilade_cpg::{CellId, PortalId};
+use enfilade_cpg::{CellId, PortalId, SpecialId};
 
 /// Index into [`Sight::chunks`](crate::Sight::chunks).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -52,6 +52,7 @@ pub(crate) struct Lists {
     pub(crate) cells: Vec<CellId>,
     pub(crate) portals: Vec<PortalId>,
     pub(crate) stopped: Vec<(PortalId, CellId)>,
+    pub(crate) specials: Vec<SpecialId>,
     pub(crate) chunks: Vec<ChunkId>,
     pub(crate) details: Vec<DetailId>,
     pub(crate) n_triangles: u64,
@@ -119,6 +120,12 @@ impl<'a> Seen<'a> {
     #[must_use]
     pub fn stopped(&self) -> &'a [(PortalId, CellId)] {
         &self.lists.stopped
+    }
+
+    /// Returns the special portals in view, each once.
+    #[must_use]
+    pub fn specials(&self) -> &'a [SpecialId] {
+        &self.lists.specials
     }
 
     /// Returns the visible chunks of structural batches, each once, by cells near to far.

@@ -50,6 +50,7 @@ pub struct Sight {
     indices: Vec<Vec<u32>>,
     pub(crate) doors: Arc<Doors>,
     pub(crate) n_portals: usize,
+    n_specials: usize,
     pub(crate) n_triangles: u64,
     /// Largest error of a stored outline. [Units: wu]
     pub(crate) tolerance: f64,
@@ -76,10 +77,7 @@ impl Sight {
         let n_cells = world.graph.cells.len();
         let doors = Doors::of(world)?;
         let drawn = Drawn::of(world, options, &doors)?;
-        let mut portals = Portals::default();
-        for (i, portal) in world.graph.portals.iter().enumerate() {
-            portals.add(PortalId(i as u32), portal, n_cells)?;
-        }
+        let mut portals = Portals::of(&world.graph)?;
         let extent = drawn.extent.max(portals.extent);
         // Snapping by a builder plus rounding in a file, for outline and wall each; `enfilade-verify` uses
         // the same bound.
@@ -114,6 +112,7 @@ impl Sight {
             indices: drawn.indices,
             doors: Arc::new(doors),
             n_portals: world.graph.portals.len(),
+            n_specials: world.graph.specials.len(),
             n_triangles,
             tolerance,
             extent: extent.max(boxes.extent),
@@ -130,6 +129,12 @@ impl Sight {
     #[must_use]
     pub fn n_portals(&self) -> usize {
         self.n_portals
+    }
+
+    /// Returns the number of special portals.
+    #[must_use]
+    pub fn n_specials(&self) -> usize {
+        self.n_specials
     }
 
     /// Returns the number of structural batches.

@@ -22,6 +22,14 @@ pub enum SightError {
         /// Number of its vertices.
         n_corners: usize,
     },
+    /// A special portal refers to a cell or portal that it is not at, leads nowhere, or its polygon has no area.
+    #[error(
+        "special portal {special} refers to a cell or portal that it is not at, leads nowhere, or its polygon has no area"
+    )]
+    Special {
+        /// The special portal.
+        special: u32,
+    },
     /// A batch or detail refers to a cell, mesh or vertex that does not exist, or to a vertex that is not
     /// finite.
     #[error(

@@ -10,7 +10,7 @@
 
 use glam::{DMat3, DVec3};
 
-use enfilade_geom::DMat4;
+use enfilade_geom::{DMat4, Similarity};
 
 /// Widest angle between opposite sides of a view with one face; wider views look all around.
 /// [Units: rad]
@@ -225,15 +225,24 @@ impl View {
         self.eye.as_vec3().to_array()
     }
 
-    /// Returns the view in the frame of another world: `turn` maps that frame's directions to this one's, `at` is its origin
-    /// in this one. [Units: wu]
+    /// Returns the position of the eye, which a view in another frame has in `f64`. [Units: wu]
     #[must_use]
-    pub fn in_frame(&self, turn: &DMat3, at: DVec3) -> Self {
+    pub fn exact_eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// Returns the view in another frame: `map` maps that frame to this one. Seen by a reflection, left and right are exchanged
+    /// in the frame, not on the screen.
+    #[must_use]
+    pub fn in_frame(&self, map: &Similarity) -> Self {
         let mut view = self.clone();
-        view.eye = turn.transpose() * (self.eye - at);
+        view.eye = map.point_back(self.eye);
+        view.far = self.far / map.scale.abs();
+        // Depth is a distance in the frame, so the scale has no part in it.
+        let turn = DMat3::from_quat(map.turn) * map.scale.signum();
         for face in &mut view.faces {
-            face.map *= *turn;
-            face.normals *= *turn;
+            face.map *= turn;
+            face.normals *= turn;
         }
         view
     }

@@ -6,6 +6,7 @@
 mod doors;
 mod grid;
 mod scale;
+mod specials;
 mod world;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use crate::rng::Rng;
 pub use doors::with_doors;
 use grid::{Face, Grid};
 pub use scale::scaled_world;
+pub use specials::with_specials;
 use world::{FaceHole, world_of};
 
 /// Parameters of [`room_grid`].

@@ -1,7 +1,7 @@
 //! Shared cell and portal layout of all queries.
 
-use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DVec3, Plane, Winding, world_tolerance};
+use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, SpecialId, Way, World};
+use enfilade_geom::{Aabb, DVec3, Plane, Similarity, Winding, world_tolerance};
 
 /// The cells and portals of a world in double precision, in contiguous arrays.
 ///
@@ -16,6 +16,9 @@ pub struct Layout {
     /// Per exit, the box around its opening; contiguous, for distance bounds to all of them.
     exit_bounds: Vec<Aabb>,
     openings: Vec<OpeningShape>,
+    specials: Vec<SpecialSide>,
+    /// By cell.
+    specials_by_cell: Vec<(CellId, SpecialId)>,
     /// Per piece its first vertex, and the number of all.
     first_corner: Vec<u32>,
     corners: Vec<DVec3>,
@@ -55,6 +58,17 @@ struct OpeningShape {
     pieces: [u32; 2],
 }
 
+/// A special portal in a layout.
+#[derive(Clone, Debug)]
+struct SpecialSide {
+    shape: OpeningShape,
+    portal: Option<PortalId>,
+    /// Per pass, from the side of those who look to the side that is seen.
+    maps: Vec<Option<Similarity>>,
+    /// The cell where those who pass come out, and the pass.
+    leads_to: Option<(CellId, usize)>,
+}
+
 /// A portal's true opening.
 #[derive(Clone, Copy)]
 pub struct Opening<'a> {
@@ -83,7 +97,13 @@ impl Layout {
         let mut first_exit = vec![0];
         let mut exits = Vec::new();
         for cell in graph.cell_ids() {
-            exits.extend(graph.exits(cell).map(|e| Exit {
+            // A special side replaces the way, unless it lets through.
+            let is_way = |portal| {
+                let side = graph.special_side(portal, cell);
+                side.is_none_or(|s| graph.specials[s.idx()].is_through())
+            };
+            let ways = graph.exits(cell).filter(|e| is_way(e.id));
+            exits.extend(ways.map(|e| Exit {
                 portal: e.id,
                 to: e.to,
             }));
@@ -99,30 +119,85 @@ impl Layout {
             exits,
             exit_bounds: Vec::new(),
             openings: Vec::new(),
+            specials: Vec::new(),
+            specials_by_cell: Vec::new(),
             first_corner: vec![0],
             corners: Vec::new(),
             locator: graph.locator.clone(),
             tolerance: world_tolerance(extent),
         };
         for portal in &graph.portals {
-            layout.add_opening(portal);
+            let opening = layout.opening_of(portal);
+            layout.openings.push(opening);
         }
+        for id in graph.special_ids() {
+            layout.add_special(id, world);
+        }
+        layout.specials_by_cell.sort_unstable();
         let bounds = |e: &Exit| layout.openings[e.portal.idx()].bounds;
         layout.exit_bounds = layout.exits.iter().map(bounds).collect();
         layout
     }
 
-    fn add_opening(&mut self, portal: &Portal) {
+    fn add_special(&mut self, id: SpecialId, world: &World) {
+        let side = &world.graph.specials[id.idx()];
+        let (normal, pieces) = world.graph.special_opening(id);
+        let (first_piece, first) = (self.first_corner.len() as u32 - 1, self.corners.len());
+        let area = (pieces.iter())
+            .map(|piece| self.add_piece(&piece.points, normal))
+            .sum();
+        let mut numbered = (0..).zip(&side.passes);
+        let leads_to = numbered.find_map(|(pass, it)| match it.way {
+            Way::Lead { to, .. } => Some((to, pass)),
+            _ => None,
+        });
+        let beyond = leads_to.map_or(side.cell, |(to, _)| to);
+        self.specials.push(SpecialSide {
+            shape: self.shape_of(
+                [side.cell, beyond],
+                PortalKind::Open,
+                normal,
+                area,
+                (first_piece, first),
+            ),
+            portal: side.portal(),
+            maps: (0..side.passes.len())
+                .map(|pass| world.graph.map_of_pass(id, pass))
+                .collect(),
+            leads_to,
+        });
+        self.specials_by_cell.push((side.cell, id));
+    }
+
+    fn opening_of(&mut self, portal: &Portal) -> OpeningShape {
         let normal = point(portal.normal).normalize_or_zero();
-        let first_piece = self.first_corner.len() as u32 - 1;
-        let first = self.corners.len();
-        let mut area = 0.0;
-        for piece in &portal.pieces {
-            area += self.add_piece(piece, normal);
-        }
+        let (first_piece, first) = (self.first_corner.len() as u32 - 1, self.corners.len());
+        let mut add = |piece: &[[f32; 3]]| {
+            let points: Vec<DVec3> = piece.iter().map(|p| point(*p)).collect();
+            self.add_piece(&points, normal)
+        };
+        let mut area = portal.pieces.iter().map(|piece| add(piece)).sum();
         if area == 0.0 {
-            area = self.add_piece(&portal.outline, normal);
+            area = add(&portal.outline);
         }
+        self.shape_of(
+            portal.cells,
+            portal.kind,
+            normal,
+            area,
+            (first_piece, first),
+        )
+    }
+
+    /// Returns the shape of an opening whose pieces and vertices are the last ones.
+    fn shape_of(
+        &self,
+        cells: [CellId; 2],
+        kind: PortalKind,
+        normal: DVec3,
+        area: f64,
+        (first_piece, first): (u32, usize),
+    ) -> OpeningShape {
         let own = &self.corners[first..];
         let bounds = Aabb::of_points(own);
         let center = if own.is_empty() {
@@ -131,27 +206,26 @@ impl Layout {
             bounds.center()
         };
         let radius = own.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
-        self.openings.push(OpeningShape {
-            cells: portal.cells,
-            kind: portal.kind,
+        OpeningShape {
+            cells,
+            kind,
             normal,
             center,
             radius,
             area,
             bounds,
             pieces: [first_piece, self.first_corner.len() as u32 - 1],
-        });
+        }
     }
 
     /// Adds a piece, counter-clockwise about `normal`, unless it has no area; returns its area.
-    fn add_piece(&mut self, corners: &[[f32; 3]], normal: DVec3) -> f64 {
-        if corners.iter().flatten().any(|x| !x.is_finite()) || normal == DVec3::ZERO {
+    fn add_piece(&mut self, points: &[DVec3], normal: DVec3) -> f64 {
+        if !points.iter().all(|p| p.is_finite()) || normal == DVec3::ZERO {
             return 0.0;
         }
-        let points: Vec<DVec3> = corners.iter().map(|p| point(*p)).collect();
         let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
         let plane = Plane::through(middle, normal);
-        let hull: Winding = Winding::hull_in_plane(&plane, &points);
+        let hull: Winding = Winding::hull_in_plane(&plane, points);
         let area = hull.area();
         if hull.points.len() < 3 || area <= 0.0 {
             return 0.0;
@@ -219,6 +293,77 @@ impl Layout {
             layout: self,
             shape: &self.openings[portal.idx()],
         }
+    }
+
+    /// Returns the special portals that a cell sees, ascending. O(log).
+    pub fn specials_of(&self, cell: CellId) -> impl ExactSizeIterator<Item = SpecialId> {
+        let all = &self.specials_by_cell;
+        let first = all.partition_point(|s| s.0 < cell);
+        let end = all.partition_point(|s| s.0 <= cell);
+        all[first..end].iter().map(|s| s.1)
+    }
+
+    /// Returns a special portal's polygon: the normal points out of its cell, the first of the opening's cells; the second is
+    /// the cell where those who pass come out, or the first again.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such special portal; likewise in all queries of one.
+    #[must_use]
+    pub fn special_opening(&self, special: SpecialId) -> Opening<'_> {
+        Opening {
+            layout: self,
+            shape: &self.specials[special.idx()].shape,
+        }
+    }
+
+    /// Returns the doorway of which a special portal is a side.
+    #[must_use]
+    pub fn portal_of_special(&self, special: SpecialId) -> Option<PortalId> {
+        self.specials[special.idx()].portal
+    }
+
+    /// Returns the map of a pass, from the side of those who look to the side that is seen; `None` for a monitor.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such pass.
+    #[must_use]
+    pub fn map_of_pass(&self, special: SpecialId, pass: usize) -> Option<&Similarity> {
+        self.specials[special.idx()].maps[pass].as_ref()
+    }
+
+    /// Returns where those who pass a special portal come out: the cell, and the map from here to there. `None` if nobody
+    /// passes it.
+    #[must_use]
+    pub fn passage(&self, special: SpecialId) -> Option<(CellId, &Similarity)> {
+        let side = &self.specials[special.idx()];
+        let (to, pass) = side.leads_to?;
+        Some((to, side.maps[pass].as_ref()?))
+    }
+
+    /// Returns the rectangle around a special portal, upright as far as its plane allows, as seen from its cell: its lower left
+    /// vertex, and its edges to the right and up. A monitor's picture fills it. [Units: wu]
+    #[must_use]
+    pub fn special_rectangle(&self, special: SpecialId) -> [DVec3; 3] {
+        let opening = self.special_opening(special);
+        let normal = opening.normal();
+        let right = normal.cross(DVec3::Y).try_normalize();
+        // As far as a level plane allows: with -Z up, as on a map.
+        let right = right
+            .filter(|_| normal.y.abs() < 1.0 - 1e-9)
+            .unwrap_or(DVec3::X);
+        let up = right.cross(normal);
+        let corners = || opening.pieces().flatten();
+        let range = |axis: DVec3| {
+            let along = corners().map(move |p| axis.dot(*p - opening.center()));
+            along.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+                [a.min(x), b.max(x)]
+            })
+        };
+        let ([left, r], [bottom, top]) = (range(right), range(up));
+        let corner = opening.center() + right * left + up * bottom;
+        [corner, right * (r - left), up * (top - bottom)]
     }
 
     /// Returns the cell of a point; `None` in solid matter and for points that are not finite. Takes about 100 ns. [Units: wu]

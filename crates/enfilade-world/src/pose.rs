@@ -1,6 +1,6 @@
 //! Rigid motions between frames.
 
-use enfilade_geom::{DMat3, DMat4, DQuat, DVec3};
+use enfilade_geom::{DMat3, DMat4, DQuat, DVec3, Similarity};
 
 /// A rigid motion: rotate, then translate. Maps points of a frame to the frame in which it stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +14,12 @@ pub struct Pose {
 impl Default for Pose {
     fn default() -> Self {
         Self::IDENTITY
+    }
+}
+
+impl From<Pose> for Similarity {
+    fn from(pose: Pose) -> Self {
+        Self::rigid(pose.turn, pose.at)
     }
 }
 

@@ -1,10 +1,10 @@
 //! Results of a visit: cells, portals, and the items whose boxes are in the view.
 
-use enfilade_cpg::{CellId, PortalId};
+use enfilade_cpg::{CellId, PortalId, SpecialId};
 use glam::{DVec3, Vec3};
 
 use super::traversal::Traversal;
-use super::window::NONE;
+use super::window::{NONE, SpecialView, Window};
 use crate::boxes::Root;
 use crate::exits::Exit;
 use crate::region::Region;
@@ -26,6 +26,30 @@ impl Traversal<'_, '_> {
             *stamp = self.viewer.frame_stamp;
             let stop = (PortalId(exit.portal), CellId(exit.to));
             self.viewer.out.stopped.push(stop);
+        }
+    }
+
+    /// Lists a special portal, and records its view.
+    pub(super) fn add_special(&mut self, special: u32, window: Window, is_at_eye: bool) {
+        let viewer = &mut *self.viewer;
+        if viewer
+            .stepping
+            .gate
+            .is_some_and(|g| g.back == Some(SpecialId(special)))
+        {
+            return;
+        }
+        let stamp = &mut viewer.special_stamps[special as usize];
+        if *stamp != viewer.frame_stamp {
+            *stamp = viewer.frame_stamp;
+            viewer.out.specials.push(SpecialId(special));
+        }
+        if viewer.stepping.is_on {
+            viewer.stepping.specials.push(SpecialView {
+                special: SpecialId(special),
+                window,
+                is_at_eye,
+            });
         }
     }
 

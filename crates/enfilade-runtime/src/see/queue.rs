@@ -90,15 +90,16 @@ impl Traversal<'_, '_> {
             if mark.n_entered >= MAX_ENTERED + MAX_JOINED {
                 region = Region::screen();
             }
-            entry = None;
+            entry = self.viewer.stepping.entry();
             n_waiting = 0;
         } else if best != NONE && (least_waste < WASTE || n_waiting >= MAX_QUEUED) {
+            let gate = self.viewer.stepping.entry();
             let other = &mut self.viewer.pending[best as usize];
             other.region = other.region.joined(&region, narrowing);
             // Begin beyond the nearer of two parallel planes; without a common direction, drop the bound.
             other.entry = match (other.entry, entry) {
                 (Some((n, h)), Some((m, k))) if n.dot(m) > 1.0 - 1e-9 => Some((n, h.min(k))),
-                _ => None,
+                _ => gate,
             };
             self.viewer.out.counts.spared += 1;
             if near < other.near {

@@ -5,7 +5,7 @@ use enfilade_cpg::CellId;
 
 use super::traversal::Traversal;
 use super::viewer::Viewer;
-use super::window::{Crossing, NONE, Window};
+use super::window::{Crossing, Gate, NONE, SpecialView, Window};
 use crate::boxes::Planes;
 use crate::seen::Seen;
 use crate::sight::Sight;
@@ -27,6 +27,8 @@ pub struct StepQuestion<'a> {
     pub border: Option<CellId>,
     /// Per cell, `true` if visits of it are [recorded](crate::Viewer::take_crossings).
     pub is_watched: &'a [bool],
+    /// The special portal through which the view comes, if any.
+    pub gate: Option<Gate>,
 }
 
 /// Stepped queries: [`begin_steps`](Viewer::begin_steps); for each face of the view [`begin_face`](Viewer::begin_face), then
@@ -39,11 +41,13 @@ impl Viewer {
     pub fn begin_steps(&mut self) {
         self.begin();
         self.stepping.crossings.clear();
+        self.stepping.specials.clear();
     }
 
     /// Begins one face of the query.
     pub fn begin_face(&mut self, question: &StepQuestion) {
         self.stepping.border = question.border.map(|c| c.0);
+        self.stepping.gate = question.gate;
         self.stepping.is_watched.clear();
         let is_watched = question.is_watched;
         self.stepping.is_watched.extend_from_slice(is_watched);
@@ -70,6 +74,7 @@ impl Viewer {
             entry,
             near,
         } = *window;
+        let entry = entry.or(self.stepping.entry());
         self.traversal(question)
             .push(cell.0, NONE, region, entry, near);
     }
@@ -84,6 +89,11 @@ impl Viewer {
     /// Appends to `into` the visits of watched cells and of the border since the last call.
     pub fn take_crossings(&mut self, into: &mut Vec<Crossing>) {
         into.append(&mut self.stepping.crossings);
+    }
+
+    /// Appends to `into` the views of special portals since the last call, in no order.
+    pub fn take_specials(&mut self, into: &mut Vec<SpecialView>) {
+        into.append(&mut self.stepping.specials);
     }
 
     /// Returns everything seen so far.

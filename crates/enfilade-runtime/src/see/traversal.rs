@@ -66,9 +66,12 @@ impl Traversal<'_, '_> {
             let mut runs = sight.runs_of(cell);
             while let Some(run) = runs.next(|group| group.is_apart_from(low, high)) {
                 for exit in run {
-                    if self.may_be_beyond(exit)
-                        && !self.viewer.pending.iter().any(|p| p.cell == exit.to)
-                    {
+                    if !self.may_be_beyond(exit) {
+                        continue;
+                    }
+                    if let Some(special) = exit.special() {
+                        self.add_special(special, Window::screen(), true);
+                    } else if !self.viewer.pending.iter().any(|p| p.cell == exit.to) {
                         self.add_portal(exit.portal);
                         self.push_start(exit.to);
                     }
@@ -86,7 +89,8 @@ impl Traversal<'_, '_> {
         if self.viewer.stepping.is_border(cell) {
             self.viewer.stepping.note(cell, NONE, Window::screen());
         }
-        self.push(cell, NONE, Region::screen(), None, 0.0);
+        let entry = self.viewer.stepping.entry();
+        self.push(cell, NONE, Region::screen(), entry, 0.0);
     }
 
     /// Returns `true` if the eye may be in the cell behind an exit: within a few tolerances of the outline of an open
@@ -148,6 +152,10 @@ impl Traversal<'_, '_> {
             self.cull_whole(cell, via);
             for exit in sight.exits_of(cell) {
                 if self.state.lets_through(exit.portal, exit.to) {
+                    if let Some(special) = exit.special() {
+                        self.add_special(special, Window::screen(), false);
+                        continue;
+                    }
                     self.add_portal(exit.portal);
                     let mark = self.mark(exit.to);
                     if mark.n_entered != u8::MAX {
@@ -155,7 +163,7 @@ impl Traversal<'_, '_> {
                             cell: exit.to,
                             via: exit.portal,
                             region: Region::screen(),
-                            entry: None,
+                            entry: self.viewer.stepping.entry(),
                             near: 0.0,
                             next: NONE,
                             state: Stage::Entered,
@@ -168,7 +176,7 @@ impl Traversal<'_, '_> {
     }
 
     pub(super) fn enter_all_in_view(&mut self) {
-        self.set_planes(&Region::screen(), None);
+        self.set_planes(&Region::screen(), self.viewer.stepping.entry());
         let planes = self.planes.clone();
         let sight = self.sight;
         sight
@@ -178,13 +186,13 @@ impl Traversal<'_, '_> {
             });
         // If no cell is in the view, the shadows are still those of the last query.
         self.viewer.shadows.clear();
-        self.set_planes(&Region::screen(), None);
+        self.set_planes(&Region::screen(), self.viewer.stepping.entry());
         self.cull(sight.unlisted_root);
     }
 
     /// Adds the items of a cell that are in the view, as if nothing hid them.
     fn cull_whole(&mut self, cell: u32, via: u32) {
-        self.set_planes(&Region::screen(), None);
+        self.set_planes(&Region::screen(), self.viewer.stepping.entry());
         self.viewer.shadows.clear();
         self.add_visit(cell, via, &Region::screen(), 0.0);
         let stepping = &mut self.viewer.stepping;
@@ -208,9 +216,15 @@ impl Traversal<'_, '_> {
         self.viewer.shadows.clear();
         if self.viewer.options.occlusion {
             let margin = self.planes.margin();
-            self.viewer
-                .shadows
-                .cast(&sight.occluders, cell, self.view.eye, margin);
+            let occluders = &sight.occluders;
+            // Beside its plane, a ray may run along a special portal for long before it passes.
+            let gate = self.viewer.stepping.gate.is_some();
+            if !gate || entry.is_some() {
+                let beyond = entry.filter(|_| gate);
+                self.viewer
+                    .shadows
+                    .cast(occluders, cell, self.view.eye, margin, beyond);
+            }
         }
         self.add_visit(cell, via, &region, near);
         if self.viewer.stepping.is_watched(cell) {
@@ -307,12 +321,22 @@ impl Traversal<'_, '_> {
                 )
             }
         };
+        // A plane this near bounds nothing, and its orientation may be noise.
+        let beyond = (ahead > 16.0 * tolerance).then_some((normal, ahead));
+        if let Some(special) = exit.special() {
+            let window = Window {
+                region: narrowed,
+                entry: beyond,
+                near: near.max(nearest),
+            };
+            self.add_special(special, window, false);
+            return;
+        }
         if narrowed.share() < f64::from(self.viewer.options.min_share) {
             self.add_stop(exit);
             return;
         }
-        // A plane this near bounds nothing, and its orientation may be noise.
-        let beyond = (ahead > 16.0 * tolerance).then_some((normal, ahead));
+        let beyond = beyond.or(self.viewer.stepping.entry());
         self.add_portal(exit.portal);
         // Along every ray it lies beyond the portal entered by; less is due to rounding or joining.
         let near = near.max(nearest);

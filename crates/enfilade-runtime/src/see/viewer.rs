@@ -79,6 +79,7 @@ pub struct Viewer {
     pub(super) cell_stamps: Vec<u32>,
     pub(super) portal_stamps: Vec<u32>,
     pub(super) stop_stamps: Vec<u32>,
+    pub(super) special_stamps: Vec<u32>,
     pub(super) item_stamps: Vec<u32>,
     /// A bit per chunk and detail: set if it may be seen from the eye's cell. Valid if `is_bounded`.
     pub(super) allowed: Vec<u64>,
@@ -115,6 +116,7 @@ impl Viewer {
             cell_stamps: vec![0; sight.n_cells()],
             portal_stamps: vec![0; sight.n_portals()],
             stop_stamps: vec![0; sight.n_portals()],
+            special_stamps: vec![0; sight.n_specials()],
             item_stamps: vec![0; sight.chunks.len() + sight.details.len()],
             allowed: Vec::new(),
             is_bounded: false,
@@ -155,12 +157,14 @@ impl Viewer {
 
     pub(super) fn begin(&mut self) {
         self.is_bounded = false;
+        self.stepping.gate = None;
         let out = &mut self.out;
         out.visits.clear();
         out.planes.clear();
         out.cells.clear();
         out.portals.clear();
         out.stopped.clear();
+        out.specials.clear();
         out.chunks.clear();
         out.details.clear();
         out.n_triangles = 0;
@@ -169,6 +173,7 @@ impl Viewer {
             self.cell_stamps.fill(0);
             self.portal_stamps.fill(0);
             self.stop_stamps.fill(0);
+            self.special_stamps.fill(0);
             self.item_stamps.fill(0);
             self.frame_stamp = 0;
         }

@@ -1,7 +1,7 @@
 //! Parts of the screen, passed from one world to another.
 
-use enfilade_cpg::{CellId, PortalId};
-use enfilade_geom::DMat3;
+use enfilade_cpg::{CellId, PortalId, SpecialId};
+use enfilade_geom::Similarity;
 use glam::DVec3;
 
 use crate::region::Region;
@@ -40,14 +40,36 @@ impl Window {
         }
     }
 
-    /// Returns the window of a view [in another frame](crate::View::in_frame); `turn` maps directions of that frame to this one.
+    /// Returns the window of a view [in another frame](crate::View::in_frame); `map` maps that frame to this one.
     #[must_use]
-    pub fn in_frame(&self, turn: &DMat3) -> Self {
-        let turned = |(n, h): (DVec3, f64)| (turn.transpose() * n, h);
+    pub fn in_frame(&self, map: &Similarity) -> Self {
+        let back = map.inverse();
+        let size = back.scale.abs();
         Self {
-            entry: self.entry.map(turned),
+            entry: (self.entry).map(|(n, h)| (back.direction(n), h * size)),
+            near: self.near * size,
             ..*self
         }
+    }
+
+    /// Returns the share of the screen that it may cover, by its rectangle.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.region.share()
+    }
+
+    /// Returns the plane beyond which the view begins: its normal, away from the eye, and its distance from the eye. `None` if
+    /// the eye may be on it. [Units: wu]
+    #[must_use]
+    pub fn plane(&self) -> Option<(DVec3, f64)> {
+        self.entry
+    }
+
+    /// Returns the rectangle around it: `[left, bottom, right, top]`, -1 to 1.
+    #[must_use]
+    pub fn rectangle(&self) -> [f64; 4] {
+        let (min, max) = (self.region.min, self.region.max);
+        [min.x, min.y, max.x, max.y]
     }
 }
 
@@ -62,16 +84,44 @@ pub struct Crossing {
     pub window: Window,
 }
 
+/// A part of the screen in which a special portal is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct SpecialView {
+    /// The special portal.
+    pub special: SpecialId,
+    /// The part of the screen. The whole of it where the eye may be in the special portal's opening.
+    pub window: Window,
+    /// True if the eye may be in the opening.
+    pub is_at_eye: bool,
+}
+
+/// The special portal through which a view comes. Nothing before it is there, so nothing before it hides anything.
+#[derive(Clone, Copy, Debug)]
+pub struct Gate {
+    /// The special portal by which one would go back: a straight line does not.
+    pub back: Option<SpecialId>,
+    /// The plane beyond which the view begins, as [`Window::plane`].
+    pub plane: Option<(DVec3, f64)>,
+}
+
 /// State of a stepped query.
 #[derive(Default)]
 pub(super) struct Stepping {
     pub(super) is_on: bool,
     pub(super) border: Option<u32>,
     pub(super) is_watched: Vec<bool>,
+    pub(super) gate: Option<Gate>,
     pub(super) crossings: Vec<Crossing>,
+    pub(super) specials: Vec<SpecialView>,
 }
 
 impl Stepping {
+    /// Returns the plane beyond which everything lies.
+    #[inline]
+    pub(super) fn entry(&self) -> Option<(DVec3, f64)> {
+        self.gate.and_then(|gate| gate.plane)
+    }
+
     #[inline]
     pub(super) fn is_border(&self, cell: u32) -> bool {
         self.is_on && self.border == Some(cell)

@@ -1,9 +1,9 @@
 //! Portals of a world as exits of its cells, with convex outlines of few vertices.
 
-use enfilade_cpg::{Portal, PortalId};
+use enfilade_cpg::{CellPortalGraph, PortalId, SpecialId};
 use enfilade_geom::{DVec2, DVec3, Plane, Winding};
 
-use crate::exits::Exit;
+use crate::exits::{Exit, NO_PORTAL, SPECIAL};
 use crate::point::point;
 use crate::region::{MAX_CORNERS, reduced_around};
 use crate::sight_error::SightError;
@@ -24,12 +24,53 @@ pub(super) struct Portals {
 }
 
 impl Portals {
-    pub(super) fn add(
-        &mut self,
-        id: PortalId,
-        portal: &Portal,
-        n_cells: usize,
-    ) -> Result<(), SightError> {
+    /// Makes the exits of all cells.
+    pub(super) fn of(graph: &CellPortalGraph) -> Result<Self, SightError> {
+        let mut portals = Self::default();
+        for id in graph.portal_ids() {
+            portals.add(id, graph)?;
+        }
+        for id in graph.special_ids() {
+            portals.add_special(id, graph)?;
+        }
+        Ok(portals)
+    }
+
+    /// Adds a special portal as an exit of its cell.
+    fn add_special(&mut self, id: SpecialId, graph: &CellPortalGraph) -> Result<(), SightError> {
+        let side = &graph.specials[id.idx()];
+        let (special, n_cells) = (id.0, graph.cells.len());
+        let portal = side.portal();
+        let is_known = side.cell.idx() < n_cells
+            && portal.is_none_or(|p| {
+                let portal = graph.portals.get(p.idx());
+                portal.is_some_and(|p| p.cells.contains(&side.cell))
+            })
+            && (side.leads_to()).is_none_or(|(to, map)| to.idx() < n_cells && map.is_valid());
+        let (normal, pieces) = if is_known {
+            graph.special_opening(id)
+        } else {
+            (DVec3::ZERO, Vec::new())
+        };
+        let is_flat = |p: &Winding| p.points.len() < 3 || !p.points.iter().all(|p| p.is_finite());
+        if normal == DVec3::ZERO || pieces.is_empty() || pieces.iter().any(is_flat) {
+            return Err(SightError::Special { special });
+        }
+        let plane = Plane::through(pieces[0].mean(), normal);
+        let portal = portal.map_or(NO_PORTAL, |p| p.0);
+        for piece in &pieces {
+            let Some(opening) = convex_of(&plane, &piece.points) else {
+                continue;
+            };
+            let exit = self.add_outline(portal, &opening, normal);
+            let to = SPECIAL | special;
+            self.exits.push((side.cell.0, Exit { to, ..exit }));
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, id: PortalId, graph: &CellPortalGraph) -> Result<(), SightError> {
+        let (portal, n_cells) = (&graph[id], graph.cells.len());
         let cells = portal.cells.map(|c| c.0);
         if cells[0] == cells[1] || cells.iter().any(|&c| c as usize >= n_cells) {
             return Err(SightError::PortalCells {
@@ -61,13 +102,30 @@ impl Portals {
         } else {
             pieces
         };
+        // A cell that sees a special side has no other way there, unless that side lets it through.
+        let is_replaced = portal.cells.map(|cell| {
+            let side = graph.special_side(id, cell);
+            side.is_some_and(|s| !graph.specials[s.idx()].is_through())
+        });
         for opening in openings {
-            self.add_opening(id, cells, &opening, normal);
+            let exit = self.add_outline(id.0, &opening, normal);
+            let turned = Exit {
+                normal: exit.normal.map(|x| -x),
+                is_turned: false,
+                ..exit
+            };
+            for (side, exit) in [exit, turned].into_iter().enumerate() {
+                if !is_replaced[side] {
+                    let to = cells[1 - side];
+                    self.exits.push((cells[side], Exit { to, ..exit }));
+                }
+            }
         }
         Ok(())
     }
 
-    fn add_opening(&mut self, id: PortalId, cells: [u32; 2], opening: &Winding, normal: DVec3) {
+    /// Adds the vertices of an outline, counter-clockwise about `normal`; returns an exit along the normal to nowhere.
+    fn add_outline(&mut self, portal: u32, opening: &Winding, normal: DVec3) -> Exit {
         // Compute bounds from the rounded `f32` values, as they are read.
         let center = opening.aabb().center().as_vec3();
         let middle = center.as_dvec3();
@@ -79,24 +137,15 @@ impl Portals {
             self.extent = self.extent.max(p.abs().max_element());
             self.corners.push(p.as_vec3().to_array());
         }
-        let n = normal.as_vec3();
-        for (from, to, normal, is_turned) in [
-            (cells[0], cells[1], n, true),
-            (cells[1], cells[0], -n, false),
-        ] {
-            self.exits.push((
-                from,
-                Exit {
-                    center: center.to_array(),
-                    radius: (radius as f32).next_up(),
-                    normal: normal.to_array(),
-                    to,
-                    portal: id.0,
-                    first_corner,
-                    n_corners,
-                    is_turned,
-                },
-            ));
+        Exit {
+            center: center.to_array(),
+            radius: (radius as f32).next_up(),
+            normal: normal.as_vec3().to_array(),
+            to: SPECIAL,
+            portal,
+            first_corner,
+            n_corners,
+            is_turned: true,
         }
     }
 
@@ -121,8 +170,12 @@ fn convex(corners: &[[f32; 3]], normal: DVec3) -> Option<Winding> {
     }
     let points: Vec<DVec3> = corners.iter().map(|p| point(*p)).collect();
     let middle = points.iter().sum::<DVec3>() / points.len() as f64;
-    let plane = Plane::through(middle, normal);
-    let hull = Winding::hull_in_plane(&plane, &points);
+    convex_of(&Plane::through(middle, normal), &points)
+}
+
+/// As [`convex`], for points of a plane.
+fn convex_of(plane: &Plane, points: &[DVec3]) -> Option<Winding> {
+    let hull = Winding::hull_in_plane(plane, points);
     // The tolerance covers vertices that rounding put off the hull.
     if hull.points.len() < 3 {
         return None;
@@ -131,6 +184,7 @@ fn convex(corners: &[[f32; 3]], normal: DVec3) -> Option<Winding> {
         return Some(hull);
     }
     let (u, v) = plane.basis();
+    let middle = hull.mean();
     let flat: Vec<DVec2> = hull
         .points
         .iter()

@@ -1,31 +1,157 @@
-//! Visibility in a world and in the worlds that move in it.
+//! Visibility in a world, in the worlds that move in it, and through special portals.
 //!
 //! Each part is followed by its own [`Viewer`], in its own frame. A view that leaves a part through one of its doors continues in
 //! the surrounding places behind the door, and in the doors that it meets; a view of a cell in which parts stand continues in
 //! these from outside. The part of the screen is passed on unchanged: it depends on the eye alone, not on the frame. Parts take
 //! turns until none has anything new, which ends because each adds only what it had not seen.
+//!
+//! A special portal opens another *context* (Dirkse 2002, section 6.1.2): the same worlds, seen by an eye that is moved, turned,
+//! scaled or reflected by the special portal's map, through the part of the screen that the special portal covers, and from its
+//! plane on. Each context has its own record of what was visited, so a room is seen once directly and once more in each mirror.
+//! Contexts form a tree: a mirror in a mirror is a context of its own. The largest on the screen come first; a context ends the
+//! recursion where it covers less than the [least share](SpecialOptions::min_share) of the screen, or where there are
+//! [too many](SpecialOptions::max_contexts), which the answer tells. A straight line meets a plane once, so no view returns
+//! through the special portal that it came by.
 
-use enfilade_cpg::CellId;
-use enfilade_runtime::{Crossing, SeeOptions, Seen, StepQuestion, View, Viewer, Window};
+use std::collections::BinaryHeap;
+
+use enfilade_cpg::{CellId, SpecialId, Way};
+use enfilade_geom::{DVec3, Similarity};
+use enfilade_runtime::{
+    Crossing, Gate, SeeOptions, Seen, SpecialView, StepQuestion, View, Viewer, Window,
+};
 
 use crate::space::{PartId, Place, Space};
 
+/// Bounds of the views through special portals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpecialOptions {
+    /// Number of contexts of one query, the direct view included. Each takes the memory of a [`Viewer`] for each part that it
+    /// reaches. [Limit: at least 1]
+    pub max_contexts: usize,
+    /// Smallest special portal looked into, as its share of the screen. Smaller ones are listed as
+    /// [stopped](SpaceSeen::stopped_specials). [Limit: 0 to 1]
+    pub min_share: f32,
+}
+
+impl Default for SpecialOptions {
+    /// 64 contexts, and a share of 1/4096: 15 by 30 pixels of a picture of 1280 by 720.
+    fn default() -> Self {
+        Self {
+            max_contexts: 64,
+            min_share: 1.0 / 4096.0,
+        }
+    }
+}
+
 /// Queries visibility in a [`Space`] for one eye, frame by frame; keeps its buffers.
 pub struct SpaceViewer {
-    parts: Vec<PartView>,
+    /// The first is the direct view. Those from `n_contexts` on are spare.
+    contexts: Vec<Context>,
+    n_contexts: usize,
     options: SeeOptions,
+    specials: SpecialOptions,
+    /// Contexts to look into in the current face, the largest on the screen first.
+    open: BinaryHeap<Open>,
+    stopped: Vec<StoppedSpecial>,
+    is_capped: bool,
+    buffers: Buffers,
+}
+
+#[derive(Default)]
+struct Buffers {
     queue: Vec<(PartId, CellId, Window)>,
     crossings: Vec<Crossing>,
+    views: Vec<SpecialView>,
+    /// Special portals in view of a context: by part, then by number.
+    found: Vec<(PartId, SpecialView)>,
+}
+
+/// A context to look into. Ordered by its share of the screen, then by age.
+#[derive(Clone, Copy, PartialEq)]
+struct Open {
+    share: f64,
+    context: usize,
+}
+
+impl Eq for Open {}
+
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let by_age = || other.context.cmp(&self.context);
+        self.share.total_cmp(&other.share).then_with(by_age)
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The worlds as seen by one eye, real or moved by special portals.
+struct Context {
+    parts: Vec<PartView>,
     seen: Vec<PartId>,
+    /// The view, in the frame of a part.
+    view: Option<View>,
+    frame: PartId,
+    /// Map from that frame to the frame of the query: where things appear.
+    map: Similarity,
+    via: Option<SeenVia>,
+    back: Option<(PartId, SpecialId)>,
+    /// The plane beyond which the view begins, relative to the eye in `frame`.
+    gate: Option<(DVec3, f64)>,
+    /// Share of the query's screen that the whole screen of this context takes.
+    share: f64,
+    /// True if the view begins at the eye: for the query's own, and for cameras.
+    is_direct: bool,
+    /// Where the view of the current face begins.
+    starts: Vec<(CellId, Option<Window>)>,
+    rectangle: [f64; 4],
 }
 
 struct PartView {
-    viewer: Viewer,
+    /// Made when first needed.
+    viewer: Option<Viewer>,
     /// In the part's frame; `None` until the query reaches the part.
     view: Option<View>,
     /// True if the current face was begun.
     is_begun: bool,
 }
+
+/// The special portal in which a context is seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenVia {
+    /// Index of the context that sees it.
+    pub parent: usize,
+    /// Its part.
+    pub part: PartId,
+    /// The special portal.
+    pub special: SpecialId,
+    /// Index of the pass that shows this context.
+    pub pass: usize,
+}
+
+/// A special portal that was not looked into.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StoppedSpecial {
+    /// The special portal, and the context that sees it.
+    pub via: SeenVia,
+    /// Its share of the screen.
+    pub share: f32,
+}
+
+/// A rectangle around nothing.
+const NOTHING: [f64; 4] = [
+    f64::INFINITY,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::NEG_INFINITY,
+];
+
+/// The rectangle around the screen.
+const SCREEN: [f64; 4] = [-1.0, -1.0, 1.0, 1.0];
 
 impl SpaceViewer {
     /// Makes a viewer of `space` with default options.
@@ -36,27 +162,22 @@ impl SpaceViewer {
 
     /// Makes a viewer of `space`.
     #[must_use]
-    pub fn with_options(space: &Space, options: SeeOptions) -> Self {
-        let mut viewer = Self {
-            parts: Vec::new(),
+    pub fn with_options(_space: &Space, options: SeeOptions) -> Self {
+        Self {
+            contexts: Vec::new(),
+            n_contexts: 0,
             options,
-            queue: Vec::new(),
-            crossings: Vec::new(),
-            seen: Vec::new(),
-        };
-        viewer.grow(space);
-        viewer
+            specials: SpecialOptions::default(),
+            open: BinaryHeap::new(),
+            stopped: Vec::new(),
+            is_capped: false,
+            buffers: Buffers::default(),
+        }
     }
 
-    /// Makes room for added parts.
-    fn grow(&mut self, space: &Space) {
-        for part in &space.parts[self.parts.len()..] {
-            self.parts.push(PartView {
-                viewer: Viewer::with_options(&part.sight, self.options),
-                view: None,
-                is_begun: false,
-            });
-        }
+    /// Returns the bounds of views through special portals, which may be changed between queries.
+    pub fn specials_mut(&mut self) -> &mut SpecialOptions {
+        &mut self.specials
     }
 
     /// Returns everything that `view`, in the frame of part `frame`, sees. A view in the frame of the part that the eye is in is
@@ -68,153 +189,477 @@ impl SpaceViewer {
     ///
     /// If there is no such part, or `space` is not the one that the viewer was made for.
     pub fn see<'a>(&'a mut self, space: &Space, frame: PartId, view: &View) -> SpaceSeen<'a> {
-        self.grow(space);
-        for id in self.seen.drain(..) {
-            self.parts[id.idx()].view = None;
-        }
-        let eye = enfilade_geom::DVec3::from_array(view.eye().map(f64::from));
-        let at = space.locate(frame, eye);
+        self.n_contexts = 0;
+        self.stopped.clear();
+        self.is_capped = false;
+        let root = self.add_context(frame, view.clone(), Similarity::IDENTITY);
         for face in 0..view.n_faces() {
-            for &id in &self.seen {
-                self.parts[id.idx()].is_begun = false;
+            self.open.clear();
+            self.contexts[root].begin_face();
+            self.see_directly(space, root, face);
+            self.find_specials(space, root);
+            while let Some(Open { context, .. }) = self.open.pop() {
+                if self.contexts[context].is_direct {
+                    self.see_directly(space, context, 0);
+                } else {
+                    self.see_from_starts(space, context, face);
+                }
+                self.find_specials(space, context);
             }
-            self.see_face(space, frame, view, face, at);
         }
-        self.seen.sort_unstable();
+        for context in &mut self.contexts[..self.n_contexts] {
+            context.seen.sort_unstable();
+        }
         SpaceSeen { viewer: self }
     }
 
-    fn see_face(
-        &mut self,
-        space: &Space,
-        frame: PartId,
-        view: &View,
-        face: usize,
-        at: Option<Place>,
-    ) {
-        // An eye in no cell sees everything in view, of all parts.
-        let start = at.map_or(PartId::ROOT, |place| place.part);
-        self.begin(space, frame, view, face, start);
-        let part = &mut self.parts[start.idx()];
-        let question = question_of(space, start, part.view.as_ref().unwrap_or(view), face);
-        part.viewer.add_eye(&question, at.map(|place| place.cell));
-        part.viewer.advance(&question);
-        part.viewer.take_crossings(&mut self.crossings);
-        self.hand_on(space, start);
-        if let Some(place) = at {
-            // An eye in the seam of two parts is in both.
-            let eye = enfilade_geom::DVec3::from_array(view.eye().map(f64::from));
-            let eye = space.between(frame, start).point(eye);
-            let queue = &mut self.queue;
-            space.for_each_beyond(place, eye, |other, portal, cell| {
-                if space.parts[other.idx()].state.is_open(portal) {
-                    queue.push((other, cell, Window::screen()));
-                }
+    /// Adds a context that has seen nothing yet; `map` maps the frame of part `frame` to that of the query.
+    fn add_context(&mut self, frame: PartId, view: View, map: Similarity) -> usize {
+        let index = self.n_contexts;
+        self.n_contexts += 1;
+        if index == self.contexts.len() {
+            self.contexts.push(Context {
+                parts: Vec::new(),
+                seen: Vec::new(),
+                view: None,
+                frame,
+                map,
+                via: None,
+                back: None,
+                gate: None,
+                share: 1.0,
+                is_direct: true,
+                starts: Vec::new(),
+                rectangle: SCREEN,
             });
         }
+        let context = &mut self.contexts[index];
+        for id in context.seen.drain(..) {
+            context.parts[id.idx()].view = None;
+        }
+        context.view = Some(view);
+        (context.frame, context.map) = (frame, map);
+        (context.via, context.back, context.gate) = (None, None, None);
+        context.share = 1.0;
+        context.is_direct = true;
+        context.starts.clear();
+        context.rectangle = SCREEN;
+        index
+    }
+
+    /// Follows the view of an eye that is where it looks from.
+    fn see_directly(&mut self, space: &Space, context: usize, face: usize) {
+        let (own, buffers) = (&mut self.contexts[context], &mut self.buffers);
+        let Some(eye) = own.view.as_ref().map(View::exact_eye) else {
+            return;
+        };
+        let at = space.locate(own.frame, eye);
+        // An eye in no cell sees everything in view, of all parts.
+        let start = at.map_or(PartId::ROOT, |place| place.part);
+        own.add_eye(
+            space,
+            &self.options,
+            face,
+            start,
+            at.map(|p| p.cell),
+            buffers,
+        );
         if at.is_none() {
             for id in (1..space.parts.len() as u32).map(PartId) {
                 if let Some(border) = space.parts[id.idx()].border {
-                    self.queue.push((id, border, Window::screen()));
+                    buffers.queue.push((id, border, Window::screen()));
                 }
             }
         }
-        while let Some((id, cell, window)) = self.queue.pop() {
-            self.begin(space, frame, view, face, id);
-            let part = &mut self.parts[id.idx()];
-            let question = question_of(space, id, part.view.as_ref().unwrap_or(view), face);
-            part.viewer.add_window(&question, cell, &window);
-            part.viewer.advance(&question);
-            part.viewer.take_crossings(&mut self.crossings);
-            self.hand_on(space, id);
+        own.follow(space, &self.options, face, buffers);
+    }
+
+    /// Follows the view from the special portal by which it comes.
+    fn see_from_starts(&mut self, space: &Space, context: usize, face: usize) {
+        let (own, buffers) = (&mut self.contexts[context], &mut self.buffers);
+        own.begin_face();
+        let frame = own.frame;
+        let mut starts = std::mem::take(&mut own.starts);
+        for (cell, window) in starts.drain(..) {
+            match window {
+                Some(window) => buffers.queue.push((frame, cell, window)),
+                None => own.add_eye(space, &self.options, face, frame, Some(cell), buffers),
+            }
+        }
+        own.starts = starts;
+        own.follow(space, &self.options, face, buffers);
+    }
+
+    /// Opens a context for each pass of each special portal in view of a context.
+    fn find_specials(&mut self, space: &Space, parent: usize) {
+        let mut found = std::mem::take(&mut self.buffers.found);
+        found.sort_by_key(|(part, view)| (*part, view.special));
+        for views in found.chunk_by(|a, b| a.0 == b.0 && a.1.special == b.1.special) {
+            let (part, special) = (views[0].0, views[0].1.special);
+            let graph = &space.parts[part.idx()].world.graph;
+            let share = views.iter().map(|v| v.1.window.share()).sum::<f64>();
+            let share = share.min(1.0) * self.contexts[parent].share;
+            for pass in 0..graph.specials[special.idx()].passes.len() {
+                let via = SeenVia {
+                    parent,
+                    part,
+                    special,
+                    pass,
+                };
+                let is_followed = graph.specials[special.idx()].passes[pass].way != Way::Through;
+                if is_followed {
+                    self.open_special(space, via, share, views);
+                }
+            }
+        }
+        found.clear();
+        self.buffers.found = found;
+    }
+
+    /// Opens the context of one pass, or adds to the one that an earlier face has opened.
+    fn open_special(
+        &mut self,
+        space: &Space,
+        via: SeenVia,
+        share: f64,
+        views: &[(PartId, SpecialView)],
+    ) {
+        let SeenVia {
+            parent,
+            part,
+            special,
+            pass,
+        } = via;
+        let known = self.contexts[..self.n_contexts]
+            .iter()
+            .position(|c| c.via == Some(via));
+        if known.is_none() {
+            let is_full = self.n_contexts >= self.specials.max_contexts;
+            if is_full || share < f64::from(self.specials.min_share) {
+                self.is_capped |= is_full;
+                let share = share as f32;
+                self.stopped.push(StoppedSpecial { via, share });
+                return;
+            }
+        }
+        let own = &space.parts[part.idx()];
+        let side = &own.world.graph.specials[special.idx()];
+        let way = &side.passes[pass].way;
+        if let Way::Monitor(camera) = way {
+            let [_, right, up] = own.layout.special_rectangle(special);
+            let aspect = (right.length() / up.length()) as f32;
+            let view =
+                View::perspective(camera.eye, camera.toward, camera.up, camera.fov_y, aspect);
+            // A camera that is no camera shows nothing.
+            if let (None, Ok(view)) = (known, view) {
+                let context = self.add_context(part, view, Similarity::IDENTITY);
+                let own = &mut self.contexts[context];
+                (own.via, own.share) = (Some(via), share);
+                own.begin_face();
+                self.open.push(Open { share, context });
+            }
+            return;
+        }
+        let Some(map) = own.layout.map_of_pass(special, pass) else {
+            return;
+        };
+        let to = side
+            .leads_to()
+            .filter(|_| *way != Way::Mirror)
+            .map_or(side.cell, |(to, _)| to);
+        if own.state.is_locked(to) {
+            return;
+        }
+        let back = match way {
+            Way::Lead { back, .. } => *back,
+            _ => Some(special),
+        };
+        // The map leads to the other side, so its inverse leads from the frame of what is seen to where it appears.
+        let appears = map.inverse();
+        let context = match known {
+            Some(context) => context,
+            None => {
+                let of_parent = &self.contexts[parent];
+                let seen_by = of_parent.parts[part.idx()].view.as_ref();
+                let Some(view) = seen_by.map(|view| view.in_frame(&appears)) else {
+                    return;
+                };
+                let to_frame = space.between(part, of_parent.frame).into();
+                let whole = of_parent.map.after(&to_frame).after(&appears);
+                let screen = of_parent.share;
+                let context = self.add_context(part, view, whole);
+                let own = &mut self.contexts[context];
+                (own.via, own.share) = (Some(via), screen);
+                own.back = back.map(|back| (part, back));
+                own.is_direct = false;
+                own.rectangle = NOTHING;
+                context
+            }
+        };
+        let own = &mut self.contexts[context];
+        own.starts.clear();
+        own.gate = None;
+        for (_, view) in views {
+            let window = view.window.in_frame(&appears);
+            own.gate = window.plane();
+            own.starts.push((to, (!view.is_at_eye).then_some(window)));
+            let [left, bottom, right, top] = window.rectangle();
+            let [l, b, r, t] = own.rectangle;
+            own.rectangle = [l.min(left), b.min(bottom), r.max(right), t.max(top)];
+        }
+        // One piece of it near the eye leaves no plane for the others either.
+        if views.iter().any(|v| v.1.window.plane().is_none()) {
+            own.gate = None;
+        }
+        self.open.push(Open { share, context });
+    }
+}
+
+impl Context {
+    fn begin_face(&mut self) {
+        for &id in &self.seen {
+            self.parts[id.idx()].is_begun = false;
         }
     }
 
-    /// Prepares a part for a face, if necessary.
-    fn begin(&mut self, space: &Space, frame: PartId, view: &View, face: usize, id: PartId) {
-        let part = &mut self.parts[id.idx()];
-        if part.view.is_none() {
-            let to_frame = space.between(id, frame);
-            part.view = Some(view.in_frame(&to_frame.matrix3(), to_frame.at));
-            part.viewer.begin_steps();
-            part.is_begun = false;
+    /// Adds the eye in a cell of a part, or in no cell.
+    fn add_eye(
+        &mut self,
+        space: &Space,
+        options: &SeeOptions,
+        face: usize,
+        part: PartId,
+        cell: Option<CellId>,
+        buffers: &mut Buffers,
+    ) {
+        self.turn(space, options, face, part, buffers, |viewer, question| {
+            viewer.add_eye(question, cell);
+        });
+        let (Some(cell), Some(eye)) = (cell, self.view.as_ref().map(View::exact_eye)) else {
+            return;
+        };
+        // An eye in the seam of two parts is in both.
+        let eye = space.between(self.frame, part).point(eye);
+        let queue = &mut buffers.queue;
+        space.for_each_beyond(Place { part, cell }, eye, |other, portal, cell| {
+            if space.parts[other.idx()].state.is_open(portal) {
+                queue.push((other, cell, Window::screen()));
+            }
+        });
+    }
+
+    /// Follows everything queued, and what it leads to.
+    fn follow(&mut self, space: &Space, options: &SeeOptions, face: usize, buffers: &mut Buffers) {
+        while let Some((id, cell, window)) = buffers.queue.pop() {
+            self.turn(space, options, face, id, buffers, |viewer, question| {
+                viewer.add_window(question, cell, &window);
+            });
+        }
+    }
+
+    /// Gives a part its turn: begins it if necessary, adds to its view, follows it, and queues the continuations elsewhere.
+    fn turn(
+        &mut self,
+        space: &Space,
+        options: &SeeOptions,
+        face: usize,
+        id: PartId,
+        buffers: &mut Buffers,
+        add: impl FnOnce(&mut Viewer, &StepQuestion<'_>),
+    ) {
+        let Some(of_frame) = &self.view else { return };
+        while self.parts.len() <= id.idx() {
+            self.parts.push(PartView {
+                viewer: None,
+                view: None,
+                is_begun: false,
+            });
+        }
+        let own = &mut self.parts[id.idx()];
+        let sight = &space.parts[id.idx()].sight;
+        let viewer = (own.viewer).get_or_insert_with(|| Viewer::with_options(sight, *options));
+        let to_frame: Similarity = space.between(id, self.frame).into();
+        if own.view.is_none() {
+            own.view = Some(of_frame.in_frame(&to_frame));
+            viewer.begin_steps();
+            own.is_begun = false;
             self.seen.push(id);
         }
-        let part = &mut self.parts[id.idx()];
-        if !part.is_begun {
-            part.is_begun = true;
-            let question = question_of(space, id, part.view.as_ref().unwrap_or(view), face);
-            part.viewer.begin_face(&question);
-        }
-    }
-
-    /// Queues the continuations in other parts.
-    fn hand_on(&mut self, space: &Space, from: PartId) {
-        let own = &space.parts[from.idx()];
-        let queue = &mut self.queue;
-        let mut add = |to: PartId, cell: CellId, window: &Window| {
-            let turn = space.between(to, from).matrix3();
-            queue.push((to, cell, window.in_frame(&turn)));
+        let part = &space.parts[id.idx()];
+        let question = StepQuestion {
+            sight,
+            state: &part.state,
+            view: own.view.as_ref().unwrap_or(of_frame),
+            face,
+            border: part.border,
+            is_watched: &part.has_guests,
+            gate: (!self.is_direct).then(|| Gate {
+                back: self.back.filter(|back| back.0 == id).map(|back| back.1),
+                plane: (self.gate).map(|(n, h)| (to_frame.turn.conjugate() * n, h)),
+            }),
         };
-        for crossing in self.crossings.drain(..) {
-            let window = &crossing.window;
-            if own.border != Some(crossing.cell) {
-                for &guest in &own.guests[crossing.cell.idx()] {
-                    if let Some(border) = space.parts[guest.idx()].border {
-                        add(guest, border, window);
-                    }
+        if !own.is_begun {
+            own.is_begun = true;
+            viewer.begin_face(&question);
+        }
+        add(viewer, &question);
+        viewer.advance(&question);
+        viewer.take_crossings(&mut buffers.crossings);
+        viewer.take_specials(&mut buffers.views);
+        let views = buffers.views.drain(..).map(|view| (id, view));
+        buffers.found.extend(views);
+        hand_on(space, id, buffers);
+    }
+}
+
+/// Queues the continuations in other parts.
+fn hand_on(space: &Space, from: PartId, buffers: &mut Buffers) {
+    let own = &space.parts[from.idx()];
+    let queue = &mut buffers.queue;
+    let mut add = |to: PartId, cell: CellId, window: &Window| {
+        let map = space.between(to, from).into();
+        queue.push((to, cell, window.in_frame(&map)));
+    };
+    for crossing in buffers.crossings.drain(..) {
+        let window = &crossing.window;
+        if own.border != Some(crossing.cell) {
+            for &guest in &own.guests[crossing.cell.idx()] {
+                if let Some(border) = space.parts[guest.idx()].border {
+                    add(guest, border, window);
                 }
-                continue;
             }
-            let is_way = |portal| crossing.via.is_none_or(|via| via == portal);
-            for door in own.doors.iter().filter(|d| is_way(d.portal)) {
-                for place in &door.leads_to {
-                    add(place.part, place.cell, window);
-                }
-                for &(other, portal) in &door.meets {
-                    let its = &space.parts[other.idx()];
-                    if let Some(border) = its.border {
-                        // Its door may be nearer than the one that the view leaves by.
-                        let radius = its.layout.opening(portal).radius();
-                        add(other, border, &window.earlier(space.docking.depth(radius)));
-                    }
+            continue;
+        }
+        let is_way = |portal| crossing.via.is_none_or(|via| via == portal);
+        for door in own.doors.iter().filter(|d| is_way(d.portal)) {
+            for place in &door.leads_to {
+                add(place.part, place.cell, window);
+            }
+            for &(other, portal) in &door.meets {
+                let its = &space.parts[other.idx()];
+                if let Some(border) = its.border {
+                    // Its door may be nearer than the one that the view leaves by.
+                    let radius = its.layout.opening(portal).radius();
+                    add(other, border, &window.earlier(space.docking.depth(radius)));
                 }
             }
         }
     }
 }
 
-fn question_of<'a>(space: &'a Space, id: PartId, view: &'a View, face: usize) -> StepQuestion<'a> {
-    let part = &space.parts[id.idx()];
-    StepQuestion {
-        sight: &part.sight,
-        state: &part.state,
-        view,
-        face,
-        border: part.border,
-        is_watched: &part.has_guests,
-    }
-}
-
-/// The answer to a view, part by part.
+/// The answer to a view, context by context and part by part.
 #[derive(Clone, Copy)]
 pub struct SpaceSeen<'a> {
     viewer: &'a SpaceViewer,
 }
 
+/// What is seen directly, or in one special portal.
+#[derive(Clone, Copy)]
+pub struct SeenContext<'a> {
+    context: &'a Context,
+}
+
 impl<'a> SpaceSeen<'a> {
     /// Returns the visible parts, ascending, each with its visible contents in its own frame: draw them at its
-    /// [pose](Space::pose). The border cell of a part stands for its outside.
+    /// [pose](Space::pose). The border cell of a part stands for its outside. Without what is seen in special portals.
     pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
-        let viewer = self.viewer;
-        let answer = |id: &PartId| (*id, viewer.parts[id.idx()].viewer.answer());
-        viewer.seen.iter().map(answer)
+        let own = &self.viewer.contexts[0];
+        own.seen.iter().map(|id| (*id, own.answer(*id)))
+    }
+
+    /// Returns the visible contents of one part; `None` if nothing of it is seen directly.
+    #[must_use]
+    pub fn of_part(&self, part: PartId) -> Option<Seen<'a>> {
+        self.context(0).of_part(part)
+    }
+
+    /// Returns the direct view, and then what is seen in special portals, each after the context that sees it.
+    pub fn contexts(&self) -> impl ExactSizeIterator<Item = SeenContext<'a>> + use<'a> {
+        let all = &self.viewer.contexts[..self.viewer.n_contexts];
+        all.iter().map(|context| SeenContext { context })
+    }
+
+    /// Returns one context.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such context.
+    #[must_use]
+    pub fn context(&self, index: usize) -> SeenContext<'a> {
+        let context = &self.viewer.contexts[..self.viewer.n_contexts][index];
+        SeenContext { context }
+    }
+
+    /// Returns the special portals in view that were not looked into: too small, or one too many.
+    #[must_use]
+    pub fn stopped_specials(&self) -> &'a [StoppedSpecial] {
+        &self.viewer.stopped
+    }
+
+    /// Returns `true` if special portals were not looked into because there were
+    /// [too many contexts](SpecialOptions::max_contexts).
+    #[must_use]
+    pub fn is_capped(&self) -> bool {
+        self.viewer.is_capped
+    }
+}
+
+impl Context {
+    fn answer(&self, part: PartId) -> Seen<'_> {
+        let viewer = self.parts[part.idx()].viewer.as_ref();
+        viewer.expect("a seen part has a viewer").answer()
+    }
+}
+
+impl<'a> SeenContext<'a> {
+    /// Returns the special portal that it is seen in; `None` for the direct view.
+    #[must_use]
+    pub fn via(&self) -> Option<SeenVia> {
+        self.context.via
+    }
+
+    /// Returns the part in whose frame [its view](SeenContext::view) is.
+    #[must_use]
+    pub fn frame(&self) -> PartId {
+        self.context.frame
+    }
+
+    /// Returns the view: that of the query, or of the eye moved by special portals.
+    #[must_use]
+    pub fn view(&self) -> &'a View {
+        self.context.view.as_ref().expect("a context has a view")
+    }
+
+    /// Returns the map from the frame of [its part](SeenContext::frame) to the frame of the query: where things appear. The
+    /// identity for a monitor, whose picture is apart.
+    #[must_use]
+    pub fn map(&self) -> &'a Similarity {
+        &self.context.map
+    }
+
+    /// Returns the plane beyond which things are seen: its normal, away from the eye, and its distance from the eye, in the
+    /// frame of [its part](SeenContext::frame). `None` if the eye may be on it, and for direct views. [Units: wu]
+    #[must_use]
+    pub fn plane(&self) -> Option<(DVec3, f64)> {
+        self.context.gate
+    }
+
+    /// Returns the rectangle of the screen around it: `[left, bottom, right, top]`, -1 to 1.
+    #[must_use]
+    pub fn rectangle(&self) -> [f64; 4] {
+        self.context.rectangle
+    }
+
+    /// Returns the visible parts, ascending, each with its visible contents in its own frame.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
+        let own = self.context;
+        own.seen.iter().map(|id| (*id, own.answer(*id)))
     }
 
     /// Returns the visible contents of one part; `None` if nothing of it is seen.
     #[must_use]
     pub fn of_part(&self, part: PartId) -> Option<Seen<'a>> {
-        let is_seen = self.viewer.seen.binary_search(&part).is_ok();
-        is_seen.then(|| self.viewer.parts[part.idx()].viewer.answer())
+        let is_seen = self.context.seen.binary_search(&part).is_ok();
+        is_seen.then(|| self.context.answer(part))
     }
 }

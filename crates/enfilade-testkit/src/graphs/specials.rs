@@ -1,0 +1,135 @@
+//! Special portals in made worlds: mirrors, teleporters and one-way places.
+
+use enfilade_cpg::{CellId, Pass, SpecialId, SpecialPortal, SpecialShape, Way, World};
+use enfilade_geom::{DQuat, DVec3, Similarity};
+
+use crate::rng::Rng;
+
+/// Distance of a made surface from the wall behind it. [Units: wu]
+const OFF_WALL: f64 = 1e-3;
+
+/// A rectangle on a wall of a cell.
+struct OnWall {
+    cell: CellId,
+    center: DVec3,
+    normal: DVec3,
+    /// Half edges: to the right as seen from the cell, and up.
+    half: [DVec3; 2],
+}
+
+impl OnWall {
+    /// Chooses an upright rectangle on a wall of a cell's box, with a random place and the given half size.
+    fn random(world: &World, cell: CellId, half: [f64; 2], rng: &mut Rng) -> Self {
+        let point = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+        let [low, high] = world.graph[cell].aabb.map(point);
+        let (axis, side) = ([DVec3::X, DVec3::Z][rng.below(2)], rng.below(2));
+        let normal = axis * [-1.0, 1.0][side];
+        let right = normal.cross(DVec3::Y);
+        let size = high - low;
+        let room = |along: DVec3, half: f64| (along.abs().dot(size) * 0.5 - half - 0.05).max(0.0);
+        let middle = (low + high) * 0.5;
+        let off = normal * (axis.dot(size) * 0.5 - OFF_WALL);
+        let mut shift = |along: DVec3, half: f64| along * rng.range(-1.0, 1.0) * room(along, half);
+        let center = middle + off + shift(right, half[0]) + shift(DVec3::Y, half[1]);
+        Self {
+            cell,
+            center,
+            normal,
+            half: [right * half[0], DVec3::Y * half[1]],
+        }
+    }
+
+    fn shape(&self) -> SpecialShape {
+        let [r, u] = self.half;
+        // Counter-clockwise about the normal, which points away from those who look.
+        let corners = [-r - u, u - r, r + u, r - u].map(|d| self.center + d);
+        SpecialShape::Surface {
+            normal: self.normal.as_vec3().to_array(),
+            pieces: vec![corners.map(|p| p.as_vec3().to_array()).to_vec()],
+        }
+    }
+
+    /// Returns the rotation from axes right, up and out of the cell.
+    fn turn(&self) -> DQuat {
+        let [r, u] = self.half.map(DVec3::normalize);
+        DQuat::from_mat3(&enfilade_geom::DMat3::from_cols(r, u, -self.normal)).normalize()
+    }
+}
+
+/// Returns a special portal with one untinted pass.
+fn special(name: &str, at: &OnWall, way: Way) -> SpecialPortal {
+    SpecialPortal {
+        name: name.into(),
+        cell: at.cell,
+        shape: at.shape(),
+        passes: vec![Pass::new(way)],
+    }
+}
+
+/// Adds special portals to the walls of random rooms: `n` mirrors, `n` pairs of rectangles that lead into each other, and `n`
+/// that lead to a turned and scaled place in the air of a room, one way. Rooms must be boxes, not rotated.
+#[must_use]
+pub fn with_specials(mut world: World, n: usize, seed: u64) -> World {
+    let mut rng = Rng::new(seed);
+    let rooms: Vec<CellId> = world.graph.indoor_cells().map(|(id, _)| id).collect();
+    for _ in 0..n {
+        let at = |half: [f64; 2], rng: &mut Rng| {
+            let cell = rooms[rng.below(rooms.len())];
+            OnWall::random(&world, cell, half, rng)
+        };
+        let mirror = at([rng.range(0.3, 1.2), rng.range(0.3, 1.2)], &mut rng);
+        let half = [rng.range(0.3, 1.0), rng.range(0.3, 1.2)];
+        let [a, b] = [at(half, &mut rng), at(half, &mut rng)];
+        let one_way = at([0.5, 0.5], &mut rng);
+        let goal = rooms[rng.below(rooms.len())];
+        world
+            .graph
+            .specials
+            .push(special("mirror", &mirror, Way::Mirror));
+        world
+            .graph
+            .specials
+            .extend(linked(&a, &b, world.graph.specials.len() as u32));
+        let [low, high] = world.graph[goal]
+            .aabb
+            .map(|p| DVec3::from_array(p.map(f64::from)));
+        let axis = DVec3::new(
+            rng.range(-1.0, 1.0),
+            rng.range(-1.0, 1.0),
+            rng.range(-1.0, 1.0),
+        );
+        let turn = DQuat::from_axis_angle(axis.normalize_or(DVec3::Y), rng.range(-3.0, 3.0));
+        let scale = rng.range(0.3, 1.5) * [1.0, -1.0][rng.below(2)];
+        let to = low.lerp(high, 0.5);
+        let map = Similarity {
+            turn,
+            at: to - turn * (one_way.center * scale),
+            scale,
+        };
+        let way = Way::Lead {
+            to: goal,
+            map,
+            back: None,
+        };
+        world.graph.specials.push(special("one way", &one_way, way));
+    }
+    world
+}
+
+/// Returns two rectangles of one size that lead into each other; they are numbered from `first`.
+fn linked(a: &OnWall, b: &OnWall, first: u32) -> [SpecialPortal; 2] {
+    let lead = |from: &OnWall, to: &OnWall, back: u32| {
+        // Half a turn about the upward axis: out of one room is into the other.
+        let turn =
+            (to.turn() * DQuat::from_rotation_y(std::f64::consts::PI)) * from.turn().conjugate();
+        Way::Lead {
+            to: to.cell,
+            map: Similarity::rigid(turn.normalize(), to.center - turn * from.center),
+            back: Some(SpecialId(back)),
+        }
+    };
+    [
+        special("there", a, lead(a, b, first + 1)),
+        special("back", b, lead(b, a, first)),
+    ]
+}
