@@ -14,6 +14,7 @@
 //! assert!(turned.truth_json().contains("\"door\""));
 //! ```
 
+mod assembled;
 mod cave;
 mod clinic;
 mod disturb;
@@ -41,6 +42,7 @@ mod truth;
 mod truth_json;
 mod tubes;
 
+pub use assembled::{Assembled, Beyond, Standing, assembled, chamber};
 pub use cave::cave;
 pub use clinic::clinic;
 pub use disturb::{Disturbance, disturb, disturbed};

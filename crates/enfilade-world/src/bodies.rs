@@ -31,5 +31,5 @@ pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
-pub(crate) use room::WalkerRoom;
+pub(crate) use room::{WalkerRoom, is_free_between};
 pub use walker::Walker;

@@ -54,7 +54,7 @@ pub(super) struct Walks {
 pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
     let mut space = Space::new(world.clone())?;
     let agent = Agent::default();
-    let map = WalkMap::new(space.layout(ROOT), world, agent);
+    let map = WalkMap::new(&space, agent);
     let as_modeled = SightState::new(space.sight(ROOT));
     let mut places = Places {
         caster: Caster::new(),
@@ -71,7 +71,8 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
             break;
         };
         let mut path = Path::default();
-        match search.find(&map, space.layout(ROOT), [from, to], |_| true, &mut path) {
+        let ends = [from, to].map(|p| (ROOT, p));
+        match search.find(&map, &space, ends, |_, _| true, &mut path) {
             Ok(()) if path.length < SHORTEST => continue,
             Ok(()) => {}
             Err(NoPath::NoWay) => {
@@ -83,9 +84,9 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
                 continue;
             }
         }
-        let eye = path.points[0] + DVec3::Y * agent.eye;
+        let eye = path.points[0].at + DVec3::Y * agent.eye;
         let mut walker = Walker::new(agent, ROOT, eye);
-        let mut follower = PathFollower::new(&space, ROOT, path.clone(), SPEED);
+        let mut follower = PathFollower::new(&space, path.clone(), SPEED);
         // A walker that follows its path takes no longer, whatever it slides along.
         let most = (10.0 + 2.0 * path.length / SPEED) / SECONDS;
         let mut progress = Progress::Walking;
