@@ -56,11 +56,7 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
     let agent = Agent::default();
     let map = WalkMap::new(&space, agent);
     let as_modeled = SightState::new(space.sight(ROOT));
-    let mut places = Places {
-        caster: Caster::new(),
-        rng: Rng::new(1),
-        agent,
-    };
+    let mut places = Places::new(agent);
     let (mut search, mut all) = (PathSearch::new(), Walks::default());
     for _ in 0..PATHS * TRIES {
         if all.walks.len() == PATHS {
@@ -113,13 +109,21 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
 }
 
 /// Places where a body can stand.
-struct Places {
+pub(super) struct Places {
     caster: Caster,
     rng: Rng,
     agent: Agent,
 }
 
 impl Places {
+    pub(super) fn new(agent: Agent) -> Self {
+        Self {
+            caster: Caster::new(),
+            rng: Rng::new(1),
+            agent,
+        }
+    }
+
     /// Returns what a body a little wider than the walker touches, by name.
     fn touched_at(&mut self, space: &Space, feet: DVec3) -> Vec<String> {
         let world: &World = space.world(ROOT);
@@ -151,7 +155,7 @@ impl Places {
     }
 
     /// Returns a place where the body stands free, with doors as in the model.
-    fn any(&mut self, space: &Space) -> Option<DVec3> {
+    pub(super) fn any(&mut self, space: &Space) -> Option<DVec3> {
         let layout: &Layout = space.layout(ROOT);
         let Agent {
             radius,

@@ -4,7 +4,7 @@ use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
 use enfilade::world::{
     ActorEvent, ActorId, Actors, Agent, Chance, Errands, PartId, Path, PathSearch, PlanDraft,
-    Space, WalkMap, WayPoint,
+    Space, WalkMap,
 };
 
 use super::file::PeopleEntry;
@@ -86,14 +86,7 @@ impl People {
                 if search.find(map, space, ends, may_pass, path).is_err() {
                     return;
                 }
-                for leg in path.points.windows(2) {
-                    let middle = (leg[0].at + leg[1].at) * 0.5 + DVec3::Y * 0.5;
-                    let cell = layout.locate(middle).unwrap_or(event.cell);
-                    way.push(WayPoint {
-                        at: leg[1].at,
-                        cell,
-                    });
-                }
+                path.add_way_points(layout, event.cell, way);
             });
         }
     }
