@@ -23,13 +23,15 @@ use walls::Walls;
 
 pub(crate) use changes::Change;
 
+pub use follow::Followed;
 pub use id::{PartId, Place};
-pub use look::{SpaceSeen, SpaceViewer};
+pub use look::{SeenContext, SeenVia, SpaceSeen, SpaceViewer, SpecialOptions, StoppedSpecial};
 pub use meet::Docking;
 pub use sweep::Passing;
 
 mod changes;
 mod doors;
+mod follow;
 mod id;
 mod look;
 mod meet;
