@@ -6,10 +6,13 @@
 //! opening. It is moved into the plane, so that the part that passes obliquely does not catch on it. So both images of a body meet
 //! disjoint obstacles, as the halves of one body that is cut at the plane would.
 
-use enfilade_geom::{DVec3, Triangle};
+use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
 
 /// Greatest depth of the wall around a special portal behind its plane. [Units: wu]
 pub(super) const FLUSH: f64 = 0.01;
+
+/// Square of twice the area of a triangle that cutting leaves by rounding. [Units: wu⁴]
+const SLIVER: f64 = 1e-24;
 
 /// The obstacles that count, in the frame of one part.
 #[derive(Clone, Debug, Default)]
@@ -132,7 +135,10 @@ impl Carver {
         }
         for polygon in self.after.iter() {
             for k in 2..polygon.len() {
-                visit([polygon[0], polygon[k - 1], polygon[k]]);
+                let t = [polygon[0], polygon[k - 1], polygon[k]];
+                if triangle_area_normal(&t).length_squared() > SLIVER {
+                    visit(t);
+                }
             }
         }
     }
@@ -205,7 +211,6 @@ fn clip(polygon: &[DVec3], normal: DVec3, least: f64, out: &mut Vec<DVec3>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade_geom::triangle_area_normal;
     use enfilade_testkit::Rng;
 
     fn area(triangles: &[Triangle]) -> f64 {
