@@ -74,6 +74,11 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
                     }
                 };
             }
+            let fittings = match known {
+                _ if i == 0 => portal.fittings.clone(),
+                Some((_, _, Beyond::Door(0, p))) => all[0].world.graph[*p].fittings.clone(),
+                _ => Vec::new(),
+            };
             let number = PortalId(world.graph.portals.len() as u32);
             for cell in cells {
                 world.graph.cells[cell.idx()].portals.push(number);
@@ -88,11 +93,7 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
                     .map(|piece| piece.iter().map(place).collect())
                     .collect(),
                 area: portal.area,
-                fittings: if i == 0 {
-                    portal.fittings.clone()
-                } else {
-                    Vec::new()
-                },
+                fittings,
             });
         }
     }
