@@ -35,6 +35,7 @@ struct Site {
     cabin: PartId,
     /// The cabin's door, and what it leads to in one world.
     door: PortalId,
+    room: CellId,
     beyond: Beyond,
     /// The cabin's pose in the building's frame if both were at rest.
     home: Pose,
@@ -164,6 +165,7 @@ fn site(
         .context("a cabin with a door")?;
     Ok(Site {
         door: door.portal,
+        room: door.to,
         stops: vec![0.0],
         space,
         building,
@@ -221,7 +223,7 @@ impl Site {
     fn ends(&self, rel: &Pose, rng: &mut Rng) -> [DVec3; 2] {
         let layout = self.space.layout(self.cabin);
         let opening = layout.opening(self.door);
-        let inside = layout.cell(CellId(0)).bounds;
+        let inside = layout.cell(self.room).bounds;
         let bounds = Aabb::new(inside.min + 0.3, inside.max - 0.3);
         let from = rng.point_in(&bounds);
         let through = rng.point_in(&opening.bounds().expanded(-0.02));
@@ -342,7 +344,8 @@ impl Site {
         let (mut search, mut path) = (PathSearch::new(), Path::default());
         let (mut one_search, mut one_path) = (PathSearch::new(), Path::default());
         let layout = self.space.layout(self.building);
-        let floor = layout_floor(&self.space, self.cabin);
+        let bounds = self.space.layout(self.cabin).cell(self.room).bounds;
+        let floor = bounds.center().with_y(bounds.min.y);
         let start = floor + DVec3::new(rng.range(-0.2, 0.2), 0.0, rng.range(-0.2, 0.2));
         let own = [(self.cabin, start), (PartId::ROOT, rel.point(start))];
         for _ in 0..8 {
@@ -393,12 +396,6 @@ impl Site {
         });
         Ok(())
     }
-}
-
-/// Returns a point on the floor in the middle of a cabin.
-fn layout_floor(space: &Space, cabin: PartId) -> DVec3 {
-    let bounds = space.layout(cabin).cell(CellId(0)).bounds;
-    bounds.center().with_y(bounds.min.y)
 }
 
 fn measure(mut site: Site) -> anyhow::Result<Figure> {
