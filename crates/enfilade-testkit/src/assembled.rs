@@ -49,7 +49,13 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
         n_cells += standing.world.graph.cells.len() as u32;
     }
     for (i, standing) in all.iter().enumerate() {
-        add(&mut world, standing, first_cell[i]);
+        // What is outside a cabin is in the shaft around it.
+        let around = doors.iter().find_map(|door| match door.2 {
+            Beyond::Cell(cell) if door.0 == i => Some(cell),
+            _ => None,
+        });
+        let around = around.or(all[0].world.graph.locator.outside);
+        add(&mut world, standing, first_cell[i], around);
     }
     for (i, standing) in all.iter().enumerate() {
         let graph = &standing.world.graph;
@@ -74,6 +80,11 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
                     }
                 };
             }
+            let fittings = match known {
+                _ if i == 0 => portal.fittings.clone(),
+                Some((_, _, Beyond::Door(0, p))) => all[0].world.graph[*p].fittings.clone(),
+                _ => Vec::new(),
+            };
             let number = PortalId(world.graph.portals.len() as u32);
             for cell in cells {
                 world.graph.cells[cell.idx()].portals.push(number);
@@ -88,11 +99,7 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
                     .map(|piece| piece.iter().map(place).collect())
                     .collect(),
                 area: portal.area,
-                fittings: if i == 0 {
-                    portal.fittings.clone()
-                } else {
-                    Vec::new()
-                },
+                fittings,
             });
         }
     }
@@ -110,10 +117,23 @@ fn placed(standing: &Standing<'_>, p: &[f32; 3]) -> [f32; 3] {
         .to_array()
 }
 
-/// Adds the cells and triangles of a world.
-fn add(all: &mut World, standing: &Standing<'_>, first_cell: u32) {
+/// Adds the cells and triangles of a world; `around` is the cell around it.
+fn add(all: &mut World, standing: &Standing<'_>, first_cell: u32, around: Option<CellId>) {
     let world = standing.world;
-    let moved = |cells: &[CellId]| cells.iter().map(|c| CellId(c.0 + first_cell)).collect();
+    let moved = |cells: &[CellId]| -> Vec<CellId> {
+        let one = |c: &CellId| {
+            let is_around = first_cell > 0 && world.graph[*c].outdoor;
+            let own = CellId(c.0 + first_cell);
+            if is_around {
+                around.unwrap_or(own)
+            } else {
+                own
+            }
+        };
+        let mut cells: Vec<CellId> = cells.iter().map(one).collect();
+        cells.sort_unstable();
+        cells
+    };
     for cell in &world.graph.cells {
         let corners = Aabb::of_points(&cell.aabb.map(|p| point(&p))).corners();
         let bounds = Aabb::of_points(&corners.map(|p| standing.turn * p + standing.at));

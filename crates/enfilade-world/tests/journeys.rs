@@ -36,10 +36,19 @@ fn docked_at(size: [DVec3; 2], gap: f64, turn: f64) -> Pose {
 }
 
 fn docked(gap: f64, turn: f64) -> Docked {
+    docked_by(gap, turn, [1.0, 2.1])
+}
+
+/// The same through doors of a width and height.
+fn docked_by(gap: f64, turn: f64, [width, height]: [f64; 2]) -> Docked {
     let sizes = [DVec3::new(4.0, 2.5, 3.0), DVec3::new(3.0, 2.5, 4.0)];
     let rooms = sizes.map(|size| {
         let middle = 0.5 * size.x;
-        Arc::new(chamber(size, [middle - 0.5, middle + 0.5], 2.1))
+        Arc::new(chamber(
+            size,
+            [middle - 0.5 * width, middle + 0.5 * width],
+            height,
+        ))
     });
     let far = Pose::about(DVec3::new(40.0, 2.0, -70.0), DVec3::Y, 0.7)
         .after(&Pose::from_translation(DVec3::new(900.0, -3.0, 500.0)));
@@ -157,7 +166,6 @@ fn a_path_through_docked_doors_is_that_of_one_world() {
             let found = search.find(&map, &space, ends, shut, &mut path);
             assert_eq!(found, Err(NoPath::NoWay));
         }
-        eprintln!("{gap} {degrees} {}", sum / 40.0);
         assert!((sum / 40.0).abs() < 0.5 * side, "{sum}");
     }
 }
@@ -204,6 +212,33 @@ fn a_path_leads_through_doors_only_while_they_meet() {
         .find(&map, &space, ends, |_, _| true, &mut path)
         .unwrap();
     assert!((path.length - length).abs() < 1e-9);
+}
+
+/// W10: a walker fits through docked doors only where its body does, and keeps away from the drop at a door that leads nowhere.
+#[test]
+fn a_walker_needs_room_in_docked_doors() {
+    let inside = [DVec3::new(1.0, 0.0, 1.0), DVec3::new(2.0, 0.0, 1.0)];
+    for (size, is_way) in [
+        ([1.0, 2.1], true),
+        ([0.49, 2.1], false),
+        ([1.0, 1.7], false),
+    ] {
+        let Docked { space, parts, .. } = docked_by(0.0, 0.0, size);
+        let map = WalkMap::new(&space, agent());
+        let ends = [(parts[0], inside[0]), (parts[1], inside[1])];
+        let (mut search, mut path) = (PathSearch::new(), Path::default());
+        let found = search.find(&map, &space, ends, |_, _| true, &mut path);
+        assert_eq!(found.is_ok(), is_way, "{size:?}: {found:?}");
+        let ends = [
+            (parts[0], DVec3::new(2.0, 0.0, 2.97)),
+            (parts[0], inside[0]),
+        ];
+        search
+            .find(&map, &space, ends, |_, _| true, &mut path)
+            .unwrap();
+        // To a square.
+        assert!(path.points[0].at.z < 2.85, "{}", path.points[0].at);
+    }
 }
 
 /// W10, W12: a walker follows a path from part to part, and waits where the next part has left.

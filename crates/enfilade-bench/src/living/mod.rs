@@ -3,6 +3,7 @@
 //! To add a row, add a file beside this one and a line in [`ROWS`].
 
 mod actors;
+mod askers;
 mod bodies;
 mod buildings;
 mod decays;
@@ -68,6 +69,12 @@ pub(crate) const ROWS: &[Row] = &[
     made("moving rooms", &["cabins"], rooms::poses),
     baked("moving rooms", LIVED_IN, buildings::poses),
     made("moving rooms: far", &["cabins"], rooms::far),
+    made(
+        "rooms that move, all askers",
+        &["lift-tower"],
+        askers::tower,
+    ),
+    baked("rooms that move, all askers", LIVED_IN, askers::entrance),
     made("parts: one", PARTS, parts::one),
     made("parts: all", &["cabins-1600"], parts::all),
     made("docking", &["cabins"], parts::docking),

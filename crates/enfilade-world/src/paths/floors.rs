@@ -382,6 +382,24 @@ impl Floors {
         }
     }
 
+    /// Returns `true` if one comes from a floor to others that are not beside a drop, within its cell.
+    pub(crate) fn leads_off_edge(&self, floor: u32) -> bool {
+        let (mut seen, mut at) = (vec![floor], 0);
+        while let Some(&here) = seen.get(at) {
+            at += 1;
+            let own = self.floor(here);
+            if !own.is_edge {
+                return true;
+            }
+            for to in own.steps.into_iter().filter(|to| *to != NONE) {
+                if self.floor(to).cell == own.cell && !seen.contains(&to) {
+                    seen.push(to);
+                }
+            }
+        }
+        false
+    }
+
     /// Returns the floor in the square of a point that is nearest to it in height, if it is within a step.
     pub(crate) fn at(&self, p: DVec3) -> Option<u32> {
         let square = self.squares.number(self.squares.at(p)?);

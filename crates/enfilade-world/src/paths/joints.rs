@@ -19,6 +19,8 @@ use crate::layout::{Exit, Layout};
 use crate::shape::is_near;
 use crate::space::{PartId, Space};
 
+/// Widest gap between a door and the floor before or behind it. [Units: squares of the floors]
+const GAP: usize = 2;
 /// Most portals that a step passes.
 const MOST_PORTALS: usize = 4;
 
@@ -304,14 +306,25 @@ impl Joints {
     }
 }
 
-/// Returns the floor nearest to a point of a sill, a little away from it.
+/// Returns the first floor away from a point of a sill that is not cut off from all others of its cell, such as by a gate behind
+/// it: the sills of a shaft's gates are in the shaft.
 fn floor_near(floors: &Floors, sill: DVec3, away: DVec3) -> Option<Bend> {
     let away = away.with_y(0.0).normalize_or_zero();
-    [0.5, 1.5, 2.5].into_iter().find_map(|squares| {
-        let p = sill + away * (squares * floors.side());
-        let floor = floors.at(p)?;
-        Some((p.with_y(floors.point(floor).y), floor))
-    })
+    let most = floors.walker().radius / floors.side() + 3.0;
+    let mut is_there = false;
+    for k in 0..most as usize {
+        let p = sill + away * ((k as f64 + 0.5) * floors.side());
+        match floors.at(p) {
+            Some(floor) if floors.leads_off_edge(floor) => {
+                return Some((p.with_y(floors.point(floor).y), floor));
+            }
+            Some(_) => is_there = true,
+            // Not over a hole.
+            None if is_there || k >= GAP => return None,
+            None => {}
+        }
+    }
+    None
 }
 
 /// Follows a line from a cell to another; calls `visit` with each portal passed, the cells before and behind it, and the share
