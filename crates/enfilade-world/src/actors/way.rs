@@ -16,16 +16,18 @@ impl Path {
             if a == first.to { b } else { a }
         });
         let mut next = self.portals.iter().zip(&self.passages).peekable();
-        for leg in self.points.windows(2) {
-            // Passages are in the order of the path, and on it in plan.
+        for (i, leg) in self.points.windows(2).enumerate() {
             let mut at = 0.0;
             while let Some((exit, passage)) = next.peek() {
-                let Some(share) = share_of(leg[0], leg[1], **passage).filter(|s| *s >= at) else {
+                let own = share_of(leg[0], leg[1], **passage).filter(|share| *share >= at);
+                // By rounding, one may be on no leg: it is passed at the end at the latest.
+                let is_last = i + 2 == self.points.len();
+                let Some(share) = own.or(is_last.then_some(1.0)) else {
                     break;
                 };
-                let (point, to) = (leg[0].lerp(leg[1], share), exit.to);
+                let point = leg[0].lerp(leg[1], share);
                 way.push(WayPoint { at: point, cell });
-                (at, cell) = (share, to);
+                (at, cell) = (share, exit.to);
                 next.next();
             }
             way.push(WayPoint { at: leg[1], cell });
@@ -35,12 +37,17 @@ impl Path {
 
 /// Farthest a passage may be from its leg by rounding. [Units: wu]
 const ROUNDING: f64 = 1e-6;
+/// Farthest it may be above or below: more than a path cuts off a step, less than a storey, as stairs lead over one another.
+/// [Units: wu]
+const STOREY: f64 = 1.0;
 
 /// Returns the share of a leg after which it is at a point, in plan; `None` if it does not pass it.
 fn share_of(from: DVec3, to: DVec3, p: DVec3) -> Option<f64> {
     let [along, by] = [to - from, p - from].map(|v| v.with_y(0.0));
     let share = (by.dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
-    (by.distance(along * share) <= ROUNDING).then_some(share)
+    let is_there = by.distance(along * share) <= ROUNDING;
+    let up = p.y - from.lerp(to, share).y;
+    (is_there && up.abs() <= STOREY).then_some(share)
 }
 
 #[cfg(test)]
@@ -49,6 +56,31 @@ mod tests {
     use crate::layout::Exit;
     use enfilade_cpg::PortalId;
     use enfilade_testkit::{GridParams, room_grid};
+
+    #[test]
+    fn a_portal_on_the_next_flight_of_stairs_is_not_passed_on_this_one() {
+        let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
+        let [here, there] = layout.opening(PortalId(0)).cells();
+        let path = Path {
+            // Up, across, and back above the first flight.
+            points: vec![
+                DVec3::ZERO,
+                DVec3::new(4.0, 1.5, 0.0),
+                DVec3::new(0.0, 3.0, 0.0),
+            ],
+            portals: vec![Exit {
+                portal: PortalId(0),
+                to: there,
+            }],
+            passages: vec![DVec3::new(1.0, 2.7, 0.0)],
+            ..Path::default()
+        };
+        let mut way = Vec::new();
+        path.add_way_points(&layout, here, &mut way);
+        let cells: Vec<CellId> = way.iter().map(|w| w.cell).collect();
+        assert_eq!(cells, [here, here, there]);
+        assert_eq!(way[1].at, DVec3::new(1.0, 2.625, 0.0));
+    }
 
     #[test]
     fn a_straight_path_through_a_door_is_listed_in_both_rooms() {
