@@ -104,7 +104,8 @@ impl Radar {
                     debug_assert!(moved.is_ok());
                 }
                 None => {
-                    self.people[i] = self.add(space, (BlipKind::Person, number), PartId::ROOT, at)
+                    let person = (BlipKind::Person, number);
+                    self.people[i] = self.add(space, person, PartId::ROOT, at);
                 }
             }
         }

@@ -146,7 +146,7 @@ impl WalkMap {
             let mut lengths = vec![0.0; n * n];
             for (i, j) in (0..n).flat_map(|i| (i..n).map(move |j| (i, j))) {
                 let length = from.real()?;
-                if !(length >= 0.0) {
+                if length.is_nan() || length < 0.0 {
                     return Err(KeptMapError::Damaged(
                         "a length is not a number of at least 0",
                     ));
