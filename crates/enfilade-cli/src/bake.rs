@@ -101,7 +101,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;
     if args.walk {
-        // Of the world as it is read.
+        // Readers get this world, rounded.
         let world = decode_glb(&bytes)?;
         let (layout, walks) = (Layout::new(&world), Walks::usual());
         let file = WorldFile {

@@ -10,7 +10,6 @@ use enfilade::world::{
 };
 
 use super::file::SoundEntry;
-use super::lived::Player;
 
 /// Longest way to a thing that the radar shows. [Units: wu]
 pub(crate) const RADAR_REACH: f64 = 20.0;
@@ -94,7 +93,7 @@ impl Radar {
         for (number, feet) in people {
             let i = number as usize;
             self.people.resize(self.people.len().max(i + 1), None);
-            // Above the floor, which is no place.
+            // A point of the floor itself has no place.
             let at = feet + DVec3::Y * 0.05;
             match self.people[i] {
                 Some(id) => {
@@ -134,11 +133,16 @@ impl Radar {
         }
     }
 
-    /// Finds the things within reach of a player: those that the cells reached list, each once.
-    pub(super) fn look(&mut self, space: &Space, player: &Player, awake: &AwakeCells) -> &[Blip] {
+    /// Finds the things within reach of an eye in a part: those that the cells reached list, each once.
+    pub(super) fn look(
+        &mut self,
+        space: &Space,
+        (frame, eye): (PartId, DVec3),
+        awake: &AwakeCells,
+    ) -> &[Blip] {
         self.blips.clear();
         let layout = space.layout(PartId::ROOT);
-        let eye = space.between(player.frame, PartId::ROOT).point(player.eye);
+        let eye = space.between(frame, PartId::ROOT).point(eye);
         let Some(here) = layout.locate(eye) else {
             return &self.blips;
         };
@@ -262,11 +266,8 @@ mod tests {
         );
         let mut awake = AwakeCells::new(layout.n_cells(), 1.0);
         awake.update(0.0, [CellId(0)]);
-        let player = Player {
-            frame: PartId::ROOT,
-            eye: middle(0),
-        };
-        let blips = radar.look(&space, &player, &awake).to_vec();
+        let player = (PartId::ROOT, middle(0));
+        let blips = radar.look(&space, player, &awake).to_vec();
         let told: Vec<_> = blips
             .iter()
             .map(|b| (b.number, b.n_portals, b.is_awake))
@@ -276,10 +277,10 @@ mod tests {
         assert_eq!(told, all[..if far < RADAR_REACH - 1.0 { 3 } else { 2 }]);
         assert_eq!(blips[1].cells, [CellId(1)]);
         assert!((blips[1].length - middle(0).distance(feet(1))).abs() < 1.0);
-        // Who stands in a doorway is in both rooms, and listed once.
+        // A person in a doorway is in both rooms, and listed once.
         let door = layout.opening(enfilade::PortalId(0));
         radar.follow(&space, [(1, door.center().with_y(0.0))].into_iter());
-        let blips = radar.look(&space, &player, &awake).to_vec();
+        let blips = radar.look(&space, player, &awake).to_vec();
         let one: Vec<&Blip> = blips.iter().filter(|b| b.number == 1).collect();
         assert!(one.len() == 1 && one[0].cells.len() == 2 && one[0].is_awake);
         let words = radar_words(&blips, |c| c.to_string());

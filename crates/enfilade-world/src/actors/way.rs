@@ -20,7 +20,7 @@ impl Path {
             let mut at = 0.0;
             while let Some((exit, passage)) = next.peek() {
                 let own = share_of(leg[0], leg[1], **passage).filter(|share| *share >= at);
-                // By rounding, one may be on no leg: it is passed at the end at the latest.
+                // Rounding may leave one on no leg: it is passed at the end at the latest.
                 let is_last = i + 2 == self.points.len();
                 let Some(share) = own.or(is_last.then_some(1.0)) else {
                     break;

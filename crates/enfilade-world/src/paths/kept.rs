@@ -25,7 +25,7 @@ use crate::layout::Layout;
 const MAGIC: &[u8; 8] = b"ENFWALK1";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What a walk map was made of.
+/// Origin of a walk map: world, objects and walker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WalkMapKey {
     /// Hash of the world's file, as [`WalkMapKey::hash`].
@@ -56,7 +56,7 @@ pub enum KeptMapError {
     /// Made by another version.
     #[error("another version of enfilade made it")]
     OtherVersion,
-    /// Of another world.
+    /// Made of another world.
     #[error("it is of another world, or the world has changed since")]
     OtherWorld,
     /// For another walker.
@@ -290,6 +290,8 @@ fn numbers_of(walker: &Agent) -> [f64; 5] {
     [radius, height, eye, step, slope]
 }
 
+const WRONG: KeptMapError = KeptMapError::Damaged("its floors contradict each other");
+
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
@@ -373,7 +375,6 @@ impl Reader<'_> {
     }
 
     fn floors(&mut self, layout: &Layout, walker: Agent) -> Result<Floors, KeptMapError> {
-        const WRONG: KeptMapError = KeptMapError::Damaged("its floors contradict each other");
         let [x, z, side] = [self.real()?, self.real()?, self.real()?];
         let n = [self.number()?, self.number()?];
         let n_squares = n[0].saturating_mul(n[1]);
@@ -427,7 +428,27 @@ impl Reader<'_> {
                 }
             }
         }
-        let n_portals = layout.n_portals();
+        let crossings = self.crossings(layout, &floors)?;
+        let swung = self.swung(layout, &floors)?;
+        let doors = self.doors(layout)?;
+        Ok(Floors {
+            first: first_of(&squares, floors.iter().map(|f| f.square)),
+            squares,
+            floors,
+            crossings,
+            swung,
+            doors,
+            walker,
+        })
+    }
+
+    /// Reads the steps between cells.
+    fn crossings(
+        &mut self,
+        layout: &Layout,
+        floors: &[Floor],
+    ) -> Result<Vec<Crossing>, KeptMapError> {
+        let (n_portals, n_floors) = (layout.n_portals(), floors.len());
         let mut crossings: Vec<Crossing> = Vec::new();
         let mut last = 0_u32;
         for _ in 0..self.count(3)? {
@@ -454,6 +475,16 @@ impl Reader<'_> {
             crossings.push(step);
             last = from;
         }
+        Ok(crossings)
+    }
+
+    /// Reads the floors in the way of leaves.
+    fn swung(
+        &mut self,
+        layout: &Layout,
+        floors: &[Floor],
+    ) -> Result<Vec<(u32, PortalId)>, KeptMapError> {
+        let (n_portals, n_floors) = (layout.n_portals(), floors.len());
         let mut swung: Vec<(u32, PortalId)> = Vec::new();
         let mut last = 0_u32;
         for _ in 0..self.count(2)? {
@@ -468,6 +499,12 @@ impl Reader<'_> {
             last = item.0;
             swung.push(item);
         }
+        Ok(swung)
+    }
+
+    /// Reads the portals with leaves.
+    fn doors(&mut self, layout: &Layout) -> Result<Vec<PortalId>, KeptMapError> {
+        let n_portals = layout.n_portals();
         let mut doors: Vec<PortalId> = Vec::new();
         for _ in 0..self.count(1)? {
             let portal = PortalId(self.below(n_portals)?);
@@ -477,140 +514,9 @@ impl Reader<'_> {
             }
             doors.push(portal);
         }
-        Ok(Floors {
-            first: first_of(&squares, floors.iter().map(|f| f.square)),
-            squares,
-            floors,
-            crossings,
-            swung,
-            doors,
-            walker,
-        })
+        Ok(doors)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::paths::{Path, PathSearch};
-    use enfilade_testkit::{GridParams, Rng, room_grid};
-
-    fn made() -> (Layout, WalkMap, WalkMapKey) {
-        let world = room_grid(&GridParams {
-            outdoors: true,
-            ..GridParams::offices(6, 3)
-        });
-        let layout = Layout::new(&world);
-        let walker = Agent::default();
-        let map = WalkMap::new(&layout, &world, walker);
-        let key = WalkMapKey {
-            world: 7,
-            objects: 1,
-            walker,
-        };
-        (layout, map, key)
-    }
-
-    #[test]
-    fn a_kept_map_is_restored_to_the_bit() {
-        let (layout, map, key) = made();
-        assert!(
-            map.floors.n_floors() > 1000
-                && !map.sides.is_empty()
-                && !map.floors.crossings.is_empty()
-        );
-        let bytes = map.kept(&layout, &key);
-        let back = WalkMap::restored(&bytes, &layout, &key).unwrap();
-        assert_eq!(format!("{back:?}"), format!("{map:?}"));
-        assert_eq!(back.kept(&layout, &key), bytes);
-        let ends = [0, 4].map(|c| layout.cell(CellId(c)).bounds.center());
-        let [a, b] = [&map, &back].map(|map| {
-            let mut path = Path::default();
-            let found = PathSearch::new().find(map, &layout, ends, |_| true, &mut path);
-            (found, path.points)
-        });
-        assert_eq!(a, b);
-    }
-
-    #[test]
-    fn a_map_of_anything_else_is_refused_with_the_reason() {
-        let (layout, map, key) = made();
-        let bytes = map.kept(&layout, &key);
-        let refused = |key: WalkMapKey| WalkMap::restored(&bytes, &layout, &key).err();
-        assert_eq!(refused(key), None);
-        assert_eq!(
-            refused(WalkMapKey { world: 8, ..key }),
-            Some(KeptMapError::OtherWorld)
-        );
-        assert_eq!(
-            refused(WalkMapKey { objects: 0, ..key }),
-            Some(KeptMapError::OtherObjects)
-        );
-        for change in [
-            |a: &mut Agent| a.radius = 0.2,
-            |a: &mut Agent| a.height = 1.7,
-            |a: &mut Agent| a.eye = 1.5,
-            |a: &mut Agent| a.step = 0.2,
-            |a: &mut Agent| a.slope = 0.7,
-        ] {
-            let mut walker = key.walker;
-            change(&mut walker);
-            assert_eq!(
-                refused(WalkMapKey { walker, ..key }),
-                Some(KeptMapError::OtherWalker)
-            );
-        }
-        let mut old = bytes.clone();
-        old[17] ^= 1;
-        hashed(&mut old);
-        let other = WalkMap::restored(&old, &layout, &key).err();
-        assert_eq!(other, Some(KeptMapError::OtherVersion));
-        assert_eq!(
-            WalkMap::restored(b"glTF", &layout, &key).err(),
-            Some(KeptMapError::NotAMap)
-        );
-    }
-
-    /// Makes the hash right after a change.
-    fn hashed(bytes: &mut [u8]) {
-        let hash = WalkMapKey::hash(&bytes[16..]).to_le_bytes();
-        bytes[8..16].copy_from_slice(&hash);
-    }
-
-    #[test]
-    fn damaged_and_forged_bytes_are_refused_or_harmless() {
-        let (layout, map, key) = made();
-        let bytes = map.kept(&layout, &key);
-        let mut rng = Rng::new(3);
-        for _ in 0..400 {
-            let n = rng.below(bytes.len());
-            assert!(WalkMap::restored(&bytes[..n], &layout, &key).is_err());
-            let mut cut = bytes[..n.max(16)].to_vec();
-            hashed(&mut cut);
-            assert!(WalkMap::restored(&cut, &layout, &key).is_err());
-            let mut flipped = bytes.clone();
-            flipped[n] ^= 1 << rng.below(8);
-            assert!(WalkMap::restored(&flipped, &layout, &key).is_err());
-        }
-        // With a hash that fits, what is not refused answers queries.
-        let mut n_read = 0;
-        let (mut search, mut path) = (PathSearch::new(), Path::default());
-        for _ in 0..600 {
-            let mut forged = bytes.clone();
-            for _ in 0..=rng.below(3) {
-                let at = 16 + rng.below(bytes.len() - 16);
-                forged[at] = rng.next_u32() as u8;
-            }
-            hashed(&mut forged);
-            if let Ok(map) = WalkMap::restored(&forged, &layout, &key) {
-                n_read += 1;
-                let ends = [(); 2].map(|()| {
-                    let cell = CellId(rng.below(layout.n_cells()) as u32);
-                    rng.point_in(&layout.cell(cell).bounds)
-                });
-                let _ = search.find(&map, &layout, ends, |_| true, &mut path);
-            }
-        }
-        assert!(n_read > 0, "none was read");
-    }
-}
+mod tests;
