@@ -32,6 +32,7 @@ mod sound;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod walk;
 
 use std::io::Write;
 use std::process::ExitCode;

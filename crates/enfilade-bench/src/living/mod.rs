@@ -14,6 +14,7 @@ mod levels;
 mod parts;
 mod paths;
 mod rooms;
+mod solids;
 mod sound;
 mod things;
 mod walk;
