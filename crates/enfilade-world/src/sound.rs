@@ -36,6 +36,7 @@ use enfilade_runtime::SightState;
 
 use crate::layout::Layout;
 use crate::paths::{Geodesics, Sampling, Ways};
+use crate::sound::edge::EdgeLosses;
 
 pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
 pub use ears::at_ears;
@@ -80,6 +81,7 @@ pub struct Acoustics {
     /// Per portal, the area of its opening, and the box around it. [Units: wu², wu]
     area: Vec<f64>,
     bounds: Vec<Aabb>,
+    edge_losses: EdgeLosses,
 }
 
 /// Area of a first Fresnel zone of 500 Hz, divided by π, where both ends are a meter and a half away. [Units: wu²]
@@ -117,6 +119,7 @@ impl Acoustics {
             rims,
             shut,
             has_pane,
+            edge_losses: EdgeLosses::new(),
         }
     }
 
@@ -155,6 +158,16 @@ impl Acoustics {
         let area = open * self.area[portal.idx()];
         let free = area * area / (area * area + MID_ZONE * MID_ZONE);
         -10.0 * (free + (1.0 - free) * shut).log10()
+    }
+
+    /// Returns how much louder a portal may let through what it did before, when its clear share changes. [Units: dB]
+    fn rise(&self, portal: PortalId, before: f64, open: f64) -> f64 {
+        if open <= before {
+            return 0.0;
+        }
+        let most = -10.0 * self.shut[portal.idx()].max(1e-30).log10();
+        // Through a small hole, energy is as the square of its area.
+        (20.0 * (open / before).log10()).min(most)
     }
 
     fn rims(&self, portal: PortalId) -> &[[DVec3; 2]] {
