@@ -54,6 +54,7 @@ pub(crate) struct Sequences {
     lengths: Vec<f64>,
     heap: BinaryHeap<Reverse<(u64, u32)>>,
     found: Vec<u32>,
+    least: f64,
 }
 
 impl Sequences {
@@ -71,6 +72,7 @@ impl Sequences {
         self.lengths.clear();
         self.heap.clear();
         self.found.clear();
+        self.least = f64::INFINITY;
         let mut most = f64::INFINITY;
         if start.cell == end.cell {
             self.complete(NONE, direct, end.at);
@@ -86,6 +88,7 @@ impl Sequences {
             }
             let Some((portal, into)) = self.partials[at as usize].last else {
                 if self.found.is_empty() {
+                    self.least = length;
                     most = length * limit.longest[0] + limit.longest[1];
                 }
                 self.found.push(at);
@@ -107,6 +110,11 @@ impl Sequences {
             self.extend(search, ways, (into, end), at, most);
         }
         self.found.len()
+    }
+
+    /// Returns the length of the shortest sequence.
+    pub(crate) fn least(&self) -> f64 {
+        self.least
     }
 
     fn complete(&mut self, before: u32, length: f64, point: DVec3) {

@@ -4,9 +4,9 @@ use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 use enfilade_runtime::SightState;
 
-use crate::layout::Layout;
+use crate::layout::{Exit, Layout};
 use crate::paths::{Corner, End, LengthSearch, Limit, Seen, Sequences};
-use crate::sound::route::{Gate, Puller, Route, Spot};
+use crate::sound::route::{Puller, Route, Spot};
 use crate::sound::{Acoustics, Heard, N_BANDS};
 
 /// Level below which nothing is heard, relative to that at one meter in the open: sources of 100 dB there, as loud as power tools,
@@ -29,7 +29,7 @@ const HEARD: Limit = Limit {
 };
 /// Length beyond that of the best at which sequences have faded out: as a share of the best, and added. These are mostly more than
 /// 10 dB down in rooms. [Units: 1, wu]
-const FADED: [f64; 2] = [0.4, 4.0];
+const FADED: [f64; 2] = [0.25, 3.0];
 /// Sequences of a source that may be the shortest, as lengths through sample points are a few percent too long.
 const SHORT: Limit = Limit {
     n: 6,
@@ -38,6 +38,8 @@ const SHORT: Limit = Limit {
 };
 /// Sequences are kept until lengths to some places may have changed by as much. [Units: wu]
 const KEPT: f64 = 0.25;
+/// The same for tolls of doors away from the listener, all together. [Units: wu]
+const SWUNG: f64 = 0.5;
 /// Length up to which openings are searched at first. [Units: wu]
 const FIRST_REACH: f64 = 24.0;
 /// Distance from an opening within which its toll fades to nothing, so that it does not matter on which side of it one is.
@@ -52,6 +54,9 @@ struct Source {
     /// The search that found the routes.
     search: u64,
     place: Option<Spot>,
+    /// The call of [`Listener::listen`] in which they were found, and the length of the best one.
+    time: u64,
+    best: f64,
     /// From the source to the points of its cell, where it was when these were found.
     lengths: Vec<f64>,
     measured: Option<(CellId, DVec3)>,
@@ -71,9 +76,11 @@ impl Source {
         self.routes[..self.n_routes].iter_mut()
     }
 
-    /// Adds a sequence, but not to measure it alone if it is heard.
+    /// Adds a sequence, with its string if it is known, but not to measure it alone if it is heard. The routes of before are
+    /// those from `n_routes` to `n_known`.
     fn add_route(
         &mut self,
+        n_known: &mut usize,
         is_heard: bool,
         portals: impl Iterator<Item = (PortalId, DVec3)> + Clone,
     ) {
@@ -81,16 +88,22 @@ impl Source {
         if !is_heard && self.routes().any(|r| r.portals().eq(own.clone())) {
             return;
         }
-        if self.routes.len() == self.n_routes {
-            self.routes.push(Route::default());
+        let mut known = self.routes[self.n_routes..*n_known].iter();
+        if let Some(i) = known.position(|r| r.portals().eq(own.clone())) {
+            self.routes.swap(self.n_routes, self.n_routes + i);
+            self.routes[self.n_routes].is_heard = is_heard;
+        } else {
+            if self.routes.len() == HEARD.n + SHORT.n {
+                // The last of before gives up its room.
+                *n_known -= usize::from(self.routes.len() == *n_known);
+            } else if self.routes.len() == *n_known {
+                self.routes.push(Route::default());
+            }
+            self.routes.swap(self.n_routes, *n_known);
+            *n_known += 1;
+            self.routes[self.n_routes].begin(is_heard, portals);
         }
-        let route = &mut self.routes[self.n_routes];
         self.n_routes += 1;
-        route.reset(is_heard);
-        for (portal, point) in portals {
-            route.gates.push(Gate::Portal(portal));
-            route.points.push(point);
-        }
     }
 }
 
@@ -102,6 +115,8 @@ impl Source {
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     search: LengthSearch,
+    /// `true` if that is to be done again.
+    is_stale: bool,
     /// The search without regard to shut doors.
     shortest: LengthSearch,
     n_searches: u64,
@@ -115,6 +130,10 @@ pub struct Listener {
     tolls: Vec<f64>,
     near_tolls: Vec<f64>,
     searched_tolls: Vec<f64>,
+    /// Number of calls of [`Listener::listen`].
+    time: u64,
+    /// Doors that moved after the listener's last search, with the time when they did.
+    moved: Vec<(PortalId, u64)>,
     /// How much louder any source may have become since the first position. [Units: dB]
     risen: f64,
     sources: Vec<Source>,
@@ -152,6 +171,8 @@ impl Listener {
         }
         self.open.resize(n, f64::NAN);
         self.searched_tolls.resize(n, f64::INFINITY);
+        self.time += 1;
+        let mut swung = 0.0;
         let mut moved = self.searched.map_or(f64::INFINITY, |s| s.1.distance(at));
         for i in 0..n {
             let portal = PortalId(i as u32);
@@ -164,25 +185,67 @@ impl Listener {
             let square = acoustics.bounds[i].distance_squared(at);
             let share = (square / (NEAR * NEAR)).min(1.0).sqrt();
             self.near_tolls[i] = share * self.tolls[i];
-            moved += (self.near_tolls[i] - self.searched_tolls[i]).abs();
+            let change = (self.near_tolls[i] - self.searched_tolls[i]).abs();
+            if share < 1.0 {
+                moved += change;
+            } else {
+                swung += change;
+            }
+        }
+        if swung > SWUNG {
+            self.note_swung();
         }
         if moved < KEPT && self.searched.is_some_and(|s| s.0 == cell) {
             return;
         }
         self.searched = Some((cell, at));
         self.searched_tolls.clone_from(&self.near_tolls);
+        self.moved.clear();
+        self.is_stale = true;
         self.n_searches += 1;
         let ways = &acoustics.ways;
         lengths_from(acoustics, cell, at, &mut self.lengths);
         let lengths = &self.lengths;
         let first = |place: usize, _| lengths[place];
-        let tolls = &self.searched_tolls;
-        self.search
-            .run_from(ways, cell, at, first, FIRST_REACH, |exit| {
-                Some(tolls[exit.portal.idx()])
-            });
         self.shortest
             .run_from(ways, cell, at, first, FIRST_REACH, |_| Some(0.0));
+    }
+
+    /// Notes which doors have moved, for the sources that may be heard through these.
+    fn note_swung(&mut self) {
+        let tolls = self.searched_tolls.iter_mut().zip(&self.near_tolls);
+        for (i, (searched, toll)) in tolls.enumerate().filter(|(_, (a, b))| a != b) {
+            *searched = *toll;
+            let portal = PortalId(i as u32);
+            match self.moved.iter_mut().find(|m| m.0 == portal) {
+                Some(known) => known.1 = self.time,
+                None => self.moved.push((portal, self.time)),
+            }
+        }
+        self.is_stale = true;
+    }
+
+    /// Searches anew if doors have moved.
+    fn search(&mut self, acoustics: &Acoustics) {
+        if let Some((cell, at)) = self.searched.filter(|_| self.is_stale) {
+            self.is_stale = false;
+            let (lengths, tolls) = (&self.lengths, &self.searched_tolls);
+            let first = |place: usize, _| lengths[place];
+            let pass = |exit: Exit| Some(tolls[exit.portal.idx()]);
+            (self.search).run_from(&acoustics.ways, cell, at, first, FIRST_REACH, pass);
+        }
+    }
+
+    /// Returns `true` if a door that has moved since a source's sequences were found may have changed which ones they are.
+    fn is_changed(&self, acoustics: &Acoustics, source: &Source, ends: [Spot; 2]) -> bool {
+        let most = source.best * HEARD.longest[0] + HEARD.longest[1];
+        let moved = self.moved.iter().filter(|m| m.1 > source.time);
+        let mut lengths = moved.map(|(portal, _)| {
+            let bounds = &acoustics.bounds[portal.idx()];
+            let squares = ends.map(|e| bounds.distance_squared(e.at));
+            squares[0].sqrt() + squares[1].sqrt()
+        });
+        lengths.any(|length| length < most)
     }
 
     /// Returns the number of searches of sequences, for cost statistics.
@@ -265,8 +328,13 @@ impl Listener {
         let source = &mut self.sources[id];
         let is_near = |p: Spot| p.cell == there.cell && p.at.distance(there.at) < KEPT;
         if source.search == self.n_searches && source.place.is_some_and(is_near) {
-            return Some(ends);
+            let source = &self.sources[id];
+            if !self.is_changed(acoustics, source, ends) {
+                return Some(ends);
+            }
         }
+        self.search(acoustics);
+        let source = &mut self.sources[id];
         let (ways, geodesics) = (&acoustics.ways, &acoustics.geodesics);
         if source.measured != Some((there.cell, there.at)) {
             source.measured = Some((there.cell, there.at));
@@ -277,8 +345,8 @@ impl Listener {
             let found = geodesics.way_with(cell, [at, there.at], &mut self.seen, &mut self.bends);
             direct = found.unwrap_or(f64::INFINITY);
         }
-        (source.search, source.place) = (self.n_searches, Some(there));
-        source.n_routes = 0;
+        (source.search, source.place, source.time) = (self.n_searches, Some(there), self.time);
+        let mut n_known = std::mem::take(&mut source.n_routes);
         let tolls = &self.searched_tolls;
         for (search, limit, is_heard) in [
             (&mut self.search, HEARD, true),
@@ -297,8 +365,11 @@ impl Listener {
                 })
             });
             let n = (self.sequences).find(search, ways, [start, end], direct, limit);
+            if is_heard {
+                source.best = self.sequences.least();
+            }
             for found in 0..n {
-                source.add_route(is_heard, self.sequences.portals(found));
+                source.add_route(&mut n_known, is_heard, self.sequences.portals(found));
             }
         }
         Some(ends)

@@ -43,7 +43,10 @@ pub(super) fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec
     };
     // As if `b` were on the other side: distances to points of the plane are the same. Heights by the length of the normal.
     let square = normal.length_squared().max(1e-300);
-    let (h_a, h_b) = (normal.dot(a - first) / square, normal.dot(b - first) / square);
+    let (h_a, h_b) = (
+        normal.dot(a - first) / square,
+        normal.dot(b - first) / square,
+    );
     let (p, q) = (a - normal * h_a, b - normal * h_b);
     let (h_a, h_b) = (h_a.abs(), h_b.abs());
     let through = if h_a + h_b > 0.0 {

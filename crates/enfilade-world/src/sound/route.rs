@@ -52,10 +52,22 @@ pub(super) struct Route {
 }
 
 impl Route {
-    /// Empties it for another sequence.
-    pub(super) fn reset(&mut self, is_heard: bool) {
+    /// Makes it another sequence: portals, each with a point near the crossing.
+    pub(super) fn begin(
+        &mut self,
+        is_heard: bool,
+        portals: impl Iterator<Item = (PortalId, DVec3)>,
+    ) {
         self.gates.clear();
         self.points.clear();
+        for (portal, point) in portals {
+            self.gates.push(Gate::Portal(portal));
+            self.points.push(point);
+        }
+        // Few sizes, as strings change places.
+        let room = self.points.len().next_power_of_two().max(32);
+        self.gates.reserve(room - self.points.len());
+        self.points.reserve(room - self.points.len());
         (self.is_heard, self.pulled, self.quiet) = (is_heard, None, 0.0);
     }
 
@@ -179,8 +191,8 @@ impl Puller {
         if self.gates == route.gates {
             return false;
         }
-        std::mem::swap(&mut self.gates, &mut route.gates);
-        std::mem::swap(&mut self.points, &mut route.points);
+        route.gates.clone_from(&self.gates);
+        route.points.clone_from(&self.points);
         true
     }
 

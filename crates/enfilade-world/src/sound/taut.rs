@@ -24,7 +24,7 @@ use crate::sound::blocks::{Block, solve};
 use crate::sound::pieces::{add_barrier, barrier, best_place, middle, plane_axes, room};
 
 /// Relative gap between the length and its lower bound that ends the search.
-const GAP: f64 = 1e-6;
+const GAP: f64 = 1e-9;
 /// Rounds of sweeps and Newton before the interior-point method.
 const ROUNDS: usize = 12;
 /// Maximum number of steps of the interior-point method.
