@@ -35,6 +35,8 @@ pub(super) struct Route {
     pub(super) gates: Vec<Gate>,
     /// A point in each gate.
     pub(super) points: Vec<DVec3>,
+    /// A point in each portal, of the string without bends.
+    plain: Vec<DVec3>,
     pub(super) length: f64,
     /// Towards its first bend.
     pub(super) toward: DVec3,
@@ -68,6 +70,9 @@ impl Route {
         let room = self.points.len().next_power_of_two().max(32);
         self.gates.reserve(room - self.points.len());
         self.points.reserve(room - self.points.len());
+        self.plain.clear();
+        self.plain.reserve(room);
+        self.plain.extend_from_slice(&self.points);
         (self.is_heard, self.pulled, self.quiet) = (is_heard, None, 0.0);
     }
 
@@ -114,7 +119,7 @@ pub(super) struct Puller {
 }
 
 impl Puller {
-    /// Pulls a route taut, starting from its last points.
+    /// Pulls a route taut.
     pub(super) fn pull(
         &mut self,
         acoustics: &Acoustics,
@@ -126,26 +131,33 @@ impl Puller {
             return;
         }
         route.pulled = Some([from.at, to.at]);
-        let mut is_pulled = false;
+        // First through the portals alone, where there is one shortest string, whatever was before: so is what follows.
+        route.gates.retain(|gate| matches!(gate, Gate::Portal(_)));
+        route.points.clone_from(&route.plain);
+        self.tighten(layout, [from, to], route);
+        route.plain.clone_from(&route.points);
         for _ in 0..ROUNDS {
-            let is_same = !self.bend(acoustics, layout, [from, to], route);
-            if is_same && is_pulled {
+            if !self.bend(acoustics, layout, [from, to], route) {
                 break;
             }
-            is_pulled = true;
-            let gates = &route.gates;
-            let pieces = |i: usize| match &gates[i] {
-                Gate::Portal(portal) => Pieces::Portal(layout.opening(*portal).pieces()),
-                Gate::Edge(edge) => Pieces::Edge(Some(edge)),
-            };
-            let start = route.points.iter().copied();
-            route.length = self.string.pull_from(from.at, to.at, start, pieces);
-            let points = self.string.points();
-            route.points.clear();
-            route.points.extend_from_slice(&points[1..points.len() - 1]);
+            self.tighten(layout, [from, to], route);
         }
         route.toward = self.string.departure();
         route.arrival = arrival_direction(self.string.points());
+    }
+
+    /// Pulls a route's string through its gates, starting from its points.
+    fn tighten(&mut self, layout: &Layout, [from, to]: [Spot; 2], route: &mut Route) {
+        let gates = &route.gates;
+        let pieces = |i: usize| match &gates[i] {
+            Gate::Portal(portal) => Pieces::Portal(layout.opening(*portal).pieces()),
+            Gate::Edge(edge) => Pieces::Edge(Some(edge)),
+        };
+        let start = route.points.iter().copied();
+        route.length = self.string.pull_from(from.at, to.at, start, pieces);
+        let points = self.string.points();
+        route.points.clear();
+        route.points.extend_from_slice(&points[1..points.len() - 1]);
     }
 
     /// Finds the bends around walls between the crossings of a route. Returns `true` if they are others than before.
