@@ -268,7 +268,12 @@ fn a_walking_listener_hears_as_a_new_one() {
     let mut rng = Rng::new(12);
     let (mut n, mut n_faint) = (0, 0);
     for seed in 0..3 {
-        let site = site(&rooms(36, seed));
+        // The last with walls to go around within rooms.
+        let merges = if seed == 2 { 0.3 } else { 0.0 };
+        let site = site(&GridParams {
+            merges,
+            ..rooms(36, seed)
+        });
         for p in (0..site.layout.n_portals() as u32).map(PortalId) {
             let opening = site.layout.opening(p);
             let source = site.place(&mut rng);
@@ -290,7 +295,7 @@ fn a_walking_listener_hears_as_a_new_one() {
             }
         }
     }
-    assert!(n > 10_000 && n_faint > 1000, "{n} {n_faint}");
+    assert!(n > 8000 && n_faint > 1000, "{n} {n_faint}");
 }
 
 /// W11: nor does it matter since when a listener has listened when doors swing, near and far.
