@@ -12,9 +12,8 @@
 //! - the transmission loss of a leaf or pane, by [kind](Transmission), for the rest.
 //!
 //! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, or the
-//! first that is not counted. Each of these is a continuous function of both places, so levels need no smoothing, and the answer
-//! does not depend on earlier ones, but for sequences being searched anew only after some movement. O(portals of a sequence)
-//! per source and band.
+//! first that is not counted, and towards the faintest that counts. Each of these is a continuous function of both places, so
+//! levels need no smoothing, and the answer does not depend on earlier ones. O(portals of a sequence) per source and band.
 //!
 //! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.09 m and more. Within a concave
 //! cell strings are straight, too short where a wall of the cell is in between.

@@ -298,7 +298,8 @@ fn a_walking_listener_hears_as_a_new_one() {
     assert!(n > 8000 && n_faint > 1000, "{n} {n_faint}");
 }
 
-/// W11: nor does it matter since when a listener has listened when doors swing, near and far.
+/// W11: nor does it matter since when a listener has listened when doors swing, near and
+/// far, from shut to open.
 #[test]
 fn a_listener_hears_doors_that_swing_as_a_new_one() {
     let mut rng = Rng::new(5);
@@ -313,7 +314,7 @@ fn a_listener_hears_doors_that_swing_as_a_new_one() {
         let (here, there) = (site.place(&mut rng), site.place(&mut rng));
         let mut ears = Listener::new();
         for k in 0..60 {
-            let open = (0.5 + 0.5 * (f64::from(k) * 0.1).cos()) as f32;
+            let open = (0.5 - 0.5 * (f64::from(k) * 0.1).cos()) as f32;
             site.state.set_leaves(p, open);
             ears.listen(&site.acoustics, &site.state, here.0, here.1);
             let heard = ears.hear(&site.acoustics, &site.layout, 0, there.0, there.1);
