@@ -39,4 +39,4 @@ pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use sources::SourceRuns;
 pub use special::{MonitorCamera, Pass, SpecialId, SpecialPortal, SpecialShape, Way};
-pub use validate::{GraphError, MAX_REPORTED};
+pub use validate::{GraphError, MAX_REPORTED, SpecialProblem};
