@@ -41,5 +41,8 @@ pub use sound::{
     AUDIO_BLOCK, Acoustics, Assumed, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Heard,
     Listener, OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, at_ears, test_sound,
 };
-pub use space::{Docking, PartId, Passing, Place, Space, SpaceError, SpaceSeen, SpaceViewer};
+pub use space::{
+    Docking, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen, SpaceViewer,
+    SpecialOptions, StoppedSpecial,
+};
 pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

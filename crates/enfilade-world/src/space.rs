@@ -24,7 +24,7 @@ use walls::Walls;
 pub(crate) use changes::Change;
 
 pub use id::{PartId, Place};
-pub use look::{SpaceSeen, SpaceViewer};
+pub use look::{SeenContext, SeenVia, SpaceSeen, SpaceViewer, SpecialOptions, StoppedSpecial};
 pub use meet::Docking;
 pub use sweep::Passing;
 
