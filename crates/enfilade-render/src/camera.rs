@@ -139,7 +139,12 @@ impl Projection {
         let right = right.try_normalize().filter(|_| right.length() > 1e-6);
         let right = right.unwrap_or_else(|| forward.any_orthonormal_vector());
         let axes = [right, right.cross(forward), forward].map(|a| a.as_vec3());
-        Some(Self::perspective(camera.eye.into(), axes, camera.fov_y, aspect))
+        Some(Self::perspective(
+            camera.eye.into(),
+            axes,
+            camera.fov_y,
+            aspect,
+        ))
     }
 
     /// Returns the same projection for points of another frame, which `map` maps to where they appear in this one.

@@ -145,7 +145,8 @@ impl Studio {
         let mut children: HashMap<ViaKey, usize> = HashMap::new();
         let mut node_of: Vec<Option<usize>> = Vec::new();
         for (index, context) in answer.contexts().enumerate() {
-            let node = self.add_node(&mut tree, shot, &context, &node_of, is_whole && index == 0)?;
+            let node =
+                self.add_node(&mut tree, shot, &context, &node_of, is_whole && index == 0)?;
             tree.n_left_out += usize::from(node.is_none());
             node_of.push(node);
             if let (Some(via), Some(node)) = (context.via(), node) {
@@ -154,7 +155,14 @@ impl Studio {
         }
         for (index, context) in answer.contexts().enumerate() {
             if let Some(node) = node_of[index] {
-                self.add_faces(&mut tree, shot.space, &context, (index, node), &children, answer);
+                self.add_faces(
+                    &mut tree,
+                    shot.space,
+                    &context,
+                    (index, node),
+                    &children,
+                    answer,
+                );
             }
         }
         let has_faces = tree.nodes.iter().any(|node| !node.faces.is_empty());
@@ -352,16 +360,21 @@ impl Studio {
                             _ => false,
                         };
                         // Those that are left out are in view; of others, nothing is.
-                        let is_left_out = answer
-                            .contexts()
-                            .any(|c| c.via().is_some_and(|v| key(0) == (v.parent, v.part, v.special, v.pass)));
+                        let is_left_out = answer.contexts().any(|c| {
+                            c.via()
+                                .is_some_and(|v| key(0) == (v.parent, v.part, v.special, v.pass))
+                        });
                         (is_shut || is_left_out || is_stopped()).then_some(Content::Color)
                     }),
                 };
                 let Some(first) = first else { continue };
                 let mut layers = Vec::new();
                 for (pass, it) in side.passes.iter().enumerate() {
-                    let content = if pass == 0 { Some(first) } else { child(pass, it) };
+                    let content = if pass == 0 {
+                        Some(first)
+                    } else {
+                        child(pass, it)
+                    };
                     let Some(content) = content else { continue };
                     let mut color = it.tint;
                     if content == Content::Color {
@@ -480,7 +493,11 @@ impl Tree {
         let mut parts: Vec<PartId> = self.parts().collect();
         parts.sort_unstable();
         parts.dedup();
-        let lists = || self.nodes.iter().flat_map(|n| n.parts.iter().map(|p| &p.list));
+        let lists = || {
+            self.nodes
+                .iter()
+                .flat_map(|n| n.parts.iter().map(|p| &p.list))
+        };
         SpaceCounts {
             n_parts: parts.len(),
             n_triangles: lists().map(RenderList::n_triangles).sum(),
@@ -496,9 +513,12 @@ impl Tree {
 
     /// Returns a node's children in the same picture, with the special portals in which they are seen.
     fn children(&self, node: usize) -> impl Iterator<Item = (usize, &Face)> {
-        self.nodes[node].faces.iter().filter_map(|face| match face.first.content {
-            Content::Node(child) => Some((child, face)),
-            _ => None,
-        })
+        self.nodes[node]
+            .faces
+            .iter()
+            .filter_map(|face| match face.first.content {
+                Content::Node(child) => Some((child, face)),
+                _ => None,
+            })
     }
 }

@@ -9,7 +9,9 @@ use enfilade_world::Opening;
 
 use crate::camera::{Camera, Projection};
 use crate::gpu::Gpu;
-use crate::pipelines::{CHOSEN, Kind, Layouts, MARK_LAYOUT, NEARER, REGION, SKY, Stencil, pipeline, shader};
+use crate::pipelines::{
+    CHOSEN, Kind, Layouts, MARK_LAYOUT, NEARER, REGION, SKY, Stencil, pipeline, shader,
+};
 
 /// Least distance of an eye from a special portal's plane, as drawn. An eye in the opening is this far before it. [Units: wu]
 const AT_EYE: f64 = 1e-6;

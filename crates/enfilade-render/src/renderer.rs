@@ -20,7 +20,9 @@ use crate::props::{Prop, PropDraw, PropMeshes};
 use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
 use crate::shadings::{Shadings, draw_runs, set_buffers};
-use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage, StageView, Sunlight, lamp_buffer};
+use crate::stage::{
+    Exposed, Globals, GlobalsBuffer, RenderStage, StageView, Sunlight, lamp_buffer,
+};
 
 /// Side of the shadow map. [Units: texels]
 const SHADOW_SIDE: u32 = 4096;
@@ -582,10 +584,20 @@ impl Renderer {
     }
 
     /// Makes a texture for a picture that is read back. Panics if the renderer was made for a window's format.
-    pub(crate) fn picture_target(&self, gpu: &Gpu, size: [u32; 2]) -> Result<wgpu::Texture, RenderError> {
+    pub(crate) fn picture_target(
+        &self,
+        gpu: &Gpu,
+        size: [u32; 2],
+    ) -> Result<wgpu::Texture, RenderError> {
         assert_eq!(self.format, COLOR, "pictures are {COLOR:?}");
         gpu.check_picture(size)?;
-        Ok(texture(gpu, "picture", size, COLOR, wgpu::TextureUsages::COPY_SRC))
+        Ok(texture(
+            gpu,
+            "picture",
+            size,
+            COLOR,
+            wgpu::TextureUsages::COPY_SRC,
+        ))
     }
 }
 

@@ -151,7 +151,11 @@ impl Studio {
         let view = shot.camera.view(size[0] as f32 / size[1] as f32)?;
         let mut viewer = match shot.seen {
             Some(_) => None,
-            None => Some(self.special_viewer.take().unwrap_or_else(|| SpaceViewer::new(space))),
+            None => Some(
+                self.special_viewer
+                    .take()
+                    .unwrap_or_else(|| SpaceViewer::new(space)),
+            ),
         };
         let answer = match (shot.seen, &mut viewer) {
             (None, Some(viewer)) => Some(viewer.see(space, shot.frame, &view)),

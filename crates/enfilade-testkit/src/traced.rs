@@ -127,7 +127,10 @@ impl Traced {
         let color = |m: Option<u32>| palette[m.expect("painted") as usize];
         for batch in &world.batches {
             let own = batch.primitive.triangles();
-            colors.extend(std::iter::repeat_n(color(batch.primitive.material), own.len()));
+            colors.extend(std::iter::repeat_n(
+                color(batch.primitive.material),
+                own.len(),
+            ));
             triangles.extend(own);
         }
         for detail in &world.details {
@@ -156,7 +159,8 @@ impl Traced {
         is_known: &dyn Fn(&Chain) -> bool,
     ) -> Option<[u8; 3]> {
         let color = |dx: f64, dy: f64| {
-            let [x, y] = [(0, dx), (1, dy)].map(|(k, d)| (f64::from(at[k]) + 0.5 + d) / f64::from(size[k]));
+            let [x, y] =
+                [(0, dx), (1, dy)].map(|(k, d)| (f64::from(at[k]) + 0.5 + d) / f64::from(size[k]));
             let ray = camera.ray(x, y);
             self.color(ray, &mut Vec::new(), is_known)
         };
@@ -167,11 +171,20 @@ impl Traced {
     }
 
     /// Returns the color along a ray; `None` if rounding decides.
-    fn color(&self, mut ray: Ray, chain: &mut Chain, is_known: &dyn Fn(&Chain) -> bool) -> Option<[u8; 3]> {
+    fn color(
+        &self,
+        mut ray: Ray,
+        chain: &mut Chain,
+        is_known: &dyn Fn(&Chain) -> bool,
+    ) -> Option<[u8; 3]> {
         ray.t_max = f64::INFINITY;
         let wall = self.structure.closest_hit(&ray, |_| false);
         ray.t_max = wall.map_or(f64::INFINITY, |hit| hit.t);
-        if let Some((t, i)) = self.special(&ray) {
+        if let Some((t, i)) = self.special(&ray, None) {
+            ray.t_max = t * (1.0 + COINCIDENT);
+            if self.special(&ray, Some(i)).is_some() {
+                return None;
+            }
             return self.color_in(i, &ray, t, chain, is_known);
         }
         let Some(hit) = wall else {
@@ -180,7 +193,9 @@ impl Traced {
         let color = self.colors[hit.triangle as usize];
         // Behind it, nothing of another color is as near.
         ray.t_max = hit.t * (1.0 + COINCIDENT);
-        let other = self.structure.closest_hit(&ray, |id| self.colors[id as usize] == color);
+        let other = self
+            .structure
+            .closest_hit(&ray, |id| self.colors[id as usize] == color);
         other.is_none().then(|| toned(color))
     }
 
@@ -201,7 +216,8 @@ impl Traced {
             let mut shown = |own: &SidePass| {
                 let mut next = Ray {
                     origin: on,
-                    ..*ray
+                    direction: ray.direction,
+                    t_max: f64::INFINITY,
                 };
                 if let Shows::Through = own.shows {
                     next.origin = on + ray.direction * 1e-9;
@@ -216,12 +232,20 @@ impl Traced {
                         self.color(next, chain, is_known)
                     }
                     Shows::Monitor(camera, [corner, right, up]) => {
-                        let [u, v] = [right, up].map(|edge| edge.dot(on - *corner) / edge.length_squared());
+                        let [u, v] =
+                            [right, up].map(|edge| edge.dot(on - *corner) / edge.length_squared());
                         let at = |du: f64, dv: f64| {
-                            self.color(camera.ray(u + du, 1.0 - v + dv), &mut chain.clone(), is_known)
+                            self.color(
+                                camera.ray(u + du, 1.0 - v + dv),
+                                &mut chain.clone(),
+                                is_known,
+                            )
                         };
                         let first = at(0.0, 0.0);
-                        let around = [[-BLUR, 0.0], [BLUR, 0.0], [0.0, -BLUR], [0.0, BLUR]];
+                        let steps = [-BLUR, -0.5 * BLUR, 0.0, 0.5 * BLUR, BLUR];
+                        let around: Vec<[f64; 2]> = (steps.iter())
+                            .flat_map(|u| steps.map(|v| [*u, v]))
+                            .collect();
                         first.filter(|_| around.iter().all(|[u, v]| at(*u, *v) == first))
                     }
                     Shows::Through => None,
@@ -244,13 +268,14 @@ impl Traced {
         Some(out)
     }
 
-    /// Returns the special portal that a ray meets first, before `t_max`.
-    fn special(&self, ray: &Ray) -> Option<(f64, usize)> {
+    /// Returns the special portal but one that a ray meets first, before `t_max`.
+    fn special(&self, ray: &Ray, but: Option<usize>) -> Option<(f64, usize)> {
         let mut first: Option<(f64, usize)> = None;
         for (i, side) in self.specials.iter().enumerate() {
             let along = side.normal.dot(ray.direction);
             let t = side.normal.dot(side.pieces[0][0] - ray.origin) / along;
-            if along <= 0.0 || t <= 1e-9 || t >= first.map_or(ray.t_max, |f| f.0) {
+            if but == Some(i) || along <= 0.0 || t <= 1e-9 || t >= first.map_or(ray.t_max, |f| f.0)
+            {
                 continue;
             }
             let p = ray.origin + ray.direction * t;
@@ -276,7 +301,8 @@ impl TracedCamera {
         let [across, above] = self.tangents;
         Ray {
             origin: self.eye,
-            direction: forward + right * (across * (2.0 * x - 1.0)) - up * (above * (2.0 * y - 1.0)),
+            direction: forward + right * (across * (2.0 * x - 1.0))
+                - up * (above * (2.0 * y - 1.0)),
             t_max: f64::INFINITY,
         }
     }
@@ -317,13 +343,25 @@ fn rectangle(normal: DVec3, pieces: &[Vec<DVec3>]) -> [DVec3; 3] {
     let right = normal.cross(DVec3::Y).normalize();
     let up = right.cross(normal);
     let [left, bottom] = [right, up].map(|axis| {
-        pieces.iter().flatten().map(|p| axis.dot(*p)).fold(f64::INFINITY, f64::min)
+        pieces
+            .iter()
+            .flatten()
+            .map(|p| axis.dot(*p))
+            .fold(f64::INFINITY, f64::min)
     });
     let [r, top] = [right, up].map(|axis| {
-        pieces.iter().flatten().map(|p| axis.dot(*p)).fold(f64::NEG_INFINITY, f64::max)
+        pieces
+            .iter()
+            .flatten()
+            .map(|p| axis.dot(*p))
+            .fold(f64::NEG_INFINITY, f64::max)
     });
     let on = normal * normal.dot(pieces[0][0]);
-    [on + right * left + up * bottom, right * (r - left), up * (top - bottom)]
+    [
+        on + right * left + up * bottom,
+        right * (r - left),
+        up * (top - bottom),
+    ]
 }
 
 fn traced_camera(camera: &MonitorCamera, aspect: f64) -> TracedCamera {

@@ -42,7 +42,7 @@ pub use sound::{
     Listener, OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, at_ears, test_sound,
 };
 pub use space::{
-    Docking, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen, SpaceViewer,
-    SpecialOptions, StoppedSpecial,
+    Docking, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen,
+    SpaceViewer, SpecialOptions, StoppedSpecial,
 };
 pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

@@ -169,7 +169,14 @@ impl Renderer {
         let pictures = (self.contexts).place(gpu, &self.layouts, format, sizes);
         for picture in (0..tree.pictures.len()).rev() {
             gpu.check_picture(tree.pictures[picture].size)?;
-            self.draw_tree_picture(gpu, worlds, (tree, picture), shown, (&props, &pictures), output);
+            self.draw_tree_picture(
+                gpu,
+                worlds,
+                (tree, picture),
+                shown,
+                (&props, &pictures),
+                output,
+            );
         }
         Ok(())
     }
@@ -299,7 +306,12 @@ impl Renderer {
             }
         }
         if let Some(marks) = marks {
-            self.draw_marks(&mut pass, &marks, size, [&second.marks, &second.marks_on_top]);
+            self.draw_marks(
+                &mut pass,
+                &marks,
+                size,
+                [&second.marks, &second.marks_on_top],
+            );
         }
         drop(pass);
         gpu.queue.submit([encoder.finish()]);
@@ -326,7 +338,9 @@ impl Renderer {
         if has_sky {
             for face in &node.faces {
                 match face.first.content {
-                    Content::Color => self.draw_pane(pass, drawing, node, face, &face.first, &panes.fill),
+                    Content::Color => {
+                        self.draw_pane(pass, drawing, node, face, &face.first, &panes.fill)
+                    }
                     Content::Monitor(_) => {
                         self.draw_pane(pass, drawing, node, face, &face.first, &panes.monitor);
                     }
