@@ -3,6 +3,8 @@
 //! In JSON a row is a line `{"row", "scene", "value", "bar", "ok"}`, where `value` and `ok` are null if a requirement
 //! is missing, which `note` then names. Rows share the scenes' bakes.
 
+use std::path::PathBuf;
+
 use anyhow::Context;
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::World;
@@ -23,6 +25,8 @@ pub(crate) struct Row {
 pub(crate) enum Measure {
     /// The bake of a shared scene.
     Baked(fn(&World) -> anyhow::Result<Figure>),
+    /// As [`Measure::Baked`], with the name of the scene, for files beside it.
+    Named(fn(&World, &str) -> anyhow::Result<Figure>),
     /// A scene that the row generates by name.
     Made(fn(&str) -> anyhow::Result<Figure>),
 }
@@ -128,12 +132,16 @@ pub(crate) fn bench_rows(all: &[Row], is_json: bool, chosen: &Chosen) -> anyhow:
         for &scene in row.scenes.iter().filter(|scene| chosen.has_scene(scene)) {
             let figure = match row.measure {
                 Measure::Made(measure) => Some(measure(scene).context(scene)?),
-                Measure::Baked(measure) => {
+                Measure::Baked(_) | Measure::Named(_) => {
                     if !baked.iter().any(|b| b.0 == scene) {
                         baked.push((scene, baked_scene(scene)?));
                     }
                     let world = baked.iter().find(|b| b.0 == scene);
-                    let measured = world.and_then(|b| b.1.as_ref()).map(measure);
+                    let measured = world.and_then(|b| b.1.as_ref()).map(|w| match row.measure {
+                        Measure::Baked(measure) => measure(w),
+                        Measure::Named(measure) => measure(w, scene),
+                        Measure::Made(measure) => measure(scene),
+                    });
                     measured.transpose().context(scene)?
                 }
             };
@@ -156,13 +164,18 @@ pub(crate) fn bench_rows(all: &[Row], is_json: bool, chosen: &Chosen) -> anyhow:
     out.finish()
 }
 
-/// Returns the world of a scene; `None` if the scene is missing.
-fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
+/// Returns the folder of a scene, if it is there.
+pub(crate) fn folder_of(name: &str) -> Option<PathBuf> {
     let beside = scenes_dir().map(|dir| dir.with_file_name("scenes2"));
     let all = scenes()
         .into_iter()
         .chain(beside.iter().flat_map(|dir| scenes_in(dir)));
-    let Some(dir) = all.into_iter().find(|dir| dir.ends_with(name)) else {
+    all.into_iter().find(|dir| dir.ends_with(name))
+}
+
+/// Returns the world of a scene; `None` if the scene is missing.
+fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
+    let Some(dir) = folder_of(name) else {
         return Ok(None);
     };
     let (files, detail) = files_of(&dir);

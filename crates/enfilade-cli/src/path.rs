@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
-use enfilade::world::{Agent, Layout, NoPath, Path, PathSearch, WalkMap};
+use enfilade::world::{Agent, NoPath, PartId, Path, PathSearch, Space, WalkMap};
 
 use crate::limits::Limits;
 use crate::screen::{print_json, printed_at_once};
@@ -74,19 +74,21 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
     if let Some(p) = args.closed.iter().find(|p| **p as usize >= n_portals) {
         bail!("--closed {p}: the world has {n_portals} portals, counted from 0");
     }
-    let layout = Layout::new(&world);
+    let names: Vec<String> = world.graph.cells.iter().map(|c| c.name.clone()).collect();
+    let space = Space::new(world)?;
     let walker = Agent {
         radius: args.radius,
         height: args.height,
         step: args.step,
         ..Agent::default()
     };
-    let map = WalkMap::with_objects(&layout, &world, walker, |_| !args.no_objects);
-    let ends = [args.from, args.to].map(|p| DVec3::from_array(p.map(f64::from)));
+    let map = WalkMap::with_objects(&space, walker, |_, _| !args.no_objects);
+    let ends = [args.from, args.to];
+    let ends = ends.map(|p| (PartId::ROOT, DVec3::from_array(p.map(f64::from))));
     let mut path = Path::default();
-    let is_open = |portal: PortalId| !args.closed.contains(&portal.0);
-    let found = PathSearch::new().find(&map, &layout, ends, is_open, &mut path);
-    let side = map.floors().side();
+    let is_open = |_, portal: PortalId| !args.closed.contains(&portal.0);
+    let found = PathSearch::new().find(&map, &space, ends, is_open, &mut path);
+    let side = map.floors(PartId::ROOT).side();
     match found {
         // Squares are a quarter of the radius wide unless the world is too large for that.
         Err(NoPath::NoWay) if side > 0.26 * args.radius => bail!(
@@ -96,14 +98,15 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         ),
         found => found?,
     }
-    let start = layout.locate(path.points[0] + DVec3::Y * 0.5 * args.height);
-    let cells = path.portals.iter().map(|e| e.to);
+    let layout = space.layout(PartId::ROOT);
+    let start = layout.locate(path.points[0].at + DVec3::Y * 0.5 * args.height);
+    let cells = path.portals.iter().map(|p| p.exit.to);
     let report = PathReport {
         length: path.length,
         length_in_plan: path.length_in_plan,
         cells: start.into_iter().chain(cells).map(|c| c.0).collect(),
-        portals: path.portals.iter().map(|e| e.portal.0).collect(),
-        points: path.points.iter().map(DVec3::to_array).collect(),
+        portals: path.portals.iter().map(|p| p.exit.portal.0).collect(),
+        points: path.points.iter().map(|p| p.at.to_array()).collect(),
     };
     let mut out = printed_at_once();
     if args.json {
@@ -118,11 +121,11 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         many(report.portals.len(), "portal"),
         many(report.points.len(), "point")
     )?;
-    let name = |c: u32| world.graph.cells[c as usize].name.as_str();
+    let name = |c: u32| names[c as usize].as_str();
     if let Some(&first) = report.cells.first() {
         writeln!(out, "from {}", name(first))?;
     }
-    for exit in &path.portals {
+    for exit in path.portals.iter().map(|p| p.exit) {
         writeln!(
             out,
             "{:>12}  into {}",

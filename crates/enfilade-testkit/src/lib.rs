@@ -14,6 +14,7 @@
 //! assert!(turned.truth_json().contains("\"door\""));
 //! ```
 
+mod assembled;
 mod cave;
 mod clinic;
 mod disturb;
@@ -42,13 +43,15 @@ mod truth;
 mod truth_json;
 mod tubes;
 
+pub use assembled::{Assembled, Beyond, Standing, assembled, chamber};
 pub use cave::cave;
 pub use clinic::clinic;
 pub use disturb::{Disturbance, disturb, disturbed};
 pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use graphs::{
-    GridParams, cabin, courtyard, room_grid, scaled_world, window_tower, with_doors, with_specials,
+    GridParams, cabin, courtyard, linked_copies, room_grid, scaled_world, window_tower, with_doors,
+    with_specials,
 };
 pub use house::furnished_house;
 pub use lift_tower::{LiftTower, lift_tower};

@@ -20,6 +20,9 @@ const DEEPEST: usize = 8;
 /// Relative distance of two surfaces between which rounding decides.
 const COINCIDENT: f64 = 2e-4;
 
+/// Relative distance of a special portal and a surface between which rounding decides.
+const IN_WALL: f64 = 5e-5;
+
 /// Share of a monitor's picture within which its colors must agree.
 const BLUR: f64 = 0.04;
 
@@ -179,8 +182,12 @@ impl Traced {
     ) -> Option<[u8; 3]> {
         ray.t_max = f64::INFINITY;
         let wall = self.structure.closest_hit(&ray, |_| false);
-        ray.t_max = wall.map_or(f64::INFINITY, |hit| hit.t);
+        // A little on: a special portal may lie in a wall.
+        ray.t_max = wall.map_or(f64::INFINITY, |hit| hit.t * (1.0 + IN_WALL));
         if let Some((t, i)) = self.special(&ray, None) {
+            if wall.is_some_and(|hit| hit.t < t * (1.0 + IN_WALL)) {
+                return None;
+            }
             ray.t_max = t * (1.0 + COINCIDENT);
             if self.special(&ray, Some(i)).is_some() {
                 return None;

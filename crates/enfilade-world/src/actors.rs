@@ -11,6 +11,7 @@
 //! | --- | --- |
 //! | `chance.rs` | random numbers determined by seed, actor and event |
 //! | `plan.rs` | points with times, straight lines between them |
+//! | `way.rs` | ways along paths, cut at portals |
 //! | `wheel.rs` | timing wheel of due actors |
 //! | `crowd.rs` | all actors: events, cells, positions |
 //! | `errand.rs` | plans that go somewhere, stay, and go on |
@@ -23,6 +24,7 @@ mod errand;
 mod plan;
 #[cfg(test)]
 mod tests;
+mod way;
 mod wheel;
 
 pub use awake::AwakeCells;

@@ -10,6 +10,7 @@
 //! | `body.rs` | spheres, capsules, boxes |
 //! | `kernel.rs` | one body, one triangle: contact, and time of first contact |
 //! | `flood.rs` | the cells and triangles on a body's way |
+//! | `carve.rs` | obstacles around special portals |
 //! | `caster.rs` | casts and contacts |
 //! | `pairs.rs` | bodies that may touch each other |
 //! | `room.rs` | room for a walker, for maps of paths |
@@ -17,6 +18,7 @@
 
 mod agent;
 mod body;
+mod carve;
 mod caster;
 mod flood;
 mod kernel;
@@ -31,5 +33,5 @@ pub use body::Body;
 pub use caster::{Cast, Caster, Contact, Impact};
 pub use flood::CastCounts;
 pub use pairs::Pairs;
-pub(crate) use room::WalkerRoom;
+pub(crate) use room::{WalkerRoom, is_free_between};
 pub use walker::Walker;

@@ -295,6 +295,12 @@ impl Layout {
         }
     }
 
+    /// Returns the number of special portals.
+    #[must_use]
+    pub fn n_specials(&self) -> usize {
+        self.specials.len()
+    }
+
     /// Returns the special portals that a cell sees, ascending. O(log).
     pub fn specials_of(&self, cell: CellId) -> impl ExactSizeIterator<Item = SpecialId> {
         let all = &self.specials_by_cell;
@@ -451,6 +457,18 @@ impl<'a> Opening<'a> {
     #[must_use]
     pub fn area(&self) -> f64 {
         self.shape.area
+    }
+
+    /// Returns `true` if a point of its plane is in one of its pieces, or within `margin` of the line of each edge. [Units: wu]
+    #[must_use]
+    pub fn is_over(&self, p: DVec3, margin: f64) -> bool {
+        let normal = self.normal();
+        self.pieces().any(|piece| {
+            (0..piece.len()).all(|i| {
+                let along = piece[(i + 1) % piece.len()] - piece[i];
+                normal.cross(along).dot(p - piece[i]) >= -margin * along.length()
+            })
+        })
     }
 
     /// Returns its convex pieces, each counter-clockwise seen from the second cell. [Units: wu]

@@ -29,8 +29,8 @@ pub use bodies::{Agent, Body, Cast, CastCounts, Caster, Contact, Impact, Pairs, 
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{
-    Arrival, Corner, Floors, Geodesics, Hops, LengthSearch, NoPath, PassedPortal, Path,
-    PathFollower, PathSearch, Progress, Sampling, WalkMap, Ways,
+    Arrival, Corner, Floors, Geodesics, Hop, Hops, LengthSearch, NoPath, PassedPortal, Path,
+    PathFollower, PathPoint, PathPortal, PathSearch, Progress, Sampling, WalkMap, Ways,
 };
 pub use pose::Pose;
 pub use saved::{
@@ -42,7 +42,7 @@ pub use sound::{
     Listener, OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, at_ears, test_sound,
 };
 pub use space::{
-    Docking, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen,
+    Docking, Followed, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen,
     SpaceViewer, SpecialOptions, StoppedSpecial,
 };
 pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

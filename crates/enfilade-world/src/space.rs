@@ -23,6 +23,7 @@ use walls::Walls;
 
 pub(crate) use changes::Change;
 
+pub use follow::Followed;
 pub use id::{PartId, Place};
 pub use look::{SeenContext, SeenVia, SpaceSeen, SpaceViewer, SpecialOptions, StoppedSpecial};
 pub use meet::Docking;
@@ -30,6 +31,7 @@ pub use sweep::Passing;
 
 mod changes;
 mod doors;
+mod follow;
 mod id;
 mod look;
 mod meet;

@@ -13,11 +13,12 @@ use enfilade_geom::{Aabb, Bvh, DVec3, Triangle};
 use enfilade_runtime::SightState;
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 use enfilade_world::{
-    Agent, Layout, NoPath, PartId, Path, PathFollower, PathSearch, Progress, Space, WalkMap, Walker,
+    Agent, Layout, NoPath, PartId, Path, PathFollower, PathPortal, PathSearch, Progress, Space,
+    WalkMap, Walker,
 };
 
 /// One storey of rooms, some of them concave, with doorways and no windows.
-fn rooms(seed: u64) -> (World, Layout, WalkMap) {
+fn rooms(seed: u64) -> (World, Space, WalkMap) {
     let world = room_grid(&GridParams {
         size: [4, 1, 3],
         seed,
@@ -28,9 +29,14 @@ fn rooms(seed: u64) -> (World, Layout, WalkMap) {
         outdoors: false,
         ..GridParams::offices(12, seed)
     });
-    let layout = Layout::new(&world);
-    let map = WalkMap::new(&layout, &world, Agent::default());
-    (world, layout, map)
+    let space = Space::new(world.clone()).unwrap();
+    let map = WalkMap::new(&space, Agent::default());
+    (world, space, map)
+}
+
+/// Points in the frame of the root.
+fn at_root(ends: [DVec3; 2]) -> [(PartId, DVec3); 2] {
+    ends.map(|p| (PartId::ROOT, p))
 }
 
 fn triangles(world: &World) -> Vec<Triangle> {
@@ -60,19 +66,20 @@ fn a_path_keeps_clear_of_walls_and_passes_open_portals_only() {
     let (mut path, mut search) = (Path::default(), PathSearch::new());
     let (mut n_found, mut n_turned) = (0, 0);
     for seed in 0..3 {
-        let (world, layout, map) = rooms(seed);
+        let (world, space, map) = rooms(seed);
+        let layout = space.layout(PartId::ROOT);
         let walls: Vec<Triangle> = (triangles(&world).into_iter())
             .filter(|t| (t[1] - t[0]).cross(t[2] - t[0]).normalize().y.abs() < 0.5)
             .collect();
         let (bvh, mut rng) = (Bvh::build(&walls), Rng::new(seed));
         for _ in 0..30 {
-            let ends = [(); 2].map(|()| point_on_floor(&layout, &mut rng));
+            let ends = [(); 2].map(|()| point_on_floor(layout, &mut rng));
             let closed: BTreeSet<u32> = (0..2)
                 .map(|_| rng.below(layout.n_portals()) as u32)
                 .collect();
-            let is_open = |p: PortalId| !closed.contains(&p.0);
+            let is_open = |_, p: PortalId| !closed.contains(&p.0);
             if search
-                .find(&map, &layout, ends, is_open, &mut path)
+                .find(&map, &space, at_root(ends), is_open, &mut path)
                 .is_err()
             {
                 assert!(path.points.is_empty() && path.portals.is_empty());
@@ -80,17 +87,21 @@ fn a_path_keeps_clear_of_walls_and_passes_open_portals_only() {
             }
             n_found += 1;
             n_turned += usize::from(path.points.len() > 2);
-            let mut cell = layout.locate(path.points[0] + DVec3::Y);
-            for exit in &path.portals {
-                assert!(layout.exits(cell.unwrap()).contains(exit) && is_open(exit.portal));
+            let mut cell = layout.locate(path.points[0].at + DVec3::Y);
+            for PathPortal { exit, .. } in &path.portals {
+                assert!(
+                    layout.exits(cell.unwrap()).contains(exit)
+                        && is_open(PartId::ROOT, exit.portal)
+                );
                 cell = Some(exit.to);
             }
             assert_eq!(
                 cell,
-                layout.locate(path.points[path.points.len() - 1] + DVec3::Y)
+                layout.locate(path.points[path.points.len() - 1].at + DVec3::Y)
             );
             let mut length = 0.0;
-            for w in path.points.windows(2) {
+            let points: Vec<DVec3> = path.points.iter().map(|p| p.at).collect();
+            for w in points.windows(2) {
                 length += w[0].distance(w[1]);
                 for i in 0..=20 {
                     let p = w[0].lerp(w[1], f64::from(i) / 20.0);
@@ -180,15 +191,16 @@ fn paths_are_hardly_longer_than_the_shortest() {
     let (mut path, mut search) = (Path::default(), PathSearch::new());
     let (mut ours, mut shortest, mut n) = (0.0, 0.0, 0);
     for seed in 0..3 {
-        let (world, layout, map) = rooms(seed);
+        let (world, space, map) = rooms(seed);
+        let layout = space.layout(PartId::ROOT);
         let (walls, mut rng) = (walls_in_plan(&world), Rng::new(seed + 10));
         for _ in 0..8 {
-            let ends = [(); 2].map(|()| point_on_floor(&layout, &mut rng).with_y(0.0));
+            let ends = [(); 2].map(|()| point_on_floor(layout, &mut rng).with_y(0.0));
             let Some(least) = by_visibility(&walls, ends, 0.3) else {
                 continue;
             };
             search
-                .find(&map, &layout, ends, |_| true, &mut path)
+                .find(&map, &space, at_root(ends), |_, _| true, &mut path)
                 .unwrap();
             assert!(
                 path.length <= 1.03 * least + 0.05,
@@ -214,18 +226,19 @@ fn what_is_near_is_as_far_as_one_walks() {
     let (mut path, mut search, mut paths) = (Path::default(), PathSearch::new(), PathSearch::new());
     let (mut n_near, mut n_far) = (0, 0);
     for seed in 0..6 {
-        let (_, layout, map) = rooms(seed);
+        let (_, space, map) = rooms(seed);
+        let layout = space.layout(PartId::ROOT);
         let mut rng = Rng::new(seed);
-        let from = point_on_floor(&layout, &mut rng);
+        let from = point_on_floor(layout, &mut rng);
         let cells = search
-            .cells_within(&map, &layout, from, 8.0, |_| true)
+            .cells_within(&map, &space, (PartId::ROOT, from), 8.0, |_, _| true)
             .unwrap();
         n_far += layout.n_cells() - cells.len();
         assert!(cells.is_sorted_by(|a, b| a.1 <= b.1) && cells.iter().all(|c| c.1 <= 8.0));
         for _ in 0..80 {
-            let to = point_on_floor(&layout, &mut rng);
-            let found = paths.find(&map, &layout, [from, to], |_| true, &mut path);
-            if let Some(far) = search.distance(&map, &layout, to) {
+            let to = point_on_floor(layout, &mut rng);
+            let found = paths.find(&map, &space, at_root([from, to]), |_, _| true, &mut path);
+            if let Some(far) = search.distance(&map, &space, (PartId::ROOT, to)) {
                 n_near += 1;
                 assert!(
                     found.is_ok() && far > 0.97 * path.length - 0.2,
@@ -267,8 +280,12 @@ fn cracks_and_panes_are_not_passed() {
         let mut world = world.clone();
         let portal = &mut world.graph.portals[0];
         (portal.kind, portal.fittings) = (kind, fittings);
-        let map = WalkMap::new(&Layout::new(&world), &world, Agent::default());
-        assert_eq!(map.is_walkable(PortalId(0)), is_walked, "{kind:?}");
+        let map = WalkMap::new(&Space::new(world).unwrap(), Agent::default());
+        assert_eq!(
+            map.is_walkable(PartId::ROOT, PortalId(0)),
+            is_walked,
+            "{kind:?}"
+        );
     }
 }
 
@@ -277,14 +294,19 @@ fn cracks_and_panes_are_not_passed() {
 fn lengths_between_portals_go_around_walls() {
     let mut n_bent = 0;
     for seed in 0..6 {
-        let (world, layout, map) = rooms(seed);
+        let (world, space, map) = rooms(seed);
+        let layout = space.layout(PartId::ROOT);
         let walls = walls_in_plan(&world);
         for cell in (0..layout.n_cells() as u32).map(CellId) {
-            let points: Vec<DVec3> = map.ways().points_of(cell).map(|p| p.1).collect();
+            let points: Vec<DVec3> = map
+                .ways(PartId::ROOT)
+                .points_of(cell)
+                .map(|p| p.1)
+                .collect();
             for (i, &from) in points.iter().enumerate() {
-                for (j, (portal, to)) in map.ways().points_of(cell).enumerate() {
+                for (j, (portal, to)) in map.ways(PartId::ROOT).points_of(cell).enumerate() {
                     let sees = walls.iter().all(|&w| distance(w, [from, to]) > 0.0);
-                    let length = map.ways().length(cell, i, j);
+                    let length = map.ways(PartId::ROOT).length(cell, i, j);
                     n_bent += usize::from(!sees);
                     let straight = from.distance(to);
                     assert!(length > straight - 1e-6, "{portal}");
@@ -304,13 +326,14 @@ fn lengths_between_portals_go_around_walls() {
 /// W10: queries allocate nothing once the buffers have grown.
 #[test]
 fn a_second_path_allocates_nothing() {
-    let (_, layout, map) = rooms(2);
+    let (_, space, map) = rooms(2);
+    let layout = space.layout(PartId::ROOT);
     let (mut path, mut search, mut rng) = (Path::default(), PathSearch::new(), Rng::new(1));
-    let ends = [(); 2].map(|()| point_on_floor(&layout, &mut rng));
+    let ends = [(); 2].map(|()| point_on_floor(layout, &mut rng));
     let mut ask = || {
-        let _ = search.find(&map, &layout, ends, |_| true, &mut path);
-        let _ = search.cells_within(&map, &layout, ends[0], 20.0, |_| true);
-        let _ = search.distance(&map, &layout, ends[1]);
+        let _ = search.find(&map, &space, at_root(ends), |_, _| true, &mut path);
+        let _ = search.cells_within(&map, &space, (PartId::ROOT, ends[0]), 20.0, |_, _| true);
+        let _ = search.distance(&map, &space, (PartId::ROOT, ends[1]));
     };
     // Buffers change places, so several queries are needed to grow all.
     (0..4).for_each(|_| ask());
@@ -318,7 +341,7 @@ fn a_second_path_allocates_nothing() {
 }
 
 /// Returns one cell with these boxes in it, and a floor of 10 m by 4 m.
-fn hall(boxes: &[Aabb]) -> (World, Layout) {
+fn hall(boxes: &[Aabb]) -> Space {
     let bounds = Aabb::new(DVec3::new(0.0, -0.5, 0.0), DVec3::new(10.0, 6.0, 4.0));
     let floor = Aabb::new(bounds.min, bounds.max.with_y(0.0));
     let corners: Vec<DVec3> = (boxes.iter().chain([&floor]))
@@ -350,16 +373,15 @@ fn hall(boxes: &[Aabb]) -> (World, Layout) {
         }],
         ..World::default()
     };
-    let layout = Layout::new(&world);
-    (world, layout)
+    Space::new(world).unwrap()
 }
 
 fn walk(boxes: &[Aabb], to_y: f64) -> Result<Path, NoPath> {
-    let (world, layout) = hall(boxes);
-    let map = WalkMap::new(&layout, &world, Agent::default());
+    let space = hall(boxes);
+    let map = WalkMap::new(&space, Agent::default());
     let mut path = Path::default();
     let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, to_y, 2.0)];
-    PathSearch::new().find(&map, &layout, ends, |_| true, &mut path)?;
+    PathSearch::new().find(&map, &space, at_root(ends), |_, _| true, &mut path)?;
     Ok(path)
 }
 
@@ -382,7 +404,7 @@ fn stairs_are_walked_and_ledges_are_not() {
     assert!((path.length_in_plan - 8.0).abs() < 0.05);
     assert!(path.length > 8.2 && path.length < 8.7, "{}", path.length);
     // At each place the line is as high as the floor, up to half a step of a walker.
-    for p in &path.points {
+    for p in path.points.iter().map(|p| p.at) {
         let n = ((p.x - 3.0) / 0.3).floor().clamp(-1.0, 9.0) + 1.0;
         assert!((p.y - 0.17 * n).abs() < 0.21, "{p}");
     }
@@ -404,7 +426,7 @@ fn a_walker_needs_its_room() {
     let around = corner(3.0) + 1.0 + corner(4.0);
     let off = pillar.length - around;
     assert!(off > -0.04 && off < 0.08, "{} {around}", pillar.length);
-    assert!(pillar.points.iter().all(|p| p.z < 2.1));
+    assert!(pillar.points.iter().all(|p| p.at.z < 2.1));
     let wall_with_gap = |gap: f64, lintel: f64| {
         [
             block([4.0, 0.0, 0.0], [4.2, 3.0, 2.0]),
@@ -427,8 +449,8 @@ fn a_walker_needs_its_room() {
 /// W10: invalid points, and points far from everything, have no floor; nor does an empty world. Nothing panics.
 #[test]
 fn points_from_nowhere_have_no_floor() {
-    let (world, layout) = hall(&[]);
-    let map = WalkMap::new(&layout, &world, Agent::default());
+    let space = hall(&[]);
+    let map = WalkMap::new(&space, Agent::default());
     let (mut search, mut path) = (PathSearch::new(), Path::default());
     let inside = DVec3::new(5.0, 0.0, 2.0);
     for x in [
@@ -443,29 +465,28 @@ fn points_from_nowhere_have_no_floor() {
         for axis in 0..3 {
             let mut p = inside;
             p[axis] = x;
-            let found = search.find(&map, &layout, [p, inside], |_| true, &mut path);
+            let found = search.find(&map, &space, at_root([p, inside]), |_, _| true, &mut path);
             assert_eq!(found, Err(NoPath::NoFloorAtStart), "{p}");
-            let found = search.find(&map, &layout, [inside, p], |_| true, &mut path);
+            let found = search.find(&map, &space, at_root([inside, p]), |_, _| true, &mut path);
             assert_eq!(found, Err(NoPath::NoFloorAtEnd), "{p}");
         }
     }
-    let nothing = World::default();
-    let layout = Layout::new(&nothing);
-    let map = WalkMap::new(&layout, &nothing, Agent::default());
-    let found = search.find(&map, &layout, [inside; 2], |_| true, &mut path);
+    let space = Space::new(World::default()).unwrap();
+    let map = WalkMap::new(&space, Agent::default());
+    let found = search.find(&map, &space, at_root([inside; 2]), |_, _| true, &mut path);
     assert_eq!(found, Err(NoPath::NoFloorAtStart));
-    assert_eq!(search.distance(&map, &layout, inside), None);
+    assert_eq!(search.distance(&map, &space, (PartId::ROOT, inside)), None);
 }
 
 /// W10: a path from a point to itself has no length.
 #[test]
 fn a_path_to_where_one_stands_has_no_length() {
-    let (world, layout) = hall(&[]);
-    let map = WalkMap::new(&layout, &world, Agent::default());
+    let space = hall(&[]);
+    let map = WalkMap::new(&space, Agent::default());
     let (mut search, mut path) = (PathSearch::new(), Path::default());
     let p = DVec3::new(5.0, 0.0, 2.0);
     search
-        .find(&map, &layout, [p; 2], |_| true, &mut path)
+        .find(&map, &space, at_root([p; 2]), |_, _| true, &mut path)
         .unwrap();
     assert!(path.length < 1e-9 && path.portals.is_empty() && !path.points.is_empty());
 }
@@ -477,7 +498,8 @@ fn a_thin_walker_finds_a_way_on_no_finer_floors() {
         windows: 0.0,
         ..GridParams::two_rooms()
     });
-    let layout = Layout::new(&world);
+    let space = Space::new(world).unwrap();
+    let layout = space.layout(PartId::ROOT);
     let ends = [0, 1].map(|c| {
         let bounds = layout.cell(CellId(c)).bounds;
         bounds.center().with_y(bounds.min.y)
@@ -487,11 +509,11 @@ fn a_thin_walker_finds_a_way_on_no_finer_floors() {
             radius,
             ..Agent::default()
         };
-        let map = WalkMap::new(&layout, &world, walker);
+        let map = WalkMap::new(&space, walker);
         let mut path = Path::default();
-        let way = PathSearch::new().find(&map, &layout, ends, |_| true, &mut path);
+        let way = PathSearch::new().find(&map, &space, at_root(ends), |_, _| true, &mut path);
         way.unwrap_or_else(|why| panic!("{radius}: {why}"));
-        (path.length, map.floors().n_floors())
+        (path.length, map.floors(PartId::ROOT).n_floors())
     };
     let (length, _) = found(0.1);
     for radius in [1e-9, 0.01] {
@@ -518,9 +540,9 @@ impl Scene {
 
     /// Walks a path; returns the end of the walk.
     fn walk(&mut self, path: &Path, agent: Agent) -> (Progress, DVec3) {
-        let eye = path.points[0] + DVec3::Y * agent.eye;
+        let eye = path.points[0].at + DVec3::Y * agent.eye;
         let mut walker = Walker::new(agent, PartId::ROOT, eye);
-        let mut follower = PathFollower::new(&self.space, PartId::ROOT, path.clone(), 1.4);
+        let mut follower = PathFollower::new(&self.space, path.clone(), 1.4);
         for _ in 0..(60.0 * (5.0 + path.length)) as usize {
             let progress = follower.step(&mut walker, &mut self.space, 1.0 / 60.0);
             if progress != Progress::Walking {
@@ -540,11 +562,11 @@ fn paths_are_walked_to_their_end() {
     for seed in 0..3 {
         let world = with_doors(room_grid(&GridParams::offices(12, seed)), |_| false);
         let mut scene = Scene::new(&world);
-        let map = WalkMap::new(scene.layout(), &world, agent);
+        let map = WalkMap::new(&scene.space, agent);
         let mut rng = Rng::new(seed);
         for _ in 0..80 {
             let ends = [(); 2].map(|()| point_on_floor(scene.layout(), &mut rng));
-            let found = search.find(&map, scene.layout(), ends, |_| true, &mut path);
+            let found = search.find(&map, &scene.space, at_root(ends), |_, _| true, &mut path);
             if found.is_err() {
                 continue;
             }
@@ -575,15 +597,15 @@ fn paths_are_walked_to_their_end() {
 #[test]
 fn a_walker_that_is_stopped_is_stuck() {
     let agent = Agent::default();
-    let (world, layout) = hall(&[block([5.0, 0.0, 0.0], [5.2, 3.0, 4.0])]);
-    let (free, _) = hall(&[]);
-    let map = WalkMap::new(&layout, &free, agent);
+    let space = hall(&[block([5.0, 0.0, 0.0], [5.2, 3.0, 4.0])]);
+    let free = hall(&[]);
+    let map = WalkMap::new(&free, agent);
     let mut path = Path::default();
     let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, 0.0, 2.0)];
     PathSearch::new()
-        .find(&map, &layout, ends, |_| true, &mut path)
+        .find(&map, &free, at_root(ends), |_, _| true, &mut path)
         .unwrap();
-    let mut scene = Scene::new(&world);
+    let mut scene = Scene { space };
     let (progress, at) = scene.walk(&path, agent);
     assert_eq!(progress, Progress::Stuck);
     assert!(at.x > 4.6 && at.x < 5.0 - agent.radius, "{at}");
@@ -593,8 +615,9 @@ fn a_walker_that_is_stopped_is_stuck() {
 #[test]
 fn an_open_leaf_is_in_the_way_of_its_own_door_only() {
     let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
-    let layout = Layout::new(&world);
-    let map = WalkMap::new(&layout, &world, Agent::default());
+    let space = Space::new(world).unwrap();
+    let layout = space.layout(PartId::ROOT);
+    let map = WalkMap::new(&space, Agent::default());
     let door = layout.opening(PortalId(0));
     let (middle, size) = (door.center(), door.bounds().size());
     // Its leaf turns into the second room, about a jamb; both ends are as far from the doorway.
@@ -606,7 +629,13 @@ fn an_open_leaf_is_in_the_way_of_its_own_door_only() {
         let mut search = PathSearch::new();
         let floor = |p: DVec3| p.with_y(0.0);
         search
-            .find(&map, &layout, [floor(from), floor(to)], |_| true, &mut path)
+            .find(
+                &map,
+                &space,
+                at_root([floor(from), floor(to)]),
+                |_, _| true,
+                &mut path,
+            )
             .unwrap();
         path.length
     };
@@ -629,13 +658,13 @@ fn a_flat_robot_goes_below_a_table() {
         ..Agent::default()
     };
     let found = |boxes: &[Aabb]| {
-        let (world, layout) = hall(boxes);
-        let map = WalkMap::new(&layout, &world, robot);
+        let space = hall(boxes);
+        let map = WalkMap::new(&space, robot);
         let ends = [DVec3::new(1.0, 0.0, 2.0), DVec3::new(9.0, 0.0, 2.0)];
         let mut path = Path::default();
-        let found = PathSearch::new().find(&map, &layout, ends, |_| true, &mut path);
+        let found = PathSearch::new().find(&map, &space, at_root(ends), |_, _| true, &mut path);
         found.map(|()| {
-            let (progress, at) = Scene::new(&world).walk(&path, robot);
+            let (progress, at) = Scene { space }.walk(&path, robot);
             assert_eq!(progress, Progress::Arrived, "{at}");
             path.length
         })

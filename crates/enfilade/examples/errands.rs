@@ -22,7 +22,9 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let world = with_doors(world, |_| false);
     let space = Space::new(world)?;
     let (layout, world) = (space.layout(PartId::ROOT), space.world(PartId::ROOT));
-    let map = WalkMap::new(layout, world, Agent::default());
+    let map = WalkMap::new(&space, Agent::default());
+
+    let ends = |ends: [DVec3; 2]| ends.map(|p| (PartId::ROOT, p));
 
     // Places to go to: a spot in each room that one can walk to from the first.
     let (mut search, mut path) = (PathSearch::new(), Path::default());
@@ -34,7 +36,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
             let from = places.first().map_or(*at, |p| p.at);
             !shape.outdoor
                 && search
-                    .find(&map, layout, [from, *at], |_| true, &mut path)
+                    .find(&map, &space, ends([from, *at]), |_, _| true, &mut path)
                     .is_ok()
         });
         places.extend(free.map(|at| WayPoint { at, cell }));
@@ -44,13 +46,14 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let mut errands = Errands::default();
     let mut plan = |event: &ActorEvent, chance: &mut Chance, plan: &mut PlanDraft<'_>| {
         errands.plan(chance, plan, places.len() as u32, |place, way| {
-            let ends = [event.at, places[place as usize].at];
-            if search.find(&map, layout, ends, |_| true, &mut path).is_ok() {
+            let ends = ends([event.at, places[place as usize].at]);
+            let found = search.find(&map, &space, ends, |_, _| true, &mut path);
+            if found.is_ok() {
                 way.extend(path.points.windows(2).map(|leg| {
                     WayPoint {
-                        at: leg[1],
+                        at: leg[1].at,
                         cell: layout
-                            .locate((leg[0] + leg[1]) * 0.5 + DVec3::Y)
+                            .locate((leg[0].at + leg[1].at) * 0.5 + DVec3::Y)
                             .unwrap_or(event.cell),
                     }
                 }));

@@ -1,24 +1,29 @@
 //! Actors near and far: their state does not depend on the camera; and the cost of a frame with many.
 //!
 //! People in generated offices without an outdoors walk to one of 64 rooms through the centers of openings, stay, and
-//! walk on. The camera perceives everything within three portals of its cell.
+//! walk on; in real buildings, by the paths of walkers from place to place. The camera perceives everything within three
+//! portals of its cell.
 
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use anyhow::Context;
-use enfilade::CellId;
+use anyhow::{Context, ensure};
 use enfilade::cpg::{CellSet, Pvs};
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    ActorEvent, ActorId, Actors, AwakeCells, Chance, Errands, Exit, Layout, PlanDraft, WayPoint,
+    ActorEvent, ActorId, ActorPlace, Actors, Agent, AwakeCells, Chance, Errands, Exit, Layout,
+    PartId, Path, PathSearch, PlanDraft, Space, WalkMap, WayPoint,
 };
+use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
+use super::walk::Places;
 use crate::rows::Figure;
 
 const ACTORS: u32 = 100_000;
 const PLACES: u32 = 64;
+/// Places of errands in a building.
+const N_IN_BUILDING: usize = 32;
 const SEED: u64 = 5;
 /// Frames per second.
 const RATE: f64 = 60.0;
@@ -28,13 +33,25 @@ const NONE: u8 = u8::MAX;
 /// Rooms, and the path from each to some places.
 struct Town {
     layout: Layout,
-    places: Vec<CellId>,
-    /// For each exit of each cell, the point of the opening and the cell behind it; and where each cell's exits begin.
-    hops: Vec<(DVec3, CellId)>,
-    first: Vec<u32>,
-    /// For each place and cell, the index of the next exit; [`NONE`] at the place, and where there is no path.
-    next: Vec<Vec<u8>>,
+    ways: TownWays,
     pvs: Pvs,
+    n_actors: u32,
+}
+
+enum TownWays {
+    Offices {
+        places: Vec<CellId>,
+        /// For each exit of each cell, the point of the opening and the cell behind it; and where each cell's exits begin.
+        hops: Vec<(DVec3, CellId)>,
+        first: Vec<u32>,
+        /// For each place and cell, the index of the next exit; [`NONE`] at the place, and where there is no path.
+        next: Vec<Vec<u8>>,
+    },
+    /// Places on floors with their cells, and the way from each to each; empty if there is none.
+    Building {
+        places: Vec<(DVec3, CellId)>,
+        ways: Vec<Vec<Vec<WayPoint>>>,
+    },
 }
 
 impl Town {
@@ -71,52 +88,119 @@ impl Town {
             row
         });
         let next = next.collect();
-        let near = |c: u32| {
-            let mut set = CellSet::new(n_cells);
-            set.insert(CellId(c));
-            let mut edge = vec![CellId(c)];
-            for _ in 0..3 {
-                let around = edge.iter().flat_map(|&c| layout.exits(c)).map(|e| e.to);
-                edge = around.filter(|&c| set.insert(c)).collect();
-            }
-            set
-        };
-        let rows: Vec<CellSet> = (0..n_cells as u32).map(near).collect();
-        let pvs = Pvs::of_rows(&rows);
         Ok(Self {
+            pvs: near_cells(&layout),
             layout,
-            places,
-            hops,
-            first,
-            next,
-            pvs,
+            ways: TownWays::Offices {
+                places,
+                hops,
+                first,
+                next,
+            },
+            n_actors: ACTORS,
         })
     }
 
-    fn way(&self, mut cell: CellId, place: u32, way: &mut Vec<WayPoint>) {
-        let next = &self.next[place as usize];
-        while next[cell.idx()] != NONE {
-            let hop = self.first[cell.idx()] + u32::from(next[cell.idx()]);
-            let (at, to) = self.hops[hop as usize];
-            way.push(WayPoint { at, cell });
-            cell = to;
+    /// Makes a town of a building, with places where people can stand and the paths between them.
+    fn of_building(world: &World) -> anyhow::Result<Self> {
+        let space = Space::new(world.clone())?;
+        let layout = Layout::new(world);
+        let map = WalkMap::new(&space, Agent::default());
+        let mut random = Places::new(Agent::default());
+        let on_root = |at: DVec3| (PartId::ROOT, at);
+        let (mut search, mut path) = (PathSearch::new(), Path::default());
+        let mut places: Vec<(DVec3, CellId)> = Vec::new();
+        for _ in 0..100 * N_IN_BUILDING {
+            let Some(at) = random.any(&space) else { break };
+            // Paths begin and end on the floor of the map.
+            let found = search.find(&map, &space, [at, at].map(on_root), |_, _| true, &mut path);
+            let middle = at + DVec3::Y * 0.5 * Agent::default().height;
+            if let (Ok(()), Some(cell)) = (found, layout.locate(middle))
+                && places.len() < N_IN_BUILDING
+            {
+                places.push((path.points[0].at, cell));
+            }
         }
-        if cell == self.places[place as usize] {
-            let at = self.layout.cell(cell).bounds.center();
-            way.push(WayPoint { at, cell });
+        let mut ways = vec![vec![Vec::new(); places.len()]; places.len()];
+        let mut n_ways = 0;
+        for (i, from) in places.iter().enumerate() {
+            for (j, to) in places.iter().enumerate().filter(|(j, _)| *j != i) {
+                let ends = [from.0, to.0].map(on_root);
+                if search
+                    .find(&map, &space, ends, |_, _| true, &mut path)
+                    .is_ok()
+                {
+                    path.add_way_points(&layout, from.1, &mut ways[i][j]);
+                    // An errand from there begins where this one ends.
+                    if let Some(last) = ways[i][j].last_mut() {
+                        last.at = to.0;
+                    }
+                    n_ways += 1;
+                }
+            }
+        }
+        ensure!(n_ways > places.len(), "only {n_ways} ways");
+        Ok(Self {
+            pvs: near_cells(&layout),
+            layout,
+            ways: TownWays::Building { places, ways },
+            n_actors: ACTORS / 20,
+        })
+    }
+
+    fn way(&self, (at, mut cell): (DVec3, CellId), place: u32, way: &mut Vec<WayPoint>) {
+        match &self.ways {
+            TownWays::Offices {
+                places,
+                hops,
+                first,
+                next,
+            } => {
+                let next = &next[place as usize];
+                while next[cell.idx()] != NONE {
+                    let hop = first[cell.idx()] + u32::from(next[cell.idx()]);
+                    let (at, to) = hops[hop as usize];
+                    way.push(WayPoint { at, cell });
+                    cell = to;
+                }
+                if cell == places[place as usize] {
+                    let at = self.layout.cell(cell).bounds.center();
+                    way.push(WayPoint { at, cell });
+                }
+            }
+            TownWays::Building { places, ways } => {
+                let to = place as usize % places.len();
+                if let Some(from) = places.iter().position(|p| p.0 == at) {
+                    way.extend_from_slice(&ways[from][to]);
+                }
+            }
         }
     }
 
     fn home(&self, id: u32) -> (DVec3, CellId) {
+        if let TownWays::Building { places, .. } = &self.ways {
+            return places[id as usize % places.len()];
+        }
         let cell =
             CellId((u64::from(id) * self.layout.n_cells() as u64 / u64::from(ACTORS)) as u32);
         (self.layout.cell(cell).bounds.center(), cell)
     }
 
+    /// Returns `true` if the middle of a body at a place is in its cell, or is beside it by less than the floors of paths resolve.
+    fn is_in_cell(&self, place: &ActorPlace) -> bool {
+        let agent = Agent::default();
+        let heights = [0.5, 0.25, 0.75, 0.4, 0.6].map(|share| DVec3::Y * share * agent.height);
+        // Floors are squares of a quarter of the radius: the crossing of a portal is up to one off in either direction.
+        let side = 0.25 * agent.radius * 1.5;
+        let around = [DVec3::ZERO, DVec3::X, -DVec3::X, DVec3::Z, -DVec3::Z].map(|v| v * side);
+        let mut all = heights.iter().flat_map(|up| around.map(|v| *up + v));
+        all.any(|v| self.layout.locate(place.at + v) == Some(place.cell))
+    }
+
     fn populate(&self) -> Actors {
         let mut actors = Actors::new(self.layout.n_cells(), SEED);
         let mut plans = self.plans();
-        for id in 0..ACTORS {
+        for id in 0..self.n_actors {
             let (at, cell) = self.home(id);
             actors.add(at, cell, &mut plans);
         }
@@ -127,7 +211,7 @@ impl Town {
         let mut errands = Errands::default();
         move |event, chance, plan| {
             errands.plan(chance, plan, PLACES, |to, way| {
-                self.way(event.cell, to, way);
+                self.way((event.at, event.cell), to, way);
             });
         }
     }
@@ -140,6 +224,22 @@ impl Town {
         }
         exits[rng.below(exits.len())].to
     }
+}
+
+/// Returns the cells within three portals of each.
+fn near_cells(layout: &Layout) -> Pvs {
+    let near = |c: u32| {
+        let mut set = CellSet::new(layout.n_cells());
+        set.insert(CellId(c));
+        let mut edge = vec![CellId(c)];
+        for _ in 0..3 {
+            let around = edge.iter().flat_map(|&c| layout.exits(c)).map(|e| e.to);
+            edge = around.filter(|&c| set.insert(c)).collect();
+        }
+        set
+    };
+    let rows: Vec<CellSet> = (0..layout.n_cells() as u32).map(near).collect();
+    Pvs::of_rows(&rows)
 }
 
 /// Returns a hash of all positions, exact to the bit.
@@ -187,7 +287,7 @@ impl Stepped {
             let speed = chance.range(usual.speed);
             let stay = chance.range(usual.stay);
             let mut way = Vec::new();
-            town.way(self.cell, to, &mut way);
+            town.way((self.from.1, self.cell), to, &mut way);
             let (mut time, mut at) = self.from;
             let mut cell = self.cell;
             for point in way {
@@ -206,9 +306,45 @@ impl Stepped {
 
 /// Counts camera walks that change any actor's state, and actors whose state differs from that of stepping every frame.
 pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
+    state_of(&Town::new(scene)?)
+}
+
+/// As [`state`], in a building; also counts actors that are not where their cell is, or in another cell's list.
+pub(super) fn state_in(world: &World) -> anyhow::Result<Figure> {
+    let town = Town::of_building(world)?;
+    let mut figure = state_of(&town)?;
+    let mut actors = town.populate();
+    let (mut n_astray, mut n_unlisted, mut n, mut n_moving) = (0_u64, 0_u64, 0_u64, 0_u64);
+    let mut worst = String::new();
+    for k in 1..=200 {
+        actors.advance(f64::from(k) * 1.7, town.plans());
+        let mut listed = vec![0_u32; town.layout.n_cells()];
+        for id in (0..town.n_actors).map(ActorId) {
+            let place = actors.place(id).context("all stay")?;
+            listed[place.cell.idx()] += 1;
+            n += 1;
+            n_moving += u64::from(place.velocity != DVec3::ZERO);
+            if !town.is_in_cell(&place) {
+                n_astray += 1;
+                let here = town.layout.locate(place.at + DVec3::Y * 0.9);
+                worst = format!("; {} in {here:?}, not {}", place.at, place.cell);
+            }
+        }
+        for (cell, n) in (0..).map(CellId).zip(listed) {
+            let in_cell = actors.in_cell(cell).filter_map(|a| actors.place(a));
+            n_unlisted += u64::from(in_cell.filter(|p| p.cell == cell).count() != n as usize);
+        }
+    }
+    figure.value += (n_astray + n_unlisted) as f64;
+    figure.note += &format!(
+        "; of {n} positions, {n_moving} of them on the way, {n_astray} are not in the actor's cell; {n_unlisted} lists differ{worst}"
+    );
+    Ok(figure)
+}
+
+fn state_of(town: &Town) -> anyhow::Result<Figure> {
     const WALKS: u64 = 100;
     const END: f64 = 300.0;
-    let town = Town::new(scene)?;
     let mut whole = town.populate();
     whole.advance(END, town.plans());
     let expected = hash(&whole);
@@ -235,7 +371,8 @@ pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
     }
     let start = Instant::now();
     let mut n_off = 0_u64;
-    for id in 0..ACTORS {
+    let n_actors = town.n_actors;
+    for id in 0..n_actors {
         let (at, cell) = town.home(id);
         let mut stepped = Stepped {
             at,
@@ -245,7 +382,7 @@ pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
             n_events: 0,
         };
         for frame in 0..=(END * RATE) as u32 {
-            stepped.step(&town, id, f64::from(frame) / RATE);
+            stepped.step(town, id, f64::from(frame) / RATE);
         }
         let place = whole.place(ActorId(id)).context("all stay")?;
         n_off += u64::from(place.at != stepped.at || place.cell != stepped.cell);
@@ -255,7 +392,7 @@ pub(super) fn state(scene: &str) -> anyhow::Result<Figure> {
         value: (n_other + n_off) as f64,
         most: 0.0,
         note: format!(
-            "of {WALKS} camera walks of {n_frames} frames in all, {n_other} end with another state of {ACTORS} actors after {END} s; \
+            "of {WALKS} camera walks of {n_frames} frames in all, {n_other} end with another state of {n_actors} actors after {END} s; \
              {n_off} actors differ, to the bit, from stepping all of them every frame, which takes {stepping:.0} µs a frame"
         ),
     })

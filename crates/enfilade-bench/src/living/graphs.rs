@@ -5,22 +5,22 @@ use std::collections::BTreeMap;
 use anyhow::bail;
 use enfilade::cpg::{Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, World};
 use enfilade::geom::DVec3;
-use enfilade::world::Layout;
+use enfilade::world::Space;
 use enfilade_testkit::{OpeningKind, Rng, Side, TowerParams, office_tower};
 
-/// Returns the named graph: the centers of its cells, and the layout.
-pub(super) fn graph(name: &str) -> anyhow::Result<(Vec<DVec3>, Layout)> {
+/// Returns the named graph: the centers of its cells, and the space.
+pub(super) fn graph(name: &str) -> anyhow::Result<(Vec<DVec3>, Space)> {
     match name {
-        "tower-1500" => Ok(tower()),
-        "city-1500" => Ok(city(1500, 200, 7)),
-        "lattice-1500" => Ok(lattice(1500)),
+        "tower-1500" => tower(),
+        "city-1500" => city(1500, 200, 7),
+        "lattice-1500" => lattice(1500),
         _ => bail!("no such graph"),
     }
 }
 
 /// Returns the graph from which a tower of 1,500 rooms is generated: rooms along corridors, stairwells, doors,
 /// openings.
-fn tower() -> (Vec<DVec3>, Layout) {
+fn tower() -> anyhow::Result<(Vec<DVec3>, Space)> {
     let params = TowerParams {
         furniture: false,
         storeys: 12,
@@ -41,12 +41,12 @@ fn tower() -> (Vec<DVec3>, Layout) {
         [Side::Room(a), Side::Room(b)] if a != b => Some(([a, b], o.center)),
         _ => None,
     });
-    layout(middles.collect(), &portals.collect::<Vec<_>>())
+    space(middles.collect(), &portals.collect::<Vec<_>>())
 }
 
 /// Returns streets after the city of Gjørup 1999, §3.3.4: crossings joined by streets of several segments, each a cell;
 /// `n_cells` in all.
-fn city(n_cells: usize, n_crossings: usize, seed: u64) -> (Vec<DVec3>, Layout) {
+fn city(n_cells: usize, n_crossings: usize, seed: u64) -> anyhow::Result<(Vec<DVec3>, Space)> {
     let mut rng = Rng::new(seed);
     let along = (n_crossings as f64).sqrt().round() as usize;
     let mut middles = Vec::new();
@@ -83,11 +83,11 @@ fn city(n_cells: usize, n_crossings: usize, seed: u64) -> (Vec<DVec3>, Layout) {
             before = cell;
         }
     }
-    layout(middles, &portals)
+    space(middles, &portals)
 }
 
 /// Returns rooms side by side, most with doors to all sides: no part of it is a chain.
-fn lattice(n_cells: usize) -> (Vec<DVec3>, Layout) {
+fn lattice(n_cells: usize) -> anyhow::Result<(Vec<DVec3>, Space)> {
     let mut rng = Rng::new(3);
     let along = (n_cells as f64).sqrt().ceil() as usize;
     let at = |i: usize| DVec3::new((i % along) as f64, 0.0, (i / along) as f64) * 5.0;
@@ -102,11 +102,14 @@ fn lattice(n_cells: usize) -> (Vec<DVec3>, Layout) {
             }
         }
     }
-    layout(middles, &portals)
+    space(middles, &portals)
 }
 
 /// Returns a layout of cells without walls: portals of 1 m².
-fn layout(middles: Vec<DVec3>, portals: &[([usize; 2], DVec3)]) -> (Vec<DVec3>, Layout) {
+fn space(
+    middles: Vec<DVec3>,
+    portals: &[([usize; 2], DVec3)],
+) -> anyhow::Result<(Vec<DVec3>, Space)> {
     let mut of_cell: BTreeMap<usize, Vec<PortalId>> = BTreeMap::new();
     let mut made = Vec::new();
     for (i, &(cells, center)) in portals.iter().enumerate() {
@@ -141,6 +144,5 @@ fn layout(middles: Vec<DVec3>, portals: &[([usize; 2], DVec3)]) -> (Vec<DVec3>, 
         graph,
         ..World::default()
     };
-    let layout = Layout::new(&world);
-    (middles, layout)
+    Ok((middles, Space::new(world)?))
 }

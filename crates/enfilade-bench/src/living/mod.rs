@@ -3,7 +3,9 @@
 //! To add a row, add a file beside this one and a line in [`ROWS`].
 
 mod actors;
+mod askers;
 mod bodies;
+mod buildings;
 mod decays;
 mod graphs;
 mod lamps;
@@ -40,6 +42,17 @@ const WALKED_IN: &[&str] = &[
     "janesville",
     "smiley-west",
 ];
+/// Buildings with the shapes of rooms by the author of the model.
+const WITH_ROOMS: &[&str] = &[
+    "duplex",
+    "institute",
+    "fzk-haus",
+    "samplehouse4",
+    "kit-edc",
+    "jasmin-sun",
+    "janesville",
+    "smiley-west",
+];
 /// Those of the graphs that contract.
 const CONTRACTING: &[&str] = &["tower-1500", "city-1500"];
 
@@ -48,17 +61,27 @@ const PARTS: &[&str] = &["cabins-10", "cabins-100", "cabins-1600"];
 
 pub(crate) const ROWS: &[Row] = &[
     made("cells of things", &["offices-1000"], things::cells),
+    baked("cells of things", LIVED_IN, buildings::cells),
     made("moving", &["offices-1000"], things::moved),
     made("moving: stays", &["offices-1000"], things::stays),
     made("moving: crosses", &["offices-1000"], things::crosses),
     made("moving portals", &["cabin"], rooms::passings),
     made("moving rooms", &["cabins"], rooms::poses),
+    baked("moving rooms", LIVED_IN, buildings::poses),
     made("moving rooms: far", &["cabins"], rooms::far),
+    made(
+        "rooms that move, all askers",
+        &["lift-tower"],
+        askers::tower,
+    ),
+    baked("rooms that move, all askers", LIVED_IN, askers::entrance),
     made("parts: one", PARTS, parts::one),
     made("parts: all", &["cabins-1600"], parts::all),
     made("docking", &["cabins"], parts::docking),
+    baked("docking", LIVED_IN, buildings::docking),
     made("maze with movers", &["maze"], things::maze),
     made("lights", &["offices-1000"], rooms::lamps),
+    baked("lights", LIVED_IN, buildings::lights),
     baked("lamps", LIVED_IN, lamps::pictures),
     made("cost", &["offices-10000"], rooms::cost),
     made("bodies: missed", &["offices-1000"], bodies::missed_in),
@@ -72,6 +95,7 @@ pub(crate) const ROWS: &[Row] = &[
     made("bodies: time", &["offices-1000"], bodies::time_in),
     baked("bodies: time", &["institute"], bodies::time),
     made("actors: state", &["offices-10000"], actors::state),
+    baked("actors: state", LIVED_IN, actors::state_in),
     made("actors: cost", &["offices-10000"], actors::cost),
     made("paths: distances", GRAPHS, paths::distances),
     made("paths: contraction", CONTRACTING, paths::contraction),
@@ -95,11 +119,11 @@ pub(crate) const ROWS: &[Row] = &[
     baked("levels: lengths", LIVED_IN, levels::length),
     made("sound: reverb", &["coupled-rooms"], sound::reverb),
     made("reverberation: RT60", &["boxes"], decays::rt60),
-    baked("reverberation: areas", &["institute"], walls::areas),
+    named("reverberation: areas", WITH_ROOMS, walls::areas),
     made("sound: cost", &["offices-1000"], sound::cost),
 ];
 
-const fn made(
+pub(crate) const fn made(
     name: &'static str,
     scenes: &'static [&'static str],
     measure: fn(&str) -> anyhow::Result<Figure>,
@@ -112,12 +136,25 @@ const fn made(
     }
 }
 
-const fn baked(
+pub(crate) const fn baked(
     name: &'static str,
     scenes: &'static [&'static str],
     measure: fn(&World) -> anyhow::Result<Figure>,
 ) -> Row {
     let measure = Measure::Baked(measure);
+    Row {
+        name,
+        scenes,
+        measure,
+    }
+}
+
+const fn named(
+    name: &'static str,
+    scenes: &'static [&'static str],
+    measure: fn(&World, &str) -> anyhow::Result<Figure>,
+) -> Row {
+    let measure = Measure::Named(measure);
     Row {
         name,
         scenes,

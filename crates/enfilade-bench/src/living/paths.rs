@@ -9,7 +9,8 @@ use anyhow::Context;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    Agent, Exit, Hops, Layout, LengthSearch, Path, PathSearch, Sampling, WalkMap, Ways,
+    Agent, Exit, Hops, Layout, LengthSearch, PartId, Path, PathSearch, Place, Sampling, Space,
+    WalkMap, Ways,
 };
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
@@ -19,8 +20,15 @@ use crate::rows::Figure;
 /// Repetitions of a timed operation.
 const REPEATS: usize = 5;
 
-fn hops(name: &str) -> anyhow::Result<(Layout, Vec<f64>, Hops)> {
-    let (middles, layout) = graph(name)?;
+const ROOT: PartId = PartId::ROOT;
+
+fn place(cell: CellId) -> Place {
+    Place { part: ROOT, cell }
+}
+
+fn hops(name: &str) -> anyhow::Result<(Space, Vec<f64>, Hops)> {
+    let (middles, space) = graph(name)?;
+    let layout = space.layout(ROOT);
     let steps: Vec<f64> = (0..layout.n_portals() as u32)
         .map(|p| {
             let opening = layout.opening(PortalId(p));
@@ -30,8 +38,8 @@ fn hops(name: &str) -> anyhow::Result<(Layout, Vec<f64>, Hops)> {
             a + b
         })
         .collect();
-    let hops = Hops::new(&layout, |p| Some(steps[p.idx()]));
-    Ok((layout, steps, hops))
+    let hops = Hops::new(&space, |_, p| Some(steps[p.idx()]));
+    Ok((space, steps, hops))
 }
 
 /// Returns lengths from a cell to all others, in whole tenths of a millimeter.
@@ -51,7 +59,8 @@ fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -
 /// Counts pairs of cells whose distance differs from Dijkstra's algorithm on all cells, or whose next portal leads
 /// elsewhere: initially, and after random flips of doors.
 pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
-    let (layout, steps, mut hops) = hops(name)?;
+    let (space, steps, mut hops) = hops(name)?;
+    let layout = space.layout(ROOT);
     let mut rng = Rng::new(1);
     let mut is_open = vec![true; layout.n_portals()];
     let (mut n_pairs, mut n_wrong) = (0_u64, 0_u64);
@@ -59,24 +68,27 @@ pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
         for _ in 0..n_flips {
             let p = PortalId(rng.below(layout.n_portals()) as u32);
             is_open[p.idx()] ^= true;
-            hops.set_open(p, is_open[p.idx()]);
+            hops.set_open(ROOT, p, is_open[p.idx()]);
         }
         let step =
             |e: Exit| is_open[e.portal.idx()].then(|| (steps[e.portal.idx()] * 1e4).round() as u64);
-        let whole = |a, b| {
-            hops.distance(a, b)
-                .map_or(u64::MAX, |d| (d * 1e4).round() as u64)
-        };
         for from in (0..layout.n_cells() as u32).map(CellId) {
-            let expected = dijkstra(&layout, from, step);
+            let expected = dijkstra(layout, from, step);
             for to in (0..layout.n_cells() as u32).map(CellId) {
                 n_pairs += 1;
                 let least = expected[to.idx()];
-                let is_next = match hops.next(to, from) {
+                let next = hops.next(&space, place(to), place(from));
+                let next = next.map(|hop| Exit {
+                    portal: hop.portal,
+                    to: hop.to.cell,
+                });
+                let is_next = match next {
                     Some(exit) => step(exit).is_some_and(|s| s + expected[exit.to.idx()] == least),
                     None => from == to || least == u64::MAX,
                 };
-                n_wrong += u64::from(whole(from, to) != least || !is_next);
+                let length = hops.distance(&space, place(from), place(to));
+                let length = length.map_or(u64::MAX, |d| (d * 1e4).round() as u64);
+                n_wrong += u64::from(length != least || !is_next);
             }
         }
     }
@@ -89,8 +101,8 @@ pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
 
 /// Measures junctions per cell.
 pub(super) fn contraction(name: &str) -> anyhow::Result<Figure> {
-    let (layout, _, hops) = hops(name)?;
-    let (n, of) = (hops.n_junctions(), layout.n_cells());
+    let (space, _, hops) = hops(name)?;
+    let (n, of) = (hops.n_junctions(ROOT), space.layout(ROOT).n_cells());
     Ok(Figure {
         value: n as f64 / of as f64,
         most: 0.2,
@@ -103,16 +115,17 @@ pub(super) fn contraction(name: &str) -> anyhow::Result<Figure> {
 
 /// Measures the time to find the next portal, for random pairs of cells. [Units: ns]
 pub(super) fn next_hop(name: &str) -> anyhow::Result<Figure> {
-    let (layout, _, hops) = hops(name)?;
+    let (space, _, mut hops) = hops(name)?;
+    let layout = space.layout(ROOT);
     let mut rng = Rng::new(2);
-    let mut cell = || CellId(rng.below(layout.n_cells()) as u32);
-    let pairs: Vec<[CellId; 2]> = (0..1 << 16).map(|_| [cell(), cell()]).collect();
+    let mut cell = || place(CellId(rng.below(layout.n_cells()) as u32));
+    let pairs: Vec<[Place; 2]> = (0..1 << 16).map(|_| [cell(), cell()]).collect();
     let mut least = f64::INFINITY;
     // The table exceeds the processor's caches: other programs slow most repetitions down.
     for _ in 0..20 * REPEATS {
         let start = Instant::now();
         for &[from, to] in &pairs {
-            black_box(hops.next(from, to));
+            black_box(hops.next(&space, from, to));
         }
         least = least.min(start.elapsed().as_secs_f64() / pairs.len() as f64);
     }
@@ -125,17 +138,18 @@ pub(super) fn next_hop(name: &str) -> anyhow::Result<Figure> {
 
 /// Measures each flip of every door, and returns the number of junctions. [Units: ms]
 fn flips(name: &str) -> anyhow::Result<(Vec<f64>, usize)> {
-    let (layout, _, mut hops) = hops(name)?;
+    let (space, _, mut hops) = hops(name)?;
+    let layout = space.layout(ROOT);
     // The fastest of several repetitions of each flip, to exclude time of other programs.
     let mut least = vec![f64::INFINITY; 2 * layout.n_portals()];
     for _ in 0..REPEATS {
         for (i, least) in least.iter_mut().enumerate() {
             let start = Instant::now();
-            hops.set_open(PortalId(i as u32 / 2), i % 2 == 1);
+            hops.set_open(ROOT, PortalId(i as u32 / 2), i % 2 == 1);
             *least = least.min(start.elapsed().as_secs_f64() * 1e3);
         }
     }
-    Ok((least, hops.n_junctions()))
+    Ok((least, hops.n_junctions(ROOT)))
 }
 
 /// Returns the slowest flip and the mean, with a note.
@@ -216,9 +230,9 @@ const RECAST: Agent = Agent {
 
 /// Compares our lengths with Recast's, pair by pair where both find a path, and lists the pairs that only one finds.
 fn lengths(world: &World, pairs: &str) -> anyhow::Result<Figure> {
-    let layout = Layout::new(world);
+    let space = Space::new(world.clone())?;
     let start = Instant::now();
-    let map = WalkMap::with_objects(&layout, world, RECAST, |_| false);
+    let map = WalkMap::with_objects(&space, RECAST, |_, _| false);
     let made = start.elapsed().as_secs_f64();
     let (mut search, mut path) = (PathSearch::new(), Path::default());
     let (mut ratios, mut seconds) = (Vec::new(), 0.0);
@@ -229,8 +243,9 @@ fn lengths(world: &World, pairs: &str) -> anyhow::Result<Figure> {
         let number = |i: usize| numbers[i].parse::<f64>().with_context(|| line.to_owned());
         let end = |i| anyhow::Ok(DVec3::new(number(i)?, number(i + 1)?, number(i + 2)?));
         let ends = [end(0)?, end(3)?];
+        let from_to = ends.map(|p| (PartId::ROOT, p));
         let start = Instant::now();
-        let found = search.find(&map, &layout, ends, |_| true, &mut path);
+        let found = search.find(&map, &space, from_to, |_, _| true, &mut path);
         seconds += start.elapsed().as_secs_f64();
         match (found, numbers[6].is_empty()) {
             (Ok(()), false) => ratios.push(path.length_in_plan / number(6)?),

@@ -54,13 +54,9 @@ pub(super) struct Walks {
 pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
     let mut space = Space::new(world.clone())?;
     let agent = Agent::default();
-    let map = WalkMap::new(space.layout(ROOT), world, agent);
+    let map = WalkMap::new(&space, agent);
     let as_modeled = SightState::new(space.sight(ROOT));
-    let mut places = Places {
-        caster: Caster::new(),
-        rng: Rng::new(1),
-        agent,
-    };
+    let mut places = Places::new(agent);
     let (mut search, mut all) = (PathSearch::new(), Walks::default());
     for _ in 0..PATHS * TRIES {
         if all.walks.len() == PATHS {
@@ -71,7 +67,8 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
             break;
         };
         let mut path = Path::default();
-        match search.find(&map, space.layout(ROOT), [from, to], |_| true, &mut path) {
+        let ends = [from, to].map(|p| (ROOT, p));
+        match search.find(&map, &space, ends, |_, _| true, &mut path) {
             Ok(()) if path.length < SHORTEST => continue,
             Ok(()) => {}
             Err(NoPath::NoWay) => {
@@ -83,9 +80,9 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
                 continue;
             }
         }
-        let eye = path.points[0] + DVec3::Y * agent.eye;
+        let eye = path.points[0].at + DVec3::Y * agent.eye;
         let mut walker = Walker::new(agent, ROOT, eye);
-        let mut follower = PathFollower::new(&space, ROOT, path.clone(), SPEED);
+        let mut follower = PathFollower::new(&space, path.clone(), SPEED);
         // A walker that follows its path takes no longer, whatever it slides along.
         let most = (10.0 + 2.0 * path.length / SPEED) / SECONDS;
         let mut progress = Progress::Walking;
@@ -112,13 +109,21 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
 }
 
 /// Places where a body can stand.
-struct Places {
+pub(super) struct Places {
     caster: Caster,
     rng: Rng,
     agent: Agent,
 }
 
 impl Places {
+    pub(super) fn new(agent: Agent) -> Self {
+        Self {
+            caster: Caster::new(),
+            rng: Rng::new(1),
+            agent,
+        }
+    }
+
     /// Returns what a body a little wider than the walker touches, by name.
     fn touched_at(&mut self, space: &Space, feet: DVec3) -> Vec<String> {
         let world: &World = space.world(ROOT);
@@ -150,7 +155,7 @@ impl Places {
     }
 
     /// Returns a place where the body stands free, with doors as in the model.
-    fn any(&mut self, space: &Space) -> Option<DVec3> {
+    pub(super) fn any(&mut self, space: &Space) -> Option<DVec3> {
         let layout: &Layout = space.layout(ROOT);
         let Agent {
             radius,

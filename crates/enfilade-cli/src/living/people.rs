@@ -3,8 +3,8 @@
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    ActorEvent, ActorId, Actors, Agent, Chance, Errands, Layout, PartId, Path, PathSearch,
-    PlanDraft, Space, WalkMap, WayPoint,
+    ActorEvent, ActorId, Actors, Agent, Chance, Errands, PartId, Path, PathSearch, PlanDraft,
+    Space, WalkMap,
 };
 
 use super::file::PeopleEntry;
@@ -34,8 +34,7 @@ impl People {
             path: Path::default(),
         };
         if entry.count > 0 {
-            let world = space.world(PartId::ROOT);
-            people.map = Some(WalkMap::new(layout, world, Agent::default()));
+            people.map = Some(WalkMap::new(space, Agent::default()));
         }
         people
     }
@@ -47,7 +46,7 @@ impl People {
             let up = DVec3::Y * 0.5;
             if let Some(cell) = space.layout(PartId::ROOT).locate(at + up) {
                 let mut actors = std::mem::replace(&mut self.actors, Actors::new(0, 0));
-                let mut plan = self.planner(space.layout(PartId::ROOT), &is_way);
+                let mut plan = self.planner(space, &is_way);
                 actors.add(at, cell, &mut plan);
                 drop(plan);
                 self.actors = actors;
@@ -58,14 +57,14 @@ impl People {
     /// Plays until a time. Doors open for people, so all but those that `is_way` excludes are ways. [Units: s]
     pub(super) fn advance(&mut self, space: &Space, now: f64, is_way: impl Fn(PortalId) -> bool) {
         let mut actors = std::mem::replace(&mut self.actors, Actors::new(0, 0));
-        actors.advance(now, self.planner(space.layout(PartId::ROOT), &is_way));
+        actors.advance(now, self.planner(space, &is_way));
         self.actors = actors;
     }
 
     /// Returns a planner of errands.
     fn planner<'a, F: Fn(PortalId) -> bool>(
         &'a mut self,
-        layout: &'a Layout,
+        space: &'a Space,
         is_way: &'a F,
     ) -> impl FnMut(&ActorEvent, &mut Chance, &mut PlanDraft<'_>) + use<'a, F> {
         let Self {
@@ -76,19 +75,18 @@ impl People {
             path,
             ..
         } = self;
+        let layout = space.layout(PartId::ROOT);
+        // They do not use lifts.
+        let may_pass = |part, portal| part == PartId::ROOT && is_way(portal);
         move |event, chance, plan| {
             let n = places.len() as u32;
             errands.plan(chance, plan, n, |place, way| {
                 let Some(map) = map else { return };
-                let ends = [event.at, places[place as usize]];
-                if search.find(map, layout, ends, is_way, path).is_err() {
+                let ends = [event.at, places[place as usize]].map(|p| (PartId::ROOT, p));
+                if search.find(map, space, ends, may_pass, path).is_err() {
                     return;
                 }
-                for leg in path.points.windows(2) {
-                    let middle = (leg[0] + leg[1]) * 0.5 + DVec3::Y * 0.5;
-                    let cell = layout.locate(middle).unwrap_or(event.cell);
-                    way.push(WayPoint { at: leg[1], cell });
-                }
+                path.add_way_points(layout, event.cell, way);
             });
         }
     }

@@ -1,8 +1,10 @@
 //! Special portals in made worlds: mirrors, teleporters and one-way places.
 
-use enfilade_cpg::{CellId, Pass, SpecialId, SpecialPortal, SpecialShape, Way, World};
+use enfilade_cpg::{CellId, Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World};
 use enfilade_geom::{DQuat, DVec3, Similarity};
 
+use super::scaled_world;
+use crate::assembled::{Assembled, Standing, assembled};
 use crate::rng::Rng;
 
 /// Distance of a made surface from the wall behind it. [Units: wu]
@@ -132,4 +134,73 @@ fn linked(a: &OnWall, b: &OnWall, first: u32) -> [SpecialPortal; 2] {
         special("there", a, lead(a, b, first + 1)),
         special("back", b, lead(b, a, first)),
     ]
+}
+
+/// Puts a scaled copy of a world at a pose beside it, and makes one doorway of the first lead into the copy, and the copy's back
+/// into the first. Nobody in the doorway's first cell can tell the result from the world itself: what lies behind the doorway looks
+/// the same, is as far, and stops the same bodies. Scaled copies have doors without motion.
+///
+/// # Panics
+///
+/// If there is no such portal.
+#[must_use]
+pub fn linked_copies(world: &World, portal: PortalId, map: &Similarity) -> World {
+    assert!(map.scale > 0.0, "copies are not reflected");
+    let scaled;
+    let copy = if map.scale == 1.0 {
+        world
+    } else {
+        scaled = scaled_world(world.clone(), map.scale as f32);
+        &scaled
+    };
+    let standing = |world, turn, at| Standing { world, turn, at };
+    let both = [
+        standing(world, DQuat::IDENTITY, DVec3::ZERO),
+        standing(copy, map.turn, map.at),
+    ];
+    let Assembled {
+        mut world,
+        first_cell,
+    } = assembled(&both, &[]);
+    let [here, behind] = both[0].world.graph[portal].cells;
+    let there = CellId(behind.0 + first_cell[1]);
+    // Portals of the copy that lead outdoors are left out.
+    let between = |p: &&PortalId| {
+        let cells = world.graph[**p]
+            .cells
+            .map(|c| c.0.wrapping_sub(first_cell[1]));
+        cells == [here.0, behind.0]
+    };
+    let same = |p: &&PortalId| {
+        let nth = |of: PortalId, cells: [CellId; 2]| {
+            let before = (0..of.0).map(PortalId);
+            before.filter(|q| world.graph[*q].cells == cells).count()
+        };
+        nth(**p, world.graph[**p].cells) == nth(portal, [here, behind])
+    };
+    let all: Vec<PortalId> = world.graph.portal_ids().collect();
+    let twin = *all
+        .iter()
+        .filter(between)
+        .find(same)
+        .expect("the copy's doorway");
+    let lead = |to: CellId, map: Similarity, back: u32| {
+        let back = Some(SpecialId(back));
+        vec![Pass::new(Way::Lead { to, map, back })]
+    };
+    world.graph.specials = vec![
+        SpecialPortal {
+            name: "there".into(),
+            cell: here,
+            shape: SpecialShape::Portal(portal),
+            passes: lead(there, *map, 1),
+        },
+        SpecialPortal {
+            name: "back".into(),
+            cell: there,
+            shape: SpecialShape::Portal(twin),
+            passes: lead(here, map.inverse(), 0),
+        },
+    ];
+    world
 }

@@ -1,8 +1,6 @@
 //! Shapes of bodies.
 
-use enfilade_geom::{Aabb, DMat3, DQuat, DVec3};
-
-use crate::pose::Pose;
+use enfilade_geom::{Aabb, DMat3, DQuat, DVec3, Similarity};
 
 /// The shape of a body about its center. Sizes must not be negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,16 +60,20 @@ impl Body {
         }
     }
 
-    /// Returns the body turned into another frame.
-    pub(super) fn turned(&self, to: &Pose) -> Self {
+    /// Returns the body in another frame.
+    pub(super) fn mapped(&self, to: &Similarity) -> Self {
+        let size = to.scale.abs();
         match *self {
-            Self::Sphere { radius } => Self::Sphere { radius },
-            Self::Capsule { half, radius } => Self::Capsule {
-                half: to.direction(half),
-                radius,
+            Self::Sphere { radius } => Self::Sphere {
+                radius: radius * size,
             },
+            Self::Capsule { half, radius } => Self::Capsule {
+                half: to.vector(half),
+                radius: radius * size,
+            },
+            // Symmetric about its center, so a reflection is a rotation.
             Self::Box { half, turn } => Self::Box {
-                half,
+                half: half * size,
                 turn: to.turn * turn,
             },
         }

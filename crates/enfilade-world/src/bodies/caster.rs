@@ -3,7 +3,7 @@
 //! The flood (`flood.rs`) finds them, the kernel (`kernel.rs`) tests each: O(candidates), and casts shorten the flood at each
 //! impact. [`ALONG`] decides nearly tangential cases.
 
-use enfilade_geom::{DVec3, Triangle};
+use enfilade_geom::{DVec3, Similarity, Triangle};
 use enfilade_runtime::{DetailId, Target};
 
 use super::body::Body;
@@ -42,6 +42,8 @@ pub struct Impact {
     pub target: Target,
     /// The place through which it was hit.
     pub place: Place,
+    /// Map from the frame of the cast to that of the place's part, through the special portals passed before.
+    pub map: Similarity,
 }
 
 /// Contact of a resting body, in the frame of the query.
@@ -57,6 +59,8 @@ pub struct Contact {
     pub target: Target,
     /// The place through which it was found.
     pub place: Place,
+    /// Map from the frame of the query to that of the place's part, through the special portals that the body stands in.
+    pub map: Similarity,
 }
 
 /// Queries contacts of bodies. Holds the buffers of the flood; use one per thread.
@@ -165,14 +169,16 @@ impl Caster {
                 point: point_of_contact(core, &corners),
                 target: it.target,
                 place: it.place,
+                map: it.moving.map,
             });
         });
-        best.map(|impact| Impact {
-            normal: turned(space, &motion, impact.place, impact.normal),
-            point: cast.from
-                + cast.by * impact.t
-                + turned(space, &motion, impact.place, impact.point),
-            ..impact
+        best.map(|impact| {
+            let back = impact.map.inverse();
+            Impact {
+                normal: back.direction(impact.normal),
+                point: cast.from + cast.by * impact.t + back.vector(impact.point),
+                ..impact
+            }
         })
     }
 
@@ -197,13 +203,14 @@ impl Caster {
             let Some(found) = depth(core, it.corners) else {
                 return;
             };
-            let to_own = |v: DVec3| turned(space, &motion, it.place, v);
+            let back = it.moving.map.inverse();
             visit(&Contact {
-                normal: to_own(found.normal),
-                depth: found.depth,
-                point: at + to_own(point_of_contact(core, it.corners)),
+                normal: back.direction(found.normal),
+                depth: found.depth * back.scale.abs(),
+                point: at + back.vector(point_of_contact(core, it.corners)),
                 target: it.target,
                 place: it.place,
+                map: it.moving.map,
             });
         });
     }
@@ -225,7 +232,8 @@ impl Caster {
         let motion = Motion::rest(space, body, (frame, at), place);
         let all = |_: PartId, _: DetailId| true;
         self.flood.run(&motion, all, |it, _| {
-            let to_own = |v: DVec3| at + turned(space, &motion, it.place, v);
+            let back = it.moving.map.inverse();
+            let to_own = |v: DVec3| at + back.vector(v);
             visit(it.place.part, it.target, &it.corners.map(to_own));
         });
     }
@@ -242,12 +250,4 @@ impl Caster {
     pub fn counts(&self) -> CastCounts {
         self.flood.counts()
     }
-}
-
-/// Turns a vector from the frame of a place's part into that of a motion.
-fn turned(space: &Space, motion: &Motion<'_>, place: Place, v: DVec3) -> DVec3 {
-    if place.part == motion.frame {
-        return v;
-    }
-    space.between(place.part, motion.frame).direction(v)
 }

@@ -9,14 +9,18 @@
 //! them from outside: their outdoor cells are reached when it meets their boxes. It leaves a part through a door into the places to
 //! which the door leads, and into the cells behind the doors that it meets, as far as these are within the docking tolerance.
 //!
+//! Special portals: a body that touches one from its front is also on its far side, as another *image*, in a frame of its own.
+//! Each image meets the obstacles on its side of the plane (`carve.rs`). Up to [`MAX_IMAGES`] follow each other.
+//!
 //! In a cell, triangles are tested in the order in which the body's bounding box touches their boxes, so that those behind the
 //! impact are not tested at all. They are gathered first, [`BATCH`] at a time, which bounds the work behind it.
 
-use enfilade_cpg::{CellId, PortalId};
-use enfilade_geom::{Aabb, DMat3, DVec3, Ray, Triangle};
+use enfilade_cpg::{CellId, PortalId, SpecialId, Way};
+use enfilade_geom::{Aabb, DMat3, DVec3, Ray, Similarity, Triangle};
 use enfilade_runtime::{DetailId, Target};
 
 use super::body::{Body, BodyCore};
+use super::carve::Carver;
 use super::kernel::{boxes_meet, sweep};
 use crate::space::walls::TriangleOf;
 use crate::space::{PartId, Place, Space};
@@ -25,6 +29,8 @@ use crate::space::{PartId, Place, Space};
 const SAME: f64 = 1e-12;
 /// Triangles gathered before they are tested. 32 is more than most rooms have on a body's way.
 const BATCH: usize = 32;
+/// Images of a body in one query; what lies behind further special portals is not met.
+const MAX_IMAGES: usize = 32;
 
 /// Cost of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +42,8 @@ pub struct CastCounts {
     pub triangles: u32,
     /// Triangles of openings tested.
     pub openings: u32,
+    /// Images of the body: itself, and one beyond each special portal that it touches.
+    pub images: u32,
 }
 
 /// Follows a body from cell to cell. Holds the buffers.
@@ -44,13 +52,18 @@ pub(super) struct BodyFlood {
     /// Per cell of all parts.
     reached: Vec<Reached>,
     question: u32,
-    waiting: Vec<Place>,
+    waiting: Vec<Spot>,
     places: Vec<Place>,
+    images: Vec<Image>,
+    /// Special portals that images touch.
+    touched: Vec<Touched>,
+    carver: Carver,
+    carved: Vec<Triangle>,
     gathered: Vec<Gathered>,
     /// Doors to the surroundings of the current part that the body touches, with the times.
     left_by: Vec<(PortalId, f64)>,
     /// The body in the frames of the parts that it has met.
-    moving: Vec<(PartId, Moving)>,
+    moving: Vec<((usize, PartId), Moving)>,
     counts: CastCounts,
 }
 
@@ -60,6 +73,31 @@ struct Reached {
     question: u32,
     is_done: bool,
     since: f64,
+}
+
+/// A place of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Spot {
+    image: usize,
+    place: Place,
+}
+
+/// A body on the far side of special portals.
+#[derive(Clone, Copy, Debug)]
+struct Image {
+    /// The part in whose frame it is, and the map there from the frame of the motion.
+    frame: PartId,
+    map: Similarity,
+    /// The plane beyond which it meets things, `normal · p >= height`, and the special portal that leads back.
+    far: Option<(DVec3, f64, Option<SpecialId>)>,
+}
+
+/// A special portal that an image touches from its front.
+#[derive(Clone, Copy, Debug)]
+struct Touched {
+    image: usize,
+    part: PartId,
+    special: SpecialId,
 }
 
 /// A body in the frame of a part.
@@ -73,6 +111,8 @@ pub(super) struct Moving {
     grown_reach: DVec3,
     from: DVec3,
     pub(super) by: DVec3,
+    /// Map from the frame of the motion to that of the part.
+    pub(super) map: Similarity,
 }
 
 /// A triangle on the way: the time at which the boxes meet, and its vertices relative to the body's position on entering the
@@ -110,6 +150,7 @@ pub(super) struct Motion<'a> {
 
 /// A place that the body is in from `since` on, and the rest of its motion then.
 struct Stay {
+    image: usize,
     place: Place,
     /// The cell that stands for the surroundings of the part.
     border: Option<CellId>,
@@ -127,6 +168,10 @@ impl BodyFlood {
             question: 0,
             waiting: Vec::new(),
             places: Vec::new(),
+            images: Vec::new(),
+            touched: Vec::new(),
+            carver: Carver::default(),
+            carved: Vec::new(),
             gathered: Vec::with_capacity(BATCH),
             left_by: Vec::new(),
             moving: Vec::new(),
@@ -157,12 +202,20 @@ impl BodyFlood {
         if !motion.is_finite() {
             return;
         }
-        self.reach(space, place, 0.0);
+        self.images.push(Image {
+            frame: motion.frame,
+            map: Similarity::IDENTITY,
+            far: None,
+        });
+        self.reach(space, Spot { image: 0, place }, 0.0);
         let (mut limit, mut is_met) = (1.0, false);
-        while let Some((place, since)) = self.next_place(space, limit) {
-            self.places.push(place);
-            let moving = self.moving_in(motion, place.part);
+        while let Some((Spot { image, place }, since)) = self.next_place(space, limit) {
+            if image == 0 || !self.places.contains(&place) {
+                self.places.push(place);
+            }
+            let moving = self.moving_in(motion, image, place.part);
             let mut stay = Stay {
+                image,
                 place,
                 border: space.parts[place.part.idx()].border,
                 since,
@@ -170,6 +223,8 @@ impl BodyFlood {
                 left: limit - since,
                 is_met,
             };
+            self.meet_specials(space, &moving, &stay);
+            self.set_cuts(space, &stay);
             self.gather_walls(space, &moving, &mut stay, &mut visit);
             self.gather_objects(space, &moving, &mut stay, &mut counts, &mut visit);
             self.try_gathered(space, &moving, &mut stay, &mut visit);
@@ -178,6 +233,7 @@ impl BodyFlood {
             (limit, is_met) = (since + stay.left, stay.is_met);
         }
         self.counts.cells = self.places.len() as u32;
+        self.counts.images = self.images.len() as u32;
     }
 
     fn begin(&mut self, space: &Space) {
@@ -186,30 +242,43 @@ impl BodyFlood {
             self.reached.fill(Reached::default());
             self.question = 1;
         }
-        self.reached.resize(space.n_cells(), Reached::default());
+        if self.reached.len() < space.n_cells() {
+            self.reached.resize(space.n_cells(), Reached::default());
+        }
+        self.images.clear();
+        self.touched.clear();
         self.waiting.clear();
         self.places.clear();
         self.moving.clear();
         self.counts = CastCounts::default();
     }
 
-    /// Returns the body in the frame of a part.
-    fn moving_in(&mut self, motion: &Motion<'_>, part: PartId) -> Moving {
-        if let Some((_, known)) = self.moving.iter().find(|(p, _)| *p == part) {
+    /// Returns an image of the body in the frame of a part.
+    fn moving_in(&mut self, motion: &Motion<'_>, image: usize, part: PartId) -> Moving {
+        let key = (image, part);
+        if let Some((_, known)) = self.moving.iter().find(|(k, _)| *k == key) {
             return *known;
         }
-        let moving = Moving::new(motion, part);
-        self.moving.push((part, moving));
+        let Image { frame, map, .. } = self.images[image];
+        let map = if part == frame {
+            map
+        } else {
+            Similarity::from(motion.space.between(frame, part)).after(&map)
+        };
+        let moving = Moving::new(motion, part, map);
+        self.moving.push((key, moving));
         moving
     }
 
-    fn index(space: &Space, place: Place) -> usize {
-        space.parts[place.part.idx()].first_cell as usize + place.cell.idx()
+    fn index(space: &Space, spot: Spot) -> usize {
+        let Spot { image, place } = spot;
+        let first = space.parts[place.part.idx()].first_cell as usize;
+        image * space.n_cells() + first + place.cell.idx()
     }
 
     /// Records that a place is reached.
-    fn reach(&mut self, space: &Space, place: Place, since: f64) {
-        let known = &mut self.reached[Self::index(space, place)];
+    fn reach(&mut self, space: &Space, spot: Spot, since: f64) {
+        let known = &mut self.reached[Self::index(space, spot)];
         if known.question == self.question {
             if !known.is_done {
                 known.since = known.since.min(since);
@@ -221,31 +290,120 @@ impl BodyFlood {
             is_done: false,
             since,
         };
-        self.waiting.push(place);
+        self.waiting.push(spot);
     }
 
-    fn is_done(&self, space: &Space, place: Place) -> bool {
-        let known = &self.reached[Self::index(space, place)];
+    fn is_done(&self, space: &Space, spot: Spot) -> bool {
+        let known = &self.reached[Self::index(space, spot)];
         known.question == self.question && known.is_done
     }
 
     /// Returns `true` if the cell behind an opening is searched already, and nothing beyond it remains to be found.
     fn is_behind_done(&self, space: &Space, stay: &Stay, cell: CellId) -> bool {
-        let part = stay.place.part;
-        stay.border != Some(cell) && self.is_done(space, Place { part, cell })
+        let (image, part) = (stay.image, stay.place.part);
+        let place = Place { part, cell };
+        stay.border != Some(cell) && self.is_done(space, Spot { image, place })
     }
 
     /// Returns the place reached next, with its time; none that is reached after `limit`.
-    fn next_place(&mut self, space: &Space, limit: f64) -> Option<(Place, f64)> {
-        let since = |p: &Place| self.reached[Self::index(space, *p)].since;
-        let order = |&(_, a): &(usize, &Place), &(_, b): &(usize, &Place)| {
+    fn next_place(&mut self, space: &Space, limit: f64) -> Option<(Spot, f64)> {
+        let since = |p: &Spot| self.reached[Self::index(space, *p)].since;
+        let order = |&(_, a): &(usize, &Spot), &(_, b): &(usize, &Spot)| {
             since(a).total_cmp(&since(b)).then(a.cmp(b))
         };
         let (at, _) = self.waiting.iter().enumerate().min_by(order)?;
-        let place = self.waiting.swap_remove(at);
-        let known = &mut self.reached[Self::index(space, place)];
+        let spot = self.waiting.swap_remove(at);
+        let known = &mut self.reached[Self::index(space, spot)];
         known.is_done = true;
-        (known.since <= limit).then_some((place, known.since))
+        (known.since <= limit).then_some((spot, known.since))
+    }
+
+    /// Continues on the far sides of the special portals of a cell that the body touches from their fronts.
+    fn meet_specials(&mut self, space: &Space, moving: &Moving, stay: &Stay) {
+        let Place { part, cell } = stay.place;
+        let own = &space.parts[part.idx()];
+        if own.layout.n_specials() == 0 {
+            return;
+        }
+        for special in own.layout.specials_of(cell) {
+            let Some((to, map)) = own.layout.passage(special) else {
+                continue;
+            };
+            let image = stay.image;
+            let Image { frame, far, .. } = self.images[image];
+            let is_back = far.is_some_and(|far| frame == part && far.2 == Some(special));
+            let is_known = |t: &Touched| t.image == image && t.part == part && t.special == special;
+            if is_back
+                || self.touched.iter().any(is_known)
+                || self.images.len() == MAX_IMAGES
+                || !space.is_special_open(part, special)
+            {
+                continue;
+            }
+            let opening = own.layout.special_opening(special);
+            let triangles = opening.pieces().flat_map(|piece| {
+                (2..piece.len()).map(move |k| [0, k - 1, k].map(|i| piece[i] - stay.start))
+            });
+            let touches = triangles.filter_map(|t| sweep(&moving.grown, moving.by, stay.left, &t));
+            let Some(after) = touches.map(|touch| touch.t).min_by(f64::total_cmp) else {
+                continue;
+            };
+            // From behind, its back is met.
+            let center = stay.start + moving.by * after;
+            if opening.height_of(center) > own.layout.tolerance() {
+                continue;
+            }
+            self.touched.push(Touched {
+                image,
+                part,
+                special,
+            });
+            let normal = map.direction(opening.normal());
+            let back = space.world(part).graph.specials[special.idx()]
+                .passes
+                .iter()
+                .find_map(|pass| match pass.way {
+                    Way::Lead { back, .. } => Some(back),
+                    _ => None,
+                });
+            self.images.push(Image {
+                frame: part,
+                map: map.after(&moving.map),
+                far: Some((
+                    normal,
+                    normal.dot(map.point(opening.center())),
+                    back.flatten(),
+                )),
+            });
+            let image = self.images.len() - 1;
+            let n = space.n_cells() * self.images.len();
+            if self.reached.len() < n {
+                self.reached.resize(n, Reached::default());
+            }
+            let place = Place { part, cell: to };
+            self.reach(space, Spot { image, place }, stay.since + after);
+        }
+    }
+
+    /// Sets the obstacles that count for an image in a part.
+    fn set_cuts(&mut self, space: &Space, stay: &Stay) {
+        self.carver.clear();
+        let part = stay.place.part;
+        let margin = space.layout(part).tolerance();
+        let image = &self.images[stay.image];
+        if let Some((normal, height, _)) = image.far {
+            let to = space.between(image.frame, part);
+            let (normal, through) = (to.direction(normal), to.point(normal * height));
+            self.carver.add_far(normal, normal.dot(through), margin);
+        }
+        for touched in self.touched.iter().filter(|t| t.image == stay.image) {
+            let opening = space.layout(touched.part).special_opening(touched.special);
+            let to = space.between(touched.part, part);
+            let normal = to.direction(opening.normal());
+            let height = normal.dot(to.point(opening.center()));
+            self.carver
+                .add_near(normal, height, margin, opening.pieces(), |p| to.point(p));
+        }
     }
 
     /// Continues beyond the doors by which the body leaves its part.
@@ -257,24 +415,31 @@ impl BodyFlood {
             let Some(door) = own.doors.iter().find(|d| d.portal == portal) else {
                 continue;
             };
+            let image = stay.image;
             for &place in &door.leads_to {
-                self.reach(space, place, since);
+                self.reach(space, Spot { image, place }, since);
             }
             for &(other, portal) in &door.meets {
-                self.dock(motion, other, portal, since);
+                self.dock(motion, image, (other, portal), since);
             }
         }
         self.left_by = left_by;
     }
 
     /// Continues behind a door of another part, from `since` on: through the prism between both doors.
-    fn dock(&mut self, motion: &Motion<'_>, other: PartId, portal: PortalId, since: f64) {
+    fn dock(
+        &mut self,
+        motion: &Motion<'_>,
+        image: usize,
+        (other, portal): (PartId, PortalId),
+        since: f64,
+    ) {
         let space = motion.space;
         let its = &space.parts[other.idx()];
         let Some(door) = its.doors.iter().find(|d| d.portal == portal) else {
             return;
         };
-        let moving = self.moving_in(motion, other);
+        let moving = self.moving_in(motion, image, other);
         let opening = its.layout.opening(portal);
         let grown = BodyCore::of(&moving.body.grown(space.docking.depth(opening.radius())));
         let start = moving.from + moving.by * since;
@@ -285,13 +450,9 @@ impl BodyFlood {
         let first = touches.map(|touch| touch.t).min_by(f64::total_cmp);
         if let Some(after) = first {
             let part = other;
-            let inner = Place {
-                part,
-                cell: door.inner,
-            };
-            self.reach(space, inner, since + after);
-            if let Some(cell) = its.border {
-                self.reach(space, Place { part, cell }, since + after);
+            for cell in std::iter::once(door.inner).chain(its.border) {
+                let place = Place { part, cell };
+                self.reach(space, Spot { image, place }, since + after);
             }
         }
     }
@@ -303,12 +464,13 @@ impl BodyFlood {
         for &part in &own.guests[stay.place.cell.idx()] {
             let its = &space.parts[part.idx()];
             let Some(cell) = its.border else { continue };
-            let moving = self.moving_in(motion, part);
+            let moving = self.moving_in(motion, stay.image, part);
             let start = moving.from + moving.by * stay.since;
             let hull = its.hull.expanded(its.layout.tolerance());
             let bounds = Aabb::new(hull.min - start, hull.max - start);
             if let Some(after) = boxes_meet(moving.grown_reach, moving.by, stay.left, &bounds) {
-                self.reach(space, Place { part, cell }, stay.since + after.max(0.0));
+                let (image, place) = (stay.image, Place { part, cell });
+                self.reach(space, Spot { image, place }, stay.since + after.max(0.0));
             }
         }
     }
@@ -336,18 +498,20 @@ impl BodyFlood {
                 let target = match walls.surfaces[i as usize] {
                     TriangleOf::Wall { batch, triangle } => Some(Target::Wall { batch, triangle }),
                     TriangleOf::Opening { portal, is_panel } => {
-                        let [a, b] = all.portal_cells[portal as usize];
-                        opens_to = Some((PortalId(portal), if a == cell { b } else { a }));
+                        let [a, b] = all.ways[portal as usize];
+                        let way = if a.from == cell { a } else { b };
+                        opens_to = way.to.map(|to| (PortalId(portal), to));
                         reach = moving.grown_reach;
-                        shut(portal).filter(|_| is_panel)
+                        let solid = Some(Target::Portal(PortalId(portal)));
+                        let shut = shut(portal).filter(|_| is_panel);
+                        if way.is_solid { solid } else { shut }
                     }
                     TriangleOf::Panel { portal } => shut(portal),
                 };
                 let is_way = |(_, to)| !self.is_behind_done(space, stay, to);
                 if target.is_some() || opens_to.is_some_and(is_way) {
-                    let corners = t.map(|p| p - stay.start);
                     let what = (opens_to, target);
-                    self.gather(space, what, (&corners, reach), moving, stay, visit);
+                    self.gather(space, what, (t, reach), moving, stay, visit);
                     *t_max = t_max.min(stay.left);
                 }
             });
@@ -392,7 +556,7 @@ impl BodyFlood {
                 t_max: stay.left,
             };
             mesh.bvh.for_each_swept(&ray, reach, |i, t, t_max| {
-                let corners = t.map(|p| to_world.transform_point3(p) - start);
+                let corners = t.map(|p| to_world.transform_point3(p));
                 let (primitive, triangle) = mesh.named(i);
                 let target = Target::Detail {
                     detail: DetailId(detail),
@@ -406,9 +570,34 @@ impl BodyFlood {
         });
     }
 
-    /// Gathers a triangle if the boxes meet; tests the gathered ones when there are enough.
+    /// Gathers what counts of a triangle, in the frame of the part.
     #[inline]
     fn gather(
+        &mut self,
+        space: &Space,
+        what: (Option<(PortalId, CellId)>, Option<Target>),
+        (corners, reach): (&Triangle, DVec3),
+        moving: &Moving,
+        stay: &mut Stay,
+        visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
+    ) {
+        if self.carver.is_empty() {
+            let corners = corners.map(|p| p - stay.start);
+            return self.gather_whole(space, what, (&corners, reach), moving, stay, visit);
+        }
+        let mut carved = std::mem::take(&mut self.carved);
+        carved.clear();
+        self.carver.carve(corners, |t| carved.push(t));
+        for t in &carved {
+            let corners = t.map(|p| p - stay.start);
+            self.gather_whole(space, what, (&corners, reach), moving, stay, visit);
+        }
+        self.carved = carved;
+    }
+
+    /// Gathers a triangle, given relative to the body, if the boxes meet; tests the gathered ones when there are enough.
+    #[inline]
+    fn gather_whole(
         &mut self,
         space: &Space,
         (opens_to, target): (Option<(PortalId, CellId)>, Option<Target>),
@@ -462,7 +651,8 @@ impl BodyFlood {
                 self.counts.openings += 1;
                 if let Some(touch) = sweep(&moving.grown, moving.by, stay.left, &it.corners) {
                     let (part, since) = (stay.place.part, stay.since + touch.t);
-                    self.reach(space, Place { part, cell }, since);
+                    let (image, place) = (stay.image, Place { part, cell });
+                    self.reach(space, Spot { image, place }, since);
                     if stay.border == Some(cell) {
                         self.left_by.push((portal, since));
                     }
@@ -510,11 +700,10 @@ impl<'a> Motion<'a> {
 }
 
 impl Moving {
-    fn new(motion: &Motion<'_>, part: PartId) -> Self {
+    fn new(motion: &Motion<'_>, part: PartId, map: Similarity) -> Self {
         let (mut body, mut from, mut by) = (*motion.body, motion.from, motion.by);
-        if part != motion.frame {
-            let to = motion.space.between(motion.frame, part);
-            (body, from, by) = (body.turned(&to), to.point(from), to.direction(by));
+        if map != Similarity::IDENTITY {
+            (body, from, by) = (body.mapped(&map), map.point(from), map.vector(by));
         }
         let core = BodyCore::of(&body);
         let tolerance = motion.space.layout(part).tolerance();
@@ -527,6 +716,7 @@ impl Moving {
             grown_reach: grown.reach(),
             from,
             by,
+            map,
         }
     }
 

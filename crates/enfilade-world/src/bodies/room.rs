@@ -5,11 +5,14 @@
 use std::ops::ControlFlow;
 
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle};
+use enfilade_runtime::{DetailId, Target};
 
 use super::agent::Agent;
 use super::body::BodyCore;
+use super::caster::Caster;
 use super::kernel::{depth, sweep};
 use super::walker::GAP;
+use crate::space::{PartId, Space};
 
 /// Obstacles of a walker.
 pub(crate) struct WalkerRoom {
@@ -74,4 +77,36 @@ impl WalkerRoom {
             p
         }
     }
+}
+
+/// Returns `true` if a walker touches nothing between two points of floors, given in the frame of a part, where several parts may
+/// meet: neither walls nor the objects for which `stops` returns `true`. It opens doors.
+pub(crate) fn is_free_between(
+    caster: &mut Caster,
+    space: &Space,
+    agent: &Agent,
+    (frame, [from, to]): (PartId, [DVec3; 2]),
+    stops: impl Fn(PartId, DetailId) -> bool,
+) -> bool {
+    let (body, up) = agent.body();
+    let body = body.grown(2.0 * GAP);
+    // Posts are thicker than the difference between a capsule and the hull of its places.
+    let n = (from.distance(to) / (0.25 * agent.radius))
+        .ceil()
+        .clamp(1.0, 64.0) as usize;
+    (0..=n).all(|i| {
+        let middle = from.lerp(to, i as f64 / n as f64) + DVec3::Y * up;
+        let mut is_free = true;
+        // In the seam of two parts, it is in neither.
+        if let Some(place) = space.locate(frame, middle) {
+            caster.for_each_contact(space, &body, (frame, middle), place, |contact| {
+                is_free &= match contact.target {
+                    Target::Wall { .. } => false,
+                    Target::Detail { detail, .. } => !stops(contact.place.part, detail),
+                    Target::Portal(_) => true,
+                };
+            });
+        }
+        is_free
+    })
 }

@@ -8,13 +8,14 @@
 //! It keeps a gap to all obstacles ([`GAP`]); without it, rounding decides at seams of walls. Motion is level, so only the level
 //! parts of normals count.
 //!
-//! It is in the frame of the part whose floor it stands on, so a lift or a ship carries it along.
+//! It is in the frame of the part whose floor it stands on, so a lift or a ship carries it along. It passes a special portal when
+//! its middle does, and stays upright and of its size there, however the other side is turned.
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, Similarity};
 use enfilade_runtime::{DetailId, Target};
 
 use super::agent::Agent;
-use crate::bodies::{Body, Cast, Caster};
+use crate::bodies::{Body, Cast, Caster, Impact};
 use crate::space::{PartId, Place, Space};
 
 /// Gap kept to walls. [Units: wu]
@@ -42,6 +43,8 @@ pub struct Walker {
     falling: f64,
     /// The last place that it was in.
     place: Option<Place>,
+    /// The map of the special portals passed in the last step.
+    passed: Similarity,
     /// The last obstacle in its way in the last step, and its part.
     obstacle: Option<(PartId, Target)>,
     caster: Caster,
@@ -57,6 +60,7 @@ impl Walker {
             agent,
             falling: 0.0,
             place: None,
+            passed: Similarity::IDENTITY,
             obstacle: None,
             caster: Caster::new(),
         }
@@ -86,6 +90,13 @@ impl Walker {
         self.obstacle
     }
 
+    /// Returns the map of the special portals that it passed in the last step, from the frame before to that after: turn the
+    /// direction of its eye and its wishes by it. The identity otherwise, also where it boards a part.
+    #[must_use]
+    pub fn passed(&self) -> Similarity {
+        self.passed
+    }
+
     /// Walks by the level part of `wish` for some seconds, at most a tenth. Stopped by walls, objects, leaves of doors in
     /// their current pose and shut openings; falls, and climbs up to the height of a step. In no cell, nothing stops it and it
     /// does not fall. Enters and leaves parts through their doors; `wish` is in the frame of its part. [Units: wu/s, s]
@@ -107,6 +118,7 @@ impl Walker {
     ) {
         let seconds = seconds.clamp(0.0, LONGEST);
         let flat = DVec3::new(wish.x, 0.0, wish.z) * seconds;
+        self.passed = Similarity::IDENTITY;
         if !(flat.is_finite() && self.eye.is_finite()) {
             return;
         }
@@ -148,6 +160,20 @@ impl Walker {
         self.place
     }
 
+    /// Moves by a displacement that nothing stops, through special portals; returns their map.
+    fn go(&mut self, space: &Space, by: DVec3) -> Similarity {
+        let below = self.body().1;
+        let step = space.follow(self.frame, self.eye + below, by);
+        if step.n_passed == 0 {
+            self.eye += by;
+            return Similarity::IDENTITY;
+        }
+        (self.frame, self.eye) = (step.frame, step.at - below);
+        self.place = step.place.or(self.place);
+        self.passed = step.map.after(&self.passed);
+        step.map
+    }
+
     fn slide(&mut self, space: &Space, flat: DVec3, counts: &impl Fn(PartId, DetailId) -> bool) {
         let (body, below) = self.body();
         self.obstacle = None;
@@ -156,7 +182,7 @@ impl Walker {
             let length = left.length();
             let from = self.eye + below;
             let Some(place) = self.locate(space, from).filter(|_| length > 1e-9) else {
-                self.eye += left;
+                self.go(space, left);
                 return;
             };
             // Farther by as much as the gap may take of it at a slanted obstacle.
@@ -170,7 +196,7 @@ impl Walker {
             };
             let hit = (self.caster).cast_where(space, &cast, counts);
             let Some(impact) = hit else {
-                self.eye += left;
+                self.go(space, left);
                 return;
             };
             self.obstacle = Some((impact.place.part, impact.target));
@@ -180,9 +206,10 @@ impl Walker {
             };
             let gap = GAP / -impact.normal.dot(direction);
             let free = (impact.t * (length + GAP) - gap).clamp(0.0, length);
-            self.eye += direction * free;
+            let passed = self.go(space, direction * free);
             left -= direction * free;
             left -= normal * normal.dot(left).min(0.0);
+            left = passed.vector(left).with_y(0.0);
         }
     }
 
@@ -211,7 +238,7 @@ impl Walker {
             if depth == 0.0 {
                 return;
             }
-            self.eye += normal * (depth + GAP);
+            self.go(space, normal * (depth + GAP));
         }
     }
 
@@ -239,24 +266,28 @@ impl Walker {
         if self.falling == 0.0 && above <= step {
             // Steps are climbed, and descended, in a few frames.
             let most = CLIMB * seconds;
-            self.eye.y -= above.clamp(-most, most);
-            self.board(space, floor.place.part);
+            self.board(space, above.clamp(-most, most), &floor);
             return;
         }
         self.falling += GRAVITY * seconds;
         if above <= self.falling * seconds {
             self.falling = 0.0;
-            self.eye.y -= above.clamp(-CLIMB * seconds, above.max(0.0));
-            self.board(space, floor.place.part);
+            let fall = above.clamp(-CLIMB * seconds, above.max(0.0));
+            self.board(space, fall, &floor);
         } else {
-            self.eye.y -= self.falling * seconds;
+            self.go(space, -DVec3::Y * self.falling * seconds);
         }
     }
 
-    /// Changes to the frame of the part whose floor it stands on.
-    fn board(&mut self, space: &Space, part: PartId) {
-        if part != self.frame {
-            self.eye = space.between(self.frame, part).point(self.eye);
+    /// Moves down onto a floor, and changes to the frame of its part.
+    fn board(&mut self, space: &Space, down: f64, floor: &Impact) {
+        let passed = self.go(space, -DVec3::Y * down);
+        let part = floor.place.part;
+        let to_part = space.between(self.frame, part);
+        // Not where the floor is seen through a special portal.
+        let is_here = passed == Similarity::IDENTITY && floor.map == to_part.into();
+        if part != self.frame && is_here {
+            self.eye = to_part.point(self.eye);
             self.frame = part;
         }
     }

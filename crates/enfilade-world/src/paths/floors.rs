@@ -18,14 +18,15 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use enfilade_cpg::{CellId, FittingPart, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DMat4, DVec3, Triangle};
+use enfilade_cpg::{CellId, PortalId, PortalKind, World};
+use enfilade_geom::{Aabb, DVec3, Triangle};
 use enfilade_runtime::DetailId;
 
 use crate::bodies::Agent;
 use crate::bodies::WalkerRoom;
 use crate::layout::Layout;
 use crate::paths::columns::{Span, Squares, spans};
+use crate::paths::solid::solid_of;
 
 /// Marks the absence of a floor.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -67,6 +68,8 @@ pub(crate) struct Floor {
     pub(crate) cell: CellId,
     /// True if an open leaf may stand there.
     is_swung: bool,
+    /// True if it is closer to a drop than the walker's radius, at a portal: to step on only where a joint leads over the drop.
+    pub(crate) is_edge: bool,
     /// The floors beside it: to +x, +z, −x, −z.
     pub(crate) steps: [u32; 4],
 }
@@ -86,6 +89,19 @@ pub(crate) enum Hindrance {
     Portal(PortalId),
     /// The place of a portal's leaf when it is open.
     Leaf(PortalId),
+    /// A floor beside a drop.
+    Edge(u32),
+}
+
+/// Returns `true` for portals that walkers pass. An opening that bakes call a window may have a sill on one side only: there the
+/// floor decides. Behind glass, none does.
+pub(crate) fn is_walked(world: &World, portal: PortalId) -> bool {
+    let portal = &world.graph[portal];
+    match portal.kind {
+        PortalKind::Open | PortalKind::Door => true,
+        PortalKind::Window => portal.fittings.is_empty(),
+        PortalKind::Crack => false,
+    }
 }
 
 /// A floor in construction.
@@ -104,8 +120,8 @@ impl Floors {
     /// would be more than half a million, they are at least 5 cm wide, so a thinner walker gets the same floors as
     /// one with a radius of 0.2 m.
     #[must_use]
-    pub fn new(
-        layout: &Layout,
+    pub(crate) fn new(
+        (layout, border): (&Layout, Option<CellId>),
         world: &World,
         walker: Agent,
         counts: impl FnMut(DetailId) -> bool,
@@ -121,7 +137,7 @@ impl Floors {
         let edges = edges_of(&squares, &spans, &grounds, &walker);
         drop(spans);
         // Distances are only as exact as a square's side.
-        let mut is_clear = clear(
+        let is_clear = clear(
             &squares,
             &grounds,
             &edges,
@@ -137,41 +153,44 @@ impl Floors {
             walker,
         };
         let room = WalkerRoom::new(&solid, &walker);
-        for (is_clear, ground) in is_clear.iter_mut().zip(&grounds) {
-            let at = floors.center(ground.square, ground.y.into());
-            *is_clear = *is_clear && room.is_free(room.standing(at));
-        }
-        floors.keep(layout, &grounds, &is_clear);
+        floors.keep((layout, border), &grounds, &is_clear, &room);
         for (portal, leaf) in &leaves {
             floors.swing(*portal, leaf, &room);
         }
         floors.swung.sort_unstable();
         floors.swung.dedup();
-        // An opening that bakes call a window may have a sill on one side only: there the floor decides. Behind
-        // glass, none does.
-        let is_open = |p: PortalId| match layout.opening(p).kind() {
-            PortalKind::Open | PortalKind::Door => true,
-            PortalKind::Window => world.graph[p].fittings.is_empty(),
-            PortalKind::Crack => false,
-        };
-        floors.find_crossings(layout, is_open);
+        floors.find_crossings(layout, |p| is_walked(world, p));
         floors
     }
 
-    /// Keeps the floors that are clear and in a cell.
-    fn keep(&mut self, layout: &Layout, grounds: &[Ground], is_clear: &[bool]) {
+    /// Keeps the floors where a walker has room, in a cell; the border of a part is none. Of those beside drops, the ones at
+    /// portals.
+    fn keep(
+        &mut self,
+        (layout, border): (&Layout, Option<CellId>),
+        grounds: &[Ground],
+        is_clear: &[bool],
+        room: &WalkerRoom,
+    ) {
         let mut number = vec![NONE; grounds.len()];
-        for (i, ground) in grounds.iter().enumerate().filter(|g| is_clear[g.0]) {
+        let reach = self.walker.radius + 2.0 * self.squares.side;
+        for (i, ground) in grounds.iter().enumerate() {
             let at = self.center(ground.square, f64::from(ground.y));
             // Doors are as high as walkers; at the feet, the matter of a step may be in the way.
             let heights = [0.5, 0.25, 0.75].map(|share| DVec3::Y * share * self.walker.height);
-            if let Some(cell) = heights.into_iter().find_map(|up| layout.locate(at + up)) {
+            let cell = heights.into_iter().find_map(|up| layout.locate(at + up));
+            let is_edge = !is_clear[i];
+            let middle = at + heights[0];
+            let is_kept = |c: &CellId| !is_edge || layout.distance_to_exits(*c, middle) <= reach;
+            let cell = cell.filter(|c| border != Some(*c) && is_kept(c));
+            if let Some(cell) = cell.filter(|_| room.is_free(room.standing(at))) {
                 number[i] = self.floors.len() as u32;
                 self.floors.push(Floor {
                     square: ground.square,
                     y: ground.y,
                     cell,
                     is_swung: false,
+                    is_edge,
                     steps: ground.steps,
                 });
             }
@@ -328,7 +347,8 @@ impl Floors {
                 for floor in self.first[square]..self.first[square + 1] {
                     let q = self.point(floor);
                     let down = p.y - q.y;
-                    if down < -self.walker.step || down > self.walker.height {
+                    let is_edge = self.floor(floor).is_edge;
+                    if is_edge || down < -self.walker.step || down > self.walker.height {
                         continue;
                     }
                     // A point anywhere in its own square is on the floor.
@@ -341,6 +361,52 @@ impl Floors {
             }
         }
         best.map(|b| b.1)
+    }
+
+    /// Adds the floors beside drops within a distance of a box.
+    pub(crate) fn add_edges(&self, bounds: &Aabb, reach: f64, edges: &mut Vec<u32>) {
+        let around = bounds.expanded(reach);
+        let n = self.squares.n.map(|n| n as f64 - 1.0);
+        let [low, high] = [around.min, around.max].map(|p| {
+            let at = self.squares.along(p);
+            [0, 1].map(|k| at[k].clamp(0.0, n[k]) as usize)
+        });
+        for z in low[1]..=high[1] {
+            let row = [low[0], high[0]].map(|x| self.squares.number([x, z]));
+            let all = self.first[row[0]]..self.first[row[1] + 1];
+            let is_near = |floor: &u32| {
+                let up = DVec3::Y * 0.5 * self.walker.height;
+                bounds.distance_squared(self.point(*floor) + up) <= reach * reach
+            };
+            edges.extend(all.filter(|f| self.floor(*f).is_edge && is_near(f)));
+        }
+    }
+
+    /// Returns `true` if one comes from a floor to others that are not beside a drop, within its cell.
+    pub(crate) fn leads_off_edge(&self, floor: u32) -> bool {
+        let (mut seen, mut at) = (vec![floor], 0);
+        while let Some(&here) = seen.get(at) {
+            at += 1;
+            let own = self.floor(here);
+            if !own.is_edge {
+                return true;
+            }
+            for to in own.steps.into_iter().filter(|to| *to != NONE) {
+                if self.floor(to).cell == own.cell && !seen.contains(&to) {
+                    seen.push(to);
+                }
+            }
+        }
+        false
+    }
+
+    /// Returns the floor in the square of a point that is nearest to it in height, if it is within a step.
+    pub(crate) fn at(&self, p: DVec3) -> Option<u32> {
+        let square = self.squares.number(self.squares.at(p)?);
+        let away = |floor: &u32| (self.point(*floor).y - p.y).abs();
+        let nearest =
+            (self.first[square]..self.first[square + 1]).min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.filter(|floor| away(floor) <= self.walker.step)
     }
 
     /// Returns the portal of a step between cells.
@@ -376,49 +442,8 @@ impl Floors {
             || self
                 .leaves_at(to)
                 .all(|p| is_in_way(p) || may(Hindrance::Leaf(p)));
-        (is_open && is_free).then_some(to)
-    }
-}
-
-type Leaves = Vec<(PortalId, Vec<Triangle>)>;
-
-/// Returns the triangles that stop walkers, of the structure and the objects that count, and apart those of leaves in their open
-/// pose.
-fn solid_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> (Vec<Triangle>, Leaves) {
-    let mut solid: Vec<Triangle> = Vec::new();
-    for batch in &world.batches {
-        solid.extend(batch.primitive.triangles());
-    }
-    let counts: Vec<bool> = (0..world.details.len() as u32)
-        .map(|i| counts(DetailId(i)))
-        .collect();
-    let mut moves = vec![false; counts.len()];
-    let mut leaves = Vec::new();
-    for (i, portal) in (0..).zip(&world.graph.portals) {
-        let parts = portal.fittings.iter();
-        for part in parts.filter(|f| f.part == FittingPart::Leaf && counts[f.detail as usize]) {
-            let Some(motion) = part.motion else {
-                continue;
-            };
-            moves[part.detail as usize] = true;
-            let mut leaf = Vec::new();
-            add_object(world, part.detail, motion.at(1.0), &mut leaf);
-            leaves.push((PortalId(i), leaf));
-        }
-    }
-    for i in (0..).take(counts.len()) {
-        if counts[i as usize] && !moves[i as usize] {
-            add_object(world, i, DMat4::IDENTITY, &mut solid);
-        }
-    }
-    (solid, leaves)
-}
-
-/// Adds the triangles of an object after a motion.
-fn add_object(world: &World, detail: u32, motion: DMat4, triangles: &mut Vec<Triangle>) {
-    let object = &world.details[detail as usize];
-    for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-        triangles.extend(primitive.placed_triangles(motion * object.placement()));
+        let is_safe = !other.is_edge || may(Hindrance::Edge(to));
+        (is_open && is_free && is_safe).then_some(to)
     }
 }
 

@@ -3,13 +3,15 @@
 //! It steers towards the point of the path a little ahead of the nearest one (Coulter, *Implementation of the Pure Pursuit Path
 //! Tracking Algorithm*, 1992), and slides along what it touches on the way. Doors open before it comes; a leaf that still
 //! stands in its way is shut, if the path does not need it open.
+//!
+//! Points of the path are in the parts that it leads through, and the walker is in the frame of the part that it stands on.
 
 use enfilade_cpg::PortalId;
 use enfilade_geom::{DVec3, closest_point_on_segment};
 use enfilade_runtime::{DetailId, Target};
 
-use crate::bodies::Walker;
-use crate::paths::Path;
+use crate::bodies::{Agent, Walker};
+use crate::paths::{Path, PathPoint, PathPortal};
 use crate::space::{PartId, Space};
 
 /// Distance along the path to the point steered for. [Units: wu]
@@ -22,6 +24,8 @@ const SWING: f64 = 0.7;
 const SHUT: f64 = 0.5;
 /// Time without progress after which it is stuck. [Units: s]
 const PATIENCE: f64 = 4.0;
+/// Parts have parted if a step between them is longer by this, or higher. [Units: wu]
+const PARTED: f64 = 0.05;
 /// Least progress that counts. [Units: wu]
 const PROGRESS: f64 = 0.05;
 
@@ -49,14 +53,15 @@ pub enum Progress {
 /// let agent = Agent::default();
 ///
 /// // From the middle of one room to that of the other, through a door that is shut.
+/// let map = WalkMap::new(&space, agent);
 /// let layout = space.layout(PartId::ROOT);
-/// let map = WalkMap::new(layout, space.world(PartId::ROOT), agent);
-/// let ends = [0, 1].map(|cell| layout.cell(CellId(cell)).bounds.center());
+/// let ends = [0, 1].map(|cell| (PartId::ROOT, layout.cell(CellId(cell)).bounds.center()));
 /// let mut path = Path::default();
-/// PathSearch::new().find(&map, layout, ends, |_| true, &mut path)?;
+/// PathSearch::new().find(&map, &space, ends, |_, _| true, &mut path)?;
 ///
-/// let mut walker = Walker::new(agent, PartId::ROOT, path.points[0] + DVec3::Y * agent.eye);
-/// let mut follower = PathFollower::new(&space, PartId::ROOT, path, 1.4);
+/// let start = path.points[0];
+/// let mut walker = Walker::new(agent, start.part, start.at + DVec3::Y * agent.eye);
+/// let mut follower = PathFollower::new(&space, path, 1.4);
 /// let mut progress = Progress::Walking;
 /// while progress == Progress::Walking {
 ///     progress = follower.step(&mut walker, &mut space, 1.0 / 60.0);
@@ -67,14 +72,12 @@ pub enum Progress {
 /// ```
 #[derive(Clone, Debug)]
 pub struct PathFollower {
-    /// The part in which the path leads.
-    part: PartId,
-    points: Vec<DVec3>,
+    points: Vec<PathPoint>,
     /// Length of the path up to each of its points, in plan.
     lengths: Vec<f64>,
     doors: Vec<DoorAhead>,
-    /// All leaves of the world, each with a portal that it opens.
-    leaves: Vec<(DetailId, PortalId)>,
+    /// All leaves of the parts of the path, each with a portal that it opens.
+    leaves: Vec<(PartId, DetailId, PortalId)>,
     speed: f64,
     /// Length passed, and when it last counted as progress.
     passed: f64,
@@ -86,6 +89,7 @@ pub struct PathFollower {
 /// A portal of a path.
 #[derive(Clone, Copy, Debug)]
 struct DoorAhead {
+    part: PartId,
     portal: PortalId,
     /// Length of the path after which it is passed.
     at: f64,
@@ -101,32 +105,40 @@ enum DoorTurn {
 }
 
 impl PathFollower {
-    /// Starts at the beginning of a path in a part. [Units: wu/s]
+    /// Starts at the beginning of a path. [Units: wu/s]
     #[must_use]
-    pub fn new(space: &Space, part: PartId, path: Path, speed: f64) -> Self {
-        let sight = space.sight(part);
+    pub fn new(space: &Space, path: Path, speed: f64) -> Self {
         let points = path.points;
         let mut lengths = vec![0.0];
         for w in points.windows(2) {
-            lengths.push(lengths[lengths.len() - 1] + in_plan(w[0], w[1]));
+            lengths.push(lengths[lengths.len() - 1] + in_plan(space, w));
         }
-        let all = (0..sight.n_portals() as u32).map(PortalId);
-        let leaves = all.flat_map(|p| sight.leaves(p).iter().map(move |l| (l.detail, p)));
+        let mut parts: Vec<PartId> = points.iter().map(|p| p.part).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let mut leaves = Vec::new();
+        for part in parts {
+            let sight = space.sight(part);
+            for portal in (0..sight.n_portals() as u32).map(PortalId) {
+                let own = sight.leaves(portal).iter();
+                leaves.extend(own.map(|leaf| (part, leaf.detail, portal)));
+            }
+        }
         let mut follower = Self {
-            part,
             points,
             lengths,
             doors: Vec::new(),
-            leaves: leaves.collect(),
+            leaves,
             speed,
             passed: 0.0,
             counted: 0.0,
             idle: 0.0,
         };
         let mut from = 0.0;
-        for (exit, at) in path.portals.iter().zip(path.passages) {
-            from = follower.nearest(at, [from, f64::INFINITY]);
+        for PathPortal { part, exit, at } in path.portals {
+            from = follower.nearest(space, (part, at), [from, f64::INFINITY]);
             follower.doors.push(DoorAhead {
+                part,
                 portal: exit.portal,
                 at: from,
                 opening: DoorTurn::Ahead,
@@ -142,40 +154,37 @@ impl PathFollower {
     }
 
     /// Walks on for some seconds, at most a tenth. Moves leaves of doors: those ahead open, and one that is in the way shuts if it
-    /// is not needed. A walker that has left the part of the path is stuck.
+    /// is not needed. Waits where the path leads into a part that has moved away since.
     pub fn step(&mut self, walker: &mut Walker, space: &mut Space, seconds: f64) -> Progress {
-        if walker.frame != self.part {
-            return Progress::Stuck;
-        }
         let feet = walker.feet();
         let agent = *walker.agent();
-        self.passed = self.nearest(feet, [self.passed, self.passed + 2.0 * AHEAD]);
-        let end = self.points.last().copied().unwrap_or(feet);
-        if in_plan(feet, end) <= agent.radius && (feet.y - end.y).abs() <= agent.step {
+        let frame = walker.frame;
+        let joined = self.joined_up_to(space, self.passed + 2.0 * AHEAD, &agent);
+        self.passed = self.nearest(space, (frame, feet), [self.passed, joined]);
+        let end = self.points.len().checked_sub(1);
+        let left = end.map_or(DVec3::ZERO, |i| self.point(space, frame, i) - feet);
+        if left.with_y(0.0).length() <= agent.radius && left.y.abs() <= agent.step {
             return Progress::Arrived;
         }
         self.open_doors(walker, space, seconds);
-        let way = (self.at(self.passed + AHEAD) - feet).with_y(0.0);
+        let ahead = joined.min(self.passed + AHEAD);
+        let way = (self.at(space, frame, ahead) - feet).with_y(0.0);
         let speed = self.speed.min(way.length() / seconds.max(1e-9));
         // Leaves pass through the walker while they open: where they come to stand, it is not.
-        let opens = |detail| {
+        let opens = |part, detail| {
             let mut moving = self.doors.iter().filter(|d| d.opening == DoorTurn::Moves);
-            moving.any(|d| self.is_leaf(detail, d.portal))
+            moving.any(|d| self.is_leaf(part, detail, d))
         };
         let wish = way.normalize_or_zero() * speed;
-        let part = self.part;
-        walker.step_where(space, wish, seconds, |p, detail| {
-            p != part || !opens(detail)
-        });
+        walker.step_where(space, wish, seconds, |part, detail| !opens(part, detail));
         self.idle += seconds;
         if self.passed >= self.counted + PROGRESS {
             (self.counted, self.idle) = (self.passed, 0.0);
         }
         if let Some((part, Target::Detail { detail, .. })) = walker.obstacle()
-            && part == self.part
             && self.idle > SHUT
         {
-            self.shut_leaf(detail, walker, space);
+            self.shut_leaf((part, detail), walker, space);
         }
         if self.idle > PATIENCE {
             Progress::Stuck
@@ -188,16 +197,16 @@ impl PathFollower {
     fn open_doors(&mut self, walker: &mut Walker, space: &mut Space, seconds: f64) {
         for i in 0..self.doors.len() {
             let door = self.doors[i];
-            let Some(share) = space.state(self.part).leaves(door.portal) else {
+            let Some(share) = space.state(door.part).leaves(door.portal) else {
                 continue;
             };
             let begins = door.opening == DoorTurn::Ahead
                 && (0.0..DOOR).contains(&(door.at - self.passed))
                 // One that does not get out of its way is pushed.
-                && (self.idle > SHUT || self.is_clear(walker, space, (door.portal, 1.0)));
+                && (self.idle > SHUT || self.is_clear(walker, space, (&door, 1.0)));
             if begins || door.opening == DoorTurn::Moves {
                 let share = share + (seconds / SWING) as f32;
-                space.set_leaves(self.part, door.portal, share);
+                space.set_leaves(door.part, door.portal, share);
                 self.doors[i].opening = if share < 1.0 {
                     DoorTurn::Moves
                 } else {
@@ -208,37 +217,46 @@ impl PathFollower {
     }
 
     /// Shuts a leaf unless the path needs it open, or the walker is in its doorway.
-    fn shut_leaf(&self, detail: DetailId, walker: &mut Walker, space: &mut Space) {
+    fn shut_leaf(
+        &self,
+        (part, detail): (PartId, DetailId),
+        walker: &mut Walker,
+        space: &mut Space,
+    ) {
         let mut ahead = self.doors.iter().filter(|d| d.at > self.passed);
-        let known = self.leaves.iter().find(|l| l.0 == detail);
-        if let Some(&(_, portal)) = known
-            && ahead.all(|d| !self.is_leaf(detail, d.portal))
-            && self.is_clear(walker, space, (portal, 0.0))
+        let known = self.leaves.iter().find(|l| (l.0, l.1) == (part, detail));
+        let Some(&(_, _, portal)) = known else { return };
+        let door = DoorAhead {
+            part,
+            portal,
+            at: 0.0,
+            opening: DoorTurn::Done,
+        };
+        if ahead.all(|d| !self.is_leaf(part, detail, d))
+            && self.is_clear(walker, space, (&door, 0.0))
         {
-            space.set_leaves(self.part, portal, 0.0);
+            space.set_leaves(part, portal, 0.0);
         }
     }
 
-    /// Returns `true` if a walker touches no leaf of a portal at a share of their way.
+    /// Returns `true` if a walker touches no leaf of a door at a share of their way.
     fn is_clear(
         &self,
         walker: &mut Walker,
         space: &mut Space,
-        (portal, share): (PortalId, f32),
+        (door, share): (&DoorAhead, f32),
     ) -> bool {
-        space.with_leaves(self.part, portal, share, |space| {
-            !walker.touches(space, |part, detail| {
-                part == self.part && self.is_leaf(detail, portal)
-            })
+        space.with_leaves(door.part, door.portal, share, |space| {
+            !walker.touches(space, |part, detail| self.is_leaf(part, detail, door))
         })
     }
 
-    fn is_leaf(&self, detail: DetailId, portal: PortalId) -> bool {
-        self.leaves.contains(&(detail, portal))
+    fn is_leaf(&self, part: PartId, detail: DetailId, door: &DoorAhead) -> bool {
+        part == door.part && self.leaves.contains(&(part, detail, door.portal))
     }
 
-    /// Returns the length of the path, within a range, after which it is nearest to a point in space.
-    fn nearest(&self, p: DVec3, [from, until]: [f64; 2]) -> f64 {
+    /// Returns the length of the path, within a range, after which it is nearest to a point in the frame of a part.
+    fn nearest(&self, space: &Space, (frame, p): (PartId, DVec3), [from, until]: [f64; 2]) -> f64 {
         let (mut least, mut nearest) = (f64::INFINITY, from);
         let first = self.lengths.partition_point(|&l| l < from).max(1) - 1;
         for i in first..self.points.len().saturating_sub(1) {
@@ -246,27 +264,66 @@ impl PathFollower {
             if low > high {
                 break;
             }
-            let [a, b] = [low, high].map(|l| self.at(l));
+            let [a, b] = [low, high].map(|l| self.at(space, frame, l));
             let q = closest_point_on_segment(p, a, b);
             if q.distance_squared(p) < least {
-                (least, nearest) = (q.distance_squared(p), low + in_plan(a, q));
+                let passed = low + (q - a).with_y(0.0).length();
+                (least, nearest) = (q.distance_squared(p), passed);
             }
         }
         nearest
     }
 
-    /// Returns the point of the path after a length.
-    fn at(&self, length: f64) -> DVec3 {
+    /// Returns the greatest length of the path, up to one, to which it leads from where the walker is, with the parts as they are.
+    fn joined_up_to(&self, space: &Space, length: f64, agent: &Agent) -> f64 {
+        let first = self.lengths.partition_point(|&l| l < self.passed);
+        for i in first..self.points.len().saturating_sub(1) {
+            if self.lengths[i] > length + agent.radius {
+                break;
+            }
+            let [a, b] = [self.points[i], self.points[i + 1]];
+            let planned = self.lengths[i + 1] - self.lengths[i];
+            if a.part != b.part {
+                let way = space.between(b.part, a.part).point(b.at) - a.at;
+                let off = way.with_y(0.0).length() - planned;
+                if off.abs() > PARTED || way.y.abs() > agent.step + PARTED {
+                    // Not at the drop.
+                    return self.passed.max(self.lengths[i] - agent.radius);
+                }
+            }
+        }
+        length
+    }
+
+    /// Returns a point of the path in a frame.
+    fn point(&self, space: &Space, frame: PartId, i: usize) -> DVec3 {
+        let PathPoint { part, at } = self.points[i];
+        if part == frame {
+            at
+        } else {
+            space.between(part, frame).point(at)
+        }
+    }
+
+    /// Returns the point of the path after a length, in a frame.
+    fn at(&self, space: &Space, frame: PartId, length: f64) -> DVec3 {
         let i = self.lengths.partition_point(|&l| l < length).max(1);
-        let Some(&b) = self.points.get(i) else {
-            return self.points.last().copied().unwrap_or_default();
+        let Some(last) = self.points.len().checked_sub(1) else {
+            return DVec3::ZERO;
         };
+        if i > last {
+            return self.point(space, frame, last);
+        }
         let leg = self.lengths[i] - self.lengths[i - 1];
         let back = (self.lengths[i] - length) / leg.max(1e-12);
-        b.lerp(self.points[i - 1], back.clamp(0.0, 1.0))
+        let [a, b] = [i - 1, i].map(|i| self.point(space, frame, i));
+        b.lerp(a, back.clamp(0.0, 1.0))
     }
 }
 
-fn in_plan(a: DVec3, b: DVec3) -> f64 {
-    (a - b).with_y(0.0).length()
+/// Returns the length in plan between two points of a path.
+fn in_plan(space: &Space, ends: &[PathPoint]) -> f64 {
+    let [a, b] = [ends[0], ends[1]];
+    let way = space.between(b.part, a.part).point(b.at) - a.at;
+    way.with_y(0.0).length()
 }

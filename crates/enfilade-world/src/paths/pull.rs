@@ -95,7 +95,8 @@ fn toward(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     a + line * t.clamp(0.0, 1.0)
 }
 
-fn straight(
+/// Returns the floor at the end of a straight walk; `None` if blocked.
+pub(crate) fn straight(
     floors: &Floors,
     from: Bend,
     to: DVec3,
@@ -187,7 +188,12 @@ mod tests {
             },
             ..CellPortalGraph::default()
         };
-        let floors = Floors::new(&Layout::new(&world), &world, Agent::default(), |_| true);
+        let floors = Floors::new(
+            (&Layout::new(&world), None),
+            &world,
+            Agent::default(),
+            |_| true,
+        );
         let on = |x: f64, z: f64| {
             let p = DVec3::new(x, 0.0, z);
             (p, floors.below(p).unwrap())

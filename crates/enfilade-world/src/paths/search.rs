@@ -413,6 +413,15 @@ impl LengthSearch {
         }
     }
 
+    /// Returns the least length to a point in a cell, whose lengths to the points of that cell are given; infinite if there is no
+    /// path.
+    pub(crate) fn least(&self, ways: &Ways, cell: CellId, lengths: &[f64]) -> f64 {
+        let exits = ways.exits_of(cell).iter();
+        let nodes = exits.flat_map(|e| ways.range(e.portal).map(|k| ways.node(k, cell)));
+        let through = nodes.zip(lengths).map(|(node, leg)| self.label(node) + leg);
+        through.fold(f64::INFINITY, f64::min)
+    }
+
     /// Returns the extra cost of a portal, the same from both sides, where the search has come `from` behind it.
     pub(crate) fn toll_of(&self, ways: &Ways, portal: PortalId, from: CellId) -> f64 {
         let other = 1 - side(ways.cells[portal.idx()], from);

@@ -30,13 +30,14 @@ struct Footprint {
 
 impl Strides {
     /// Finds the paths from a floor to all others of its cell, or until `goal` is reached. Passes no portal, nor the open leaves
-    /// of those `opened`.
+    /// of those `opened`, nor floors beside drops but those of `edges`, ascending.
     pub(crate) fn spread(
         &mut self,
         floors: &Floors,
         start: u32,
         goal: Option<u32>,
         opened: &[PortalId],
+        edges: &[u32],
     ) {
         self.stamp = self.stamp.wrapping_add(1);
         if self.stamp == 0 {
@@ -65,7 +66,7 @@ impl Strides {
                 continue;
             }
             let from = floors.point(at);
-            each_move(floors, at, opened, |to| {
+            each_move(floors, at, (opened, edges), |to| {
                 let through = length + floors.point(to).distance(from) as f32;
                 let label = &mut self.labels[to as usize];
                 if label.stamp != self.stamp || through < label.length {
@@ -101,10 +102,16 @@ impl Strides {
 }
 
 /// Calls `visit` with the floors around one that are in its cell.
-fn each_move(floors: &Floors, at: u32, opened: &[PortalId], mut visit: impl FnMut(u32)) {
+fn each_move(
+    floors: &Floors,
+    at: u32,
+    (opened, edges): (&[PortalId], &[u32]),
+    mut visit: impl FnMut(u32),
+) {
     let mut may = |hindrance| match hindrance {
         Hindrance::Portal(_) => false,
         Hindrance::Leaf(portal) => !opened.contains(&portal),
+        Hindrance::Edge(floor) => edges.binary_search(&floor).is_ok(),
     };
     let mut step = |from: u32, direction: usize| floors.step(from, direction % 4, &mut may);
     let beside: [Option<u32>; 4] = std::array::from_fn(|d| step(at, d));

@@ -42,6 +42,11 @@ impl Changes {
         self.n += 1;
     }
 
+    /// Returns the number of all so far.
+    pub(super) fn number(&self) -> u64 {
+        self.n
+    }
+
     /// Records a change of everything.
     pub(super) fn reset(&mut self) {
         self.last.clear();

@@ -16,6 +16,35 @@ impl Space {
         self.changes.since(known)
     }
 
+    /// Marks the parts that have moved after change number `known`, with all that stand in them; all parts if these changes are no
+    /// longer kept, or `known` is `None`. Sets `known` to the number of all so far; returns `true` if any has moved.
+    pub(crate) fn moved_since(&self, known: &mut Option<u64>, moved: &mut Vec<bool>) -> bool {
+        if *known == Some(self.changes.number()) {
+            return false;
+        }
+        let is_new = known.is_none();
+        moved.clear();
+        moved.resize(self.n_parts(), is_new);
+        match self.changes_since(known.get_or_insert(0)) {
+            None => moved.fill(true),
+            Some(changes) => {
+                for change in changes {
+                    if let Change::Part(part) = change {
+                        self.mark(part, moved);
+                    }
+                }
+            }
+        }
+        moved.contains(&true)
+    }
+
+    fn mark(&self, part: PartId, moved: &mut [bool]) {
+        moved[part.idx()] = true;
+        for &child in &self.parts[part.idx()].children {
+            self.mark(child, moved);
+        }
+    }
+
     /// Opens a portal of a part fully, and its leaves. As the other setters of doors, takes effect with the next query of
     /// anything, and ignores portals that do not exist.
     pub fn open(&mut self, part: PartId, portal: PortalId) {

@@ -92,21 +92,10 @@ fn each_crossing(
                     high = middle;
                 }
             }
-            if is_in(opening, place(high), margin) {
+            if opening.is_over(place(high), margin) {
                 found(high, h_next > 0.0);
             }
         }
         (t, h) = (next, h_next);
     }
-}
-
-/// Returns `true` if a point of an opening's plane is in one of its pieces, or within `margin` of the line of each edge.
-fn is_in(opening: &Opening, p: DVec3, margin: f64) -> bool {
-    let normal = opening.normal();
-    opening.pieces().any(|piece| {
-        (0..piece.len()).all(|i| {
-            let along = piece[(i + 1) % piece.len()] - piece[i];
-            normal.cross(along).dot(p - piece[i]) >= -margin * along.length()
-        })
-    })
 }

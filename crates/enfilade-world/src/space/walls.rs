@@ -21,8 +21,18 @@ pub(crate) struct Walls {
     pub(crate) meshes: Vec<MeshWalls>,
     /// Per detail object; `None` for those without triangles.
     pub(crate) placed: Vec<Option<Placed>>,
-    /// Per portal.
-    pub(crate) portal_cells: Vec<[CellId; 2]>,
+    /// Per portal and cell, the way there; the second cell is the first's way.
+    pub(crate) ways: Vec<[PortalWay; 2]>,
+}
+
+/// A portal from one of its cells.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PortalWay {
+    pub(crate) from: CellId,
+    /// The cell behind it; `None` where a special portal is in its place.
+    pub(crate) to: Option<CellId>,
+    /// True if the special portal in its place leads nowhere: a mirror, a monitor.
+    pub(crate) is_solid: bool,
 }
 
 /// Obstacles of one cell.
@@ -87,10 +97,19 @@ impl Walls {
                 }
             }
         }
-        let mut portal_cells = Vec::new();
+        let mut ways = Vec::new();
         for portal in (0..layout.n_portals() as u32).map(PortalId) {
             let cells = layout.opening(portal).cells();
-            portal_cells.push(cells);
+            ways.push([0, 1].map(|side| {
+                let from = cells[side];
+                let special = world.graph.special_side(portal, from);
+                let replaced = special.filter(|s| !world.graph.specials[s.idx()].is_through());
+                PortalWay {
+                    from,
+                    to: replaced.is_none().then_some(cells[1 - side]),
+                    is_solid: replaced.is_some_and(|s| layout.passage(s).is_none()),
+                }
+            }));
             for (t, surface) in openings(layout, sight, portal) {
                 for cell in cells {
                     triangles[cell.idx()].push(t);
@@ -113,7 +132,7 @@ impl Walls {
         Self {
             cells: cells.collect(),
             meshes,
-            portal_cells,
+            ways,
             placed,
         }
     }
