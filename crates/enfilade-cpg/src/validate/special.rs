@@ -1,6 +1,6 @@
 //! Checks special portals: that they are sides of doorways or parts of walls, and that what they show exists.
 //!
-//! Two mirrors back to back in one doorway pass: nobody sees or goes through, but that is no contradiction.
+//! Two mirrors back to back in one doorway pass: nobody sees or goes through, but nothing contradicts itself.
 
 use std::collections::HashMap;
 
