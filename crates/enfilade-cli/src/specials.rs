@@ -61,6 +61,6 @@ pub(crate) fn described(graph: &CellPortalGraph, special: SpecialId) -> String {
 pub(crate) fn middle(graph: &CellPortalGraph, special: SpecialId) -> DVec3 {
     let (_, pieces) = graph.special_opening(special);
     let points = pieces.iter().flat_map(|p| &p.points).copied();
-    let bounds = points.fold(Aabb::EMPTY, |b, p| b.including(p));
+    let bounds = points.fold(Aabb::EMPTY, Aabb::including);
     bounds.center()
 }
