@@ -1,7 +1,7 @@
 //! Points and bodies that pass special portals meet what they would meet without them.
 
-use enfilade_cpg::{Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World};
-use enfilade_geom::{DMat4, DQuat, DVec3, Similarity};
+use enfilade_cpg::{PortalId, SpecialId, SpecialPortal, SpecialShape, World};
+use enfilade_geom::{DQuat, DVec3, Similarity};
 use enfilade_testkit::{GridParams, Rng, endless_room, linked_copies, room_grid, traced_step};
 use enfilade_world::{Agent, Body, Cast, Caster, PartId, Place, Space, Walker};
 
