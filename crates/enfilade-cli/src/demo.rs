@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
-use enfilade::cpg::World;
+use enfilade::bake::edit::special::{self, LinkOptions, Spot};
 use enfilade::cpg::wire::encode_glb;
+use enfilade::cpg::{MonitorCamera, PortalId, World};
 use enfilade::geom::{DVec3, shown};
 use enfilade::import::{ImportOptions, decode_gltf, export_glb};
 use enfilade_report::{PlanOptions, plan_svg};
-use enfilade_testkit::{Generated, furnished_house, lift_tower};
+use enfilade_testkit::{Generated, furnished_house, impossible_house, lift_tower};
 
 use crate::bake::{Summary, bake_scene, print_summary};
 use crate::formats::Format;
@@ -21,7 +22,8 @@ use crate::screen::{print_json, printed, write_lines};
 const LAMP_COLOR: [f32; 3] = [1.6, 1.35, 1.0];
 
 /// Makes a furnished two-storey house, bakes it, draws its plan and suggests what to try next; with `--living`, a tower
-/// with a lift that one rides, people on errands, doors that open as one nears, lamps and a radio.
+/// with a lift that one rides, people on errands, doors that open as one nears, lamps and a radio; with `--impossible`, a
+/// house of mirrors and doors that lead elsewhere.
 #[derive(clap::Args)]
 pub(crate) struct Demo {
     /// Folder to write `house.glb`, `world.glb` and `plan.svg` to; the demo ends with an error rather than overwrite
@@ -31,6 +33,10 @@ pub(crate) struct Demo {
     /// Make the tower: `tower.glb` (the model), `world.glb`, `lift.glb` and `living.json`, which says what lives there.
     #[arg(long)]
     living: bool,
+    /// Make a house that does not fit in space: `house.glb` (the model) and `world.glb`, with a room that is its own
+    /// neighbor, a cabinet larger inside than outside, mirrors that face each other, a screen and a window that reflects.
+    #[arg(long, conflicts_with = "living")]
+    impossible: bool,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -53,7 +59,11 @@ struct Made {
 }
 
 pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
-    let made = if args.living { tower()? } else { house()? };
+    let made = match (args.living, args.impossible) {
+        (true, _) => tower()?,
+        (_, true) => impossible()?,
+        _ => house()?,
+    };
     make_folder("-o", &args.output)?;
     let path = |name: &str| args.output.join(name);
     let mut outputs = Outputs::default();
@@ -159,4 +169,63 @@ fn tower() -> anyhow::Result<Made> {
         hints: "  enfilade view {1} --living {4} --eye 6,1.6,7.5\n\
                 and walk into the lift; F1 in the window lists all keys. {4} can be edited.",
     })
+}
+
+/// Bakes the impossible house as `bake` does, and makes its special portals as `edit` does.
+fn impossible() -> anyhow::Result<Made> {
+    let made = impossible_house();
+    let (model, mut world, _) = baked(&made.house)?;
+    let on_wall = |polygon: &Vec<DVec3>| Spot::Wall(polygon.clone());
+    for polygon in &made.mirrors {
+        special::mirror(&mut world, &on_wall(polygon))?;
+    }
+    for [a, b] in &made.links {
+        special::link(
+            &mut world,
+            &on_wall(a),
+            &on_wall(b),
+            &LinkOptions::default(),
+        )?;
+    }
+    let (screen, eye, toward) = &made.monitor;
+    let camera = MonitorCamera {
+        eye: eye.as_vec3().to_array(),
+        toward: toward.as_vec3().to_array(),
+        up: [0.0, 1.0, 0.0],
+        fov_y: 1.0,
+    };
+    special::monitor(&mut world, &on_wall(screen), camera)?;
+    for (portal, cell) in sides_near(&world, made.window) {
+        let cell = Some(cell);
+        special::reflect(&mut world, &Spot::Doorway { portal, cell }, 0.25)?;
+    }
+    let bytes = encode_glb(&world).context("the world breaks an invariant (a bug)")?;
+    let plan = plan_svg(&world, &PlanOptions::default()).into_bytes();
+    Ok(Made {
+        world,
+        files: vec![
+            ("house.glb", Format::World, model),
+            ("world.glb", Format::World, bytes),
+            ("plan.svg", Format::Plan, plan),
+        ],
+        hints: "  enfilade view {1} --eye 4.5,1.6,1\n  \
+                enfilade inspect {1}\n\
+                and walk into the blue cabinet, or out by an end of the long room beside the hall.",
+    })
+}
+
+/// Returns the portal whose middle is nearest to a point, from both its cells.
+fn sides_near(world: &World, at: DVec3) -> Vec<(PortalId, enfilade::CellId)> {
+    let distance = |id: &PortalId| {
+        let corners = world.graph[*id].outline.iter();
+        let points = corners.map(|p| DVec3::from_array(p.map(f64::from)));
+        let n = points.len() as f64;
+        (points.sum::<DVec3>() / n).distance(at)
+    };
+    let nearest = world
+        .graph
+        .portal_ids()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let sides = nearest.map(|id| world.graph[id].cells.map(|cell| (id, cell)));
+    sides.into_iter().flatten().collect()
 }

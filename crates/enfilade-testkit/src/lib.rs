@@ -23,6 +23,7 @@ pub mod furniture;
 mod gjorup;
 mod graphs;
 mod house;
+mod impossible;
 mod interior;
 mod lift_tower;
 mod maze;
@@ -54,6 +55,7 @@ pub use graphs::{
     traced_step, window_tower, with_doors, with_specials,
 };
 pub use house::furnished_house;
+pub use impossible::{ImpossibleHouse, impossible_house};
 pub use lift_tower::{LiftTower, lift_tower};
 pub use maze::dirkse_maze;
 pub use rng::Rng;
