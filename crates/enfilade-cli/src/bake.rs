@@ -17,9 +17,10 @@ use anyhow::{Context, bail};
 use enfilade::bake::bsp::find_leak;
 use enfilade::bake::delaunay::LEAST_BALL;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
-use enfilade::cpg::wire::encode_glb;
+use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
+use enfilade::world::{Space, WalkMapKey};
 use serde::Serialize;
 
 use crate::formats::Format;
@@ -27,7 +28,8 @@ use crate::inspect::{write_holes, write_seals};
 use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
-use enfilade_cli::input::import_scene;
+use crate::walk::{self, Walks, WorldFile};
+use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
@@ -39,6 +41,9 @@ pub(crate) struct Bake {
     /// World to write, one GLB; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
+    /// Keep a map of floors beside it, as OUT.walk, so that `path` and `view --living` start at once.
+    #[arg(long)]
+    walk: bool,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -51,6 +56,12 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let options = &args.options;
     let mut outputs = Outputs::reading(options.inputs(&args.inputs))?;
     outputs.write("-o", Format::World, &args.output)?;
+    if args.walk {
+        if is_stream(&args.output) {
+            bail!("--walk writes a file beside the world; give -o a file, not '-'");
+        }
+        outputs.write("--walk", Format::Walk, &walk::beside(&args.output))?;
+    }
     if let Some(path) = &options.leak {
         outputs.write("--leak", Format::Leak, path)?;
     }
@@ -89,6 +100,16 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     }
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;
+    if args.walk {
+        // Readers get this world, rounded.
+        let world = decode_glb(&bytes)?;
+        let (space, walks) = (Space::new(world)?, Walks::usual());
+        let file = WorldFile {
+            path: &args.output,
+            hash: WalkMapKey::hash(&bytes),
+        };
+        walk::keep(file, &space, &walks, &walks.map(&space))?;
+    }
     report_bake(&baked, config, options.verbose)?;
     if let Some(path) = &leak_path {
         path.write(&mut path.says())?;

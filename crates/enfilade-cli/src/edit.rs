@@ -1,4 +1,6 @@
-//! `enfilade edit`: removes portals from a world and inserts others.
+//! `enfilade edit`: removes portals from a world, inserts others, and makes mirrors, monitors and links.
+
+mod special;
 
 use std::path::PathBuf;
 
@@ -15,7 +17,7 @@ use crate::simplify::{Done, write};
 use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 
-/// Removes portals from a world and inserts new ones.
+/// Removes portals from a world, inserts new ones, and makes mirrors, monitors, tinted panes and links of them.
 #[derive(clap::Args)]
 #[command(group(clap::ArgGroup::new("edits").required(true).multiple(true)))]
 pub(crate) struct Edit {
@@ -38,6 +40,8 @@ pub(crate) struct Edit {
         allow_hyphen_values = true
     )]
     add_portal: Vec<Polygon>,
+    #[command(flatten)]
+    specials: special::Specials,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -89,8 +93,14 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
     let before = read_world(&args.input)?;
     let mut done = Done::default();
     let mut world: Option<World> = None;
+    // Clones only what is changed.
+    let specials = &args.specials;
+    if specials.removes() {
+        let changed = world.insert(before.clone());
+        specials.remove(changed, &mut done.notes)?;
+    }
     if !args.delete_portal.is_empty() {
-        let simpler = without_portals(args, &before)?;
+        let simpler = without_portals(args, world.as_ref().unwrap_or(&before))?;
         done.costs = Some([simpler.min_cost, simpler.max_cost]);
         world = Some(simpler.world);
     }
@@ -114,6 +124,10 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
                 .push(format!("{kept} is cut in two: now {kept} and {new}"));
         }
         world = Some(added.world);
+    }
+    if specials.makes() {
+        let changed = world.get_or_insert_with(|| before.clone());
+        specials.make(changed, &mut done.notes)?;
     }
     let world = world.context("no portal was removed")?;
     write(&outputs, &args.output, [&before, &world], done, args.json)

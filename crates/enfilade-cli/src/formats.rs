@@ -23,6 +23,7 @@ pub(crate) enum Format {
     Manual,
     Sound,
     Living,
+    Walk,
 }
 
 struct Row {
@@ -40,13 +41,13 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
         format,
         name,
         extensions,
-        // A saved search is read again.
-        is_streamed: !matches!(format, Format::Search),
+        // Both are read again.
+        is_streamed: !matches!(format, Format::Search | Format::Walk),
     }
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 16] = [
+const TABLE: [Row; 17] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(
@@ -70,6 +71,7 @@ const TABLE: [Row; 16] = [
     row(Format::Living, "what lives in a world, as JSON", &["json"]),
     row(Format::Evidence, "evidence", &["ev", "evidence"]),
     row(Format::Search, "a saved search", &["search", "checkpoint"]),
+    row(Format::Walk, "a map of floors", &["walk"]),
     row(Format::Manual, "a manual page", &["1"]),
 ];
 

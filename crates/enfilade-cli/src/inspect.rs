@@ -2,6 +2,7 @@
 
 mod doors;
 mod objects;
+mod specials;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -11,7 +12,9 @@ use anyhow::Context;
 use doors::FittingReport;
 use enfilade::bake::simplify::{CostModel, portal_scores};
 use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
+pub(crate) use objects::cell_of;
 use serde::Serialize;
+use specials::SpecialReport;
 
 use crate::limits::Limits;
 use crate::screen::{print_json, printed_at_once};
@@ -50,6 +53,9 @@ pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
 struct Inspection<'a> {
     cells: Vec<CellReport<'a>>,
     portals: Vec<PortalReport<'a>>,
+    /// Absent if there are none, as in worlds of version 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    specials: Vec<SpecialReport<'a>>,
     suspected_holes: Vec<HoleReport>,
     seals: SealReport,
     stats: Stats<'a>,
@@ -159,6 +165,9 @@ fn report(world: &World) -> Inspection<'_> {
     Inspection {
         cells: cells.collect(),
         portals: portals.collect(),
+        specials: (graph.special_ids())
+            .map(|id| SpecialReport::of(graph, id))
+            .collect(),
         suspected_holes: holes.collect(),
         seals: SealReport {
             count: seals.count,
@@ -255,6 +264,7 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
         )?;
     }
     writeln!(out)?;
+    specials::write(out, graph)?;
     if write_holes(out, graph, usize::MAX)? {
         writeln!(out)?;
     }
@@ -340,6 +350,9 @@ fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
         format!(" ({})", kinds.join(", "))
     };
     row("portals", format!("{}{kinds}", graph.portals.len()))?;
+    if !graph.specials.is_empty() {
+        row("special portals", graph.specials.len().to_string())?;
+    }
     if let Some(doors) = doors::summary(world) {
         row("doors", doors)?;
     }

@@ -5,6 +5,8 @@ mod file;
 mod lift;
 mod lived;
 mod people;
+mod radar;
 
 pub(crate) use file::{LampEntry, LiftEntry, LivingFile, PeopleEntry, SoundEntry};
 pub(crate) use lived::{Lived, Player, STEP};
+pub(crate) use radar::{Blip, BlipKind, RADAR_REACH, radar_words};

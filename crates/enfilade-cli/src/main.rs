@@ -29,9 +29,11 @@ mod screen;
 mod see;
 mod simplify;
 mod sound;
+mod specials;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod walk;
 
 use std::io::Write;
 use std::process::ExitCode;

@@ -6,12 +6,16 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
-use enfilade::world::{Agent, NoPath, PartId, Path, PathSearch, Space, WalkMap};
+use enfilade::world::{Agent, NoPath, PartId, Path, PathSearch, Space};
 
+use crate::formats::Format;
 use crate::limits::Limits;
+use crate::output::Outputs;
 use crate::screen::{print_json, printed_at_once};
+use crate::walk::{self, Walks, WorldFile};
+use enfilade_cli::input::is_stream;
 use enfilade_cli::values::point;
-use enfilade_cli::world::read_world;
+use enfilade_cli::world::read_world_hashed;
 
 /// Prints the walk from one point to another: its length, the portals it passes, and the points where it bends.
 ///
@@ -42,6 +46,10 @@ pub(crate) struct WalkedPath {
     /// Walk through objects, such as furniture.
     #[arg(long)]
     no_objects: bool,
+    /// Keep the map of floors beside the world, as `world.walk`: later runs for the same walker start at once, and `view` for
+    /// the usual one.
+    #[arg(long)]
+    keep: bool,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -69,7 +77,14 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
     if !(0.0..100.0).contains(&args.step) {
         bail!("--step {}: a length of at least 0 is needed", args.step);
     }
-    let world = read_world(&args.world)?;
+    if args.keep {
+        if is_stream(&args.world) {
+            bail!("--keep writes a file beside the world; give it a file, not '-'");
+        }
+        let mut outputs = Outputs::reading([&args.world])?;
+        outputs.write("--keep", Format::Walk, &walk::beside(&args.world))?;
+    }
+    let (world, hash) = read_world_hashed(&args.world)?;
     let n_portals = world.graph.portals.len();
     if let Some(p) = args.closed.iter().find(|p| **p as usize >= n_portals) {
         bail!("--closed {p}: the world has {n_portals} portals, counted from 0");
@@ -82,7 +97,18 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         step: args.step,
         ..Agent::default()
     };
-    let map = WalkMap::with_objects(&space, walker, |_, _| !args.no_objects);
+    let walks = Walks {
+        agent: walker,
+        objects: !args.no_objects,
+    };
+    let file = WorldFile {
+        path: &args.world,
+        hash,
+    };
+    let map = walk::kept_or_made(Some(file), &space, &walks);
+    if args.keep {
+        walk::keep(file, &space, &walks, &map)?;
+    }
     let ends = [args.from, args.to];
     let ends = ends.map(|p| (PartId::ROOT, DVec3::from_array(p.map(f64::from))));
     let mut path = Path::default();

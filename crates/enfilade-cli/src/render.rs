@@ -22,6 +22,7 @@ use crate::limits::Limits;
 use crate::living::{Lived, Player, STEP};
 use crate::output::{Outputs, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json};
+use crate::walk::WorldFile;
 use enfilade_cli::cameras::{path_text, read_path};
 use enfilade_cli::input::name_of;
 use enfilade_cli::values::{door, point, size};
@@ -271,7 +272,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     studio.day = args.daylight;
     let mut lived = match &args.living {
         Some(path) => {
-            let lived = Lived::read(path, &world)?;
+            let lived = Lived::read(path, &world, WorldFile::of(&args.world))?;
             lived.furnish(&mut studio)?;
             Some(lived)
         }

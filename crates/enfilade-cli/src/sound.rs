@@ -202,13 +202,15 @@ impl HeardWalk<'_> {
             };
             ears.listen(&acoustics, &state, cell, at);
             let heard = ears.hear(&acoustics, &layout, 0, source_cell, source);
+            // Too faint, it keeps its delay.
+            let way = ears.shortest(&acoustics, &layout, 0, source_cell, source);
             let (toward, gain) = heard.map_or((DVec3::ZERO, 0.0), |h| (h.direction, h.gain));
             let (room, rt60) = (fields.gain(cell), fields.rt60(cell));
             let follow = |of: fn(&AudioBlock) -> f64, now| {
                 follow(before.as_ref().map(of), now, self.seconds_of_block)
             };
             let block = AudioBlock {
-                length: heard.map_or(0.0, |h| h.length),
+                length: way.map_or(0.0, |w| w.0),
                 ears: at_ears(toward, ahead, DVec3::Y).map(|(g, late)| (g * gain, late)),
                 room: follow(|b| b.room, room),
                 rt60: follow(|b| b.rt60, rt60),

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade::cpg::wire::decode_glb;
+use enfilade::world::WalkMapKey;
 
 use crate::input::{name_of, read_glb};
 
@@ -15,4 +16,15 @@ use crate::input::{name_of, read_glb};
 /// If the file cannot be read or is not a valid world; the error names it.
 pub fn read_world(path: &Path) -> anyhow::Result<World> {
     decode_glb(&read_glb(path)?).with_context(|| name_of(path))
+}
+
+/// As [`read_world`]; also returns the hash of the file, for what is kept beside it.
+///
+/// # Errors
+///
+/// As [`read_world`].
+pub fn read_world_hashed(path: &Path) -> anyhow::Result<(World, u64)> {
+    let bytes = read_glb(path)?;
+    let world = decode_glb(&bytes).with_context(|| name_of(path))?;
+    Ok((world, WalkMapKey::hash(&bytes)))
 }

@@ -125,3 +125,53 @@ fn furniture_is_in_the_way_unless_it_is_left_out() {
     let done = enfilade(&[&args[..], &["--no-objects"]].concat());
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
 }
+
+#[test]
+fn a_kept_map_is_used_where_it_fits_and_else_refused_with_the_reason() {
+    let (world, [from, to]) = two_rooms("kept.glb");
+    let map = PathBuf::from(&world).with_extension("walk");
+    let _ = fs::remove_file(&map);
+    let args = ["path", &world, "--from", &from, "--to", &to];
+    let asked = |more: &[&str]| {
+        let done = enfilade(&[&args[..], more].concat());
+        assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+        (text(&done.stdout).to_owned(), text(&done.stderr).to_owned())
+    };
+    let (expected, silent) = asked(&[]);
+    assert!(silent.is_empty() && !map.exists(), "{silent}");
+    let (found, told) = asked(&["--keep"]);
+    assert!(found == expected && told.contains("kept.walk"), "{told}");
+    let kept = fs::read(&map).unwrap();
+    assert_eq!(asked(&[]), (expected.clone(), String::new()));
+    // For another walker, and with other objects, it is made anew.
+    for (more, why) in [
+        (&["--radius", "0.2"][..], "a walker of another size"),
+        (&["--no-objects"], "other objects"),
+    ] {
+        let (_, told) = asked(more);
+        assert!(
+            told.contains("kept.walk is not used") && told.contains(why),
+            "{told}"
+        );
+    }
+    let mut damaged = kept.clone();
+    damaged[100] ^= 1;
+    fs::write(&map, &damaged).unwrap();
+    let (found, told) = asked(&[]);
+    assert!(found == expected && told.contains("damaged"), "{told}");
+    // A world that has changed.
+    fs::write(&map, &kept).unwrap();
+    let changed = room_grid(&GridParams {
+        windows: 1.0,
+        outdoors: true,
+        ..GridParams::two_rooms()
+    });
+    fs::write(&world, encode_glb(&changed).unwrap()).unwrap();
+    let (_, told) = asked(&["--keep"]);
+    assert!(told.contains("another world"), "{told}");
+    assert_ne!(fs::read(&map).unwrap(), kept);
+    assert_eq!(asked(&[]).1, "");
+    let refused = enfilade(&["path", "-", "--keep", "--from", &from, "--to", &to]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("--keep"));
+}

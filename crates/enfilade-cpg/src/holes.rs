@@ -97,24 +97,9 @@ impl Portal {
     /// its size along x and z. [Units: wu]
     #[must_use]
     pub fn size(&self) -> [f32; 2] {
-        let normal = DVec3::from(self.normal.map(f64::from));
-        let up_hint = if normal.y.abs() < f64::from(LEVEL) {
-            DVec3::Y
-        } else {
-            DVec3::Z
-        };
-        let across = up_hint.cross(normal).normalize_or_zero();
-        let up = normal.cross(across);
-        [across, up].map(|axis| {
-            let along = self
-                .outline
-                .iter()
-                .map(|c| axis.dot(DVec3::from(c.map(f64::from))));
-            let (least, most) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), d| {
-                (lo.min(d), hi.max(d))
-            });
-            (most - least) as f32
-        })
+        let vector = |v: &[f32; 3]| DVec3::from(v.map(f64::from));
+        let outline = self.outline.iter().map(vector);
+        size_across(vector(&self.normal), &outline).map(|v| v as f32)
     }
 
     /// Returns the mean of the outline's vertices. [Units: wu]
@@ -126,6 +111,27 @@ impl Portal {
             .fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k]));
         sum.map(|s| s / self.outline.len() as f32)
     }
+}
+
+/// Returns the width and height of points in a plane, as [`Portal::size`]. [Units: wu]
+pub(crate) fn size_across(
+    normal: DVec3,
+    points: &(impl Iterator<Item = DVec3> + Clone),
+) -> [f64; 2] {
+    let up_hint = if normal.y.abs() < f64::from(LEVEL) {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    let across = up_hint.cross(normal).normalize_or_zero();
+    let up = normal.cross(across);
+    [across, up].map(|axis| {
+        let along = points.clone().map(|p| axis.dot(p));
+        let (least, most) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), d| {
+            (lo.min(d), hi.max(d))
+        });
+        most - least
+    })
 }
 
 #[cfg(test)]

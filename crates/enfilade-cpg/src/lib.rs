@@ -21,6 +21,7 @@ mod seals;
 mod sight_graph;
 mod sources;
 mod special;
+mod special_access;
 mod validate;
 pub mod wire;
 
@@ -39,4 +40,4 @@ pub use seals::Seals;
 pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use sources::SourceRuns;
 pub use special::{MonitorCamera, Pass, SpecialId, SpecialPortal, SpecialShape, Way};
-pub use validate::{GraphError, MAX_REPORTED};
+pub use validate::{GraphError, MAX_REPORTED, SpecialProblem};

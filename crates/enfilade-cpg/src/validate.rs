@@ -11,6 +11,8 @@ mod geometry;
 mod locator;
 mod origin;
 mod portal;
+mod special;
+mod special_error;
 
 use std::collections::HashMap;
 
@@ -20,8 +22,10 @@ use extent::{check_boxes_around_geometry, check_cells_in_locator};
 use geometry::{check_cell_list, check_detail, check_mesh, check_primitive};
 use locator::check_locator;
 use portal::check_portal;
+use special::check_specials;
 
 pub use error::{GraphError, MAX_REPORTED};
+pub use special_error::SpecialProblem;
 
 impl CellPortalGraph {
     /// Checks every invariant of the graph.
@@ -46,6 +50,7 @@ impl CellPortalGraph {
             }
             check_portal(i as u32, portal, self.cells.len(), found);
         }
+        check_specials(self, found);
         check_locator(&self.locator, self.cells.len(), found);
         check_outside(self, found);
         check_cells_in_locator(self, found);

@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::{two_rooms, two_rooms_with_parts, two_rooms_with_pvs};
+use common::{two_rooms, two_rooms_with_parts, two_rooms_with_pvs, two_rooms_with_specials};
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
-use enfilade_cpg::{SourceRuns, World};
+use enfilade_cpg::{SourceRuns, SpecialShape, World};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -29,7 +29,11 @@ fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
 
 /// Returns the two rooms' JSON and binary chunk.
 fn parts() -> (String, Vec<u8>) {
-    let bytes = encode_glb(&two_rooms()).unwrap();
+    parts_of(&two_rooms())
+}
+
+fn parts_of(world: &World) -> (String, Vec<u8>) {
+    let bytes = encode_glb(world).unwrap();
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let end = 20 + word(12);
     (
@@ -62,7 +66,12 @@ fn taking_a_file_apart_and_together_changes_nothing() {
 
 #[test]
 fn every_prefix_is_an_error() {
-    let bytes = encode_glb(&two_rooms_with_parts()).unwrap();
+    every_prefix_of(&two_rooms_with_parts());
+    every_prefix_of(&two_rooms_with_specials());
+}
+
+fn every_prefix_of(world: &World) {
+    let bytes = encode_glb(world).unwrap();
     for n in 0..bytes.len() {
         assert!(decode_glb(&bytes[..n]).is_err(), "{n} bytes decoded");
         // With a corrected header, too.
@@ -80,9 +89,28 @@ fn every_prefix_is_an_error() {
 #[test]
 fn every_bit_flip_is_an_error_or_a_valid_world() {
     let bytes = encode_glb(&two_rooms_with_parts()).unwrap();
+    flip_every_bit(&bytes, 0..bytes.len());
+}
+
+#[test]
+fn every_bit_flip_in_special_portals_is_an_error_or_a_valid_world() {
+    let (text, bin) = parts_of(&two_rooms_with_specials());
+    let bytes = glb(&text, &bin);
+    let at = |key: &str| 20 + text.find(key).unwrap();
+    flip_every_bit(&bytes, at("\"specials\":")..at("\"batches\":"));
+    let root: Value = serde_json::from_str(&text).unwrap();
+    let view = &root["extensions"]["ENFILADE_cell_portal_graph"]["specialCorners"];
+    let view = &root["bufferViews"][view.as_u64().unwrap() as usize];
+    let [first, len] = ["byteOffset", "byteLength"].map(|f| view[f].as_u64().unwrap() as usize);
+    let first = 28 + text.len() + first;
+    flip_every_bit(&bytes, first..first + len);
+}
+
+fn flip_every_bit(bytes: &[u8], range: std::ops::Range<usize>) {
     let mut n_accepted = 0;
-    for i in 0..bytes.len() * 8 {
-        let mut flipped = bytes.clone();
+    let n_bits = range.len() * 8;
+    for i in range.start * 8..range.end * 8 {
+        let mut flipped = bytes.to_vec();
         flipped[i / 8] ^= 1 << (i % 8);
         if let Ok(world) = decode_glb(&flipped) {
             world.validate().unwrap();
@@ -90,7 +118,7 @@ fn every_bit_flip_is_an_error_or_a_valid_world() {
         }
     }
     // Names and low bits of vertices may have any value; most of the rest may not.
-    assert!((1..bytes.len() * 8).contains(&n_accepted), "{n_accepted}");
+    assert!((1..n_bits).contains(&n_accepted), "{n_accepted}");
 }
 
 #[test]
@@ -119,9 +147,15 @@ fn text_is_no_glb() {
 
 #[test]
 fn another_version_is_named() {
-    let error = with("\"version\":1,", "\"version\":2,\"cells\":7,").unwrap_err();
-    assert_eq!(error, WireError::Version { found: 2 });
-    assert!(error.to_string().contains("version 2"), "{error}");
+    for found in [0, 3, 7] {
+        let says = format!("\"version\":{found},\"cells\":7,");
+        let error = with("\"version\":1,", &says).unwrap_err();
+        assert_eq!(error, WireError::Version { found });
+        assert!(
+            error.to_string().contains(&format!("version {found}")),
+            "{error}"
+        );
+    }
 }
 
 #[test]
@@ -357,6 +391,169 @@ fn sources_that_do_not_hold_together_are_errors() {
 }
 
 #[test]
+fn a_world_of_version_2_may_have_no_special_portals() {
+    let read = with("\"version\":1,", "\"version\":2,").unwrap();
+    // It is written in the lowest version that holds it.
+    assert_eq!(
+        encode_glb(&read).unwrap(),
+        encode_glb(&two_rooms()).unwrap()
+    );
+}
+
+#[test]
+fn special_portals_that_do_not_hold_together_are_errors() {
+    let (text, bin) = parts_of(&two_rooms_with_specials());
+    let root: Value = serde_json::from_str(&text).unwrap();
+    let extension = &root["extensions"]["ENFILADE_cell_portal_graph"];
+    let corners = extension["specialCorners"].as_u64().unwrap();
+    let camera = "\"way\":\"monitor\",";
+    for (from, to) in [
+        // A reader of version 1 would not know of them.
+        ("\"version\":2,", "\"version\":1,".to_owned()),
+        // Shapes: of both kinds, of none, in half.
+        (
+            "\"cell\":0,\"portal\":0",
+            "\"cell\":0,\"portal\":0,\"pieces\":[4]".to_owned(),
+        ),
+        ("\"cell\":0,\"portal\":0", "\"cell\":0".to_owned()),
+        (
+            "\"pieces\":[4],\"passes\":[{\"way\":\"mon",
+            "\"passes\":[{\"way\":\"mon".to_owned(),
+        ),
+        // Vertices: more and fewer than there are, and a view of something else.
+        (
+            "\"pieces\":[4],\"passes\"",
+            "\"pieces\":[5],\"passes\"".to_owned(),
+        ),
+        (
+            "\"pieces\":[4],\"passes\"",
+            "\"pieces\":[3],\"passes\"".to_owned(),
+        ),
+        (
+            "\"pieces\":[4],\"passes\"",
+            "\"pieces\":[4294967295],\"passes\"".to_owned(),
+        ),
+        ("\"specialCorners\":", "\"specialCorners\":9".to_owned()),
+        // Fields of other ways, and fields that lack.
+        ("\"way\":\"mirror\"", "\"way\":\"glass\"".to_owned()),
+        (
+            "\"way\":\"mirror\"",
+            "\"way\":\"mirror\",\"to\":1".to_owned(),
+        ),
+        (
+            "\"way\":\"mirror\"",
+            "\"way\":\"mirror\",\"scale\":1".to_owned(),
+        ),
+        (
+            "\"way\":\"mirror\"",
+            "\"way\":\"mirror\",\"fovY\":1".to_owned(),
+        ),
+        (camera, format!("{camera}\"back\":1,")),
+        ("\"fovY\":1.25", "\"fov\":1.25".to_owned()),
+        ("\"way\":\"lead\",\"to\":1,", "\"way\":\"lead\",".to_owned()),
+        // Values of a kind that JSON has but we do not.
+        ("\"fovY\":1.25", "\"fovY\":1e999".to_owned()),
+        ("\"scale\":-2.5", "\"scale\":[1,1,1]".to_owned()),
+        ("\"back\":1", "\"back\":-1".to_owned()),
+        ("\"specials\":[", "\"specials\":[7,".to_owned()),
+        ("\"passes\":[", "\"passes\":[null,".to_owned()),
+    ] {
+        assert!(text.contains(from), "{from}: {text}");
+        let result = decode_glb(&glb(&text.replacen(from, &to, 1), &bin));
+        assert!(
+            matches!(
+                result,
+                Err(WireError::Structure { .. } | WireError::Json(_))
+            ),
+            "{from} -> {to}: {result:?}"
+        );
+    }
+    // The vertices of the portals instead.
+    let other = extension["portalCorners"].as_u64().unwrap();
+    let [own, other] = [corners, other].map(|view| format!("\"specialCorners\":{view}"));
+    assert!(decode_glb(&glb(&text.replacen(&own, &other, 1), &bin)).is_err());
+    // Each number of each vertex.
+    let view = &root["bufferViews"][corners as usize];
+    let at = |field: &str| view[field].as_u64().unwrap() as usize;
+    for word in 0..at("byteLength") / 4 {
+        let mut bin = bin.clone();
+        let first = at("byteOffset") + 4 * word;
+        bin[first..first + 4].fill(0xff);
+        let result = decode_glb(&glb(&text, &bin));
+        assert!(matches!(result, Err(WireError::Invalid(_))), "{word}");
+    }
+}
+
+/// In a few bytes, many special portals that all lead back by one of many vertices.
+#[test]
+fn a_large_opening_is_not_compared_again_and_again() {
+    let mut world = two_rooms_with_specials();
+    let lead = world.graph.specials[1].clone();
+    let SpecialShape::Surface { pieces, .. } = &mut world.graph.specials[2].shape else {
+        panic!("a wardrobe is in a wall");
+    };
+    let [a, .., d] = pieces[0][..] else {
+        panic!("of four vertices");
+    };
+    let n = 100_000;
+    let along = (1..n).map(|i| i as f32 / n as f32);
+    pieces[0].extend(along.map(|s| [0, 1, 2].map(|k| d[k] + (a[k] - d[k]) * s)));
+    assert_eq!(world.validate(), Ok(()));
+    world.graph.specials.extend(vec![lead; 100_000]);
+    let from = std::time::Instant::now();
+    let _ = world.validate().unwrap_err();
+    let portrait = world.graph.specials[0].shape.clone();
+    for special in &mut world.graph.specials[6..] {
+        special.shape = portrait.clone();
+    }
+    let _ = world.validate().unwrap_err();
+    // Days, if each were compared.
+    assert!(from.elapsed().as_secs() < 60);
+}
+
+/// Objects of ours may have `extensions` and `extras` of others, which we ignore.
+#[test]
+fn what_others_add_is_accepted_anywhere() {
+    let mut rich = two_rooms_with_specials();
+    rich.leak_path = vec![[0.0; 3], [1.0; 3]];
+    rich.pvs = two_rooms_with_parts().pvs;
+    let (text, bin) = parts_of(&rich);
+    let mut root: Value = serde_json::from_str(&text).unwrap();
+    let mut n = 0;
+    add_to_all(
+        &mut root["extensions"]["ENFILADE_cell_portal_graph"],
+        "",
+        &mut n,
+    );
+    assert!(n > 40, "{n}");
+    let read = decode_glb(&glb(&root.to_string(), &bin)).unwrap();
+    // Nothing of ours is lost or changed: the same but for the order of keys in materials.
+    let sorted = |text: &str| serde_json::from_str::<Value>(text).unwrap();
+    let (own, own_bin) = parts_of(&read);
+    assert_eq!(sorted(&own), sorted(&text));
+    assert!(own_bin == bin);
+}
+
+/// Adds fields of others to an object and all objects in it, except where keys are names.
+fn add_to_all(value: &mut Value, key: &str, n: &mut usize) {
+    match value {
+        Value::Object(fields) if !matches!(key, "extras" | "statistics" | "settings") => {
+            for (key, inner) in fields.iter_mut() {
+                add_to_all(inner, key, n);
+            }
+            let theirs = json!({"VENDOR_moss": {"passes": [{"way": 7}], "cell": "north"}});
+            fields.insert("extensions".into(), theirs);
+            if key != "sources" {
+                fields.insert("extras".into(), json!([null, {"specials": 3}]));
+            }
+            *n += 1;
+        }
+        Value::Array(items) => items.iter_mut().for_each(|item| add_to_all(item, key, n)),
+        _ => {}
+    }
+}
+
+#[test]
 fn broken_parts_and_volumes_are_errors() {
     let mut world = two_rooms_with_parts();
     // Makes the last five buffer views those of parts and volumes.
@@ -447,7 +644,7 @@ proptest! {
         paste in prop::collection::vec(any::<u8>(), 0..16),
         remove in 0usize..16,
     ) {
-        let mut bytes = encode_glb(&two_rooms()).unwrap();
+        let mut bytes = encode_glb(&two_rooms_with_specials()).unwrap();
         let at = cut.index(bytes.len());
         let end = (at + remove).min(bytes.len());
         bytes.splice(at..end, paste);

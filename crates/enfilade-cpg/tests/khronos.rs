@@ -8,7 +8,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{nasty_rooms, two_rooms};
+use common::{nasty_rooms, two_rooms, two_rooms_with_specials};
 use enfilade_cpg::World;
 use enfilade_cpg::wire::encode_glb;
 
@@ -45,6 +45,11 @@ fn the_validator_finds_nothing_in_a_leak_path() {
         ..two_rooms()
     };
     validate("leak.glb", &world, true);
+}
+
+#[test]
+fn the_validator_finds_nothing_in_special_portals() {
+    validate("specials.glb", &two_rooms_with_specials(), true);
 }
 
 #[test]

@@ -7,8 +7,9 @@ mod common;
 use std::path::PathBuf;
 use std::process::Command;
 
-use common::two_rooms;
+use common::{two_rooms, two_rooms_with_specials};
 use enfilade_cpg::wire::encode_glb;
+use enfilade_cpg::{SpecialPortal, SpecialShape, World};
 use enfilade_geom::DVec3;
 use serde_json::{Value, json};
 
@@ -18,11 +19,16 @@ const FORMAT: &str = include_str!("../../../docs/format.md");
 fn the_reader_in_the_documentation_reads_a_world() {
     let (_, rest) = FORMAT.split_once("```js\n").unwrap();
     let (code, _) = rest.split_once("```").unwrap();
+    for (name, world) in [("read", two_rooms()), ("read_2", two_rooms_with_specials())] {
+        read(code, name, &world);
+    }
+}
+
+fn read(code: &str, name: &str, world: &World) {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
-    let (script, file) = (dir.join("reader.mjs"), dir.join("read.glb"));
-    let world = two_rooms();
+    let (script, file) = (dir.join("reader.mjs"), dir.join(name).with_extension("glb"));
     std::fs::write(&script, code).unwrap();
-    std::fs::write(&file, encode_glb(&world).unwrap()).unwrap();
+    std::fs::write(&file, encode_glb(world).unwrap()).unwrap();
     for point in [
         [1.0, 1.0, 1.0],
         [5.0, 1.0, 1.0],
@@ -69,6 +75,16 @@ fn the_reader_in_the_documentation_reads_a_world() {
             let outline: Vec<_> = p.outline.iter().map(|c| c.map(f64::from)).collect();
             exits.push(json!([to.0, outline]));
         }
+        let specials = world.graph.specials.iter();
+        let specials = specials.filter(|s| cell == Some(s.cell));
+        let pieces = |s: &SpecialPortal| match &s.shape {
+            SpecialShape::Portal(portal) => world.graph[*portal].pieces.clone(),
+            SpecialShape::Surface { pieces, .. } => pieces.clone(),
+        };
+        let pieces: Vec<f64> = (specials.flat_map(pieces).flatten().flatten())
+            .map(f64::from)
+            .collect();
+        assert_eq!(numbers(&said["specials"]), pieces, "{point:?}");
         assert_eq!(numbers(&said["exits"]), numbers(&json!(exits)), "{point:?}");
     }
 }

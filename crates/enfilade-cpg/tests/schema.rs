@@ -5,7 +5,9 @@
 
 mod common;
 
-use common::{nasty_rooms, two_rooms, two_rooms_with_parts, two_rooms_with_pvs};
+use common::{
+    nasty_rooms, two_rooms, two_rooms_with_parts, two_rooms_with_pvs, two_rooms_with_specials,
+};
 use enfilade_cpg::World;
 use enfilade_cpg::wire::{EXTENSION, encode_glb};
 use serde_json::{Value, json};
@@ -156,6 +158,7 @@ fn encoded_worlds_follow_the_schema() {
         leaking,
         seen,
         parts,
+        two_rooms_with_specials(),
     ] {
         assert_eq!(check(&schema, &schema, &extension(&world), ""), Ok(()));
     }
@@ -167,13 +170,16 @@ fn the_schema_names_every_field_that_is_written() {
     let schema: Value = serde_json::from_str(SCHEMA).unwrap();
     let good = extension(&World {
         leak_path: vec![[0.0; 3], [1.0; 3]],
-        ..two_rooms_with_parts()
+        pvs: two_rooms_with_parts().pvs,
+        ..two_rooms_with_specials()
     });
     for (pointer, optional) in [
         (
             "",
             &[
                 "portalCorners",
+                "specials",
+                "specialCorners",
                 "sources",
                 "sourceRuns",
                 "fixtures",
@@ -189,6 +195,15 @@ fn the_schema_names_every_field_that_is_written() {
         ("/batches/0", &["sources"]),
         ("/sources/3", &["name", "parent", "extras"]),
         ("/details/1", &["aabb", "source", "partOf"]),
+        ("/specials/0", &["name"]),
+        ("/specials/1", &[]),
+        ("/specials/3/passes/1", &["tint"]),
+        ("/specials/4/passes/0", &[]),
+        (
+            "/specials/5/passes/0",
+            &["translation", "rotation", "scale"],
+        ),
+        ("/specials/2/passes/0", &["translation", "rotation", "back"]),
         ("/locator", &["bounds", "outside", "planes", "nodes"]),
         ("/provenance", &[]),
         ("/pvs", &["parts", "volumes"]),

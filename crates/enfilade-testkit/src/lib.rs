@@ -50,8 +50,8 @@ pub use disturb::{Disturbance, disturb, disturbed};
 pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use graphs::{
-    GridParams, cabin, courtyard, linked_copies, room_grid, scaled_world, window_tower, with_doors,
-    with_specials,
+    GridParams, cabin, courtyard, endless_room, linked_copies, room_grid, scaled_world,
+    traced_step, window_tower, with_doors, with_specials,
 };
 pub use house::furnished_house;
 pub use lift_tower::{LiftTower, lift_tower};

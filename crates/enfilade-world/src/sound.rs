@@ -12,9 +12,8 @@
 //! - the transmission loss of a leaf or pane, by [kind](Transmission), for the rest.
 //!
 //! Distances count as 1 / r beyond a meter. Sequences add up by energy, and fade out towards the longest that counts, or the
-//! first that is not counted. Each of these is a continuous function of both places, so levels need no smoothing, and the answer
-//! does not depend on earlier ones, but for sequences being searched anew only after some movement. O(portals of a sequence)
-//! per source and band.
+//! first that is not counted, and towards the faintest that counts. Each of these is a continuous function of both places, so
+//! levels need no smoothing, and the answer does not depend on earlier ones. O(portals of a sequence) per source and band.
 //!
 //! Detours are differences of lengths: they round at 1e-15 of these, against wavelengths of 0.09 m and more. Within a concave
 //! cell strings are straight, too short where a wall of the cell is in between.
@@ -36,6 +35,7 @@ use enfilade_runtime::SightState;
 
 use crate::layout::Layout;
 use crate::paths::{Geodesics, Sampling, Ways};
+use crate::sound::edge::EdgeLosses;
 
 pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
 pub use ears::at_ears;
@@ -80,6 +80,7 @@ pub struct Acoustics {
     /// Per portal, the area of its opening, and the box around it. [Units: wu², wu]
     area: Vec<f64>,
     bounds: Vec<Aabb>,
+    edge_losses: EdgeLosses,
 }
 
 /// Area of a first Fresnel zone of 500 Hz, divided by π, where both ends are a meter and a half away. [Units: wu²]
@@ -117,6 +118,7 @@ impl Acoustics {
             rims,
             shut,
             has_pane,
+            edge_losses: EdgeLosses::new(),
         }
     }
 
@@ -155,6 +157,16 @@ impl Acoustics {
         let area = open * self.area[portal.idx()];
         let free = area * area / (area * area + MID_ZONE * MID_ZONE);
         -10.0 * (free + (1.0 - free) * shut).log10()
+    }
+
+    /// Returns how much louder a portal may let through what it did before, when its clear share changes. [Units: dB]
+    fn rise(&self, portal: PortalId, before: f64, open: f64) -> f64 {
+        if open <= before {
+            return 0.0;
+        }
+        let most = -10.0 * self.shut[portal.idx()].max(1e-30).log10();
+        // Through a small hole, energy is as the square of its area.
+        (20.0 * (open / before).log10()).min(most)
     }
 
     fn rims(&self, portal: PortalId) -> &[[DVec3; 2]] {

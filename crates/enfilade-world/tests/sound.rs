@@ -6,7 +6,7 @@ use cone::least_length;
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
 use enfilade_runtime::{Sight, SightState};
-use enfilade_testkit::{GridParams, Rng, room_grid};
+use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 use enfilade_world::{Acoustics, Heard, Layout, Listener, Transmission};
 
 struct Site {
@@ -17,7 +17,10 @@ struct Site {
 }
 
 fn site(params: &GridParams) -> Site {
-    let world = room_grid(params);
+    site_of(room_grid(params))
+}
+
+fn site_of(world: World) -> Site {
     let layout = Layout::new(&world);
     let acoustics = Acoustics::new(&layout, &world, &Transmission::default());
     let state = SightState::new(&Sight::build(&world).unwrap());
@@ -115,7 +118,10 @@ fn the_shortest_of_all_sequences_is_found() {
         let site = site(&rooms(16, seed));
         for _ in 0..12 {
             let (listener, source) = (site.place(&mut rng), site.place(&mut rng));
-            let Some(heard) = site.hear(listener, source) else {
+            let mut ears = Listener::new();
+            ears.listen(&site.acoustics, &site.state, listener.0, listener.1);
+            let found = ears.shortest(&site.acoustics, &site.layout, 0, source.0, source.1);
+            let Some((length, nearest)) = found else {
                 continue;
             };
             let (least, chain) = site.least(listener, source, 8);
@@ -123,14 +129,10 @@ fn the_shortest_of_all_sequences_is_found() {
                 continue;
             }
             n_checked += 1;
-            assert!(
-                heard.length <= 1.001 * least + 1e-6,
-                "{} {least}",
-                heard.length
-            );
+            assert!(length <= 1.001 * least + 1e-6, "{length} {least}");
             if chain.is_empty() {
                 let straight = (source.1 - listener.1).normalize();
-                assert!((heard.nearest - straight).length() < 1e-9);
+                assert!((nearest - straight).length() < 1e-9);
             }
         }
     }
@@ -246,13 +248,32 @@ fn walking_through_doorways_changes_the_level_little_by_little() {
     assert!(n_checked > 5000, "{n_checked}");
 }
 
-/// W11: a walking listener hears what one without memory hears, to 0.3 dB, 1° and a millimeter.
+/// How far a listener and one without memory are apart: share of the gain, radians and lengths; infinite if only one hears.
+fn apart(a: Option<Heard>, b: Option<Heard>) -> f64 {
+    match (a, b) {
+        (Some(a), Some(b)) => {
+            let level = (a.gain / b.gain - 1.0).abs();
+            let turn = (a.direction - b.direction).length();
+            level.max(turn).max((a.length - b.length).abs())
+        }
+        (None, None) => 0.0,
+        _ => f64::INFINITY,
+    }
+}
+
+/// W11: a walking listener hears what one without memory hears, to 1e-6 of the gain, a radian and a meter, and is as deaf to
+/// what is too faint.
 #[test]
 fn a_walking_listener_hears_as_a_new_one() {
     let mut rng = Rng::new(12);
-    let (mut n, mut worst) = (0, [0.0_f64; 3]);
+    let (mut n, mut n_faint) = (0, 0);
     for seed in 0..3 {
-        let site = site(&rooms(16, seed));
+        // The last with walls to go around within rooms.
+        let merges = if seed == 2 { 0.3 } else { 0.0 };
+        let site = site(&GridParams {
+            merges,
+            ..rooms(36, seed)
+        });
         for p in (0..site.layout.n_portals() as u32).map(PortalId) {
             let opening = site.layout.opening(p);
             let source = site.place(&mut rng);
@@ -265,22 +286,45 @@ fn a_walking_listener_hears_as_a_new_one() {
                 walker.listen(&site.acoustics, &site.state, cell, at);
                 let heard = walker.hear(&site.acoustics, &site.layout, 0, source.0, source.1);
                 let fresh = site.hear((cell, at), source);
-                let (Some(a), Some(b)) = (heard, fresh) else {
-                    continue;
-                };
+                assert!(
+                    apart(heard, fresh) < 1e-6,
+                    "{seed} {p:?} {k}: {heard:?} {fresh:?}"
+                );
                 n += 1;
-                let level = 20.0 * (a.gain / b.gain).log10().abs();
-                let turn = a.direction.angle_between(b.direction).to_degrees();
-                let length = (a.length - b.length).abs();
-                for (worst, x) in worst.iter_mut().zip([level, turn, length]) {
-                    *worst = worst.max(x);
-                }
+                n_faint += usize::from(heard.is_none());
             }
         }
     }
-    assert!(n > 2000, "{n}");
-    let is_small = [worst[0] / 0.3, worst[1], worst[2] / 1e-3];
-    assert!(is_small.iter().all(|x| *x <= 1.0), "{worst:?}");
+    assert!(n > 8000 && n_faint > 1000, "{n} {n_faint}");
+}
+
+/// W11: nor does it matter since when a listener has listened when doors swing, near and
+/// far, from shut to open.
+#[test]
+fn a_listener_hears_doors_that_swing_as_a_new_one() {
+    let mut rng = Rng::new(5);
+    let mut site = site_of(with_doors(room_grid(&rooms(36, 1)), |_| false));
+    let portals = (0..site.layout.n_portals() as u32).map(PortalId);
+    portals.clone().for_each(|p| {
+        site.state.open(p);
+        site.state.set_leaves(p, 1.0);
+    });
+    let mut n = 0;
+    for p in portals {
+        let (here, there) = (site.place(&mut rng), site.place(&mut rng));
+        let mut ears = Listener::new();
+        for k in 0..60 {
+            let open = (0.5 - 0.5 * (f64::from(k) * 0.1).cos()) as f32;
+            site.state.set_leaves(p, open);
+            ears.listen(&site.acoustics, &site.state, here.0, here.1);
+            let heard = ears.hear(&site.acoustics, &site.layout, 0, there.0, there.1);
+            let fresh = site.hear(here, there);
+            assert!(apart(heard, fresh) < 1e-6, "{p:?} {k}: {heard:?} {fresh:?}");
+            n += usize::from(heard.is_some());
+        }
+        site.state.set_leaves(p, 1.0);
+    }
+    assert!(n > 500, "{n}");
 }
 
 /// W11.
@@ -320,7 +364,10 @@ fn hearing_allocates_nothing_once_warm() {
             }
         }
     };
-    walk(&mut ears);
+    // Strings change places, so that it takes some walks until each has room.
+    for _ in 0..4 {
+        walk(&mut ears);
+    }
     let counted = allocation_counter::measure(|| walk(&mut ears));
     assert_eq!(counted.count_total, 0);
 }

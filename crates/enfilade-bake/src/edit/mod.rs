@@ -7,11 +7,13 @@
 //!
 //! **Which way it errs:** a triangle that neither part is found to see is listed in both.
 
+mod carried;
+pub mod special;
 mod splice;
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Cell, CellId, Portal, PortalId, SourceRuns, World};
+use enfilade_cpg::{Cell, CellId, Portal, PortalId, SourceRuns, SpecialId, World};
 use enfilade_geom::{DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::rounded_portal;
@@ -129,6 +131,17 @@ pub enum AddPortalError {
         /// The cell.
         cell: CellId,
     },
+    /// A special portal would be cut.
+    #[error(
+        "the portal at {} cuts {special}, or what it leads to, in two; make it plain first, or cut elsewhere",
+        place(*.at)
+    )]
+    CutsSpecial {
+        /// Its middle. [Units: wu]
+        at: DVec3,
+        /// The special portal.
+        special: SpecialId,
+    },
     /// It would vanish by rounding.
     #[error("the opening of the portal at {} is narrower than the rounding of coordinates", place(*.at))]
     TooNarrow {
@@ -166,6 +179,7 @@ pub fn add_portal(world: &World, corners: &[DVec3]) -> Result<Added, AddPortalEr
         Uncut::Undivided(Undivided::Around(at)) => AddPortalError::DoesNotPart { cell, at },
         Uncut::Undivided(Undivided::Endless) => AddPortalError::Endless { at, cell },
         Uncut::TooNarrow => AddPortalError::TooNarrow { at },
+        Uncut::Special(special) => AddPortalError::CutsSpecial { at, special },
     })?;
     // The count shows readers of the file that no rule placed its portals.
     let counts = &mut added.world.graph.statistics.counts;
@@ -180,6 +194,8 @@ pub(crate) enum Uncut {
     Undivided(Undivided),
     /// The portals would vanish by rounding.
     TooNarrow,
+    /// A special portal would be cut.
+    Special(SpecialId),
 }
 
 /// Cuts a cell in two by candidates; `distance` returns how far in front of all of them a point lies.
@@ -225,6 +241,9 @@ pub(crate) fn cut_cell(
     out.pvs = None;
     out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids);
     let halved = parts.hand_out_portals(&mut out, complex.opening_tolerance());
+    parts
+        .hand_out_specials(&mut out, &halved, complex.opening_tolerance())
+        .map_err(Uncut::Special)?;
     let mut new_portals: Vec<Portal> = Vec::new();
     for p in &partition.portals {
         let rounded = rounded_portal(&p.plane, &p.outline, &p.pieces, complex.opening_tolerance());

@@ -6,6 +6,7 @@ use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, SourceRuns, World};
 use enfilade_geom::scene::Primitive;
 
 use crate::layout::{Layout, layout_of};
+use crate::specials::renumbered as renumbered_specials;
 
 /// Returns the world with each cell merged into `into[cell]`, and the new number of each old cell.
 ///
@@ -53,9 +54,12 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
         out
     };
     let mut portals = Vec::new();
+    let mut portal_of = Vec::with_capacity(old.portals.len());
     for p in &old.portals {
         let joined = p.cells.map(|c| cell_of[c.0 as usize]);
-        if joined[0] != joined[1] {
+        let stays = joined[0] != joined[1];
+        portal_of.push(stays.then_some(PortalId(portals.len() as u32)));
+        if stays {
             for c in joined {
                 cells[c.0 as usize]
                     .portals
@@ -91,6 +95,8 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     out.graph.locator = locator(&old.locator, &cell_of);
     out.graph.cells = cells;
     out.graph.portals = portals;
+    out.graph.specials =
+        renumbered_specials(&old.specials, |c| cell_of[c.idx()], |p| portal_of[p.idx()]);
     out.batches = batches;
     out.details = details;
     (out, cell_of)

@@ -2,9 +2,9 @@
 //!
 //! The single source of costs: for merging cells, cutting cells, and judging views.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_cpg::{CellId, DetailObject, World};
+use enfilade_cpg::{CellId, CellPortalGraph, DetailObject, SpecialPortal, World};
 use enfilade_geom::scene::{Material, Primitive};
 use enfilade_geom::{Aabb, DVec3, shown};
 
@@ -190,6 +190,14 @@ impl Prices<'_> {
     }
 }
 
+/// Returns the cells at doorways with a special side, ascending: merged across one, they would lose it.
+fn alone(graph: &CellPortalGraph) -> Vec<u32> {
+    let portals = graph.specials.iter().filter_map(SpecialPortal::portal);
+    let cells = portals.flat_map(|p| graph[p].cells).map(|c| c.0);
+    let cells: BTreeSet<u32> = cells.collect();
+    cells.into_iter().collect()
+}
+
 /// Returns the cells with their drawing costs; each batch and each detail object is an item.
 pub(super) fn cost_graph(world: &World, cost: &CostModel) -> CostGraph {
     let mut graph = CostGraph {
@@ -201,6 +209,7 @@ pub(super) fn cost_graph(world: &World, cost: &CostModel) -> CostGraph {
             .map(|p| p.cells.map(|c| c.0))
             .collect(),
         aloof: world.graph.cells.iter().map(|c| c.outdoor).collect(),
+        alone: alone(&world.graph),
         ..CostGraph::default()
     };
     let prices = Prices { world, cost };

@@ -89,6 +89,7 @@ pub fn simplify_graph(
         items: (0..n as u32).map(|c| vec![c]).collect(),
         pairs: pairs.clone(),
         aloof: vec![false; n],
+        alone: Vec::new(),
     };
     let into = merge(whole, &bounds, &mut Openness(areas));
     let mut cell_of = vec![0; n];

@@ -17,6 +17,8 @@ pub(super) struct CostGraph {
     pub(super) pairs: Vec<[u32; 2]>,
     /// The outdoors: cells that merge with others only on request.
     pub(super) aloof: Vec<bool>,
+    /// Cells that merge with none, ascending: one of their doorways shows something else than the cell behind it.
+    pub(super) alone: Vec<u32>,
 }
 
 /// Limits that the result should meet.
@@ -40,9 +42,13 @@ pub(super) trait Badness {
 }
 
 impl CostGraph {
-    /// Returns `true` if the outdoors and the cost allow two cells to merge.
+    /// Returns `true` if the outdoors, special portals and the cost allow two cells to merge.
     pub(super) fn may_join(&self, [a, b]: [u32; 2], both: f64, bounds: &Bounds) -> bool {
         let is_alike = self.aloof[a as usize] == self.aloof[b as usize];
+        let is_alone = |c: u32| self.alone.binary_search(&c).is_ok();
+        if is_alone(a) || is_alone(b) {
+            return false;
+        }
         both <= bounds.max_cost && (is_alike || bounds.joins_outdoors)
     }
 
@@ -94,6 +100,8 @@ impl CostGraph {
                 .map(|pair| pair.map(|c| into[c as usize]))
                 .collect(),
             aloof,
+            // They keep their numbers.
+            alone: self.alone.clone(),
         }
     }
 
@@ -367,6 +375,7 @@ pub(super) mod tests {
                     items: items.into_iter().map(|s| s.into_iter().collect()).collect(),
                     pairs,
                     aloof,
+                    alone: Vec::new(),
                 })
         })
     }
@@ -395,6 +404,7 @@ pub(super) mod tests {
             items: (0..7).map(|c| vec![c]).collect(),
             pairs: pairs.collect(),
             aloof: vec![false; 7],
+            alone: Vec::new(),
         };
         let scores = |[a, b]: [u32; 2]| ([a, b], if a == 0 { 9.0 } else { 1.0 });
         let n_left = |max_portals| {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use anyhow::{Context, ensure};
 use enfilade::cpg::Portal;
 use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Ray, Sets, Triangle};
-use enfilade::runtime::{ChunkId, DetailId, View};
+use enfilade::runtime::View;
 use enfilade::world::{
     Lamp, LampId, Lights, PartId, Place, Pose, Shape, Space, SpaceViewer, ThingId, Things, Tie,
 };
@@ -17,6 +17,7 @@ use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
 use super::parts::{Docked, Pair};
 use super::rooms::point;
+use super::solids::{PartItem, Solid, hull};
 use crate::rows::Figure;
 
 const ROOT: PartId = PartId::ROOT;
@@ -136,7 +137,7 @@ pub(super) fn cells(world: &World) -> anyhow::Result<Figure> {
             } else {
                 rng.point_in(&Aabb::new(-half, half))
             });
-            // By rounding, a point on a portal may be on either side.
+            // A point on a portal may be on either side, after rounding.
             let beyond = q + (q - at).normalize_or_zero() * 8.0 * layout.tolerance();
             let cell = layout
                 .locate(q)
@@ -247,7 +248,7 @@ pub(super) fn lights(world: &World) -> anyhow::Result<Figure> {
         };
         let may = lights.may_light(&space, LampId(k as u32), place, p);
         n_known += usize::from(may);
-        // By rounding, a point on a wall may be on either side.
+        // A point on a wall may be on either side, after rounding.
         let beyond = p + (p - at).normalize_or_zero() * 8.0 * space.layout(ROOT).tolerance();
         let is_clear = !walls.any_hit(at, beyond, |_| false);
         if is_clear && first_hit(&leaves, at, beyond).is_none() {
@@ -266,55 +267,6 @@ pub(super) fn lights(world: &World) -> anyhow::Result<Figure> {
             n_known as f64 / n_lit as f64
         ),
     })
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Item {
-    Chunk(ChunkId),
-    Detail(DetailId),
-}
-
-/// All triangles of a part in its own frame, and the item of each.
-pub(super) struct Solid {
-    pub(super) tree: Bvh,
-    pub(super) items: Vec<Item>,
-}
-
-impl Solid {
-    pub(super) fn of(space: &Space, part: PartId) -> Self {
-        let (world, sight) = (space.world(part), space.sight(part));
-        let (mut triangles, mut items): (Vec<Triangle>, Vec<Item>) = (Vec::new(), Vec::new());
-        for (id, chunk) in (0..).map(ChunkId).zip(sight.chunks()) {
-            let positions = &world.batches[chunk.batch as usize].primitive.positions;
-            let first = chunk.first_index as usize;
-            let indices = &sight.indices(chunk.batch)[first..first + chunk.n_indices as usize];
-            for t in indices.chunks_exact(3) {
-                triangles.push([0, 1, 2].map(|k| point(positions[t[k] as usize])));
-                items.push(Item::Chunk(id));
-            }
-        }
-        for (id, object) in (0..).map(DetailId).zip(&world.details) {
-            for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-                triangles.extend(primitive.placed_triangles(object.placement()));
-                items.resize(triangles.len(), Item::Detail(id));
-            }
-        }
-        Self {
-            tree: Bvh::build(&triangles),
-            items,
-        }
-    }
-
-    fn is_free(&self, bounds: &Aabb) -> bool {
-        !self.tree.any_in_box(bounds, |_| true)
-    }
-}
-
-/// Returns the box of a cabin's room and of its walls.
-pub(super) fn hull(world: &World) -> Aabb {
-    let positions = world.batches.iter().flat_map(|b| &b.primitive.positions);
-    let positions: Vec<DVec3> = positions.map(|p| point(*p)).collect();
-    Aabb::of_points(&positions)
 }
 
 /// Places a part anew until the box around it is free of the host's triangles.
@@ -401,8 +353,8 @@ pub(super) fn poses(world: &World) -> anyhow::Result<Figure> {
         let mut known = HashSet::new();
         for (part, seen) in seen.parts() {
             n_parts += 1;
-            known.extend(seen.chunks().iter().map(|c| (part, Item::Chunk(*c))));
-            known.extend(seen.details().iter().map(|d| (part, Item::Detail(*d))));
+            known.extend(seen.chunks().iter().map(|c| (part, PartItem::Chunk(*c))));
+            known.extend(seen.details().iter().map(|d| (part, PartItem::Detail(*d))));
         }
         for _ in 0..RAYS {
             let direction = rng.turn() * DVec3::X;

@@ -31,9 +31,8 @@ fn wrong(world: &World, pairs: &str) -> anyhow::Result<Figure> {
         };
         let mut ears = Listener::new();
         ears.listen(&site.acoustics, &site.state, here, from);
-        let heard = ears.hear(&site.acoustics, &site.layout, 0, there, to);
-        match heard {
-            Some(heard) => ratios.push(heard.length / row[6]),
+        match ears.shortest(&site.acoustics, &site.layout, 0, there, to) {
+            Some((length, _)) => ratios.push(length / row[6]),
             None => n_lost += 1,
         }
     }

@@ -1,4 +1,5 @@
-//! Jumps of what is heard on walks through doorways: a fresh listener at each centimeter, so that nothing is smoothed.
+//! Jumps of what is heard on walks through doorways, centimeter by centimeter. A listener hears what a fresh one hears, so that nothing
+//! is smoothed: compared every 29 cm.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -77,9 +78,33 @@ fn doorways(site: &Office) -> Vec<PortalId> {
     portals.filter(is_doorway).collect()
 }
 
-fn walk(site: &Office, door: PortalId, share: f32, sources: &[(CellId, DVec3)], jumps: &mut Jumps) {
+/// Greatest difference from a fresh listener, as a share of the gain, in radians and in lengths.
+const SAME: f64 = 1e-5;
+
+fn ensure_same(walked: Option<Heard>, fresh: Option<Heard>) -> anyhow::Result<()> {
+    let is_same = match (&walked, &fresh) {
+        (Some(a), Some(b)) => {
+            let level = (a.gain / b.gain - 1.0).abs();
+            level < SAME
+                && (a.direction - b.direction).length() < SAME
+                && (a.length - b.length).abs() < SAME
+        }
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    anyhow::ensure!(is_same, "a fresh listener hears {fresh:?}, not {walked:?}");
+    Ok(())
+}
+
+fn walk(
+    site: &Office,
+    door: PortalId,
+    share: f32,
+    sources: &[(CellId, DVec3)],
+    jumps: &mut Jumps,
+) -> anyhow::Result<()> {
     let opening = site.layout.opening(door);
     let mut before: Vec<Option<Heard>> = vec![None; sources.len()];
+    let mut ears = Listener::new();
     for k in -REACH..REACH {
         let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.01;
         let cell = site.layout.locate(at);
@@ -87,10 +112,15 @@ fn walk(site: &Office, door: PortalId, share: f32, sources: &[(CellId, DVec3)], 
             before.fill(None);
             continue;
         };
-        let mut ears = Listener::new();
         ears.listen(&site.acoustics, &site.state, cell, at);
         for (id, &source) in sources.iter().enumerate() {
             let heard = ears.hear(&site.acoustics, &site.layout, id, source.0, source.1);
+            if k % 29 == 0 {
+                let mut fresh = Listener::new();
+                fresh.listen(&site.acoustics, &site.state, cell, at);
+                let other = fresh.hear(&site.acoustics, &site.layout, id, source.0, source.1);
+                ensure_same(heard, other)?;
+            }
             let place = || {
                 format!(
                     "portal {}, open {share}, {k} cm, source {}",
@@ -103,6 +133,7 @@ fn walk(site: &Office, door: PortalId, share: f32, sources: &[(CellId, DVec3)], 
             before[id] = heard;
         }
     }
+    Ok(())
 }
 
 fn jumps_of(site: &mut Office) -> anyhow::Result<Jumps> {
@@ -120,7 +151,7 @@ fn jumps_of(site: &mut Office) -> anyhow::Result<Jumps> {
             let door = *doors.get(k % doors.len().max(1)).context("no doorway")?;
             let places = (0..N_SOURCES).map(|_| site.place(&mut rng));
             let sources: Vec<_> = places.collect::<Option<_>>().context("no place")?;
-            walk(site, door, share, &sources, &mut jumps);
+            walk(site, door, share, &sources, &mut jumps)?;
             jumps.n_walks += N_SOURCES;
         }
     }

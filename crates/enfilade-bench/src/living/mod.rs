@@ -14,6 +14,7 @@ mod levels;
 mod parts;
 mod paths;
 mod rooms;
+mod solids;
 mod sound;
 mod things;
 mod walk;
@@ -27,6 +28,14 @@ use crate::rows::{Figure, Measure, Row};
 const GRAPHS: &[&str] = &["tower-1500", "city-1500", "lattice-1500"];
 /// Real buildings with doors.
 const LIVED_IN: &[&str] = &["duplex", "institute", "fzk-haus"];
+/// Real buildings to listen in.
+const HEARD_IN: &[&str] = &[
+    "institute",
+    "duplex",
+    "fzk-haus",
+    "clearpath-office",
+    "smiley-west",
+];
 /// Real buildings to walk in.
 const WALKED_IN: &[&str] = &[
     "duplex",
@@ -112,15 +121,20 @@ pub(crate) const ROWS: &[Row] = &[
     baked("sound: lengths", &["fzk-haus"], lengths::fzk_haus),
     baked("sound: lengths", &["institute"], lengths::institute),
     made("levels", &["offices-100"], levels::level_in),
-    baked("levels", LIVED_IN, levels::level),
+    baked("levels", HEARD_IN, levels::level),
     made("levels: directions", &["offices-100"], levels::direction_in),
-    baked("levels: directions", LIVED_IN, levels::direction),
+    baked("levels: directions", HEARD_IN, levels::direction),
     made("levels: lengths", &["offices-100"], levels::length_in),
-    baked("levels: lengths", LIVED_IN, levels::length),
+    baked("levels: lengths", HEARD_IN, levels::length),
     made("sound: reverb", &["coupled-rooms"], sound::reverb),
     made("reverberation: RT60", &["boxes"], decays::rt60),
     named("reverberation: areas", WITH_ROOMS, walls::areas),
     made("sound: cost", &["offices-1000"], sound::cost),
+    made(
+        "sound: cost, a door moving",
+        &["offices-1000"],
+        sound::cost_of_door,
+    ),
 ];
 
 pub(crate) const fn made(

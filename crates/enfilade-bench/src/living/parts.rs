@@ -11,7 +11,7 @@ use enfilade::world::{PartId, Pose, Shape, Space, SpaceViewer, Things, Tie};
 use enfilade::{PortalId, World};
 use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
-use super::buildings::{Item, Solid, hull};
+use super::solids::{PartItem, Solid, hull};
 use crate::rows::Figure;
 
 /// Rounds of motions, of which the median counts.
@@ -196,20 +196,20 @@ impl Pair {
         viewer: &mut SpaceViewer,
         from: usize,
         eye: DVec3,
-    ) -> anyhow::Result<HashSet<Item>> {
+    ) -> anyhow::Result<HashSet<PartItem>> {
         let view = View::around(eye.as_vec3().to_array())?;
         let seen = viewer.see(&self.space, self.ids[from], &view);
         let Some(seen) = seen.of_part(self.ids[1 - from]) else {
             return Ok(HashSet::new());
         };
-        let details = seen.details().iter().map(|d| Item::Detail(*d));
-        let chunks = seen.chunks().iter().map(|c| Item::Chunk(*c));
+        let details = seen.details().iter().map(|d| PartItem::Detail(*d));
+        let chunks = seen.chunks().iter().map(|c| PartItem::Chunk(*c));
         Ok(chunks.chain(details).collect())
     }
 
     /// Returns those objects and chunks of the other part that rays through the opening hit first, by tracing the
     /// triangles of both.
-    fn hit(&self, from: usize, eye: DVec3, rng: &mut Rng) -> HashSet<Item> {
+    fn hit(&self, from: usize, eye: DVec3, rng: &mut Rng) -> HashSet<PartItem> {
         let opening = self
             .space
             .layout(self.ids[from])
@@ -329,7 +329,7 @@ fn window(space: &Space, part: PartId) -> (DVec3, DVec3) {
     (window.center(), outward)
 }
 
-/// What is lost by docking with an error.
+/// Losses by docking with an error.
 #[derive(Default)]
 pub(super) struct Docked {
     n_wrong: usize,

@@ -2,6 +2,7 @@
 //!
 //! To add a row, add a file beside this one and a line in [`ROWS`].
 
+mod passing;
 mod pictures;
 
 use crate::living::{baked, made};
@@ -17,4 +18,13 @@ pub(crate) const ROWS: &[Row] = &[
     baked("teleporters", BUILDINGS, pictures::teleporters),
     made("passes", &["offices-8"], pictures::passes_in),
     baked("passes", BUILDINGS, pictures::passes),
+    made("walking through", &["endless"], passing::steps),
+    made("in two places", &["offices-40"], passing::bodies_in),
+    baked("in two places", BUILDINGS, passing::bodies),
+    made(
+        "recursion",
+        &["facing-mirrors", "endless", "turned", "ring-100"],
+        passing::recursion,
+    ),
+    made("bad input", &["offices-4"], passing::bad_input),
 ];

@@ -217,8 +217,8 @@ fn lead(world: &World, (from, cell): (PortalId, CellId), goal: PortalId) -> Way 
 fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure> {
     let world = painted(world, 251);
     ensure!(!world.graph.specials.is_empty(), "no doorway is special");
-    let faults = world.graph.validate().err().unwrap_or_default();
-    ensure!(faults.is_empty(), "{faults:?}");
+    let is_valid = world.graph.validate();
+    is_valid.map_err(|e| anyhow::anyhow!("{e:?}"))?;
     let traced = Traced::new(&world);
     let space = Space::new(world.clone())?;
     let mut studio = Studio::new(Gpu::open(&AdapterChoice::Software)?, &world)?;

@@ -63,7 +63,7 @@ pub(super) fn write(
     Ok(())
 }
 
-fn cell_of(graph: &CellPortalGraph, text: &str) -> anyhow::Result<CellId> {
+pub(crate) fn cell_of(graph: &CellPortalGraph, text: &str) -> anyhow::Result<CellId> {
     let by_id = || {
         let id = text.parse::<u32>().ok()?;
         ((id as usize) < graph.cells.len()).then_some(CellId(id))

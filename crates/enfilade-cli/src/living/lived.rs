@@ -17,6 +17,8 @@ use super::doors::AutoDoors;
 use super::file::{LivingFile, SoundEntry, read_living};
 use super::lift::{Lift, LiftPlace};
 use super::people::People;
+use super::radar::{Blip, Radar};
+use crate::walk::WorldFile;
 
 /// Time that a cell stays awake after it was seen last. [Units: s]
 const LINGER: f64 = 5.0;
@@ -85,6 +87,8 @@ pub(crate) struct Lived {
     near: Vec<DVec3>,
     seen_lamps: Vec<u32>,
     pub(crate) counts: LivedCounts,
+    /// Made when it is asked for.
+    radar: Option<Radar>,
 }
 
 impl Lived {
@@ -93,12 +97,16 @@ impl Lived {
     /// # Errors
     ///
     /// As [`read_living`] and [`Lived::new`].
-    pub(crate) fn read(path: &Path, world: &World) -> anyhow::Result<Self> {
+    pub(crate) fn read(
+        path: &Path,
+        world: &World,
+        world_file: Option<WorldFile<'_>>,
+    ) -> anyhow::Result<Self> {
         let (file, lifts) = read_living(path)?;
-        Self::new(world.clone(), file, lifts)
+        Self::new(world.clone(), file, lifts, world_file)
     }
 
-    /// Prepares a world and what lives in it, at time 0.
+    /// Prepares a world and what lives in it, at time 0. A map of floors beside the world's file is used.
     ///
     /// # Errors
     ///
@@ -107,6 +115,7 @@ impl Lived {
         world: World,
         file: LivingFile,
         lift_worlds: Vec<World>,
+        world_file: Option<WorldFile<'_>>,
     ) -> anyhow::Result<Self> {
         let mut space = Space::new(world)?;
         let mut lifts = Vec::new();
@@ -137,7 +146,7 @@ impl Lived {
         let mut lived = Self {
             time: 0.0,
             lift_places: lifts.iter().map(|l| l.place(0.0)).collect(),
-            people: People::new(&space, &file.people),
+            people: People::new(&space, &file.people, world_file),
             viewer: SpaceViewer::new(&space),
             awake: AwakeCells::new(layout.n_cells(), LINGER),
             acoustics: (!file.sounds.is_empty()).then(|| {
@@ -148,6 +157,7 @@ impl Lived {
             near: Vec::new(),
             seen_lamps: Vec::new(),
             counts: LivedCounts::default(),
+            radar: None,
             lamps,
             lights,
             doors,
@@ -241,6 +251,18 @@ impl Lived {
             text += &format!("\n{}: {level:.0} dB, {length:.1} m off", shown(name));
         }
         text
+    }
+
+    /// Returns the things around the player, nearest first, by the way through openings.
+    pub(crate) fn radar(&mut self, player: &Player) -> &[Blip] {
+        let radar = self.radar.get_or_insert_with(|| Radar::new(&self.space));
+        let ids = (0..self.people.actors.len() as u32).map(ActorId);
+        let actors = &self.people.actors;
+        let people = ids.filter_map(|id| Some((id.0, actors.place(id)?.at)));
+        radar.follow(&self.space, people);
+        let lamps = self.lamps.iter().map(|l| (l.part, l.at.map(f64::from)));
+        radar.place_fixed(&self.space, lamps, &self.file.sounds);
+        radar.look(&self.space, (player.frame, player.eye), &self.awake)
     }
 
     /// Plays some seconds: lifts, people, and the doors that they and the player open.

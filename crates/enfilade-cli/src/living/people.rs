@@ -3,11 +3,12 @@
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    ActorEvent, ActorId, Actors, Agent, Chance, Errands, PartId, Path, PathSearch, PlanDraft,
-    Space, WalkMap,
+    ActorEvent, ActorId, Actors, Chance, Errands, PartId, Path, PathSearch, PlanDraft, Space,
+    WalkMap,
 };
 
 use super::file::PeopleEntry;
+use crate::walk::{Walks, WorldFile, kept_or_made};
 
 /// The people of a world.
 pub(super) struct People {
@@ -20,8 +21,9 @@ pub(super) struct People {
 }
 
 impl People {
-    /// Makes people at their places in turn. Makes a map of the floors if there are any, which takes seconds in large buildings.
-    pub(super) fn new(space: &Space, entry: &PeopleEntry) -> Self {
+    /// Makes people at their places in turn. Makes a map of the floors if there are any, which takes seconds in large buildings,
+    /// unless one is kept beside the world.
+    pub(super) fn new(space: &Space, entry: &PeopleEntry, file: Option<WorldFile<'_>>) -> Self {
         let layout = space.layout(PartId::ROOT);
         let mut errands = Errands::default();
         errands.stay = entry.stay;
@@ -34,7 +36,7 @@ impl People {
             path: Path::default(),
         };
         if entry.count > 0 {
-            people.map = Some(WalkMap::new(space, Agent::default()));
+            people.map = Some(kept_or_made(file, space, &Walks::usual()));
         }
         people
     }

@@ -5,12 +5,17 @@ use enfilade::cpg::{CellId, World};
 use enfilade::geom::DVec3;
 use enfilade_render::{Camera, cell_color};
 
+use crate::living::{Blip, BlipKind, RADAR_REACH};
+
 /// Most points along the longer side of the map.
 const POINTS: f32 = 360.0;
 /// The cut is remade when the eye has moved up or down by this. [Units: wu]
 const STEP: f32 = 0.25;
 /// Cells smaller than this on the map get no name. [Units: px²]
 const ROOM_FOR_A_NAME: f32 = 900.0;
+
+/// Things higher or lower than this are on another storey. [Units: wu]
+const STOREY: f64 = 2.0;
 
 /// State of a frame that the map shows.
 pub(super) struct MapShown<'a> {
@@ -20,6 +25,8 @@ pub(super) struct MapShown<'a> {
     pub(super) closed: &'a [u32],
     /// 1 for the whole world; more for the surroundings of the eye.
     pub(super) zoom: f32,
+    /// Things on the radar; none if it is off.
+    pub(super) blips: &'a [Blip],
 }
 
 /// A name on the map: the point of the cell nearest to its middle, and the number of points of the cell.
@@ -226,6 +233,30 @@ impl Map {
                 Color32::BLACK,
             );
             painter.text(at, Align2::CENTER_CENTER, name, font, Color32::WHITE);
+        }
+        for blip in shown.blips {
+            let at = place([blip.at.x as f32, blip.at.z as f32]);
+            let (radius, color) = match blip.kind {
+                BlipKind::Person => (4.0, Color32::from_rgb(90, 230, 255)),
+                BlipKind::Lamp => (2.5, Color32::from_rgb(255, 235, 90)),
+                BlipKind::Sound => (4.0, Color32::from_rgb(255, 110, 220)),
+            };
+            // A ring is asleep; what is on another storey is small.
+            let is_here = (blip.at.y - f64::from(y)).abs() < STOREY;
+            let radius = if is_here { radius } else { 0.6 * radius };
+            painter.circle_stroke(at, radius, Stroke::new(3.0, Color32::BLACK));
+            painter.circle_stroke(at, radius, Stroke::new(1.5, color));
+            if blip.is_awake {
+                painter.circle_filled(at, radius, color);
+            }
+        }
+        if !shown.blips.is_empty() {
+            let reach = RADAR_REACH as f32 * scale;
+            painter.circle_stroke(
+                place(eye),
+                reach,
+                Stroke::new(1.0, Color32::from_white_alpha(90)),
+            );
         }
         let at = place(eye);
         let ahead = Vec2::new(shown.camera.toward[0], shown.camera.toward[2]).normalized() * 14.0;

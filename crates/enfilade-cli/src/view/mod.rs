@@ -36,10 +36,11 @@ use crate::formats::Format;
 use crate::limits::Limits;
 use crate::living::{Lived, LivingFile, STEP};
 use crate::output::{Outputs, refuse_stream, write_whole};
+use crate::walk::WorldFile;
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{path_text, read_path};
 use enfilade_cli::values::{point, size};
-use enfilade_cli::world::read_world;
+use enfilade_cli::world::read_world_hashed;
 
 /// Opens a window to walk through a world: W A S D and the mouse; F1 in the window lists all keys.
 #[derive(clap::Args)]
@@ -100,10 +101,14 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         .as_deref()
         .map(|p| read_path(p, FOV))
         .transpose()?;
-    let world = read_world(&args.world)?;
+    let (world, hash) = read_world_hashed(&args.world)?;
+    let file = WorldFile {
+        path: &args.world,
+        hash,
+    };
     let lived = match &args.living {
-        Some(path) => Lived::read(path, &world)?,
-        None => Lived::new(world.clone(), LivingFile::default(), Vec::new())?,
+        Some(path) => Lived::read(path, &world, Some(file))?,
+        None => Lived::new(world.clone(), LivingFile::default(), Vec::new(), None)?,
     };
     let events = EventLoop::new()
         .context("no window can be opened here; `enfilade render` draws without one")?;
@@ -366,6 +371,7 @@ impl App<'_> {
                     Paint::Overdraw => Paint::Lit,
                 };
             }
+            KeyCode::KeyR => shown.radar = !shown.radar,
             KeyCode::KeyO => shown.portals = !shown.portals,
             KeyCode::KeyP => shown.plain = !shown.plain,
             KeyCode::F4 => open.recorded = Some(Vec::new()),

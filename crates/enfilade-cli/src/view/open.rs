@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use enfilade::cpg::{PortalId, World};
+use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
 use enfilade::runtime::View;
@@ -22,7 +22,7 @@ use super::mode::Mode;
 use super::panel::{Panel, Shown};
 use super::walker::Walker;
 use crate::formats::Format;
-use crate::living::Lived;
+use crate::living::{Lived, radar_words};
 use crate::output::{Outputs, write_whole};
 use crate::render::{light, portal_marks};
 
@@ -172,6 +172,20 @@ impl Open {
         (forward * ahead + right * aside + DVec3::Y * up).normalize_or_zero() * speed
     }
 
+    /// Updates what the radar shows.
+    fn scan(&mut self, world: &World) {
+        self.shown.blips.clear();
+        self.shown.told.clear();
+        if self.shown.radar {
+            let player = self.walker.player();
+            self.shown
+                .blips
+                .extend_from_slice(self.lived.radar(&player));
+            let name = |c: CellId| world.graph[c].name.clone();
+            self.shown.told = radar_words(&self.shown.blips, name);
+        }
+    }
+
     fn style(&self) -> Style {
         Style {
             paint: self.shown.paint,
@@ -212,6 +226,7 @@ impl Open {
             light(&mut self.studio, world)?;
         }
         self.shown.queries = None;
+        self.scan(world);
         if self.is_living {
             return self.draw_living(world, (camera, &view), target, seconds);
         }

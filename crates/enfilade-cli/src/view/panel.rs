@@ -10,12 +10,15 @@ use winit::window::Window;
 
 use super::map::{Map, MapShown};
 use super::mode::Mode;
+use crate::living::Blip;
 
 /// The contents of the panel.
 #[derive(Default)]
 pub(super) struct Shown {
     pub(super) help: bool,
     pub(super) portals: bool,
+    /// `true` if the radar is on.
+    pub(super) radar: bool,
     pub(super) plain: bool,
     pub(super) paint: Paint,
     pub(super) cells: Vec<u32>,
@@ -37,6 +40,9 @@ pub(super) struct Shown {
     pub(super) message: String,
     /// Counters and sounds of what lives there, in lines.
     pub(super) living: String,
+    /// The things on the radar, and what it says of them.
+    pub(super) blips: Vec<Blip>,
+    pub(super) told: String,
     pub(super) times: VecDeque<f32>,
 }
 
@@ -67,6 +73,7 @@ F              fly; Q and E: down and up
 M              drawn: portals, portals by occlusion queries,
                frustum, everything
 L              spare small portals and what is behind them
+R              radar: things around, on the map and in words
 C              paint: lit, cells, overdraw
 O              outline doorways and narrowed views
 P              plain: no shadows, no ambient occlusion
@@ -191,7 +198,7 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
             text += words;
         }
     }
-    for line in [&shown.living, &shown.message] {
+    for line in [&shown.living, &shown.told, &shown.message] {
         if !line.is_empty() {
             text += "\n";
             text += line;
@@ -217,6 +224,7 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
             cells: &shown.cells,
             closed: &shown.closed,
             zoom: shown.zoom,
+            blips: &shown.blips,
         };
         map.draw(painter, area, &shown);
     }

@@ -1,7 +1,9 @@
 //! Problems of a graph or a world, and a list to collect them.
 
-use crate::Locator;
 use enfilade_geom::shown;
+
+use super::special_error::SpecialProblem;
+use crate::{Locator, SpecialId};
 
 /// Most problems that one call reports; a world with more usually repeats the same one.
 pub const MAX_REPORTED: usize = 64;
@@ -173,6 +175,16 @@ pub enum GraphError {
         stored: f32,
         /// Sum over the pieces. [Units: wu²]
         measured: f64,
+    },
+    /// A special portal is broken.
+    #[error("{special}{}: {problem}", shown(place))]
+    Special {
+        /// The special portal.
+        special: SpecialId,
+        /// Its name, cell and middle, as far as they are known; empty or in parentheses.
+        place: String,
+        /// The problem.
+        problem: SpecialProblem,
     },
     /// The locator's box is not finite and ordered (nor the empty box).
     #[error("the locator's box {min:?} to {max:?} is neither finite and ordered nor empty")]

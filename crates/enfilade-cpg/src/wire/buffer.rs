@@ -7,6 +7,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Image, Primitive};
 
 use super::json::{self, FLOAT, LINE_STRIP, TRIANGLES, U16, U32, VERTICES};
+use super::special::surface;
 use super::visible::words;
 use crate::World;
 
@@ -266,6 +267,11 @@ impl<'a> Layout<'a> {
                 bulk.floats(&portal.outline);
                 portal.pieces.iter().for_each(|piece| bulk.floats(piece));
             }
+        }
+        let surfaces = || world.graph.specials.iter().filter_map(surface);
+        if surfaces().next().is_some() {
+            bulk.align(ALIGNMENT);
+            surfaces().flatten().for_each(|piece| bulk.floats(piece));
         }
         let locator = &world.graph.locator;
         if !locator.planes.is_empty() {

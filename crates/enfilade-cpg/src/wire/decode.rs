@@ -15,13 +15,14 @@ use super::boxes;
 use super::fitting;
 use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
 use super::origin;
-use super::rows::{Row, eight, four, pairs};
+use super::rows::{Row, eight, four, pairs, take_polygon};
+use super::special;
 use super::visible::read_pvs;
 use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError, broken};
 use crate::look::material_of_text;
 use crate::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
-    Provenance, Pvs, SourceRuns, Statistics, World,
+    Provenance, Pvs, SourceRuns, SpecialPortal, Statistics, World,
 };
 
 /// Decodes a world from one GLB.
@@ -108,7 +109,7 @@ fn check_version(text: &str) -> Result<(), WireError> {
         .get(EXTENSION)
         .ok_or(WireError::NotAWorld)?;
     let Ours { version } = serde_json::from_str(ours.get()).map_err(json_error)?;
-    if version == VERSION {
+    if (1..=VERSION).contains(&version) {
         Ok(())
     } else {
         Err(WireError::Version { found: version })
@@ -256,12 +257,13 @@ impl<'a> Reader<'a> {
         });
         let cells = cells.collect::<Result<_, _>>()?;
         let portals = self.portals()?;
+        let specials = self.specials()?;
         let locator = self.locator()?;
         let p = &graph.provenance;
         Ok(CellPortalGraph {
-            specials: Vec::new(),
             cells,
             portals,
+            specials,
             locator,
             provenance: Provenance {
                 generator: p.generator.clone(),
@@ -288,19 +290,7 @@ impl<'a> Reader<'a> {
         self.spend(bytes.len() as u64)?;
         let mut portals = Vec::with_capacity(graph.portals.len());
         for (i, p) in graph.portals.iter().enumerate() {
-            let mut take = |n: u32| {
-                let (polygon, rest) = corners.split_at_checked(n as usize).ok_or_else(|| {
-                    broken(
-                        format!("portal {i}"),
-                        "has more vertices than the file holds",
-                    )
-                })?;
-                corners = rest;
-                Ok(polygon
-                    .iter()
-                    .map(|c| <[f32; 3]>::of_bytes(c))
-                    .collect::<Vec<_>>())
-            };
+            let mut take = |n| take_polygon(&mut corners, n, || format!("portal {i}"));
             let outline = take(p.outline)?;
             let pieces = p
                 .pieces
@@ -325,6 +315,13 @@ impl<'a> Reader<'a> {
             ));
         }
         Ok(portals)
+    }
+
+    fn specials(&mut self) -> Result<Vec<SpecialPortal>, WireError> {
+        let graph = &self.root.extensions.graph;
+        let bytes = self.optional_view(graph.special_corners, special::CORNERS)?;
+        self.spend(bytes.len() as u64)?;
+        special::read_all(graph, bytes)
     }
 
     fn locator(&mut self) -> Result<Locator, WireError> {

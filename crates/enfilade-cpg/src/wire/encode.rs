@@ -14,6 +14,7 @@ use super::boxes;
 use super::buffer::{Layout, image_bytes, mime};
 use super::fitting;
 use super::json::{self, TEXTURE_EXTENSIONS};
+use super::special;
 use super::transform::{IDENTITY, is_trs, transformed};
 use super::{
     CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, LEAK_PATH, LIGHTS, VERSION, WireError,
@@ -105,6 +106,8 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
         .map(|p| p.outline.len() + p.pieces.iter().map(Vec::len).sum::<usize>())
         .sum();
     let portal_corners = layout.view(corners as u64 * 12);
+    let corners = graph.specials.iter().filter_map(special::surface).flatten();
+    let special_corners = layout.view(corners.map(|p| p.len() as u64 * 12).sum());
     let locator = lay_out_locator(layout, world);
     let pvs = lay_out_pvs(layout, world);
     let n_runs: usize = world.batches.iter().map(|b| b.sources.runs().len()).sum();
@@ -136,10 +139,12 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
             .collect(),
         extensions: json::RootExtensions {
             graph: json::Graph {
-                version: VERSION,
+                version: version(world),
                 cells: cells(world),
                 portals: portals(world),
                 portal_corners,
+                specials: graph.specials.iter().map(special::written).collect(),
+                special_corners,
                 batches,
                 details,
                 detail_meshes,
@@ -154,6 +159,15 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
             },
             lights: placed.lights,
         },
+    }
+}
+
+/// Returns the lowest version that holds a world.
+fn version(world: &World) -> u64 {
+    if world.graph.specials.is_empty() {
+        1
+    } else {
+        VERSION
     }
 }
 

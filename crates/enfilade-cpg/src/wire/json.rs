@@ -214,6 +214,12 @@ pub(super) struct Graph {
     /// Buffer view of all portals' vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) portal_corners: Option<u32>,
+    /// Since version 2.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) specials: Vec<SpecialJson>,
+    /// Buffer view of the vertices of special portals in walls.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) special_corners: Option<u32>,
     pub(super) batches: Vec<BatchJson>,
     pub(super) details: Vec<Detail>,
     /// For each detail mesh, its glTF mesh; null for a mesh without triangles.
@@ -295,6 +301,61 @@ pub(super) struct SlideJson {
     pub(super) along: [f64; 3],
     pub(super) shut: f64,
     pub(super) open: f64,
+}
+
+/// A side of a portal, or a part of a wall: either `portal`, or `normal` and `pieces`.
+#[derive(Serialize, Deserialize)]
+pub(super) struct SpecialJson {
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(super) name: String,
+    pub(super) cell: u32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) portal: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) normal: Option<[f64; 3]>,
+    /// Number of vertices of each piece.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) pieces: Option<Vec<u32>>,
+    pub(super) passes: Vec<PassJson>,
+}
+
+/// Fields that do not belong to the way are absent.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct PassJson {
+    pub(super) way: WayJson,
+    /// Absent if it changes nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) tint: Option<[f64; 4]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) to: Option<u32>,
+    /// As a glTF node's; absent for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) translation: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) rotation: Option<[f64; 4]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) scale: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) back: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) eye: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) toward: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) up: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) fov_y: Option<f64>,
+}
+
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum WayJson {
+    #[default]
+    Through,
+    Mirror,
+    Lead,
+    Monitor,
 }
 
 #[derive(Clone, Copy, Serialize, Deserialize)]

@@ -38,6 +38,7 @@ mod fitting;
 mod json;
 mod origin;
 mod rows;
+mod special;
 mod transform;
 mod visible;
 
@@ -56,8 +57,11 @@ pub const LEAK_PATH: &str = "enfilade leak path";
 /// Name of the glTF extension for lights.
 const LIGHTS: &str = "KHR_lights_punctual";
 
-/// Version of the extension that this program writes and reads.
-pub const VERSION: u64 = 1;
+/// Newest version of the extension that this program writes; it reads all from 1 on.
+///
+/// A world is written in the lowest version that can hold it, so that older programs read what they understand: special portals
+/// need version 2.
+pub const VERSION: u64 = 2;
 
 const GLB_MAGIC: [u8; 4] = *b"glTF";
 const GLB_VERSION: u32 = 2;
@@ -90,7 +94,7 @@ pub enum WireError {
     NotAWorld,
     /// A world of another version.
     #[error(
-        "this world has version {found}, but this program reads version {VERSION}; \
+        "this world has version {found}, but this program reads versions 1 to {VERSION}; \
          bake the scene again, or use the program that wrote it"
     )]
     Version {

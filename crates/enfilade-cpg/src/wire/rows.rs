@@ -1,5 +1,7 @@
 //! Rows of numbers as stored in a buffer: little-endian, tightly packed.
 
+use super::{WireError, broken};
+
 /// A row of an accessor.
 pub(super) trait Row: Sized {
     const KIND: &'static str;
@@ -34,4 +36,17 @@ pub(super) fn pairs(bytes: &[u8]) -> Option<Vec<[u32; 2]>> {
     let (pairs, rest) = bytes.as_chunks::<8>();
     let pair = |p: &[u8; 8]| [0, 4].map(|at| u32::from_le_bytes(four(p, at)));
     rest.is_empty().then(|| pairs.iter().map(pair).collect())
+}
+
+/// Takes a polygon of `n` vertices from the front of `corners`; `owner` names its owner.
+pub(super) fn take_polygon(
+    corners: &mut &[[u8; 12]],
+    n: u32,
+    owner: impl Fn() -> String,
+) -> Result<Vec<[f32; 3]>, WireError> {
+    let (polygon, rest) = corners
+        .split_at_checked(n as usize)
+        .ok_or_else(|| broken(owner(), "has more vertices than the file holds"))?;
+    *corners = rest;
+    Ok(polygon.iter().map(|c| <[f32; 3]>::of_bytes(c)).collect())
 }

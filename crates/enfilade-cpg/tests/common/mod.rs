@@ -3,13 +3,14 @@
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Fitting, FittingPart, Locator,
-    LocatorNode, Motion, MotionKind, PartNumbers, Portal, PortalId, PortalKind, Provenance, Pvs,
-    SourceRuns, Statistics, VisibleParts, VisibleVolumes, World,
+    LocatorNode, MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Portal, PortalId,
+    PortalKind, Provenance, Pvs, SourceRuns, SpecialId, SpecialPortal, SpecialShape, Statistics,
+    VisibleParts, VisibleVolumes, Way, World,
 };
 use enfilade_geom::scene::{
     About, Fixture, FixtureKind, Image, Material, Mesh, Primitive, SourceNode, Texture,
 };
-use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_geom::{Aabb, DMat4, DQuat, DVec3, Similarity};
 
 /// Makes two triangles of four vertices, with normals and texture coordinates.
 pub(crate) fn quad(corners: [[f32; 3]; 4], normal: [f32; 3]) -> Primitive {
@@ -274,6 +275,111 @@ pub(crate) fn two_rooms() -> World {
         leak_path: Vec::new(),
         pvs: None,
     }
+}
+
+/// Makes the two rooms with special portals of every kind: a mirror in two pieces, a link of the doorway and a wall, a window that
+/// reflects, a monitor, and a way into another scale without a way back.
+pub(crate) fn two_rooms_with_specials() -> World {
+    let special = |name: &str, cell, shape, passes| SpecialPortal {
+        name: name.into(),
+        cell: CellId(cell),
+        shape,
+        passes,
+    };
+    let surface = |normal, pieces| SpecialShape::Surface { normal, pieces };
+    // Rectangles in walls at x, and at z, counter-clockwise about the second argument.
+    let at_x = |x: f32, [z0, z1]: [f32; 2], [y0, y1]: [f32; 2]| {
+        vec![[x, y0, z0], [x, y0, z1], [x, y1, z1], [x, y1, z0]]
+    };
+    let at_z = |z: f32, toward: f32, [x0, x1]: [f32; 2], [y0, y1]: [f32; 2]| {
+        let mut points = vec![[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]];
+        if toward < 0.0 {
+            points.reverse();
+        }
+        points
+    };
+    // The door's middle and outward normal become the middle and inward normal there.
+    let quarter = DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2);
+    let map = Similarity {
+        turn: quarter,
+        at: DVec3::new(5.5, 1.05, 0.0) - quarter * DVec3::new(4.0, 1.05, 2.5),
+        scale: 1.0,
+    };
+    let lead = |to, map, back: Option<u32>| {
+        let to = CellId(to);
+        let back = back.map(SpecialId);
+        Pass::new(Way::Lead { to, map, back })
+    };
+    let tinted = |way, tint| Pass { way, tint };
+    let giant = Similarity {
+        turn: DQuat::from_rotation_y(0.5),
+        at: DVec3::new(6.0, 1.0 / 3.0, 2.0),
+        scale: -2.5,
+    };
+    let camera = MonitorCamera {
+        eye: [1.0, 2.5, 1.0],
+        toward: [1.0, -0.5, 0.75],
+        up: [0.0, 1.0, 0.0],
+        fov_y: 1.25,
+    };
+    let mut world = two_rooms();
+    world.graph.specials = vec![
+        special(
+            "portrait",
+            0,
+            surface(
+                [-1.0, 0.0, 0.0],
+                vec![
+                    at_x(0.0, [1.0, 2.0], [0.5, 2.0]),
+                    at_x(0.0, [2.5, 3.0], [0.5, 2.0]),
+                ],
+            ),
+            vec![Pass::new(Way::Mirror)],
+        ),
+        special(
+            "",
+            0,
+            SpecialShape::Portal(PortalId(0)),
+            vec![lead(1, map, Some(2))],
+        ),
+        special(
+            "wardrobe",
+            1,
+            surface(
+                [0.0, 0.0, -1.0],
+                vec![at_z(0.0, -1.0, [5.0, 6.0], [0.0, 2.1])],
+            ),
+            vec![lead(0, map.inverse(), Some(1))],
+        ),
+        special(
+            "",
+            1,
+            SpecialShape::Portal(PortalId(1)),
+            vec![
+                tinted(Way::Through, [0.5, 1.0, 0.75, 1.0]),
+                tinted(Way::Mirror, [1.0, 1.0, 1.0, 0.2]),
+            ],
+        ),
+        special(
+            "\u{1b}[31mscreen",
+            1,
+            surface(
+                [0.0, 0.0, 1.0],
+                vec![at_z(5.0, 1.0, [5.0, 7.0], [1.0, 2.0])],
+            ),
+            vec![Pass::new(Way::Monitor(camera))],
+        ),
+        special(
+            "looking glass",
+            0,
+            surface(
+                [0.0, 0.0, 1.0],
+                vec![at_z(5.0, 1.0, [1.0, 2.0], [0.0, 2.0])],
+            ),
+            vec![lead(1, giant, None)],
+        ),
+    ];
+    world
 }
 
 /// Makes the two rooms with a potentially visible set: all pairs, except from the outdoors into the second room.

@@ -17,12 +17,13 @@ impl Path {
             if a == first.exit.to { b } else { a }
         });
         let mut next = self.portals.iter().peekable();
-        for leg in self.points.windows(2) {
-            // Passages are in the order of the path, and on it in plan.
+        for (i, leg) in self.points.windows(2).enumerate() {
             let mut at = 0.0;
             while let Some(passed) = next.peek() {
-                let share = share_of(leg[0].at, leg[1].at, passed.at);
-                let Some(share) = share.filter(|s| *s >= at) else {
+                let own = share_of(leg[0].at, leg[1].at, passed.at).filter(|share| *share >= at);
+                // Rounding may leave one on no leg: it is passed at the end at the latest.
+                let is_last = i + 2 == self.points.len();
+                let Some(share) = own.or(is_last.then_some(1.0)) else {
                     break;
                 };
                 let point = leg[0].at.lerp(leg[1].at, share);
@@ -38,12 +39,17 @@ impl Path {
 
 /// Farthest a passage may be from its leg by rounding. [Units: wu]
 const ROUNDING: f64 = 1e-6;
+/// Farthest it may be above or below: more than a path cuts off a step, less than a storey, as stairs lead over one another.
+/// [Units: wu]
+const STOREY: f64 = 1.0;
 
 /// Returns the share of a leg after which it is at a point, in plan; `None` if it does not pass it.
 fn share_of(from: DVec3, to: DVec3, p: DVec3) -> Option<f64> {
     let [along, by] = [to - from, p - from].map(|v| v.with_y(0.0));
     let share = (by.dot(along) / along.length_squared().max(1e-12)).clamp(0.0, 1.0);
-    (by.distance(along * share) <= ROUNDING).then_some(share)
+    let is_there = by.distance(along * share) <= ROUNDING;
+    let up = p.y - from.lerp(to, share).y;
+    (is_there && up.abs() <= STOREY).then_some(share)
 }
 
 #[cfg(test)]
@@ -55,16 +61,49 @@ mod tests {
     use enfilade_cpg::PortalId;
     use enfilade_testkit::{GridParams, room_grid};
 
+    fn on_root(at: DVec3) -> PathPoint {
+        PathPoint {
+            part: PartId::ROOT,
+            at,
+        }
+    }
+
+    #[test]
+    fn a_portal_on_the_next_flight_of_stairs_is_not_passed_on_this_one() {
+        let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
+        let [here, there] = layout.opening(PortalId(0)).cells();
+        let path = Path {
+            // Up, across, and back above the first flight.
+            points: [
+                DVec3::ZERO,
+                DVec3::new(4.0, 1.5, 0.0),
+                DVec3::new(0.0, 3.0, 0.0),
+            ]
+            .map(on_root)
+            .to_vec(),
+            portals: vec![PathPortal {
+                part: PartId::ROOT,
+                exit: Exit {
+                    portal: PortalId(0),
+                    to: there,
+                },
+                at: DVec3::new(1.0, 2.7, 0.0),
+            }],
+            ..Path::default()
+        };
+        let mut way = Vec::new();
+        path.add_way_points(&layout, here, &mut way);
+        let cells: Vec<CellId> = way.iter().map(|w| w.cell).collect();
+        assert_eq!(cells, [here, here, there]);
+        assert_eq!(way[1].at, DVec3::new(1.0, 2.625, 0.0));
+    }
+
     #[test]
     fn a_straight_path_through_a_door_is_listed_in_both_rooms() {
         let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
         let door = layout.opening(PortalId(0));
         let [here, there] = door.cells();
         let at = |x: f64| (door.center() + door.normal() * x).with_y(0.0);
-        let on_root = |at| PathPoint {
-            part: PartId::ROOT,
-            at,
-        };
         let path = Path {
             points: [at(-1.0), at(1.5), at(1.5) + DVec3::Z]
                 .map(on_root)

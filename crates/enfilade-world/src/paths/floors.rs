@@ -32,7 +32,7 @@ use crate::paths::solid::solid_of;
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Most squares: beyond that, they get wider.
-const MAX_SQUARES: f64 = 8e6;
+pub(super) const MAX_SQUARES: f64 = 8e6;
 
 /// Narrowest squares for a small walker, if there would be more than `MAX_FINE_SQUARES`. [Units: wu]
 const FINE: f64 = 0.05;
@@ -47,17 +47,17 @@ const GROUND: f64 = 30.0;
 /// The floors of a world for one walker.
 #[derive(Clone, Debug)]
 pub struct Floors {
-    squares: Squares,
+    pub(super) squares: Squares,
     /// For each square, its first floor; and the number of all.
-    first: Vec<u32>,
-    floors: Vec<Floor>,
+    pub(super) first: Vec<u32>,
+    pub(super) floors: Vec<Floor>,
     /// Steps between cells, sorted.
-    crossings: Vec<Crossing>,
+    pub(super) crossings: Vec<Crossing>,
     /// Floors in the way of leaves, each with the portal that they open, sorted.
-    swung: Vec<(u32, PortalId)>,
+    pub(super) swung: Vec<(u32, PortalId)>,
     /// Portals with leaves, sorted.
-    doors: Vec<PortalId>,
-    walker: Agent,
+    pub(super) doors: Vec<PortalId>,
+    pub(super) walker: Agent,
 }
 
 /// A place to stand, one square in size.
@@ -67,7 +67,7 @@ pub(crate) struct Floor {
     pub(crate) y: f32,
     pub(crate) cell: CellId,
     /// True if an open leaf may stand there.
-    is_swung: bool,
+    pub(super) is_swung: bool,
     /// True if it is closer to a drop than the walker's radius, at a portal: to step on only where a joint leads over the drop.
     pub(crate) is_edge: bool,
     /// The floors beside it: to +x, +z, −x, −z.
@@ -510,7 +510,7 @@ fn grounds(spans: &[Span], height: f32) -> Vec<Ground> {
     .collect()
 }
 
-fn first_of(squares: &Squares, floors: impl Iterator<Item = u32>) -> Vec<u32> {
+pub(super) fn first_of(squares: &Squares, floors: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut first = vec![0; squares.n[0] * squares.n[1] + 1];
     for square in floors {
         first[square as usize + 1] += 1;

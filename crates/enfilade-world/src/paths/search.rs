@@ -22,6 +22,7 @@ use enfilade_geom::DVec3;
 
 use crate::layout::{Exit, Layout};
 use crate::paths::sampling::{Sampling, sample};
+use crate::paths::sequences::{End, Limit};
 
 /// The graph of a search: crossings, and the lengths between them within each cell. Made once, read by all searches.
 #[derive(Clone, Debug)]
@@ -250,6 +251,8 @@ pub struct LengthSearch {
     reached: Vec<PassedPortal>,
     cells: Vec<(CellId, f64)>,
     start: Option<(CellId, DVec3)>,
+    /// All up to this length is found.
+    radius: f64,
 }
 
 impl LengthSearch {
@@ -306,11 +309,23 @@ impl LengthSearch {
                 self.relax(ways.node(k, exit.to), START, length, exit);
             }
         }
-        while let Some(Reverse((bits, node))) = self.heap.pop() {
+        self.run_on(ways, radius, pass);
+    }
+
+    /// Goes on with a search, up to a larger radius. `pass` must be that of before.
+    pub(crate) fn run_on(
+        &mut self,
+        ways: &Ways,
+        radius: f64,
+        mut pass: impl FnMut(Exit) -> Option<f64>,
+    ) {
+        self.radius = radius;
+        while let Some(Reverse((bits, node))) = self.heap.peek().copied() {
             let length = f64::from_bits(bits);
             if length > radius {
                 break;
             }
+            self.heap.pop();
             let label = &mut self.labels[node as usize];
             if label.is_settled {
                 continue;
@@ -331,6 +346,37 @@ impl LengthSearch {
                     self.relax(ways.node(k, exit.to), node, length + leg + toll, exit);
                 }
             }
+        }
+    }
+
+    /// Goes on with a search until all within the limit of lengths around the shortest path to an end is found. `direct` is the
+    /// length from the start, if that is in the same cell; `pass` must be that of before.
+    pub(crate) fn reach(
+        &mut self,
+        ways: &Ways,
+        end: End<'_>,
+        direct: f64,
+        limit: Limit,
+        mut pass: impl FnMut(Exit) -> Option<f64>,
+    ) {
+        loop {
+            let mut least = direct;
+            for exit in ways.exits_of(end.cell) {
+                let last = &end.lengths[ways.places(exit.portal, end.cell)];
+                for (k, last) in ways.range(exit.portal).zip(last) {
+                    least = least.min(self.label(ways.node(k, end.cell)) + last);
+                }
+            }
+            let most = least * limit.longest[0] + limit.longest[1];
+            if self.radius >= most || self.heap.is_empty() {
+                return;
+            }
+            let radius = if most < f64::INFINITY {
+                most
+            } else {
+                2.0 * self.radius
+            };
+            self.run_on(ways, radius, &mut pass);
         }
     }
 

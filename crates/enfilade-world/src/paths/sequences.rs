@@ -55,7 +55,6 @@ pub(crate) struct Sequences {
     heap: BinaryHeap<Reverse<(u64, u32)>>,
     found: Vec<u32>,
     least: f64,
-    reach: f64,
 }
 
 impl Sequences {
@@ -73,7 +72,7 @@ impl Sequences {
         self.lengths.clear();
         self.heap.clear();
         self.found.clear();
-        (self.least, self.reach) = (f64::INFINITY, f64::INFINITY);
+        self.least = f64::INFINITY;
         let mut most = f64::INFINITY;
         if start.cell == end.cell {
             self.complete(NONE, direct, end.at);
@@ -81,11 +80,9 @@ impl Sequences {
         self.extend(search, ways, (end.cell, end), NONE, most);
         for _ in 0..limit.steps {
             let Some(Reverse((bits, at))) = self.heap.pop() else {
-                self.reach = most;
                 break;
             };
             let length = f64::from_bits(bits);
-            self.reach = length.min(most);
             if length > most {
                 break;
             }
@@ -118,11 +115,6 @@ impl Sequences {
     /// Returns the length of the shortest sequence.
     pub(crate) fn least(&self) -> f64 {
         self.least
-    }
-
-    /// Returns the length up to which all sequences were found: the limit of lengths, unless another ended the enumeration.
-    pub(crate) fn reach(&self) -> f64 {
-        self.reach
     }
 
     fn complete(&mut self, before: u32, length: f64, point: DVec3) {
@@ -226,12 +218,10 @@ impl Sequences {
     }
 
     /// Returns the portals of a sequence from the start to the end, each with a point near the crossing.
-    pub(crate) fn portals(&self, found: usize) -> impl Iterator<Item = (PortalId, DVec3)> {
-        let mut at = self.partials[self.found[found] as usize].before;
-        std::iter::from_fn(move || {
-            let partial = self.partials.get(at as usize)?;
-            at = partial.before;
-            Some((partial.last?.0, partial.point))
-        })
+    pub(crate) fn portals(&self, found: usize) -> impl Iterator<Item = (PortalId, DVec3)> + Clone {
+        let of = |at: u32| self.partials.get(at as usize);
+        let first = of(self.partials[self.found[found] as usize].before);
+        std::iter::successors(first, move |partial| of(partial.before))
+            .map_while(|partial| Some((partial.last?.0, partial.point)))
     }
 }

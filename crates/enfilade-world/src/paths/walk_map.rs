@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use enfilade_cpg::{CellId, FittingPart, PortalId};
+use enfilade_cpg::{CellId, FittingPart, PortalId, World};
 use enfilade_geom::DVec3;
 use enfilade_runtime::DetailId;
 
@@ -79,6 +79,20 @@ impl WalkMap {
         }
     }
 
+    /// Makes the maps of all parts but the root.
+    pub(super) fn around(
+        root: PartMap,
+        space: &Space,
+        walker: Agent,
+        mut counts: impl FnMut(PartId, DetailId) -> bool,
+    ) -> Self {
+        let others = (1..space.n_parts() as u32).map(PartId);
+        let others = others.map(|p| Arc::new(PartMap::new(space, p, walker, |d| counts(p, d))));
+        Self {
+            parts: Arc::new(std::iter::once(Arc::new(root)).chain(others).collect()),
+        }
+    }
+
     /// Returns the floors of a part.
     ///
     /// # Panics
@@ -115,6 +129,18 @@ impl WalkMap {
     }
 }
 
+/// Returns per object whether it stops walkers: if it counts, and is no leaf that moves.
+pub(super) fn stops_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> Vec<bool> {
+    let n = world.details.len() as u32;
+    let mut stops: Vec<bool> = (0..n).map(|i| counts(DetailId(i))).collect();
+    for fitting in world.graph.portals.iter().flat_map(|p| &p.fittings) {
+        if fitting.part == FittingPart::Leaf && fitting.motion.is_some() {
+            stops[fitting.detail as usize] = false;
+        }
+    }
+    stops
+}
+
 impl PartMap {
     fn new(
         space: &Space,
@@ -124,14 +150,10 @@ impl PartMap {
     ) -> Self {
         let (layout, world) = (space.layout(part), space.world(part));
         let n = world.details.len() as u32;
-        let mut stops: Vec<bool> = (0..n).map(|i| counts(DetailId(i))).collect();
+        let counted: Vec<bool> = (0..n).map(|i| counts(DetailId(i))).collect();
+        let stops = stops_of(world, |d| counted[d.0 as usize]);
         let border = space.parts[part.idx()].border;
-        let floors = Floors::new((layout, border), world, walker, |d| stops[d.0 as usize]);
-        for fitting in world.graph.portals.iter().flat_map(|p| &p.fittings) {
-            if fitting.part == FittingPart::Leaf && fitting.motion.is_some() {
-                stops[fitting.detail as usize] = false;
-            }
-        }
+        let floors = Floors::new((layout, border), world, walker, |d| counted[d.0 as usize]);
         let mut chosen: Vec<(PortalId, [u32; 2])> = Vec::new();
         let mut by_portal: Vec<(PortalId, u32, u32)> = Vec::new();
         for c in floors.crossings().iter().filter(|c| c.direction < 2) {

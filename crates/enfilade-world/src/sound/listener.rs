@@ -4,31 +4,44 @@ use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 use enfilade_runtime::SightState;
 
-use crate::layout::Layout;
+use crate::layout::{Exit, Layout};
 use crate::paths::{Corner, End, LengthSearch, Limit, Seen, Sequences};
-use crate::sound::route::{Gate, Puller, Route, Spot};
+use crate::sound::route::{Puller, Route, Spot};
 use crate::sound::{Acoustics, Heard, N_BANDS};
 
-/// Sequences of a source that are heard. Longer ones by half, and by 5 m, count, as these are mostly more than 10 dB down in rooms;
-/// 24 are more than the doors of most corridors.
+/// Level below which nothing is heard, relative to that at one meter in the open: sources of 100 dB there, as loud as power tools,
+/// are at the threshold of hearing (ISO 389-7). [Units: dB]
+const FAINTEST: f64 = -100.0;
+/// Share of the energy of the loudest sequence at which others have faded to nothing: all of them together are 0.1 dB at most.
+const LEAST: f64 = 1e-3;
+/// Greatest rise of a level on the way of a listener or source, ten times what it is mostly: how far a source that is fainter
+/// must at least come before it can be heard. [Units: dB/wu]
+const STEEPEST: f64 = 100.0;
+/// Longest step that counts as one along a way; a longer one may lead anywhere. [Units: wu]
+const STRIDE: f64 = 1.0;
+/// Sequences of a source that are heard: 24 are more than the doors of most corridors.
+const N_HEARD: usize = 24;
+/// Those found, as lengths through sample points are a few percent too long, and change until the next search.
 const HEARD: Limit = Limit {
-    n: 24,
-    // A little more than fades to nothing, as lengths through sample points are a few percent too long.
-    longest: [1.55, 5.5],
+    n: N_HEARD + 8,
+    longest: [1.0 + FADED[0] + 0.1, FADED[1] + 1.5],
     steps: 1500,
 };
-/// Length beyond that of the best at which sequences have faded out: as a share of the best, and added. [Units: 1, wu]
-const FADED: [f64; 2] = [0.5, 5.0];
+/// Length beyond that of the best at which sequences have faded out: as a share of the best, and added. These are mostly more than
+/// 10 dB down in rooms. [Units: 1, wu]
+const FADED: [f64; 2] = [0.25, 3.0];
 /// Sequences of a source that may be the shortest, as lengths through sample points are a few percent too long.
 const SHORT: Limit = Limit {
     n: 6,
-    longest: [1.1, 0.5],
+    longest: [1.1, 1.0],
     steps: 400,
 };
-/// Share of the energy below which a sequence is dropped until the next search: 24 of them are 0.1 dB at most.
-const LEAST: f64 = 1e-3;
-/// A listener or source that has moved by less keeps its sequences. [Units: wu]
+/// Sequences are kept until lengths to some places may have changed by as much. [Units: wu]
 const KEPT: f64 = 0.25;
+/// The same for tolls of doors away from the listener, all together. [Units: wu]
+const SWUNG: f64 = 0.5;
+/// Length up to which openings are searched at first. [Units: wu]
+const FIRST_REACH: f64 = 24.0;
 /// Distance from an opening within which its toll fades to nothing, so that it does not matter on which side of it one is.
 /// [Units: wu]
 const NEAR: f64 = 2.0;
@@ -41,62 +54,69 @@ struct Source {
     /// The search that found the routes.
     search: u64,
     place: Option<Spot>,
+    /// The call of [`Listener::listen`] in which they were found, and the length of the best one.
+    time: u64,
+    best: f64,
     /// From the source to the points of its cell, where it was when these were found.
     lengths: Vec<f64>,
     measured: Option<(CellId, DVec3)>,
     /// The first `n_routes` count.
     routes: Vec<Route>,
     n_routes: usize,
-    /// Length beyond that of the best at which sequences have faded out. [Units: wu]
-    cut: f64,
+    /// Too faint, from here, until [`Listener::risen`] has reached a value.
+    quiet: Option<(Spot, f64)>,
 }
 
 impl Source {
     fn routes(&self) -> impl Iterator<Item = &Route> {
-        self.routes[..self.n_routes]
-            .iter()
-            .filter(|r| !r.is_dropped)
+        self.routes[..self.n_routes].iter()
     }
 
     fn routes_mut(&mut self) -> impl Iterator<Item = &mut Route> {
-        let routes = self.routes[..self.n_routes].iter_mut();
-        routes.filter(|r| !r.is_dropped)
+        self.routes[..self.n_routes].iter_mut()
     }
 
-    /// Drops sequences that need not be pulled again until the next search.
-    fn drop_faint(&mut self, least: f64) {
-        let lengths = self.routes().map(|r| r.length);
-        let shortest = lengths.fold(f64::INFINITY, f64::min);
-        for r in self.routes_mut() {
-            r.is_dropped = if r.is_heard {
-                r.loudness < least
-            } else {
-                r.length > shortest + KEPT
-            };
+    /// Adds a sequence, with its string if it is known, but not to measure it alone if it is heard. The routes of before are
+    /// those from `n_routes` to `n_known`.
+    fn add_route(
+        &mut self,
+        n_known: &mut usize,
+        is_heard: bool,
+        portals: impl Iterator<Item = (PortalId, DVec3)> + Clone,
+    ) {
+        let own = portals.clone().map(|p| p.0);
+        if !is_heard && self.routes().any(|r| r.portals().eq(own.clone())) {
+            return;
         }
-    }
-
-    fn add_route(&mut self, is_heard: bool, portals: impl Iterator<Item = (PortalId, DVec3)>) {
-        if self.routes.len() == self.n_routes {
-            self.routes.push(Route::default());
+        let mut known = self.routes[self.n_routes..*n_known].iter();
+        if let Some(i) = known.position(|r| r.portals().eq(own.clone())) {
+            self.routes.swap(self.n_routes, self.n_routes + i);
+            self.routes[self.n_routes].is_heard = is_heard;
+        } else {
+            if self.routes.len() == HEARD.n + SHORT.n {
+                // The last of before gives up its room.
+                *n_known -= usize::from(self.routes.len() == *n_known);
+            } else if self.routes.len() == *n_known {
+                self.routes.push(Route::default());
+            }
+            self.routes.swap(self.n_routes, *n_known);
+            *n_known += 1;
+            self.routes[self.n_routes].begin(is_heard, portals);
         }
-        let route = &mut self.routes[self.n_routes];
         self.n_routes += 1;
-        route.reset(is_heard);
-        for (portal, point) in portals {
-            route.gates.push(Gate::Portal(portal));
-            route.points.push(point);
-        }
     }
 }
 
 /// A pair of ears, with reusable buffers: allocates nothing once they have grown.
 ///
-/// Searches sequences again when the listener enters a cell or has moved by a quarter of a meter, and when doors moved; pulls
-/// strings at each query. What it hears differs from what a new listener hears by 0.3 dB, 1° and a millimeter at most in offices.
+/// Searches sequences again when the listener enters a cell or has moved by a quarter of a meter, and when doors moved; finds
+/// more than count, so that it hears what a new listener hears. A string that is too long to matter is not pulled until it may
+/// have become shorter, and a source that is too faint to be heard is not asked until it may have become louder.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     search: LengthSearch,
+    /// `true` if that is to be done again.
+    is_stale: bool,
     /// The search without regard to shut doors.
     shortest: LengthSearch,
     n_searches: u64,
@@ -104,13 +124,21 @@ pub struct Listener {
     searched: Option<(CellId, DVec3)>,
     /// From there to the points of its cell.
     lengths: Vec<f64>,
-    at: DVec3,
+    here: Option<Spot>,
     open: Vec<f64>,
-    /// Per portal, the length that it adds when sequences are compared: far from it, and from here.
+    /// Per portal, the length that it adds when sequences are compared: far from it, from here, and at the last search.
     tolls: Vec<f64>,
     near_tolls: Vec<f64>,
+    searched_tolls: Vec<f64>,
+    /// Number of calls of [`Listener::listen`].
+    time: u64,
+    /// Doors that moved after the listener's last search, with the time when they did.
+    moved: Vec<(PortalId, u64)>,
+    /// How much louder any source may have become since the first position. [Units: dB]
+    risen: f64,
     sources: Vec<Source>,
     sequences: Sequences,
+    totals: Vec<f64>,
     puller: Puller,
     seen: Seen,
     bends: Vec<Corner>,
@@ -129,41 +157,95 @@ impl Listener {
     ///
     /// If there is no such cell.
     pub fn listen(&mut self, acoustics: &Acoustics, state: &SightState, cell: CellId, at: DVec3) {
-        self.at = at;
+        let before = self.here.replace(Spot { cell, at }).filter(|b| {
+            let mut exits = acoustics.ways.exits_of(b.cell).iter();
+            b.at.distance(at) < STRIDE && (cell == b.cell || exits.any(|e| e.to == cell))
+        });
+        match before {
+            Some(before) => self.risen += STEEPEST * before.at.distance(at),
+            None => self.sources.iter_mut().for_each(|s| s.quiet = None),
+        }
         let n = acoustics.shut.len();
-        let mut is_same = self.open.len() == n;
+        for list in [&mut self.tolls, &mut self.near_tolls] {
+            list.resize(n, 0.0);
+        }
         self.open.resize(n, f64::NAN);
-        self.tolls.resize(n, 0.0);
-        self.near_tolls.resize(n, 0.0);
+        self.searched_tolls.resize(n, f64::INFINITY);
+        self.time += 1;
+        let mut swung = 0.0;
+        let mut moved = self.searched.map_or(f64::INFINITY, |s| s.1.distance(at));
         for i in 0..n {
             let portal = PortalId(i as u32);
             let open = acoustics.open_share(state, portal);
             if self.open[i] != open {
-                is_same = false;
+                self.risen += acoustics.rise(portal, self.open[i], open);
                 self.open[i] = open;
                 self.tolls[i] = acoustics.toll(state, portal);
             }
             let square = acoustics.bounds[i].distance_squared(at);
             let share = (square / (NEAR * NEAR)).min(1.0).sqrt();
             self.near_tolls[i] = share * self.tolls[i];
+            let change = (self.near_tolls[i] - self.searched_tolls[i]).abs();
+            if share < 1.0 {
+                moved += change;
+            } else {
+                swung += change;
+            }
         }
-        let is_near = |(c, p): (CellId, DVec3)| c == cell && p.distance(at) < KEPT;
-        if is_same && self.searched.is_some_and(is_near) {
+        if swung > SWUNG {
+            self.note_swung();
+        }
+        if moved < KEPT && self.searched.is_some_and(|s| s.0 == cell) {
             return;
         }
         self.searched = Some((cell, at));
+        self.searched_tolls.clone_from(&self.near_tolls);
+        self.moved.clear();
+        self.is_stale = true;
         self.n_searches += 1;
         let ways = &acoustics.ways;
         lengths_from(acoustics, cell, at, &mut self.lengths);
         let lengths = &self.lengths;
         let first = |place: usize, _| lengths[place];
-        let tolls = &self.near_tolls;
-        self.search
-            .run_from(ways, cell, at, first, f64::INFINITY, |exit| {
-                Some(tolls[exit.portal.idx()])
-            });
         self.shortest
-            .run_from(ways, cell, at, first, f64::INFINITY, |_| Some(0.0));
+            .run_from(ways, cell, at, first, FIRST_REACH, |_| Some(0.0));
+    }
+
+    /// Notes which doors have moved, for the sources that may be heard through these.
+    fn note_swung(&mut self) {
+        let tolls = self.searched_tolls.iter_mut().zip(&self.near_tolls);
+        for (i, (searched, toll)) in tolls.enumerate().filter(|(_, (a, b))| a != b) {
+            *searched = *toll;
+            let portal = PortalId(i as u32);
+            match self.moved.iter_mut().find(|m| m.0 == portal) {
+                Some(known) => known.1 = self.time,
+                None => self.moved.push((portal, self.time)),
+            }
+        }
+        self.is_stale = true;
+    }
+
+    /// Searches anew if doors have moved.
+    fn search(&mut self, acoustics: &Acoustics) {
+        if let Some((cell, at)) = self.searched.filter(|_| self.is_stale) {
+            self.is_stale = false;
+            let (lengths, tolls) = (&self.lengths, &self.searched_tolls);
+            let first = |place: usize, _| lengths[place];
+            let pass = |exit: Exit| Some(tolls[exit.portal.idx()]);
+            (self.search).run_from(&acoustics.ways, cell, at, first, FIRST_REACH, pass);
+        }
+    }
+
+    /// Returns `true` if a door that has moved since a source's sequences were found may have changed which ones they are.
+    fn is_changed(&self, acoustics: &Acoustics, source: &Source, ends: [Spot; 2]) -> bool {
+        let most = source.best * HEARD.longest[0] + HEARD.longest[1];
+        let moved = self.moved.iter().filter(|m| m.1 > source.time);
+        let mut lengths = moved.map(|(portal, _)| {
+            let bounds = &acoustics.bounds[portal.idx()];
+            let squares = ends.map(|e| bounds.distance_squared(e.at));
+            squares[0].sqrt() + squares[1].sqrt()
+        });
+        lengths.any(|length| length < most)
     }
 
     /// Returns the number of searches of sequences, for cost statistics.
@@ -173,7 +255,7 @@ impl Listener {
     }
 
     /// Returns a source in `cell` as heard. `id` numbers sources from 0, without large gaps. `None` before the first
-    /// [`Listener::listen`], and if no path exists. [Units: wu]
+    /// [`Listener::listen`], if no path exists, and if it is fainter than 100 dB below its level at a meter. [Units: wu]
     ///
     /// # Panics
     ///
@@ -186,38 +268,74 @@ impl Listener {
         cell: CellId,
         at: DVec3,
     ) -> Option<Heard> {
-        let here = Spot {
-            cell: self.searched?.0,
-            at: self.at,
-        };
         let there = Spot { cell, at };
+        if let Some(Some((spot, until))) = self.sources.get(id).map(|s| s.quiet) {
+            let come = STEEPEST * spot.at.distance(at);
+            if spot.cell == cell && self.risen + come < until {
+                return None;
+            }
+        }
+        let ends = self.choose_routes(acoustics, id, there)?;
+        self.pull_heard(acoustics, layout, id, ends);
+        let energy = self.sum_up(acoustics, layout, id, ends);
+        let level = energy.map_or(f64::NEG_INFINITY, |h| 20.0 * h.gain.log10());
+        let source = &mut self.sources[id];
+        if level < FAINTEST {
+            source.quiet = Some((there, self.risen + (FAINTEST - level)));
+            return None;
+        }
+        source.quiet = None;
+        let (length, nearest) = self.pull_shortest(acoustics, layout, id, ends)?;
+        let heard = energy?;
+        Some(Heard {
+            length,
+            nearest,
+            direction: heard.direction.normalize_or(nearest),
+            ..heard
+        })
+    }
+
+    /// Returns the length of the shortest path from a source, and the unit vector towards its last bend, zero if the source is at
+    /// the listener. As in [`Heard`], but also for sources that are too faint to be heard. [Units: wu]
+    ///
+    /// # Panics
+    ///
+    /// If there is no such cell.
+    pub fn shortest(
+        &mut self,
+        acoustics: &Acoustics,
+        layout: &Layout,
+        id: usize,
+        cell: CellId,
+        at: DVec3,
+    ) -> Option<(f64, DVec3)> {
+        let ends = self.choose_routes(acoustics, id, Spot { cell, at })?;
+        self.pull_shortest(acoustics, layout, id, ends)
+    }
+
+    /// Finds the sequences of a source, unless they are kept. Returns both ends.
+    fn choose_routes(
+        &mut self,
+        acoustics: &Acoustics,
+        id: usize,
+        there: Spot,
+    ) -> Option<[Spot; 2]> {
+        let (cell, at) = self.searched?;
+        let ends = [self.here?, there];
         if self.sources.len() <= id {
             self.sources.resize_with(id + 1, Source::default);
         }
-        let source = &self.sources[id];
-        let is_near = |p: Spot| p.cell == cell && p.at.distance(at) < KEPT;
-        let is_kept = source.search == self.n_searches && source.place.is_some_and(is_near);
-        if !is_kept {
-            self.choose_routes(acoustics, id, there);
-        }
         let source = &mut self.sources[id];
-        for route in source.routes_mut() {
-            self.puller.pull(acoustics, layout, [here, there], route);
+        let is_near = |p: Spot| p.cell == there.cell && p.at.distance(there.at) < KEPT;
+        if source.search == self.n_searches && source.place.is_some_and(is_near) {
+            let source = &self.sources[id];
+            if !self.is_changed(acoustics, source, ends) {
+                return Some(ends);
+            }
         }
-        let heard = self.sum_up(acoustics, layout, id, [here, there]);
-        if !is_kept {
-            let loudest = heard.map_or(0.0, |h| h.gain * h.gain) * N_BANDS as f64;
-            self.sources[id].drop_faint(LEAST * loudest);
-        }
-        heard
-    }
-
-    fn choose_routes(&mut self, acoustics: &Acoustics, id: usize, there: Spot) {
-        let Some((cell, at)) = self.searched else {
-            return;
-        };
+        self.search(acoustics);
+        let source = &mut self.sources[id];
         let (ways, geodesics) = (&acoustics.ways, &acoustics.geodesics);
-        let source = &mut self.sources[id];
         if source.measured != Some((there.cell, there.at)) {
             source.measured = Some((there.cell, there.at));
             lengths_from(acoustics, there.cell, there.at, &mut source.lengths);
@@ -227,31 +345,84 @@ impl Listener {
             let found = geodesics.way_with(cell, [at, there.at], &mut self.seen, &mut self.bends);
             direct = found.unwrap_or(f64::INFINITY);
         }
-        (source.search, source.place) = (self.n_searches, Some(there));
-        source.n_routes = 0;
-        for (search, limit, is_heard) in
-            [(&self.search, HEARD, true), (&self.shortest, SHORT, false)]
-        {
-            let start = End {
-                cell,
-                at,
-                lengths: &self.lengths,
-            };
-            let end = End {
-                cell: there.cell,
-                at: there.at,
-                lengths: &source.lengths,
-            };
+        (source.search, source.place, source.time) = (self.n_searches, Some(there), self.time);
+        let mut n_known = std::mem::take(&mut source.n_routes);
+        let tolls = &self.searched_tolls;
+        for (search, limit, is_heard) in [
+            (&mut self.search, HEARD, true),
+            (&mut self.shortest, SHORT, false),
+        ] {
+            let [start, end] = [
+                (ends[0].cell, at, &self.lengths),
+                (there.cell, there.at, &source.lengths),
+            ]
+            .map(|(cell, at, lengths)| End { cell, at, lengths });
+            search.reach(ways, end, direct, limit, |exit| {
+                Some(if is_heard {
+                    tolls[exit.portal.idx()]
+                } else {
+                    0.0
+                })
+            });
             let n = (self.sequences).find(search, ways, [start, end], direct, limit);
-            for found in 0..n {
-                source.add_route(is_heard, self.sequences.portals(found));
-            }
             if is_heard {
-                source.cut = self.sequences.reach() - self.sequences.least();
+                source.best = self.sequences.least();
+            }
+            for found in 0..n {
+                source.add_route(&mut n_known, is_heard, self.sequences.portals(found));
+            }
+        }
+        Some(ends)
+    }
+
+    /// Pulls the strings that may be heard.
+    fn pull_heard(&mut self, acoustics: &Acoustics, layout: &Layout, id: usize, ends: [Spot; 2]) {
+        let source = &mut self.sources[id];
+        let routes = &mut source.routes[..source.n_routes];
+        let n_heard = routes.iter().filter(|r| r.is_heard).count();
+        // What was the best comes first, so that others need not be pulled.
+        let known = |r: &Route| r.bounds(ends).1 + r.toll(&self.near_tolls);
+        let mut most =
+            (routes.iter().filter(|r| r.is_heard).map(known)).fold(f64::INFINITY, f64::min);
+        for is_first in [true, false] {
+            for route in routes.iter_mut().filter(|r| r.is_heard) {
+                let toll = route.toll(&self.near_tolls);
+                let low = route.bounds(ends).0 + toll;
+                let longest = if is_first || n_heard <= N_HEARD && route.quiet > self.risen {
+                    most
+                } else {
+                    (1.0 + FADED[0]) * most + FADED[1]
+                };
+                if low <= longest {
+                    self.puller.pull(acoustics, layout, ends, route);
+                    most = most.min(route.length + toll);
+                }
             }
         }
     }
 
+    fn pull_shortest(
+        &mut self,
+        acoustics: &Acoustics,
+        layout: &Layout,
+        id: usize,
+        ends: [Spot; 2],
+    ) -> Option<(f64, DVec3)> {
+        let source = &mut self.sources[id];
+        let mut best = None;
+        for route in &mut source.routes[..source.n_routes] {
+            let least = best.map_or(f64::INFINITY, |b: (f64, DVec3)| b.0);
+            if route.bounds(ends).0 < least {
+                self.puller.pull(acoustics, layout, ends, route);
+                if route.length < least {
+                    best = Some((route.length, route.toward));
+                }
+            }
+        }
+        best
+    }
+
+    /// Adds up what is heard along the sequences of a source.
     fn sum_up(
         &mut self,
         acoustics: &Acoustics,
@@ -261,40 +432,57 @@ impl Listener {
     ) -> Option<Heard> {
         let source = &mut self.sources[id];
         let tolls = &self.near_tolls;
-        let total = |route: &Route| {
-            let own = route.portals().map(|p| tolls[p.idx()]);
-            route.length + own.sum::<f64>()
-        };
-        let shortest = (source.routes()).min_by(|a, b| a.length.total_cmp(&b.length))?;
-        let mut heard = Heard {
-            length: shortest.length,
-            nearest: shortest.toward,
-            ..Heard::default()
-        };
-        let best = (source.routes().filter(|r| r.is_heard))
-            .map(total)
-            .fold(f64::INFINITY, f64::min);
-        let cut = source.cut.min(FADED[0] * best + FADED[1]);
-        let mut energy = [0.0; N_BANDS];
-        for route in source.routes_mut().filter(|r| r.is_heard) {
+        let is_pulled = |r: &Route| r.is_heard && r.is_pulled_for(ends);
+        self.totals.clear();
+        let totals = source.routes().filter(|r| is_pulled(r));
+        self.totals.extend(totals.map(|r| r.length + r.toll(tolls)));
+        let totals = &mut self.totals;
+        let best = totals.iter().copied().reduce(f64::min)?;
+        let mut cut = FADED[0] * best + FADED[1];
+        if totals.len() > N_HEARD {
+            // The first that is not counted ends the fading.
+            let (_, next, _) = totals.select_nth_unstable_by(N_HEARD, f64::total_cmp);
+            cut = cut.min(*next - best);
+        }
+        // What is too faint in any case is not evaluated.
+        let mut loudest: f64 = 0.0;
+        for route in source.routes_mut().filter(|r| is_pulled(r)) {
+            let total = route.length + route.toll(tolls);
             // A tie of more sequences than are counted has no room to fade.
             let fade = if cut > 0.0 {
-                ((best + cut - total(route)) / cut).clamp(0.0, 1.0)
+                ((best + cut - total) / cut).clamp(0.0, 1.0)
             } else {
                 1.0
             };
-            route.loudness = 0.0;
-            if fade > 0.0 {
-                let gains = (self.puller).energy(acoustics, layout, ends, &self.open, route);
-                for (sum, gain) in energy.iter_mut().zip(gains) {
-                    *sum += fade * gain;
-                    route.loudness += fade * gain;
-                }
+            route.fade = fade;
+            if fade > 0.0 && route.quiet <= self.risen {
+                route.energy = (self.puller).energy(acoustics, layout, ends, &self.open, route);
+                loudest = loudest.max(fade * route.energy.iter().sum::<f64>());
             }
-            heard.direction += route.arrival * route.loudness;
+        }
+        let mut heard = Heard::default();
+        let mut energy = [0.0; N_BANDS];
+        for route in source.routes_mut().filter(|r| is_pulled(r)) {
+            if route.fade == 0.0 || route.quiet > self.risen {
+                continue;
+            }
+            let loudness = route.energy.iter().sum::<f64>();
+            let excess = route.fade * loudness - LEAST * loudest;
+            if loudness < LEAST * loudest {
+                // Both may change.
+                let faint = 10.0 * (LEAST * loudest / loudness).log10();
+                route.quiet = self.risen + 0.5 * faint;
+            }
+            if excess <= 0.0 {
+                continue;
+            }
+            let share = excess / loudness;
+            for (sum, gain) in energy.iter_mut().zip(route.energy) {
+                *sum += share * gain;
+            }
+            heard.direction += route.arrival * excess;
             heard.n_ways += 1;
         }
-        heard.direction = heard.direction.normalize_or(heard.nearest);
         heard.gain = (energy.iter().sum::<f64>() / N_BANDS as f64).sqrt();
         heard.bands = energy.map(f64::sqrt);
         Some(heard)

@@ -37,12 +37,16 @@ pub(super) fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec
         let (place, axis) = best_on_edge(a, b, from, to);
         return (place, [axis, DVec3::ZERO]);
     }
-    let normal = area_normal(corners).normalize_or_zero();
+    let normal = area_normal(corners);
     let Some(&first) = corners.first() else {
         return (a, [DVec3::ZERO; 2]);
     };
-    // As if `b` were on the other side: distances to points of the plane are the same.
-    let (h_a, h_b) = (normal.dot(a - first), normal.dot(b - first));
+    // As if `b` were on the other side: distances to points of the plane are the same. Heights by the length of the normal.
+    let square = normal.length_squared().max(1e-300);
+    let (h_a, h_b) = (
+        normal.dot(a - first) / square,
+        normal.dot(b - first) / square,
+    );
     let (p, q) = (a - normal * h_a, b - normal * h_b);
     let (h_a, h_b) = (h_a.abs(), h_b.abs());
     let through = if h_a + h_b > 0.0 {
@@ -69,7 +73,7 @@ pub(super) fn best_place(a: DVec3, b: DVec3, corners: &[DVec3]) -> (DVec3, [DVec
         }
     }
     if is_inside {
-        let (u, v) = normal.any_orthonormal_pair();
+        let (u, v) = normal.normalize_or_zero().any_orthonormal_pair();
         return (through, [u, v]);
     }
     best
@@ -105,13 +109,14 @@ pub(super) fn room(at: DVec3, step: DVec3, corners: &[DVec3]) -> f64 {
         let end = if step.dot(to - from) > 0.0 { to } else { from };
         return (end.distance(at) / step.length().max(1e-300)).min(1.0);
     }
-    let normal = area_normal(corners).normalize_or_zero();
+    let normal = area_normal(corners);
     let mut share: f64 = 1.0;
     for (from, to) in edges(corners) {
-        let inward = normal.cross(to - from).normalize_or_zero();
+        let inward = normal.cross(to - from);
         let (depth, toward) = (inward.dot(at - from), -inward.dot(step));
         // Along the edge at which it is caught, rounding does not count as motion.
-        if toward > 1e-12 * step.length() && toward * share > depth {
+        let least = 1e-24 * step.length_squared() * inward.length_squared();
+        if toward > 0.0 && toward * toward > least && toward * share > depth {
             share = (depth / toward).max(0.0);
         }
     }

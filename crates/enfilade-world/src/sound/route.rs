@@ -6,7 +6,7 @@ use enfilade_geom::DVec3;
 use crate::layout::Layout;
 use crate::paths::{Corner, Seen, into_cell};
 use crate::sound::edge::{
-    arrival_direction, bend_loss, detour, edge_loss, straight_end, through_area, wall_share,
+    arrival_direction, bend_loss, detour, straight_end, through_area, wall_share,
 };
 use crate::sound::reverb::SPEED_OF_SOUND;
 use crate::sound::taut::TautString;
@@ -35,26 +35,64 @@ pub(super) struct Route {
     pub(super) gates: Vec<Gate>,
     /// A point in each gate.
     pub(super) points: Vec<DVec3>,
+    /// A point in each portal, of the string without bends.
+    plain: Vec<DVec3>,
     pub(super) length: f64,
     /// Towards its first bend.
     pub(super) toward: DVec3,
     /// The direction in which it is heard.
     pub(super) arrival: DVec3,
-    /// Energy when last heard, the sum over the bands.
-    pub(super) loudness: f64,
+    /// Energy when last heard, by octave band, and the share of it that counts.
+    pub(super) energy: [f64; N_BANDS],
+    pub(super) fade: f64,
+    /// Too faint until all may have risen by as much, in decibels since the first position of the listener.
+    pub(super) quiet: f64,
     /// `false` if it is only measured.
     pub(super) is_heard: bool,
-    /// `true` if it does not matter until the next search.
-    pub(super) is_dropped: bool,
+    /// The ends between which it was last pulled.
+    pulled: Option<[DVec3; 2]>,
 }
 
 impl Route {
-    /// Empties it for another sequence.
-    pub(super) fn reset(&mut self, is_heard: bool) {
+    /// Makes it another sequence: portals, each with a point near the crossing.
+    pub(super) fn begin(
+        &mut self,
+        is_heard: bool,
+        portals: impl Iterator<Item = (PortalId, DVec3)>,
+    ) {
         self.gates.clear();
         self.points.clear();
-        (self.length, self.loudness) = (0.0, 0.0);
-        (self.is_heard, self.is_dropped) = (is_heard, false);
+        for (portal, point) in portals {
+            self.gates.push(Gate::Portal(portal));
+            self.points.push(point);
+        }
+        // Few sizes, as strings change places.
+        let room = self.points.len().next_power_of_two().max(32);
+        self.gates.reserve(room - self.points.len());
+        self.points.reserve(room - self.points.len());
+        self.plain.clear();
+        self.plain.reserve(room);
+        self.plain.extend_from_slice(&self.points);
+        (self.is_heard, self.pulled, self.quiet) = (is_heard, None, 0.0);
+    }
+
+    /// Returns `true` if its string is that between two ends.
+    pub(super) fn is_pulled_for(&self, ends: [Spot; 2]) -> bool {
+        self.pulled == Some(ends.map(|e| e.at))
+    }
+
+    /// Returns bounds of its length between two ends: the string is no longer than the last one, extended to these.
+    pub(super) fn bounds(&self, ends: [Spot; 2]) -> (f64, f64) {
+        let Some(pulled) = self.pulled else {
+            return (0.0, f64::INFINITY);
+        };
+        let moved = pulled[0].distance(ends[0].at) + pulled[1].distance(ends[1].at);
+        (self.length - moved, self.length + moved)
+    }
+
+    /// Returns the sum of its portals' tolls.
+    pub(super) fn toll(&self, tolls: &[f64]) -> f64 {
+        self.portals().map(|p| tolls[p.idx()]).sum()
     }
 
     /// Returns its portals.
@@ -81,7 +119,7 @@ pub(super) struct Puller {
 }
 
 impl Puller {
-    /// Pulls a route taut, starting from its last points.
+    /// Pulls a route taut.
     pub(super) fn pull(
         &mut self,
         acoustics: &Acoustics,
@@ -89,26 +127,37 @@ impl Puller {
         [from, to]: [Spot; 2],
         route: &mut Route,
     ) {
-        let mut is_pulled = false;
+        if route.is_pulled_for([from, to]) {
+            return;
+        }
+        route.pulled = Some([from.at, to.at]);
+        // First through the portals alone, where there is one shortest string, whatever was before: so is what follows.
+        route.gates.retain(|gate| matches!(gate, Gate::Portal(_)));
+        route.points.clone_from(&route.plain);
+        self.tighten(layout, [from, to], route);
+        route.plain.clone_from(&route.points);
         for _ in 0..ROUNDS {
-            let is_same = !self.bend(acoustics, layout, [from, to], route);
-            if is_same && is_pulled {
+            if !self.bend(acoustics, layout, [from, to], route) {
                 break;
             }
-            is_pulled = true;
-            let gates = &route.gates;
-            let pieces = |i: usize| match &gates[i] {
-                Gate::Portal(portal) => Pieces::Portal(layout.opening(*portal).pieces()),
-                Gate::Edge(edge) => Pieces::Edge(Some(edge)),
-            };
-            let start = route.points.iter().copied();
-            route.length = self.string.pull_from(from.at, to.at, start, pieces);
-            let points = self.string.points();
-            route.points.clear();
-            route.points.extend_from_slice(&points[1..points.len() - 1]);
+            self.tighten(layout, [from, to], route);
         }
         route.toward = self.string.departure();
         route.arrival = arrival_direction(self.string.points());
+    }
+
+    /// Pulls a route's string through its gates, starting from its points.
+    fn tighten(&mut self, layout: &Layout, [from, to]: [Spot; 2], route: &mut Route) {
+        let gates = &route.gates;
+        let pieces = |i: usize| match &gates[i] {
+            Gate::Portal(portal) => Pieces::Portal(layout.opening(*portal).pieces()),
+            Gate::Edge(edge) => Pieces::Edge(Some(edge)),
+        };
+        let start = route.points.iter().copied();
+        route.length = self.string.pull_from(from.at, to.at, start, pieces);
+        let points = self.string.points();
+        route.points.clear();
+        route.points.extend_from_slice(&points[1..points.len() - 1]);
     }
 
     /// Finds the bends around walls between the crossings of a route. Returns `true` if they are others than before.
@@ -154,8 +203,8 @@ impl Puller {
         if self.gates == route.gates {
             return false;
         }
-        std::mem::swap(&mut self.gates, &mut route.gates);
-        std::mem::swap(&mut self.points, &mut route.points);
+        route.gates.clone_from(&self.gates);
+        route.points.clone_from(&self.points);
         true
     }
 
@@ -170,30 +219,32 @@ impl Puller {
     ) -> [f64; N_BANDS] {
         self.set_crossings([from, to], route);
         let mut energy = [route.length.max(1.0).powi(-2); N_BANDS];
+        let mut losses = [0.0; N_BANDS];
         for &extra in self.extra.iter().filter(|extra| **extra > 0.0) {
-            for (energy, frequency) in energy.iter_mut().zip(OCTAVES) {
-                let loss = bend_loss(2.0 * extra * frequency / SPEED_OF_SOUND);
-                *energy *= 10f64.powf(-0.1 * loss);
+            for (loss, frequency) in losses.iter_mut().zip(OCTAVES) {
+                *loss += bend_loss(2.0 * extra * frequency / SPEED_OF_SOUND);
             }
         }
+        const LONGEST_WAVE: f64 = SPEED_OF_SOUND / OCTAVES[0];
         for (i, portal) in route.portals().enumerate() {
             let at = self.crossings[i + 1];
             let back = self.crossings[..=i].iter().rev().copied();
             let before = straight_end(at, back);
             let after = straight_end(at, self.crossings[i + 2..].iter().copied());
             let opening = layout.opening(portal);
-            let area = opening.area() * open[portal.idx()];
             let rims = acoustics.rims(portal);
-            let beside = wall_share(&opening, rims, before) * wall_share(&opening, rims, after);
-            let detour = detour(rims, before, at, after);
-            for (energy, frequency) in energy.iter_mut().zip(OCTAVES) {
-                let wave = SPEED_OF_SOUND / frequency;
+            let beside = || wall_share(&opening, rims, before) * wall_share(&opening, rims, after);
+            let fresnel = 2.0 * detour(rims, before, at, after) / LONGEST_WAVE;
+            (acoustics.edge_losses).add(fresnel, beside, &mut losses);
+            let area = opening.area() * open[portal.idx()];
+            let free = through_area(area, LONGEST_WAVE, before, at, after);
+            for (energy, free) in energy.iter_mut().zip(free) {
                 // Sound through the leaf passes its whole area.
-                let free = through_area(area, wave, before, at, after).powi(2);
-                let through = free + (1.0 - free) * acoustics.shut[portal.idx()];
-                let loss = beside * edge_loss(2.0 * detour / wave);
-                *energy *= through * 10f64.powf(-0.1 * loss);
+                *energy *= free + (1.0 - free) * acoustics.shut[portal.idx()];
             }
+        }
+        for (energy, loss) in energy.iter_mut().zip(losses) {
+            *energy *= 10f64.powf(-0.1 * loss);
         }
         energy
     }

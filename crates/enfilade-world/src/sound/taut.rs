@@ -24,7 +24,7 @@ use crate::sound::blocks::{Block, solve};
 use crate::sound::pieces::{add_barrier, barrier, best_place, middle, plane_axes, room};
 
 /// Relative gap between the length and its lower bound that ends the search.
-const GAP: f64 = 1e-6;
+const GAP: f64 = 1e-9;
 /// Rounds of sweeps and Newton before the interior-point method.
 const ROUNDS: usize = 12;
 /// Maximum number of steps of the interior-point method.
@@ -198,11 +198,14 @@ impl TautString {
     where
         I: Iterator<Item = &'a [DVec3]>,
     {
-        self.length = length_of(&self.points);
+        self.length = 0.0;
         self.directions.clear();
-        let legs = self.points.windows(2);
-        self.directions
-            .extend(legs.map(|p| (p[1] - p[0]).normalize_or_zero()));
+        for p in self.points.windows(2) {
+            let leg = p[1] - p[0];
+            let length = leg.length();
+            self.length += length;
+            self.directions.push(leg / length.max(1e-300));
+        }
         self.own_bound = 0.0;
         self.lift_bound(pieces);
         self.length - self.own_bound <= GAP * self.length
