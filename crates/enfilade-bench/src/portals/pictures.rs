@@ -143,7 +143,7 @@ fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// Returns upright, rectangular openings between rooms, evenly from all.
+/// Returns upright, rectangular openings between rooms, evenly from all without leaves, or, if these are few, from all.
 fn doorways(world: &World) -> Vec<PortalId> {
     let is_indoor = |cell: CellId| !world.graph[cell].outdoor;
     let all: Vec<PortalId> = (world.graph.portal_ids())
@@ -164,6 +164,9 @@ fn doorways(world: &World) -> Vec<PortalId> {
                 && area > 0.99 * box_area
         })
         .collect();
+    let is_bare = |id: &PortalId| world.graph[*id].fittings.is_empty();
+    let bare: Vec<PortalId> = all.iter().copied().filter(is_bare).collect();
+    let all = if bare.len() < 4 { all } else { bare };
     let step = all.len().div_ceil(MOST_SPECIALS / 2).max(1);
     all.into_iter().step_by(step).collect()
 }
@@ -288,7 +291,7 @@ fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure
     }
     let n_pixels = n_views * (SIZE[0] * SIZE[1]) as usize;
     ensure!(
-        n_special * 20 > n_pixels,
+        n_special * 50 > n_pixels,
         "only {n_special} pixels show special portals"
     );
     ensure!(
