@@ -78,7 +78,7 @@ pub fn see_world(
     let mut is_complete = vis.is_complete;
     let scale = Dirs::new(&unfolded.graph(&rows.nodes())).scale;
     let clearance = config.clearance.unwrap_or(1e-8 * scale);
-    let mut opened = Vec::new();
+    // What is opened and not searched in the end is a bound: all that its first cell sees.
     loop {
         let nodes = rows.nodes();
         let sight = unfolded.graph(&nodes);
@@ -93,25 +93,22 @@ pub fn see_world(
         let mut search = Search::new(&dirs, clearance, config.far, None);
         let is_done = rows.search(&nodes, &mut search, config, context);
         vis.n_steps += search.effort.steps;
-        opened.clear();
         is_complete &= is_done;
         if !is_done {
             break;
         }
         let n_open = unfolded.layers.iter().filter(|l| l.is_open).count() - 1;
         let seen = rows.closed_layers(&unfolded).into_iter();
-        opened.extend(seen.filter(|&l| unfolded.can_open(l, config.max_specials)));
-        opened.truncate(config.max_chains.saturating_sub(n_open));
+        let seen = seen.filter(|&l| unfolded.can_open(l, config.max_specials));
+        let opened: Vec<u32> = seen
+            .take(config.max_chains.saturating_sub(n_open))
+            .collect();
         if opened.is_empty() {
             break;
         }
-        for &layer in &opened {
+        for layer in opened {
             rows.open(&mut unfolded, layer, &direct);
         }
-    }
-    // What was opened and not searched, is as good as not opened.
-    for layer in opened {
-        rows.shut(&mut unfolded, layer);
     }
     vis.is_complete = is_complete;
     Ok(rows.output(&unfolded, vis, context.walls.is_some()))
@@ -254,18 +251,6 @@ impl<'a> Rows<'a> {
                 let cells = plain.visible_from(CellId(first)).map(|c| c.0);
                 unfolded.open(layer, cells, &mut row.seen);
             }
-        }
-    }
-
-    fn shut(&mut self, unfolded: &mut Unfolded, layer: u32) {
-        let first = (layer, unfolded.first_cell(layer));
-        unfolded.layers[layer as usize].is_open = false;
-        for row in &mut self.all {
-            let is_behind = |node: &Node| {
-                let own = &unfolded.layers[node.0 as usize];
-                node.0 == layer || own.gate.is_some() && own.parent == layer
-            };
-            row.seen.retain(|node| *node == first || !is_behind(node));
         }
     }
 

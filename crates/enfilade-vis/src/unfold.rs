@@ -53,8 +53,6 @@ pub(crate) struct Gate {
 pub(crate) struct Layer {
     /// The gate by which it is entered; `None` for the first.
     pub(crate) gate: Option<u32>,
-    /// The layer that it is entered from.
-    pub(crate) parent: u32,
     /// Map from the cells to where they appear.
     map: Similarity,
     /// Number of special portals of the chain.
@@ -126,7 +124,6 @@ impl Unfolded {
         let reach = corners.map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let root = Layer {
             gate: None,
-            parent: 0,
             map: Similarity::IDENTITY,
             depth: 0,
             is_open: true,
@@ -210,7 +207,6 @@ impl Unfolded {
         if child == next {
             let behind = Layer {
                 gate: Some(gate_idx),
-                parent: layer,
                 map: parent.map.after(&gate.map.inverse()),
                 depth: parent.depth + u32::from(gate.counts),
                 is_open: false,

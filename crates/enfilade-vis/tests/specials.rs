@@ -197,13 +197,10 @@ fn chains_cut_at_a_bound_show_everything_that_they_might_lead_to() {
     let graph = ring_of_rooms(&windows);
     let deep = see(&graph);
     assert_eq!(deep.n_cut, 0);
-    for (max_specials, max_chains, max_memory) in
-        [(0, 256, 1 << 30), (4, 1, 1 << 30), (4, 0, 1 << 30)]
-    {
+    for (max_specials, max_chains) in [(0, 256), (4, 1), (4, 0)] {
         let config = VisConfig {
             max_specials,
             max_chains,
-            max_memory,
             ..VisConfig::default()
         };
         let cut = see_by(&graph, None, &config);
@@ -337,6 +334,59 @@ fn a_monitor_shows_all_that_its_camera_sees() {
     graph.specials = vec![monitor(rooms[0], [middle(0), middle(1), middle(2)])];
     assert_eq!(see_row(&graph, own), [own, rooms[1].0]);
     assert_eq!(see_row(&graph, rooms[1].0), [rooms[1].0]);
+}
+
+/// Rooms without a doorway, each of which leads on into the next; the last shows what a camera in the first sees.
+#[test]
+fn what_is_beyond_a_bound_may_lead_on() {
+    let mut graph = row_of_rooms(&[[0.2, 0.8, 0.2, 0.8]; 5]);
+    graph.portals.clear();
+    let special = |cell: u32, way| SpecialPortal {
+        name: String::new(),
+        cell: CellId(cell),
+        shape: SpecialShape::Surface {
+            normal: [1.0, 0.0, 0.0],
+            pieces: vec![window([0.2, 0.8, 0.2, 0.8], cell as f32 + 1.0)],
+        },
+        passes: vec![Pass::new(way)],
+    };
+    let lead = |to| Way::Lead {
+        to: CellId(to),
+        map: Similarity::IDENTITY,
+        back: None,
+    };
+    // As every cell is found by its box.
+    graph.locator = room_grid(&GridParams::two_rooms()).graph.locator;
+    let camera = MonitorCamera {
+        eye: [1e6, 0.0, 0.0],
+        toward: [1.0, 0.0, 0.0],
+        up: [0.0, 1.0, 0.0],
+        fov_y: 1.0,
+    };
+    graph.specials = (0..3).map(|c| special(c, lead(c + 1))).collect();
+    let rows = |max_specials, graph: &CellPortalGraph| {
+        let config = VisConfig {
+            max_specials,
+            ..VisConfig::default()
+        };
+        let vis = see_by(graph, None, &config);
+        let cells = vis.vis.cells;
+        ([0, 1, 2, 3].map(|c| row(&cells, c, 4)), vis.n_cut)
+    };
+    let all = [vec![0, 1, 2, 3], vec![1, 2, 3], vec![2, 3], vec![3]];
+    assert_eq!(rows(4, &graph), (all.clone(), 0));
+    assert_eq!(rows(0, &graph), (all.clone(), 3));
+    // The surroundings of the locator are the cell of an eye far away.
+    graph.locator.outside = Some(CellId(0));
+    graph.specials.push(special(3, Way::Monitor(camera)));
+    let everything = vec![0, 1, 2, 3];
+    for depth in [0, 4] {
+        assert_eq!(
+            rows(depth, &graph).0,
+            [0; 4].map(|_| everything.clone()),
+            "{depth}"
+        );
+    }
 }
 
 #[test]
