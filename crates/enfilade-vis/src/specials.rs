@@ -43,6 +43,20 @@ pub struct WorldVis {
     pub n_cut: u64,
 }
 
+impl WorldVis {
+    /// Makes the answer of a graph without special portals.
+    #[must_use]
+    pub fn of(vis: VisOutput) -> Self {
+        let through = Pvs::of_ascending((0..vis.cells.n_cells()).map(|_| Vec::new()));
+        Self {
+            vis,
+            through,
+            n_chains: 0,
+            n_cut: 0,
+        }
+    }
+}
+
 /// Finds the cells that can be seen from every cell of a world, directly or through special portals. Without special
 /// portals, the answer is that of [`see_all`].
 ///
@@ -55,14 +69,7 @@ pub fn see_world(
     context: &mut VisContext<'_>,
 ) -> Result<WorldVis, VisError> {
     if graph.specials.is_empty() {
-        let vis = see_all(&SightGraph::of_graph(graph), config, context)?;
-        let through = Pvs::of_ascending((0..graph.cells.len()).map(|_| Vec::new()));
-        return Ok(WorldVis {
-            vis,
-            through,
-            n_chains: 0,
-            n_cut: 0,
-        });
+        return see_all(&SightGraph::of_graph(graph), config, context).map(WorldVis::of);
     }
     if config.has_evidence {
         return Err(VisError::SpecialEvidence);
