@@ -48,6 +48,10 @@ fn main() -> std::io::Result<()> {
     for (to, head) in [("world", 0), ("report", 0), ("run_time", 96)] {
         write(to, "doors", &[&vec![0; head][..], &doors].concat())?;
     }
+    let specials = enfilade_fuzz::world::with_specials();
+    for (to, head) in [("world", 0), ("report", 0), ("run_time", 96)] {
+        write(to, "specials", &[&vec![0; head][..], &specials].concat())?;
+    }
     let [evidence, checkpoint] = enfilade_fuzz::sight::seeds();
     write("evidence", "good", &evidence)?;
     write("checkpoint", "good", &checkpoint)?;

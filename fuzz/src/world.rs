@@ -6,7 +6,8 @@ use enfilade::runtime::{
     DrawList, Follower, Narrowing, SeeOptions, Sight, SightState, Sightlines, Target, View, Viewer,
 };
 use enfilade_cpg::wire::{decode_glb, encode_glb};
-use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_cpg::{CellId, Pass, PortalId, SpecialPortal, SpecialShape, Way, World};
+use enfilade_geom::Similarity;
 use enfilade_report::{PlanOptions, ReportParts, plan_svg, report_html};
 use enfilade_testkit::{GridParams, room_grid};
 
@@ -127,6 +128,43 @@ pub fn with_doors() -> Vec<u8> {
         ..GridParams::offices(4, 2)
     };
     let world = enfilade_testkit::with_doors(room_grid(&grid), |portal| portal % 2 == 0);
+    encode_glb(&world).unwrap_or_default()
+}
+
+/// Returns a seed: four rooms with a reflecting pane, a mirror in each room and a link of each to the next.
+#[must_use]
+pub fn with_specials() -> Vec<u8> {
+    let mut world = room_grid(&GridParams::offices(4, 2));
+    let mut made = Vec::new();
+    let special = |cell, shape, passes| SpecialPortal {
+        name: "glass".to_owned(),
+        cell,
+        shape,
+        passes,
+    };
+    let pane = Pass {
+        way: Way::Mirror,
+        tint: [1.0, 1.0, 1.0, 0.25],
+    };
+    for (id, portal) in world.graph.portal_ids().zip(&world.graph.portals) {
+        let passes = vec![Pass::new(Way::Through), pane.clone()];
+        made.push(special(portal.cells[0], SpecialShape::Portal(id), passes));
+    }
+    for (id, cell) in world.graph.cell_ids().zip(&world.graph.cells) {
+        let [[x, _, z], [_, top, _]] = cell.aabb;
+        let shape = |at: f32| SpecialShape::Surface {
+            normal: [0.0, 1.0, 0.0],
+            pieces: vec![vec![[x, top, at], [x, top, at + 1.0], [x + 1.0, top, at]]],
+        };
+        let lead = Way::Lead {
+            to: CellId(id.0 / 2),
+            map: Similarity::default(),
+            back: None,
+        };
+        made.push(special(id, shape(z), vec![Pass::new(Way::Mirror)]));
+        made.push(special(id, shape(z + 1.0), vec![Pass::new(lead)]));
+    }
+    world.graph.specials = made;
     encode_glb(&world).unwrap_or_default()
 }
 

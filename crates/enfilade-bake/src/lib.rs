@@ -31,6 +31,7 @@ mod output;
 mod proposal;
 mod realize;
 pub mod simplify;
+mod specials;
 mod stage;
 mod structure;
 mod subset;

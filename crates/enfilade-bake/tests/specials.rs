@@ -82,7 +82,7 @@ fn a_mirror_covers_a_doorway_or_a_wall_and_not_both_sides() {
         }
     );
     assert!(both.to_string().contains("cover a wall instead"), "{both}");
-    // What is special already stays as it is.
+    // A side that is special already stays as it is.
     let again = mirror(&mut world, &side(0, a)).unwrap_err();
     let is_same = |p: &SpecialProblem| matches!(p, SpecialProblem::SameSide { .. });
     assert!(
@@ -327,7 +327,7 @@ fn furnished(world: &World, rng: &mut Rng) -> World {
     world
 }
 
-/// What a special portal is, without numbers.
+/// Polygons and number of passes of a special portal.
 fn shape(world: &World, special: &SpecialPortal) -> (Vec<Vec<[f32; 3]>>, usize) {
     let pieces = match &special.shape {
         SpecialShape::Portal(portal) => world.graph[*portal].pieces.clone(),

@@ -13,6 +13,7 @@ mod growth;
 mod living;
 mod measure;
 mod messy;
+mod portals;
 mod process;
 mod rows;
 mod score;
@@ -60,6 +61,8 @@ enum What {
     Bring(Chosen),
     /// Things, paths, sound, contacts and moving rooms: a row per figure, with the value that it must reach.
     Living(Chosen),
+    /// Special portals, such as mirrors: a row per figure, with the value that it must reach.
+    Portals(Chosen),
     /// Rooms, doors and windows found, compared with those that architects modeled; fails below the floors.
     Score {
         /// Folders with `scene.glb` and `truth.json`; all real scenes if there are none.
@@ -195,6 +198,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
     match &args.what {
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
+        What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
         What::Messy(options) => return bench_messy(options, args.json),
         What::Trust(options) => return bench_trust(options, args.json),
         What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),

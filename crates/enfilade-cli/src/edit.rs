@@ -1,6 +1,6 @@
 //! `enfilade edit`: removes portals from a world, inserts others, and makes mirrors, monitors and links.
 
-pub(crate) mod special;
+mod special;
 
 use std::path::PathBuf;
 

@@ -29,6 +29,7 @@ mod screen;
 mod see;
 mod simplify;
 mod sound;
+mod specials;
 mod verify;
 #[cfg(feature = "view")]
 mod view;

@@ -15,6 +15,7 @@ use enfilade_render::{
 use serde_json::json;
 
 mod above;
+mod special;
 
 use crate::formats::Format;
 use crate::limits::Limits;
@@ -28,6 +29,7 @@ use enfilade_cli::values::{door, point, size};
 use enfilade_cli::world::read_world;
 
 pub(crate) use above::above;
+use special::Mirrored;
 
 /// Draws a picture of a world, or one for each camera of a path, to PNG files; does not need a display.
 #[derive(clap::Args)]
@@ -276,6 +278,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         None => None,
     };
+    let mut mirrored = Mirrored::new(&world, &args.door, &args.close)?;
     let mut out = outputs.printed();
     let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
@@ -286,7 +289,8 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
-            draw(args, (&world, &mut studio, lived.as_mut()), camera, size)
+            let live = (lived.as_mut(), mirrored.as_mut());
+            draw(args, (&world, &mut studio), live, camera, size)
         })?;
         let to = if is_path {
             numbered(&args.output, i + 1)
@@ -317,7 +321,8 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
 /// Draws a picture of a size, which may be a multiple of the requested one.
 fn draw(
     args: &Render,
-    (world, studio, lived): (&World, &mut Studio, Option<&mut Lived>),
+    (world, studio): (&World, &mut Studio),
+    (lived, mirrored): (Option<&mut Lived>, Option<&mut Mirrored>),
     camera: &Camera,
     size: [u32; 2],
 ) -> anyhow::Result<Picture> {
@@ -341,7 +346,11 @@ fn draw(
     } else {
         Vec::new()
     };
-    Ok(studio.picture(camera, args.mode.culling(), style, &marks, size)?)
+    let culling = args.mode.culling();
+    if let Some(mirrored) = mirrored {
+        return mirrored.picture(studio, (camera, culling), style, &marks, size);
+    }
+    Ok(studio.picture(camera, culling, style, &marks, size)?)
 }
 
 /// Closes portals and moves leaves.

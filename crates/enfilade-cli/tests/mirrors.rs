@@ -61,7 +61,7 @@ fn all_kinds_are_made_listed_and_made_plain() {
         &before,
         &[
             "--mirror",
-            "0,1,1;0,1,2;0,2,2;0,2,1",
+            "0,1,2;0,1,1;0,2,1;0,2,2",
             "--link",
             "0:cell-0",
             "2:1",

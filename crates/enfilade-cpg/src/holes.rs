@@ -99,7 +99,7 @@ impl Portal {
     pub fn size(&self) -> [f32; 2] {
         let vector = |v: &[f32; 3]| DVec3::from(v.map(f64::from));
         let outline = self.outline.iter().map(vector);
-        size_across(vector(&self.normal), outline).map(|v| v as f32)
+        size_across(vector(&self.normal), &outline).map(|v| v as f32)
     }
 
     /// Returns the mean of the outline's vertices. [Units: wu]
@@ -114,7 +114,10 @@ impl Portal {
 }
 
 /// Returns the width and height of points in a plane, as [`Portal::size`]. [Units: wu]
-pub(crate) fn size_across(normal: DVec3, points: impl Iterator<Item = DVec3> + Clone) -> [f64; 2] {
+pub(crate) fn size_across(
+    normal: DVec3,
+    points: &(impl Iterator<Item = DVec3> + Clone),
+) -> [f64; 2] {
     let up_hint = if normal.y.abs() < f64::from(LEVEL) {
         DVec3::Y
     } else {

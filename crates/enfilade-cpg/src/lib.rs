@@ -21,6 +21,7 @@ mod seals;
 mod sight_graph;
 mod sources;
 mod special;
+mod special_access;
 mod validate;
 pub mod wire;
 

@@ -4,16 +4,16 @@
 //! replaces a doorway, or covers a part of a wall. What is seen in it comes in passes: through the doorway as it is, out of
 //! another place by a [`Similarity`], back in a mirror, or from a camera.
 
-use enfilade_geom::{DVec3, Similarity, Winding};
+use enfilade_geom::Similarity;
 
-use crate::{CellId, CellPortalGraph, PortalId};
+use crate::{CellId, PortalId};
 
-/// Index of a special portal in [`CellPortalGraph::specials`].
+/// Index of a special portal in [`CellPortalGraph::specials`](crate::CellPortalGraph::specials).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SpecialId(pub u32);
 
 impl SpecialId {
-    /// Returns its index in [`CellPortalGraph::specials`].
+    /// Returns its index in [`CellPortalGraph::specials`](crate::CellPortalGraph::specials).
     #[inline]
     #[must_use]
     pub fn idx(self) -> usize {
@@ -40,7 +40,7 @@ pub struct SpecialPortal {
     pub cell: CellId,
     /// Its polygon.
     pub shape: SpecialShape,
-    /// What it shows, in order of drawing: the first pass covers what was there before, each further one is blended over it by
+    /// The layers that it shows, in order of drawing: the first pass covers what was there before, each further one is blended over it by
     /// the share of its tint. At least one.
     pub passes: Vec<Pass>,
 }
@@ -62,14 +62,14 @@ pub enum SpecialShape {
 /// One pass of a special portal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pass {
-    /// What is seen.
+    /// The place that is seen.
     pub way: Way,
     /// Factors of red, green and blue, linear; and the share by which a later pass covers earlier ones. The share of the first
     /// pass is 1. [Limit: 0 to 1]
     pub tint: [f32; 4],
 }
 
-/// What a pass shows.
+/// The place that a pass shows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Way {
     /// The cell behind the doorway.
@@ -137,68 +137,5 @@ impl SpecialPortal {
             Way::Lead { to, map, .. } => Some((*to, map)),
             _ => None,
         })
-    }
-}
-
-impl CellPortalGraph {
-    /// Returns the ids of all special portals, ascending.
-    pub fn special_ids(&self) -> impl ExactSizeIterator<Item = SpecialId> + use<> {
-        (0..self.specials.len() as u32).map(SpecialId)
-    }
-
-    /// Returns the special portal that is a doorway's side in a cell. O(special portals).
-    #[must_use]
-    pub fn special_side(&self, portal: PortalId, cell: CellId) -> Option<SpecialId> {
-        let is_it = |s: &SpecialPortal| s.cell == cell && s.portal() == Some(portal);
-        let at = self.specials.iter().position(is_it)?;
-        Some(SpecialId(at as u32))
-    }
-
-    /// Returns the unit normal of a special portal, out of its cell, and its convex pieces, counter-clockwise about it. [Units: wu]
-    ///
-    /// # Panics
-    ///
-    /// If there is no such special portal, or it refers to a portal that does not exist.
-    #[must_use]
-    pub fn special_opening(&self, special: SpecialId) -> (DVec3, Vec<Winding>) {
-        let side = &self.specials[special.idx()];
-        let point = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
-        let (normal, pieces, is_turned) = match &side.shape {
-            SpecialShape::Portal(portal) => {
-                let portal = &self[*portal];
-                (&portal.normal, &portal.pieces, portal.cells[0] != side.cell)
-            }
-            SpecialShape::Surface { normal, pieces } => (normal, pieces, false),
-        };
-        let sign = if is_turned { -1.0 } else { 1.0 };
-        let pieces = pieces.iter().map(|piece| {
-            let mut points: Vec<DVec3> = piece.iter().map(point).collect();
-            if is_turned {
-                points.reverse();
-            }
-            Winding::new(points)
-        });
-        (point(normal).normalize_or_zero() * sign, pieces.collect())
-    }
-
-    /// Returns the map of a pass: from the side of those who look to the side that is seen. The identity for the doorway itself,
-    /// `None` for a monitor.
-    ///
-    /// # Panics
-    ///
-    /// As [`CellPortalGraph::special_opening`], and if there is no such pass.
-    #[must_use]
-    pub fn map_of_pass(&self, special: SpecialId, pass: usize) -> Option<Similarity> {
-        match &self.specials[special.idx()].passes[pass].way {
-            Way::Through => Some(Similarity::IDENTITY),
-            Way::Lead { map, .. } => Some(*map),
-            Way::Mirror => {
-                let (normal, pieces) = self.special_opening(special);
-                let corners = pieces.iter().flat_map(|p| &p.points);
-                let n = corners.clone().count().max(1) as f64;
-                Some(Similarity::reflection(corners.sum::<DVec3>() / n, normal))
-            }
-            Way::Monitor(_) => None,
-        }
     }
 }

@@ -451,7 +451,7 @@ fn special_portals_that_do_not_hold_together_are_errors() {
         (camera, format!("{camera}\"back\":1,")),
         ("\"fovY\":1.25", "\"fov\":1.25".to_owned()),
         ("\"way\":\"lead\",\"to\":1,", "\"way\":\"lead\",".to_owned()),
-        // Of a kind that JSON has but we do not.
+        // Values of a kind that JSON has but we do not.
         ("\"fovY\":1.25", "\"fovY\":1e999".to_owned()),
         ("\"scale\":-2.5", "\"scale\":[1,1,1]".to_owned()),
         ("\"back\":1", "\"back\":-1".to_owned()),

@@ -270,7 +270,7 @@ fn two_mirrors_back_to_back_are_no_contradiction() {
 #[test]
 fn an_opening_may_lead_to_itself() {
     let mut world = two_rooms();
-    // Who leaves by the doorway comes in by it.
+    // One leaves by the doorway and comes in by it.
     let at = DVec3::new(4.0, 0.0, 2.5);
     let half = DQuat::from_rotation_y(std::f64::consts::PI);
     let map = Similarity::rigid(half, at - half * at);

@@ -4,9 +4,11 @@
 //! apart across a large building and nothing is clipped far away. The camera's position is subtracted from points
 //! before any multiplication, so that large coordinates cost no precision.
 
+use enfilade_cpg::MonitorCamera;
+use enfilade_geom::{DVec3, Similarity};
 use enfilade_runtime::{View, ViewError};
 use enfilade_world::Pose;
-use glam::{DVec3, Mat4, Vec3, Vec4};
+use glam::{Mat4, Vec3, Vec4};
 
 /// A perspective camera without roll: +Y is up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,21 +60,12 @@ impl Camera {
     /// As [`Camera::view`].
     pub fn projection(&self, aspect: f32) -> Result<Projection, ViewError> {
         self.view(aspect)?;
-        let [right, up, forward] = self.axes();
-        let focal = 1.0 / (self.fov_y * 0.5).tan();
-        let rows = [
-            (right * (focal / aspect)).extend(0.0),
-            (up * focal).extend(0.0),
-            Vec4::new(0.0, 0.0, 0.0, Self::NEAR),
-            forward.extend(0.0),
-        ];
-        Ok(Projection {
-            clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
-            origin: Vec3::from(self.eye),
-            origin_low: Vec3::ZERO,
-            eye: Vec3::from(self.eye),
-            is_parallel: false,
-        })
+        Ok(Projection::perspective(
+            Vec3::from(self.eye),
+            self.axes(),
+            self.fov_y,
+            aspect,
+        ))
     }
 
     /// Returns right, up and forward: orthogonal unit vectors.
@@ -113,6 +106,63 @@ pub struct Projection {
 }
 
 impl Projection {
+    /// Returns the projection of a camera with the given axes: right, up and forward.
+    pub(crate) fn perspective(
+        eye: Vec3,
+        [right, up, forward]: [Vec3; 3],
+        fov_y: f32,
+        aspect: f32,
+    ) -> Self {
+        let focal = 1.0 / (fov_y * 0.5).tan();
+        let rows = [
+            (right * (focal / aspect)).extend(0.0),
+            (up * focal).extend(0.0),
+            Vec4::new(0.0, 0.0, 0.0, Camera::NEAR),
+            forward.extend(0.0),
+        ];
+        Self {
+            clip_from_relative: Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose(),
+            origin: eye,
+            origin_low: Vec3::ZERO,
+            eye,
+            is_parallel: false,
+        }
+    }
+
+    /// Returns the projection of a monitor's camera; `None` if it has no direction.
+    pub(crate) fn of_monitor(camera: &MonitorCamera, aspect: f32) -> Option<Self> {
+        let toward = Vec3::from(camera.toward).as_dvec3();
+        let forward = toward.try_normalize()?;
+        let up = Vec3::from(camera.up).as_dvec3().normalize_or_zero();
+        // Same as `View::perspective`.
+        let right = forward.cross(up);
+        let right = right.try_normalize().filter(|_| right.length() > 1e-6);
+        let right = right.unwrap_or_else(|| forward.any_orthonormal_vector());
+        let axes = [right, right.cross(forward), forward].map(|a| a.as_vec3());
+        Some(Self::perspective(
+            camera.eye.into(),
+            axes,
+            camera.fov_y,
+            aspect,
+        ))
+    }
+
+    /// Returns the same projection for points of another frame, which `map` maps to where they appear in this one.
+    pub(crate) fn of_appearing(&self, map: &Similarity) -> Self {
+        if *map == Similarity::IDENTITY {
+            return *self;
+        }
+        let exact = map.point_back(self.exact_origin());
+        let origin = exact.as_vec3();
+        Self {
+            clip_from_relative: self.clip_from_relative * Mat4::from_mat3(map.linear().as_mat3()),
+            origin,
+            origin_low: (exact - origin.as_dvec3()).as_vec3(),
+            eye: origin,
+            is_parallel: self.is_parallel,
+        }
+    }
+
     /// Returns a parallel projection along `toward` onto a picture `height` meters high with `center` in its middle. It
     /// contains points up to `depth` meters before and behind that center.
     #[must_use]
@@ -145,6 +195,11 @@ impl Projection {
             eye: origin - forward * depth,
             is_parallel: true,
         }
+    }
+
+    /// Returns the vector by which the product with a relative point is its distance ahead, for a perspective.
+    pub(crate) fn ahead(&self) -> DVec3 {
+        self.clip_from_relative.row(3).truncate().as_dvec3()
     }
 
     /// Returns the origin in full precision. [Units: wu]

@@ -2,4 +2,6 @@
 
 pub(crate) const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// For pictures with special portals: the stencil tells whose region a pixel is in.
+pub(crate) const DEPTH_STENCIL: wgpu::TextureFormat = wgpu::TextureFormat::Depth32FloatStencil8;
 pub(crate) const ID: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;

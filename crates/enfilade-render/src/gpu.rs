@@ -242,7 +242,9 @@ impl Gpu {
         if let Some(what) = lacking(&adapter) {
             return Err(broken(format!("it lacks {what}, which are required")));
         }
-        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::INDIRECT_FIRST_INSTANCE;
+        let wanted = wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::INDIRECT_FIRST_INSTANCE
+            | wgpu::Features::DEPTH32FLOAT_STENCIL8;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("enfilade"),
             required_features: wanted & adapter.features(),
@@ -272,6 +274,13 @@ impl Gpu {
         let flags = self.adapter.get_downlevel_capabilities().flags;
         flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE)
             && self.device.limits().max_storage_buffers_per_shader_stage >= 2
+    }
+
+    /// Returns `true` if pictures can show what special portals show. Otherwise these are not drawn.
+    #[must_use]
+    pub fn has_stencil(&self) -> bool {
+        let features = self.device.features();
+        features.contains(wgpu::Features::DEPTH32FLOAT_STENCIL8)
     }
 
     /// Returns `true` if shaders must write depths themselves, as on OpenGL: see `depth_written.wgsl`.

@@ -157,7 +157,7 @@ impl Renderer {
                 });
                 pass.set_pipeline(&self.pipelines.id);
                 pass.set_bind_group(0, &group, &[]);
-                pass.set_vertex_buffer(0, stage.instances.buffer.slice(..));
+                pass.set_vertex_buffer(0, stage.first().instances.buffer.slice(..));
                 if let Some(listed) = &world.listed {
                     pass.set_vertex_buffer(1, listed.slice(..));
                 }

@@ -67,6 +67,7 @@
 //! surfaces directly only, and props cast no shadows. Metalness, roughness and normal maps are ignored.
 
 mod camera;
+mod contexts;
 mod explain;
 mod formats;
 mod frame;
@@ -80,6 +81,7 @@ mod lit;
 mod marks;
 mod materials;
 mod oracle;
+mod panes;
 mod picture;
 mod pipelines;
 mod props;

@@ -2,7 +2,7 @@
 
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_runtime::{Seen, Sight, SightState, View, Viewer};
-use enfilade_world::{PartId, Pose, Space, SpaceViewer};
+use enfilade_world::{PartId, Pose, Space, SpaceSeen, SpaceViewer};
 use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt;
 
@@ -105,14 +105,20 @@ impl Studio {
 
     /// Returns the lamps of a view of a space: those that the caller chooses, or of the brightest at the eye those that reach
     /// a cell in view.
-    pub(crate) fn space_lamps(&mut self, shot: &SpaceShot<'_>) -> Vec<ActiveLamp> {
+    pub(crate) fn space_lamps(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        seen: Option<SpaceSeen<'_>>,
+    ) -> Vec<ActiveLamp> {
         let eye = Vec3::from(shot.camera.eye).as_dvec3();
         let eye = shot.space.pose(shot.frame).point(eye);
         let mut lamps = self.active_lamps(Some(shot.space), &shot.style, eye, shot.lamps);
-        let Some(seen) = shot.seen.filter(|_| shot.lamps.is_none()) else {
+        let seen = seen.filter(|_| shot.seen.is_some() && shot.lamps.is_none());
+        let Some(seen) = seen else {
             return lamps;
         };
-        let visible: LampReach = (seen.parts())
+        let visible: LampReach = (seen.contexts())
+            .flat_map(|context| context.parts())
             .map(|(id, seen)| {
                 let (world, space) = (world_of(&self.world, &self.parts, id), shot.space);
                 let cells = cells_of(&seen, world, space.sight(id), space.state(id));
@@ -318,7 +324,7 @@ impl Renderer {
                 let offset = ((face * parts.len() + i) * ALIGNED) as u64;
                 let group = self.globals_at(gpu, &buffer, offset);
                 pass.set_bind_group(0, &group, &[]);
-                set_buffers(&mut pass, part.world, &part.stage.instances);
+                set_buffers(&mut pass, part.world, &part.stage.first().instances);
                 for run in &part.list.opaque {
                     pass.draw_indexed(run.first..run.first + run.n, 0, run.instances.clone());
                 }

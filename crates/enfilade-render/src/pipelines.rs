@@ -3,17 +3,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::formats::{COLOR, DEPTH, ID};
+use crate::formats::{COLOR, DEPTH, DEPTH_STENCIL, ID};
 use crate::gpu::Gpu;
 use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
+pub(crate) const SKY: &str = include_str!("shaders/sky.wgsl");
 
 pub(crate) struct Layouts {
     /// Globals; shadow map and its sampler; the locator and the light of places; lamps and their maps.
     pub(crate) world: wgpu::BindGroupLayout,
     /// A base color texture.
-    texture: wgpu::BindGroupLayout,
+    pub(crate) texture: wgpu::BindGroupLayout,
     /// Globals; vertices and indices for shaders that fetch them.
     pub(crate) ids: wgpu::BindGroupLayout,
     /// Globals.
@@ -50,6 +51,8 @@ pub(crate) struct Variant {
     pub(crate) has_lamps: bool,
     /// True if it draws to the output, not to the intermediate target of the post pass.
     pub(crate) is_last: bool,
+    /// True if it draws in the region of one context: see `contexts.rs`.
+    pub(crate) is_in_context: bool,
 }
 
 pub(crate) struct Pipelines {
@@ -174,7 +177,7 @@ impl Layouts {
     }
 }
 
-const MARK_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+pub(crate) const MARK_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: 32,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4],
@@ -192,20 +195,64 @@ const OUTLINE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayo
 
 /// Differences between pipelines.
 #[derive(Clone, Copy)]
-struct Kind<'a> {
-    label: &'a str,
-    module: &'a wgpu::ShaderModule,
-    vertex: &'a str,
-    fragment: Option<&'a str>,
-    layouts: &'a [&'a wgpu::BindGroupLayout],
-    buffers: &'a [wgpu::VertexBufferLayout<'a>],
-    target: Option<(wgpu::TextureFormat, Option<wgpu::BlendState>)>,
-    depth: Option<(bool, wgpu::CompareFunction)>,
+pub(crate) struct Kind<'a> {
+    pub(crate) label: &'a str,
+    pub(crate) module: &'a wgpu::ShaderModule,
+    pub(crate) vertex: &'a str,
+    pub(crate) fragment: Option<&'a str>,
+    pub(crate) layouts: &'a [&'a wgpu::BindGroupLayout],
+    pub(crate) buffers: &'a [wgpu::VertexBufferLayout<'a>],
+    pub(crate) target: Option<(wgpu::TextureFormat, Option<wgpu::BlendState>)>,
+    pub(crate) depth: Option<(bool, wgpu::CompareFunction)>,
     /// Constants of the shader.
-    constants: &'a [(&'a str, f64)],
+    pub(crate) constants: &'a [(&'a str, f64)],
+    /// Test of the region; `None` for passes without a stencil.
+    pub(crate) stencil: Option<Stencil>,
+    pub(crate) writes_color: bool,
 }
 
-fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
+/// A test of the stencil. What passes replaces the bits of `writes` by those of the reference.
+#[derive(Clone, Copy)]
+pub(crate) struct Stencil {
+    pub(crate) compare: wgpu::CompareFunction,
+    pub(crate) reads: u32,
+    pub(crate) writes: u32,
+}
+
+impl Stencil {
+    /// Where the region is that of the reference.
+    pub(crate) const IN_REGION: Self = Self {
+        compare: wgpu::CompareFunction::Equal,
+        reads: REGION,
+        writes: 0,
+    };
+
+    fn state(self) -> wgpu::StencilState {
+        let face = wgpu::StencilFaceState {
+            compare: self.compare,
+            fail_op: wgpu::StencilOperation::Keep,
+            depth_fail_op: wgpu::StencilOperation::Keep,
+            pass_op: if self.writes == 0 {
+                wgpu::StencilOperation::Keep
+            } else {
+                wgpu::StencilOperation::Replace
+            },
+        };
+        wgpu::StencilState {
+            front: face,
+            back: face,
+            read_mask: self.reads,
+            write_mask: self.writes,
+        }
+    }
+}
+
+/// Bits of the stencil that number the region of a context.
+pub(crate) const REGION: u32 = 0x7f;
+/// The bit that marks pixels about to change their region.
+pub(crate) const CHOSEN: u32 = 0x80;
+
+pub(crate) fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
     let layouts: Vec<_> = kind.layouts.iter().map(|l| Some(*l)).collect();
     let layout = gpu
         .device
@@ -218,7 +265,11 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
     let targets = [kind.target.map(|(format, blend)| wgpu::ColorTargetState {
         format,
         blend,
-        write_mask: wgpu::ColorWrites::ALL,
+        write_mask: if kind.writes_color {
+            wgpu::ColorWrites::ALL
+        } else {
+            wgpu::ColorWrites::empty()
+        },
     })];
     let compilation_options = wgpu::PipelineCompilationOptions {
         constants: kind.constants,
@@ -237,10 +288,14 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
             // Draw both sides: models of buildings seldom have a consistent front side.
             primitive: wgpu::PrimitiveState::default(),
             depth_stencil: kind.depth.map(|(writes, compare)| wgpu::DepthStencilState {
-                format: DEPTH,
+                format: if kind.stencil.is_some() {
+                    DEPTH_STENCIL
+                } else {
+                    DEPTH
+                },
                 depth_write_enabled: Some(writes),
                 depth_compare: Some(compare),
-                stencil: wgpu::StencilState::default(),
+                stencil: kind.stencil.map_or_else(Default::default, Stencil::state),
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState::default(),
@@ -255,7 +310,7 @@ fn pipeline(gpu: &Gpu, kind: &Kind<'_>) -> wgpu::RenderPipeline {
         })
 }
 
-const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
+pub(crate) const NEARER: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
 
 struct Modules {
     surface: wgpu::ShaderModule,
@@ -265,22 +320,25 @@ struct Modules {
     lines: wgpu::ShaderModule,
 }
 
+/// Makes a shader module of texts, after those that all shaders share.
+pub(crate) fn shader(gpu: &Gpu, label: &str, source: &[&str]) -> wgpu::ShaderModule {
+    let drawn = if gpu.writes_depth() {
+        include_str!("shaders/depth_written.wgsl")
+    } else {
+        include_str!("shaders/depth_drawn.wgsl")
+    };
+    let source = [&[COMMON, drawn], source].concat().concat();
+    gpu.device
+        .create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        })
+}
+
 impl Modules {
     fn new(gpu: &Gpu) -> Self {
-        let drawn = if gpu.writes_depth() {
-            include_str!("shaders/depth_written.wgsl")
-        } else {
-            include_str!("shaders/depth_drawn.wgsl")
-        };
-        let module = |label, source: &[&str]| {
-            let source = [&[COMMON, drawn], source].concat().concat();
-            gpu.device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: Some(label),
-                    source: wgpu::ShaderSource::Wgsl(source.into()),
-                })
-        };
-        let sky = include_str!("shaders/sky.wgsl");
+        let module = |label, source: &[&str]| shader(gpu, label, source);
+        let sky = SKY;
         let light = include_str!("shaders/light.wgsl");
         let surface = include_str!("shaders/surface.wgsl");
         let lamps = include_str!("shaders/lamps.wgsl");
@@ -320,6 +378,8 @@ fn id_pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, layouts: &Layouts) -> wgp
         target: Some((ID, None)),
         depth: Some((true, NEARER)),
         constants: &[],
+        stencil: None,
+        writes_color: true,
     };
     pipeline(gpu, &kind)
 }
@@ -346,6 +406,8 @@ impl Pipelines {
             target: None,
             depth: Some((true, NEARER)),
             constants: &[],
+            stencil: None,
+            writes_color: true,
         };
         let marks = Kind {
             label: "marks",
@@ -367,6 +429,8 @@ impl Pipelines {
             target: Some((output, None)),
             depth: None,
             constants: &[],
+            stencil: None,
+            writes_color: true,
         };
         let make = |kind| pipeline(gpu, &kind);
         Self {
@@ -467,7 +531,10 @@ impl Pipelines {
                     ("EXPLAINS", number(variant.explains)),
                     ("IS_PROP", number(variant.is_prop)),
                     ("HAS_LAMPS", number(variant.has_lamps)),
+                    ("HAS_GATE", number(variant.is_in_context)),
                 ],
+                stencil: variant.is_in_context.then_some(Stencil::IN_REGION),
+                writes_color: true,
             },
         );
         self.surfaces.insert(variant, made);

@@ -225,7 +225,7 @@ impl Studio {
             });
             pass.set_bind_group(0, &renderer.camera.group, &[]);
             pass.set_pipeline(&renderer.pipelines.depth);
-            set_buffers(&mut pass, &self.world, &self.stage.instances);
+            set_buffers(&mut pass, &self.world, &self.stage.first().instances);
             for &c in new {
                 let span = &self.world.chunks[c as usize];
                 pass.draw_indexed(span.first..span.first + span.n, 0, 0..1);

@@ -6,6 +6,7 @@ use enfilade_world::{PartId, Pose};
 use glam::{Mat4, Vec3};
 
 use crate::camera::Projection;
+use crate::contexts::ContextTargets;
 use crate::formats::{COLOR, DEPTH};
 use crate::frame::{Paint, Style};
 use crate::gpu::{Gpu, RenderError};
@@ -19,7 +20,9 @@ use crate::props::{Prop, PropDraw, PropMeshes};
 use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
 use crate::scene::GpuWorld;
 use crate::shadings::{Shadings, draw_runs, set_buffers};
-use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage, Sunlight, lamp_buffer};
+use crate::stage::{
+    Exposed, Globals, GlobalsBuffer, RenderStage, StageView, Sunlight, lamp_buffer,
+};
 
 /// Side of the shadow map. [Units: texels]
 const SHADOW_SIDE: u32 = 4096;
@@ -37,6 +40,24 @@ pub(crate) struct DrawnPart<'a> {
     pub(crate) id: PartId,
     pub(crate) world: &'a GpuWorld,
     pub(crate) stage: &'a mut RenderStage,
+    pub(crate) list: &'a RenderList,
+}
+
+impl DrawnPart<'_> {
+    fn as_view(&self) -> PartView<'_> {
+        PartView {
+            world: self.world,
+            view: self.stage.first(),
+            list: self.list,
+        }
+    }
+}
+
+/// One world of a frame, ready to draw.
+#[derive(Clone, Copy)]
+pub(crate) struct PartView<'a> {
+    pub(crate) world: &'a GpuWorld,
+    pub(crate) view: &'a StageView,
     pub(crate) list: &'a RenderList,
 }
 
@@ -77,6 +98,7 @@ pub(crate) struct Renderer {
     pub(crate) props: PropMeshes,
     pub(crate) lamps: LampMaps,
     pub(crate) targets: Option<Targets>,
+    pub(crate) contexts: ContextTargets,
     shadow_map: wgpu::TextureView,
     shadow_sampler: wgpu::Sampler,
     pub(crate) sun: Sunlight,
@@ -110,6 +132,7 @@ impl Renderer {
             props: PropMeshes::new(gpu),
             lamps: LampMaps::none(gpu),
             targets: None,
+            contexts: ContextTargets::new(gpu),
             shadow_map: shadow_map.create_view(&wgpu::TextureViewDescriptor::default()),
             shadow_sampler,
             sun: Sunlight {
@@ -127,10 +150,21 @@ impl Renderer {
 
     /// Prepares a world with its light for this renderer.
     pub(crate) fn stage(&self, gpu: &Gpu, light: Light) -> RenderStage {
+        let view = self.stage_view(gpu, &light, None);
+        RenderStage::new(view, light)
+    }
+
+    /// Makes the buffers for one more view of a world.
+    pub(crate) fn stage_view(
+        &self,
+        gpu: &Gpu,
+        light: &Light,
+        explanation: Option<&wgpu::TextureView>,
+    ) -> StageView {
         let globals = GlobalsBuffer::new(gpu, &self.layouts);
         let lamps = lamp_buffer(gpu);
-        let world = self.world_group(gpu, [&globals.buffer, &lamps], &light, None);
-        RenderStage::new(gpu, world, globals, lamps, light)
+        let group = self.world_group(gpu, [&globals.buffer, &lamps], light, explanation);
+        StageView::new(gpu, group, globals, lamps)
     }
 
     fn world_group(
@@ -181,9 +215,11 @@ impl Renderer {
 
     /// Binds the renderer's textures to a stage anew.
     pub(crate) fn bind(&self, gpu: &Gpu, stage: &mut RenderStage) {
-        let buffers = [&stage.globals.buffer, &stage.lamps];
         let explanation = stage.explanation.as_ref();
-        stage.world = self.world_group(gpu, buffers, &stage.light, explanation);
+        for view in &mut stage.views {
+            let buffers = [&view.globals.buffer, &view.lamps];
+            view.group = self.world_group(gpu, buffers, &stage.light, explanation);
+        }
     }
 
     /// Points the shadow map's view along the sun, parallel, over all worlds.
@@ -234,8 +270,8 @@ impl Renderer {
             });
             pass.set_pipeline(&self.pipelines.shadow);
             for part in parts {
-                pass.set_bind_group(0, &part.stage.globals.group, &[]);
-                set_buffers(&mut pass, part.world, &part.stage.instances);
+                pass.set_bind_group(0, &part.stage.first().globals.group, &[]);
+                set_buffers(&mut pass, part.world, &part.stage.first().instances);
                 for run in &part.list.opaque {
                     pass.draw_indexed(run.first..run.first + run.n, 0, run.instances.clone());
                 }
@@ -353,8 +389,8 @@ impl Renderer {
             ..wgpu::RenderPassDescriptor::default()
         });
         for ((part, shadings), props) in parts.iter().zip(&shadings).zip(&props) {
-            self.draw_surfaces(&mut pass, part, shadings, size);
-            self.draw_props(&mut pass, part, shadings, props, size);
+            self.draw_surfaces(&mut pass, part.as_view(), shadings, size);
+            self.draw_props(&mut pass, part.as_view(), shadings, props, size);
         }
         if in_two {
             drop(pass);
@@ -374,14 +410,15 @@ impl Renderer {
         if !is_count {
             self.draw_glass(&mut pass, parts, &shadings, size);
         }
-        self.draw_marks(&mut pass, &marks, size);
+        let pipelines = [&self.pipelines.marks, &self.pipelines.marks_on_top];
+        self.draw_marks(&mut pass, &marks, size, pipelines);
         drop(pass);
         gpu.queue.submit([encoder.finish()]);
         Ok(())
     }
 
     /// Writes the vertices of marks, those hidden by surfaces first; returns both ranges.
-    fn write_marks(
+    pub(crate) fn write_marks(
         &mut self,
         gpu: &Gpu,
         parts: &[DrawnPart<'_>],
@@ -405,15 +442,15 @@ impl Renderer {
         [0..n_hidden, n_hidden..hidden.len() as u32]
     }
 
-    fn draw_surfaces(
+    pub(crate) fn draw_surfaces(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        part: &DrawnPart<'_>,
+        part: PartView<'_>,
         shadings: &Shadings,
         size: [u32; 2],
     ) {
-        pass.set_bind_group(0, &part.stage.world, &[]);
-        set_buffers(pass, part.world, &part.stage.instances);
+        pass.set_bind_group(0, &part.view.group, &[]);
+        set_buffers(pass, part.world, &part.view.instances);
         let surface = |run: &Run| self.pipelines.surface(shadings.opaque(run));
         draw_runs(pass, part.world, part.list.opaque.iter(), size, surface);
         if shadings.is_count {
@@ -422,10 +459,10 @@ impl Renderer {
         }
     }
 
-    fn draw_props(
+    pub(crate) fn draw_props(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        part: &DrawnPart<'_>,
+        part: PartView<'_>,
         shadings: &Shadings,
         props: &[PropDraw],
         size: [u32; 2],
@@ -435,7 +472,7 @@ impl Renderer {
         }
         self.props.set_buffers(pass);
         pass.set_scissor_rect(0, 0, size[0], size[1]);
-        pass.set_bind_group(0, &part.stage.world, &[]);
+        pass.set_bind_group(0, &part.view.group, &[]);
         pass.set_bind_group(1, &part.world.textures[0], &[]);
         for draw in props {
             let span = &draw.span;
@@ -467,13 +504,26 @@ impl Renderer {
         }
         for group in order.chunk_by(|a, b| a.1 == b.1) {
             let (part, shadings) = (&parts[group[0].1], &shadings[group[0].1]);
-            pass.set_bind_group(0, &part.stage.world, &[]);
-            set_buffers(pass, part.world, &part.stage.instances);
-            let runs = group.iter().map(|g| &part.list.transparent[g.2]);
-            draw_runs(pass, part.world, runs, size, |run| {
-                self.pipelines.surface(shadings.glass(run))
-            });
+            let runs = group.iter().map(|g| g.2);
+            self.draw_panes(pass, part.as_view(), shadings, runs, size);
         }
+    }
+
+    /// Draws transparent surfaces of one world.
+    pub(crate) fn draw_panes(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        part: PartView<'_>,
+        shadings: &Shadings,
+        runs: impl Iterator<Item = usize>,
+        size: [u32; 2],
+    ) {
+        pass.set_bind_group(0, &part.view.group, &[]);
+        set_buffers(pass, part.world, &part.view.instances);
+        let runs = runs.map(|i| &part.list.transparent[i]);
+        draw_runs(pass, part.world, runs, size, |run| {
+            self.pipelines.surface(shadings.glass(run))
+        });
     }
 
     /// Draws the image of the surfaces to `output`, with ambient occlusion or as counts.
@@ -499,11 +549,13 @@ impl Renderer {
         picture.draw(0..3, 0..1);
     }
 
-    fn draw_marks(
+    /// Draws marks by the pipelines of those hidden by surfaces, and of those on top.
+    pub(crate) fn draw_marks(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         [hidden, on_top]: &[Range<u32>; 2],
         size: [u32; 2],
+        pipelines: [&wgpu::RenderPipeline; 2],
     ) {
         if on_top.end == 0 {
             return;
@@ -511,9 +563,9 @@ impl Renderer {
         pass.set_scissor_rect(0, 0, size[0], size[1]);
         pass.set_bind_group(0, &self.camera.group, &[]);
         pass.set_vertex_buffer(0, self.marks.buffer.slice(..));
-        pass.set_pipeline(&self.pipelines.marks);
+        pass.set_pipeline(pipelines[0]);
         pass.draw(hidden.clone(), 0..1);
-        pass.set_pipeline(&self.pipelines.marks_on_top);
+        pass.set_pipeline(pipelines[1]);
         pass.draw(on_top.clone(), 0..1);
     }
 
@@ -525,17 +577,41 @@ impl Renderer {
         shown: &Shown<'_>,
         size: [u32; 2],
     ) -> Result<Picture, RenderError> {
-        assert_eq!(self.format, COLOR, "pictures are {COLOR:?}");
-        self.resize(gpu, size)?;
-        let target = texture(gpu, "picture", size, COLOR, wgpu::TextureUsages::COPY_SRC);
+        let target = self.picture_target(gpu, size)?;
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
         self.draw(gpu, parts, shown, &view, size)?;
-        let [width, height] = size;
-        let rgba = read_texture(gpu, &target, size, 4)?;
-        Ok(Picture {
-            width,
-            height,
-            rgba,
-        })
+        read_picture(gpu, &target, size)
     }
+
+    /// Makes a texture for a picture that is read back. Panics if the renderer was made for a window's format.
+    pub(crate) fn picture_target(
+        &self,
+        gpu: &Gpu,
+        size: [u32; 2],
+    ) -> Result<wgpu::Texture, RenderError> {
+        assert_eq!(self.format, COLOR, "pictures are {COLOR:?}");
+        gpu.check_picture(size)?;
+        Ok(texture(
+            gpu,
+            "picture",
+            size,
+            COLOR,
+            wgpu::TextureUsages::COPY_SRC,
+        ))
+    }
+}
+
+/// Reads a picture back.
+pub(crate) fn read_picture(
+    gpu: &Gpu,
+    target: &wgpu::Texture,
+    size: [u32; 2],
+) -> Result<Picture, RenderError> {
+    let [width, height] = size;
+    let rgba = read_texture(gpu, target, size, 4)?;
+    Ok(Picture {
+        width,
+        height,
+        rgba,
+    })
 }

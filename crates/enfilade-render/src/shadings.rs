@@ -25,6 +25,8 @@ pub(crate) struct Shadings {
     has_lamps: bool,
     /// True if a cut makes holes in everything.
     has_cut: bool,
+    /// True for pictures with special portals.
+    is_in_context: bool,
 }
 
 impl Shadings {
@@ -46,6 +48,15 @@ impl Shadings {
                 || list.instances.iter().any(is_reasoned),
             has_lamps: n_lamps > 0,
             has_cut: style.cut_above < f32::INFINITY,
+            is_in_context: false,
+        }
+    }
+
+    /// Returns the same pipelines, drawing in the region of one context.
+    pub(crate) fn in_context(self) -> Self {
+        Self {
+            is_in_context: true,
+            ..self
         }
     }
 
@@ -60,6 +71,7 @@ impl Shadings {
                 is_prop: false,
                 has_lamps: false,
                 is_last: false,
+                is_in_context: self.is_in_context,
             };
         }
         Variant {
@@ -71,6 +83,7 @@ impl Shadings {
             is_prop: false,
             has_lamps: self.has_lamps,
             is_last,
+            is_in_context: self.is_in_context,
         }
     }
 

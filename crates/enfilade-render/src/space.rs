@@ -5,7 +5,7 @@
 
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, View};
-use enfilade_world::{PartId, Pose, Space, SpaceSeen};
+use enfilade_world::{PartId, Pose, Space, SpaceSeen, SpaceViewer};
 use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
@@ -17,9 +17,9 @@ use crate::list::{RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::props::{Prop, PropMesh};
-use crate::renderer::Shown;
+use crate::renderer::{Shown, read_picture};
 use crate::scene::GpuWorld;
-use crate::studio::{Studio, StudioPart, StudioTarget, drawn_parts, world_of};
+use crate::studio::{Studio, StudioPart, StudioTarget, drawn_parts, staged_worlds, world_of};
 
 /// A view of a space of worlds.
 #[derive(Clone, Copy)]
@@ -30,7 +30,8 @@ pub struct SpaceShot<'a> {
     pub frame: PartId,
     /// The camera.
     pub camera: Camera,
-    /// The answer to draw, to [this view](Camera::view) in the same frame; `None` draws everything of all parts.
+    /// The answer to draw, to [this view](Camera::view) in the same frame, with what it sees in special portals; `None` draws
+    /// everything of all parts, and in special portals what is seen there.
     pub seen: Option<SpaceSeen<'a>>,
     /// The style.
     pub style: Style,
@@ -52,6 +53,10 @@ pub struct SpaceCounts {
     pub n_triangles: u64,
     /// Draws, without those of props.
     pub n_draws: usize,
+    /// Contexts: the direct view, and what special portals show.
+    pub n_contexts: usize,
+    /// Special portals in view that show one color, or nothing: too small, or one too many.
+    pub n_left_out: usize,
 }
 
 impl Studio {
@@ -112,12 +117,67 @@ impl Studio {
         output: &wgpu::TextureView,
         size: [u32; 2],
     ) -> Result<SpaceCounts, RenderError> {
-        let lists = self.begin_space(shot, size)?;
-        let lamps = self.space_lamps(shot);
+        self.place_parts(shot.space);
+        self.cast_sun(shot);
+        if let Some(counts) = self.draw_contexts(shot, output, size)? {
+            return Ok(counts);
+        }
+        let lists = self.space_lists(shot, size)?;
+        let lamps = self.space_lamps(shot, shot.seen);
         let shown = self.space_shown(shot, &lamps, size)?;
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
         (self.renderer).draw(&self.gpu, &mut parts, &shown, output, size)?;
-        Ok(counts(&lists))
+        let missed = |s: SpaceSeen<'_>| s.contexts().len() - 1 + s.stopped_specials().len();
+        let is_without = !self.gpu.has_stencil();
+        Ok(SpaceCounts {
+            n_left_out: shot.seen.filter(|_| is_without).map_or(0, missed),
+            ..counts(&lists)
+        })
+    }
+
+    /// Draws a view with special portals in it; `None` without any, or if the adapter cannot.
+    fn draw_contexts(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        output: &wgpu::TextureView,
+        size: [u32; 2],
+    ) -> Result<Option<SpaceCounts>, RenderError> {
+        let space = shot.space;
+        let mut ids = (0..space.n_parts() as u32).map(PartId);
+        let has_specials = ids.any(|id| !space.world(id).graph.specials.is_empty());
+        if !has_specials || !self.gpu.has_stencil() {
+            return Ok(None);
+        }
+        let view = shot.camera.view(size[0] as f32 / size[1] as f32)?;
+        let mut viewer = match shot.seen {
+            Some(_) => None,
+            None => Some(
+                self.special_viewer
+                    .take()
+                    .unwrap_or_else(|| SpaceViewer::new(space)),
+            ),
+        };
+        let answer = match (shot.seen, &mut viewer) {
+            (None, Some(viewer)) => Some(viewer.see(space, shot.frame, &view)),
+            (seen, _) => seen,
+        };
+        let Some(answer) = answer else {
+            return Ok(None);
+        };
+        let drawn = match self.tree(shot, answer, shot.seen.is_none(), size)? {
+            Some(tree) => {
+                let lamps = self.space_lamps(shot, Some(answer));
+                let shown = self.space_shown(shot, &lamps, size)?;
+                let mut worlds = staged_worlds(&self.world, &mut self.stage, &mut self.parts);
+                (self.renderer).draw_tree(&self.gpu, &mut worlds, &tree, &shown, output)?;
+                Some(tree.counts())
+            }
+            None => None,
+        };
+        if viewer.is_some() {
+            self.special_viewer = viewer;
+        }
+        Ok(drawn)
     }
 
     /// Draws a view of a space to a target.
@@ -143,23 +203,10 @@ impl Studio {
         shot: &SpaceShot<'_>,
         size: [u32; 2],
     ) -> Result<(Picture, SpaceCounts), RenderError> {
-        let lists = self.begin_space(shot, size)?;
-        let lamps = self.space_lamps(shot);
-        let shown = self.space_shown(shot, &lamps, size)?;
-        let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
-        let picture = (self.renderer).picture(&self.gpu, &mut parts, &shown, size)?;
-        Ok((picture, counts(&lists)))
-    }
-
-    /// Moves parts and leaves as the space has them, redraws the sun's shadows if necessary, and lists the draws by part.
-    fn begin_space(
-        &mut self,
-        shot: &SpaceShot<'_>,
-        size: [u32; 2],
-    ) -> Result<Vec<(PartId, RenderList)>, RenderError> {
-        self.place_parts(shot.space);
-        self.cast_sun(shot);
-        self.space_lists(shot, size)
+        let target = self.renderer.picture_target(&self.gpu, size)?;
+        let view = target.create_view(&wgpu::TextureViewDescriptor::default());
+        let counts = self.draw_space(shot, &view, size)?;
+        Ok((read_picture(&self.gpu, &target, size)?, counts))
     }
 
     fn place_parts(&mut self, space: &Space) {
@@ -259,20 +306,11 @@ impl Studio {
         size: [u32; 2],
     ) -> Result<Shown<'s>, RenderError> {
         let projection = shot.camera.projection(size[0] as f32 / size[1] as f32)?;
-        let pose = *shot.space.pose(shot.frame);
         let eye = Vec3::from(shot.camera.eye).as_dvec3();
-        let place = shot.space.locate(shot.frame, eye);
-        let at = place.map_or(shot.frame, |p| p.part);
-        let stage = self.stage_of(at);
-        let own = stage.pose.point_back(pose.point(eye)).as_vec3();
-        let exposure = if shot.style.daylight {
-            stage.light.exposure(own, stage.surroundings)
-        } else {
-            1.0
-        };
+        let exposure = self.exposure(shot, shot.frame, eye);
         Ok(Shown {
             projection,
-            pose,
+            pose: *shot.space.pose(shot.frame),
             style: shot.style,
             marks: shot.marks,
             props: shot.props,
@@ -281,16 +319,29 @@ impl Studio {
             exposure,
         })
     }
+
+    /// Returns the exposure of pictures of an eye in the frame of a part.
+    pub(crate) fn exposure(&self, shot: &SpaceShot<'_>, frame: PartId, eye: DVec3) -> f32 {
+        if !shot.style.daylight {
+            return 1.0;
+        }
+        let place = shot.space.locate(frame, eye);
+        let stage = self.stage_of(place.map_or(frame, |p| p.part));
+        let pose = shot.space.pose(frame);
+        let own = stage.pose.point_back(pose.point(eye)).as_vec3();
+        stage.light.exposure(own, stage.surroundings)
+    }
 }
 
 /// Returns a view of a part's frame, given in another's.
-fn view_in(space: &Space, part: PartId, frame: PartId, view: &View) -> View {
+pub(crate) fn view_in(space: &Space, part: PartId, frame: PartId, view: &View) -> View {
     view.in_frame(&space.between(part, frame).into())
 }
 
 fn counts(lists: &[(PartId, RenderList)]) -> SpaceCounts {
     let mut counts = SpaceCounts {
         n_parts: lists.len(),
+        n_contexts: 1,
         ..SpaceCounts::default()
     };
     for (_, list) in lists {

@@ -28,6 +28,7 @@ pub(crate) struct Globals {
     light: LightGlobals,
     origin_low: [f32; 4],
     root_rows: [[f32; 4]; 3],
+    gate: [f32; 4],
 }
 
 /// The sun, and the map of its shadows. In the frame of the first world.
@@ -80,13 +81,39 @@ impl GlobalsBuffer {
     }
 }
 
-/// A world's bind groups and buffers.
-pub(crate) struct RenderStage {
-    pub(crate) world: wgpu::BindGroup,
+/// The plane before which nothing lies.
+pub(crate) const NO_GATE: [f32; 4] = [0.0, 0.0, 0.0, -1.0];
+
+/// Bind groups and buffers for one view of a world.
+pub(crate) struct StageView {
+    pub(crate) group: wgpu::BindGroup,
     pub(crate) globals: GlobalsBuffer,
     /// The lamps of the frame.
     pub(crate) lamps: wgpu::Buffer,
     pub(crate) instances: Grown,
+}
+
+impl StageView {
+    /// Makes the buffers of a view; `group` is the world's bind group over the first two.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        group: wgpu::BindGroup,
+        globals: GlobalsBuffer,
+        lamps: wgpu::Buffer,
+    ) -> Self {
+        Self {
+            group,
+            globals,
+            lamps,
+            instances: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
+        }
+    }
+}
+
+/// A world's bind groups and buffers.
+pub(crate) struct RenderStage {
+    /// The first is that of frames without special portals; more for the same world seen through these, in one picture.
+    pub(crate) views: Vec<StageView>,
     /// Instances of the last list, reused from frame to frame.
     drawn: Vec<Instance>,
     pub(crate) light: Light,
@@ -99,19 +126,10 @@ pub(crate) struct RenderStage {
 }
 
 impl RenderStage {
-    /// Makes a stage at the origin. `world` is its bind group over `globals` and `light`.
-    pub(crate) fn new(
-        gpu: &Gpu,
-        world: wgpu::BindGroup,
-        globals: GlobalsBuffer,
-        lamps: wgpu::Buffer,
-        light: Light,
-    ) -> Self {
+    /// Makes a stage at the origin.
+    pub(crate) fn new(view: StageView, light: Light) -> Self {
         Self {
-            world,
-            globals,
-            lamps,
-            instances: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
+            views: vec![view],
             drawn: Vec::new(),
             light,
             explanation: None,
@@ -120,24 +138,56 @@ impl RenderStage {
         }
     }
 
+    /// Returns the view of frames without special portals.
+    pub(crate) fn first(&self) -> &StageView {
+        &self.views[0]
+    }
+
     /// Writes the instances of a list in its order.
     pub(crate) fn write_instances(&mut self, gpu: &Gpu, world: &GpuWorld, list: &RenderList) {
+        self.write_instances_of(gpu, 0, world, list);
+    }
+
+    /// As [`RenderStage::write_instances`], for one of its views.
+    pub(crate) fn write_instances_of(
+        &mut self,
+        gpu: &Gpu,
+        view: usize,
+        world: &GpuWorld,
+        list: &RenderList,
+    ) {
         self.drawn.clear();
         self.drawn.extend(list.instances.iter().map(|&key| {
             let number = (key & crate::list::INSTANCE_MASK) as usize;
             world.instances[number].drawn(key)
         }));
-        self.instances.write(gpu, bytemuck::cast_slice(&self.drawn));
+        let instances = &mut self.views[view].instances;
+        instances.write(gpu, bytemuck::cast_slice(&self.drawn));
     }
 
     /// Writes the parameters of a frame. `projection` is in the world's own frame.
     pub(crate) fn write_globals(&self, gpu: &Gpu, projection: &Projection, exposed: &Exposed<'_>) {
+        self.write_globals_of(gpu, 0, projection, exposed, NO_GATE);
+    }
+
+    /// As [`RenderStage::write_globals`], for one of its views. `gate` is the plane before which nothing is drawn, relative
+    /// to the eye.
+    pub(crate) fn write_globals_of(
+        &self,
+        gpu: &Gpu,
+        view: usize,
+        projection: &Projection,
+        exposed: &Exposed<'_>,
+        gate: [f32; 4],
+    ) {
+        let view = &self.views[view];
         let origin = projection.exact_origin();
         let mut globals = Globals::new(projection, &self.pose, exposed);
         globals.light = self.light.globals(origin, exposed.exposure);
         globals.style[1] = u32::from(self.explanation.is_some());
         globals.origin_low[3] = self.surroundings;
-        self.globals.write(gpu, &globals);
+        globals.gate = gate;
+        view.globals.write(gpu, &globals);
         if exposed.lamps.is_empty() {
             return;
         }
@@ -147,7 +197,7 @@ impl RenderStage {
             .collect();
         let head = [n as u32, 0, 0, 0];
         let bytes = [bytemuck::bytes_of(&head), bytemuck::cast_slice(&lamps)].concat();
-        gpu.queue.write_buffer(&self.lamps, 0, &bytes);
+        gpu.queue.write_buffer(&view.lamps, 0, &bytes);
     }
 }
 
@@ -199,6 +249,7 @@ impl Globals {
             light,
             origin_low: projection.origin_low.extend(1.0).to_array(),
             root_rows: [row(0, 0.0), row(1, height), row(2, day)],
+            gate: NO_GATE,
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
-use enfilade_world::{PartId, Pose, Space};
+use enfilade_world::{PartId, Pose, Space, SpaceViewer};
 
 use crate::camera::Camera;
+use crate::contexts::StagedWorld;
 use crate::explain::Explanation;
 use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
@@ -71,6 +72,8 @@ pub struct Studio {
     pub day: f32,
     /// Poses of the worlds that cast the shadows in the sun's map; `None` if it is out of date.
     pub(crate) shadows_of: Option<Vec<Option<Pose>>>,
+    /// For pictures of everything: finds what special portals show.
+    pub(crate) special_viewer: Option<SpaceViewer>,
 }
 
 impl Studio {
@@ -113,6 +116,7 @@ impl Studio {
             lamps: LampState::default(),
             day: 1.0,
             shadows_of: None,
+            special_viewer: None,
         })
     }
 
@@ -483,6 +487,16 @@ pub(crate) fn world_of<'a>(
         0 => root,
         i => &others[i - 1].world,
     }
+}
+
+/// Returns all worlds by part.
+pub(crate) fn staged_worlds<'a>(
+    root: &'a GpuWorld,
+    root_stage: &'a mut RenderStage,
+    others: &'a mut [StudioPart],
+) -> Vec<StagedWorld<'a>> {
+    let others = others.iter_mut().map(|p| (&p.world, &mut p.stage));
+    std::iter::once((root, root_stage)).chain(others).collect()
 }
 
 /// Returns the worlds of `lists`, whose parts ascend.

@@ -18,7 +18,7 @@ use crate::rng::Rng;
 pub use doors::with_doors;
 use grid::{Face, Grid};
 pub use scale::scaled_world;
-pub use specials::{linked_copies, with_specials};
+pub use specials::{endless_room, linked_copies, traced_step, with_specials};
 use world::{FaceHole, world_of};
 
 /// Parameters of [`room_grid`].

@@ -37,6 +37,7 @@ pub mod solid;
 mod surface_net;
 pub mod tamper;
 mod tower;
+mod traced;
 mod transform;
 mod truth;
 mod truth_json;
@@ -49,8 +50,8 @@ pub use disturb::{Disturbance, disturb, disturbed};
 pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use graphs::{
-    GridParams, cabin, courtyard, linked_copies, room_grid, scaled_world, window_tower, with_doors,
-    with_specials,
+    GridParams, cabin, courtyard, endless_room, linked_copies, room_grid, scaled_world,
+    traced_step, window_tower, with_doors, with_specials,
 };
 pub use house::furnished_house;
 pub use lift_tower::{LiftTower, lift_tower};
@@ -59,6 +60,7 @@ pub use rng::Rng;
 pub use shuffle::{shuffled_glb, shuffled_map, shuffled_obj};
 pub use site::{Generated, Site};
 pub use tower::{TowerParams, office_tower};
+pub use traced::{Chain, Traced, TracedCamera, painted};
 pub use transform::{reordered, rotated, scaled, shuffled, transformed};
 pub use truth::{Convex, Opening, OpeningKind, Room, Side, Truth};
 pub use tubes::{Tube, tubes};

@@ -1,8 +1,8 @@
 //! Points and bodies that pass special portals meet what they would meet without them.
 
-use enfilade_cpg::{Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World};
-use enfilade_geom::{DMat4, DQuat, DVec3, Similarity};
-use enfilade_testkit::{GridParams, Rng, linked_copies, room_grid};
+use enfilade_cpg::{PortalId, SpecialId, SpecialPortal, SpecialShape, World};
+use enfilade_geom::{DQuat, DVec3, Similarity};
+use enfilade_testkit::{GridParams, Rng, endless_room, linked_copies, room_grid, traced_step};
 use enfilade_world::{Agent, Body, Cast, Caster, PartId, Place, Space, Walker};
 
 const ROOT: PartId = PartId::ROOT;
@@ -147,99 +147,11 @@ fn bodies_meet_in_and_beyond_a_special_portal_what_they_meet_in_a_doorway() {
     );
 }
 
-/// A room of which opposite walls, almost whole, lead into each other, as in Gjørup 1999, section 3.4.2; and some that turn.
-fn endless(turned: bool) -> World {
-    let mut world = room_grid(&GridParams {
-        size: [1, 1, 1],
-        windows: 0.0,
-        furniture: 0,
-        outdoors: false,
-        ..GridParams::offices(1, 1)
-    });
-    let [low, high] = world.graph.cells[0].aabb.map(point);
-    // 2 m by 2 m in the middle of each of the four walls.
-    let middle = (low + high) * 0.5;
-    let half = (high - low) * 0.5;
-    let walls: Vec<(DVec3, DVec3)> = [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z]
-        .map(|n| (n, middle + n * (n.abs().dot(half) - 1e-3)))
-        .to_vec();
-    let pairs = if turned { [2, 3, 1, 0] } else { [1, 0, 3, 2] };
-    for (i, (normal, center)) in walls.iter().enumerate() {
-        let right = normal.cross(DVec3::Y);
-        let corners = [
-            -right - DVec3::Y,
-            DVec3::Y - right,
-            right + DVec3::Y,
-            right - DVec3::Y,
-        ];
-        // Out of one wall is into the other.
-        let (out, at) = walls[pairs[i]];
-        let turn = DQuat::from_rotation_y(normal.cross(-out).y.atan2(normal.dot(-out)));
-        let map = Similarity::rigid(turn, at - turn * *center);
-        world.graph.specials.push(SpecialPortal {
-            name: String::new(),
-            cell: enfilade_cpg::CellId(0),
-            shape: SpecialShape::Surface {
-                normal: normal.as_vec3().to_array(),
-                pieces: vec![corners.map(|c| (*center + c).as_vec3().to_array()).to_vec()],
-            },
-            passes: vec![Pass::new(Way::Lead {
-                to: enfilade_cpg::CellId(0),
-                map,
-                back: None,
-            })],
-        });
-    }
-    world
-}
-
-/// Returns the end of a segment, the matrix to there, and where and along which direction it passes which special portals: by
-/// matrices and planes alone.
-fn traced(
-    world: &World,
-    mut from: DVec3,
-    mut by: DVec3,
-) -> (DVec3, DMat4, Vec<(usize, DVec3, DVec3)>) {
-    let (mut whole, mut crossings) = (DMat4::IDENTITY, Vec::new());
-    loop {
-        let mut first: Option<(f64, usize)> = None;
-        for k in 0..world.graph.specials.len() {
-            let (normal, pieces) = world.graph.special_opening(SpecialId(k as u32));
-            let corners = &pieces[0].points;
-            let t = normal.dot(corners[0] - from) / normal.dot(by);
-            let p = from + by * t;
-            let [u, v] = [corners[1] - corners[0], corners[3] - corners[0]];
-            let [x, y] = [u, v].map(|e| e.dot(p - corners[0]) / e.length_squared());
-            let is_in = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
-            if normal.dot(by) > 0.0
-                && (0.0..1.0).contains(&t)
-                && is_in
-                && first.is_none_or(|f| t < f.0)
-            {
-                first = Some((t, k));
-            }
-        }
-        let Some((t, k)) = first else {
-            return (from + by, whole, crossings);
-        };
-        let Way::Lead { map, .. } = &world.graph.specials[k].passes[0].way else {
-            panic!("leads")
-        };
-        let matrix = map.matrix();
-        crossings.push((k, from + by * t, by.normalize()));
-        (from, by) = (
-            matrix.transform_point3(from + by * t),
-            matrix.transform_vector3(by * (1.0 - t)),
-        );
-        whole = matrix * whole;
-    }
-}
-
 // Covers W9.
 #[test]
 fn steps_through_many_special_portals_end_at_the_right_place_and_lead_back() {
     for turned in [false, true] {
-        let world = endless(turned);
+        let world = endless_room(turned);
         let space = Space::new(world.clone()).unwrap();
         let [low, high] = world.graph.cells[0].aabb.map(point);
         let mut rng = Rng::new(8);
@@ -250,7 +162,7 @@ fn steps_through_many_special_portals_end_at_the_right_place_and_lead_back() {
             let angle = rng.range(0.0, std::f64::consts::TAU);
             let along = DVec3::new(angle.cos(), 0.0, angle.sin());
             let by = along * rng.range(0.0, 80.0);
-            let (end, whole, crossings) = traced(&world, from, by);
+            let (end, whole, crossings) = traced_step(&world, from, by);
             let n_passed = crossings.len() as u32;
             if n_passed > 20 {
                 continue;
@@ -275,7 +187,7 @@ fn steps_through_many_special_portals_end_at_the_right_place_and_lead_back() {
 // Covers W9.
 #[test]
 fn a_step_that_does_not_end_is_cut_off() {
-    let world = endless(false);
+    let world = endless_room(false);
     let space = Space::new(world.clone()).unwrap();
     let [low, high] = world.graph.cells[0].aabb.map(point);
     let step = space.follow(ROOT, (low + high) * 0.5, DVec3::X * 1e6);
@@ -330,7 +242,7 @@ fn a_walker_goes_through_and_back_without_a_jump() {
 // Covers W9.
 #[test]
 fn a_ball_that_fits_through_an_opening_does_not_catch_on_the_wall_behind_it() {
-    let world = endless(true);
+    let world = endless_room(true);
     let space = Space::new(world.clone()).unwrap();
     let [low, high] = world.graph.cells[0].aabb.map(point);
     let (mut rng, mut caster) = (Rng::new(5), Caster::new());
@@ -358,7 +270,7 @@ fn a_ball_that_fits_through_an_opening_does_not_catch_on_the_wall_behind_it() {
                 inward.dot(p - a) > radius / slant + 1e-3
             })
         };
-        let (end, _, crossings) = traced(&world, from, by);
+        let (end, _, crossings) = traced_step(&world, from, by);
         let inside =
             |p: DVec3| p.cmpgt(low + radius + 0.01).all() && p.cmplt(high - radius - 0.01).all();
         let all_fit = crossings
@@ -389,7 +301,7 @@ fn a_ball_that_fits_through_an_opening_does_not_catch_on_the_wall_behind_it() {
 // Covers W9.
 #[test]
 fn from_behind_a_special_portal_is_not_there() {
-    let mut world = endless(false);
+    let mut world = endless_room(false);
     let [low, high] = world.graph.cells[0].aabb.map(point);
     let middle = (low + high) * 0.5;
     // One in the middle of the room, seen from -x.
@@ -434,7 +346,7 @@ fn from_behind_a_special_portal_is_not_there() {
 // Covers W9.
 #[test]
 fn a_step_that_ends_in_the_opening_passes_with_the_next_one() {
-    let world = endless(false);
+    let world = endless_room(false);
     let space = Space::new(world.clone()).unwrap();
     for id in world.graph.special_ids() {
         let (normal, pieces) = world.graph.special_opening(id);

@@ -7,7 +7,7 @@
 //!
 //! **Which way it errs:** a triangle that neither part is found to see is listed in both.
 
-pub(crate) mod carried;
+mod carried;
 pub mod special;
 mod splice;
 

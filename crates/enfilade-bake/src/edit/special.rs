@@ -10,8 +10,8 @@ use enfilade_cpg::{
 };
 use enfilade_geom::{DMat3, DQuat, DVec3, Plane, Similarity, Winding, shown};
 
-use super::carried::without;
 use super::{AddPortalError, checked, place};
+use crate::specials::without;
 
 /// How far before a wall the cell of a polygon is looked for, nearest first: people type coordinates with two or three digits, and
 /// pictures are thick. [Units: wu]
@@ -84,7 +84,7 @@ pub enum SpecialError {
         /// Names of its cells.
         cells: [String; 2],
     },
-    /// The vertices are no polygon.
+    /// The vertices do not form a polygon.
     #[error("this is no place for a special portal: {0}")]
     Polygon(AddPortalError),
     /// No cell lies before the polygon.

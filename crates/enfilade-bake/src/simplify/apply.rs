@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, SourceRuns, World};
 use enfilade_geom::scene::Primitive;
 
-use crate::edit::carried::renumbered as renumbered_specials;
 use crate::layout::{Layout, layout_of};
+use crate::specials::renumbered as renumbered_specials;
 
 /// Returns the world with each cell merged into `into[cell]`, and the new number of each old cell.
 ///

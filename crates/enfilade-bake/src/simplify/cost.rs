@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_cpg::{CellId, CellPortalGraph, DetailObject, World};
+use enfilade_cpg::{CellId, CellPortalGraph, DetailObject, SpecialPortal, World};
 use enfilade_geom::scene::{Material, Primitive};
 use enfilade_geom::{Aabb, DVec3, shown};
 
@@ -192,7 +192,7 @@ impl Prices<'_> {
 
 /// Returns the cells at doorways with a special side, ascending: merged across one, they would lose it.
 fn alone(graph: &CellPortalGraph) -> Vec<u32> {
-    let portals = graph.specials.iter().filter_map(|s| s.portal());
+    let portals = graph.specials.iter().filter_map(SpecialPortal::portal);
     let cells = portals.flat_map(|p| graph[p].cells).map(|c| c.0);
     let cells: BTreeSet<u32> = cells.collect();
     cells.into_iter().collect()

@@ -137,7 +137,7 @@ pub(crate) const ROWS: &[Row] = &[
     ),
 ];
 
-const fn made(
+pub(crate) const fn made(
     name: &'static str,
     scenes: &'static [&'static str],
     measure: fn(&str) -> anyhow::Result<Figure>,
@@ -150,7 +150,7 @@ const fn made(
     }
 }
 
-const fn baked(
+pub(crate) const fn baked(
     name: &'static str,
     scenes: &'static [&'static str],
     measure: fn(&World) -> anyhow::Result<Figure>,

@@ -2,11 +2,12 @@
 
 use anyhow::{Context, bail};
 use enfilade::bake::edit::special::{self, LinkOptions, Spot};
-use enfilade::cpg::{CellPortalGraph, MonitorCamera, PortalId, SpecialId, SpecialShape, World};
-use enfilade::geom::{DMat4, DVec3, Similarity, shown};
+use enfilade::cpg::{CellPortalGraph, MonitorCamera, PortalId, SpecialId, World};
+use enfilade::geom::{DMat4, Similarity, shown};
 
 use super::{Polygon, parse_polygon};
 use crate::inspect::cell_of;
+use crate::specials::described;
 use enfilade_cli::values::point;
 
 // No doc comment: it would replace the command's description.
@@ -131,7 +132,7 @@ fn parse_monitor(text: &str) -> Result<(Place, MonitorCamera), String> {
         ));
     }
     let [x, y, z] = toward;
-    // Who looks straight up or down has no upright.
+    // A camera that looks straight up or down has no upright.
     let is_steep = x.abs().max(z.abs()) < 1e-3 * y.abs();
     let up = if is_steep {
         [0.0, 0.0, 1.0]
@@ -296,72 +297,10 @@ fn sides_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<Vec<Spot>>
     })
 }
 
-/// Says what a special portal is, in words.
-pub(crate) fn described(graph: &CellPortalGraph, special: SpecialId) -> String {
-    use enfilade::cpg::Way;
-    let side = &graph.specials[special.idx()];
-    let passes = side.passes.iter().enumerate().map(|(i, pass)| {
-        let share = match i {
-            0 => String::new(),
-            _ => format!(" {:.0} %", pass.tint[3] * 100.0),
-        };
-        let what = match &pass.way {
-            Way::Through => "through".to_owned(),
-            Way::Mirror => "mirror".to_owned(),
-            Way::Lead { to, map, back } => {
-                let mut out = format!("to {}", graph[*to].name);
-                if map.scale.abs() != 1.0 {
-                    out += &format!(", ×{:.4}", map.scale.abs());
-                }
-                if map.is_reflection() {
-                    out += ", reflected";
-                }
-                match back {
-                    Some(back) => out + &format!(", back by {back}"),
-                    None => out + ", one way",
-                }
-            }
-            Way::Monitor(camera) => {
-                let [x, y, z] = camera.eye;
-                format!("monitor of a camera at {x:.2} {y:.2} {z:.2}")
-            }
-        };
-        let [r, g, b, _] = pass.tint;
-        let tint = if [r, g, b] == [1.0; 3] {
-            String::new()
-        } else {
-            format!(" in {r:.2} {g:.2} {b:.2}")
-        };
-        what + &share + &tint
-    });
-    let passes: Vec<String> = passes.collect();
-    let place = match side.shape {
-        SpecialShape::Portal(portal) => portal.to_string(),
-        SpecialShape::Surface { .. } => "a wall".to_owned(),
-    };
-    let at = middle(graph, special);
-    let text = format!(
-        "{} of {place} in {}, at {:.2} {:.2} {:.2}",
-        passes.join(" + "),
-        graph[side.cell].name,
-        at.x,
-        at.y,
-        at.z
-    );
-    shown(text).to_string()
-}
-
-/// Returns the middle of a special portal's box.
-pub(crate) fn middle(graph: &CellPortalGraph, special: SpecialId) -> DVec3 {
-    let (_, pieces) = graph.special_opening(special);
-    let points = pieces.iter().flat_map(|p| &p.points).copied();
-    let bounds = points.fold(enfilade::geom::Aabb::EMPTY, |b, p| b.including(p));
-    bounds.center()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use enfilade::geom::DVec3;
 
     #[test]
     fn places_colors_cameras_and_maps_are_read_and_others_refused() {

@@ -6,7 +6,7 @@ use enfilade::cpg::{CellPortalGraph, SpecialId, Way};
 use enfilade::geom::shown;
 use serde::Serialize;
 
-use crate::edit::special::{described, middle};
+use crate::specials::{described, middle};
 
 /// A special portal.
 #[derive(Serialize)]

@@ -292,7 +292,8 @@ impl App<'_> {
         };
         Ok(Open {
             walker: Walker::new(start.eye),
-            is_living: self.args.living.is_some(),
+            has_company: self.args.living.is_some(),
+            is_living: self.args.living.is_some() || !self.world.graph.specials.is_empty(),
             lived,
             window,
             surface,

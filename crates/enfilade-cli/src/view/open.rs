@@ -36,6 +36,8 @@ pub(super) struct Open {
     pub(super) walker: Walker,
     pub(super) lived: Lived,
     /// `true` if something lives in the world.
+    pub(super) has_company: bool,
+    /// `true` if that is so, or if the world has special portals: then it is drawn as a space.
     pub(super) is_living: bool,
     pub(super) yaw: f32,
     pub(super) pitch: f32,
@@ -327,7 +329,9 @@ impl Open {
         self.shown.mode = self.mode;
         self.shown.is_recording = self.recorded.is_some();
         self.shown.flies = self.walker.flies;
-        self.shown.living = self.lived.words(&player);
+        if self.has_company {
+            self.shown.living = self.lived.words(&player);
+        }
         let (gpu, window) = (&self.studio.gpu, &self.window);
         self.panel
             .draw(gpu, window, &output, size, world, &self.shown);

@@ -1,6 +1,6 @@
 //! Checks special portals: that they are sides of doorways or parts of walls, and that what they show exists.
 //!
-//! Two mirrors back to back in one doorway pass: nobody sees or goes through, but that is no contradiction.
+//! Two mirrors back to back in one doorway pass: nobody sees or goes through, but nothing contradicts itself.
 
 use std::collections::HashMap;
 
@@ -129,11 +129,11 @@ impl Check<'_> {
             if !tint.iter().all(|v| (0.0..=1.0).contains(v)) {
                 return Err(SpecialProblem::Tint { pass, tint: *tint });
             }
-            if matches!(way, Way::Through | Way::Lead { .. }) {
-                if let Some(first) = way_to_go.replace(pass) {
-                    let second = pass;
-                    return Err(SpecialProblem::TwoWays { first, second });
-                }
+            if matches!(way, Way::Through | Way::Lead { .. })
+                && let Some(first) = way_to_go.replace(pass)
+            {
+                let second = pass;
+                return Err(SpecialProblem::TwoWays { first, second });
             }
             match way {
                 Way::Through if special.portal().is_none() => {
@@ -242,9 +242,9 @@ impl Check<'_> {
         let off = outlines_differ(&plane, &mapped, &points_there().collect::<Vec<_>>());
         if exceeds(off, FIT + slack) {
             let sizes = [
-                size_across(normal, points()),
-                size_across(inward, mapped.iter().copied()),
-                size_across(normal_there, points_there()),
+                size_across(normal, &points()),
+                size_across(inward, &mapped.iter().copied()),
+                size_across(normal_there, &points_there()),
             ];
             return Err(SpecialProblem::Outline {
                 pass,

@@ -66,7 +66,7 @@ pub enum SpecialProblem {
     /// It shows nothing.
     #[error("it has no passes; give it one, or remove it")]
     NoPass,
-    /// A tint is no color.
+    /// A tint is not a color.
     #[error("the tint {tint:?} of pass {pass} must be four numbers from 0 to 1")]
     Tint {
         /// The pass.
@@ -131,7 +131,7 @@ pub enum SpecialProblem {
         to: CellId,
         /// The cell that it should lead to.
         cell: CellId,
-        /// What it is instead.
+        /// The problem with it.
         is: &'static str,
     },
     /// The way back leads elsewhere than to where one came from.

@@ -319,23 +319,9 @@ impl<'a> Reader<'a> {
 
     fn specials(&mut self) -> Result<Vec<SpecialPortal>, WireError> {
         let graph = &self.root.extensions.graph;
-        const CORNERS: &str = "the vertices of special portals";
-        if graph.version < 2 && !(graph.specials.is_empty() && graph.special_corners.is_none()) {
-            return Err(broken("specials", "special portals need version 2"));
-        }
-        let bytes = self.optional_view(graph.special_corners, CORNERS)?;
-        let (mut corners, rest) = bytes.as_chunks::<12>();
-        if !rest.is_empty() {
-            return Err(broken(CORNERS, "their buffer view is cut off"));
-        }
+        let bytes = self.optional_view(graph.special_corners, special::CORNERS)?;
         self.spend(bytes.len() as u64)?;
-        let specials = (graph.specials.iter().enumerate())
-            .map(|(i, s)| special::read(i, s, &mut corners))
-            .collect::<Result<_, _>>()?;
-        if !corners.is_empty() {
-            return Err(broken(CORNERS, "there are more than special portals use"));
-        }
-        Ok(specials)
+        special::read_all(graph, bytes)
     }
 
     fn locator(&mut self) -> Result<Locator, WireError> {

@@ -139,11 +139,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
             .collect(),
         extensions: json::RootExtensions {
             graph: json::Graph {
-                version: if graph.specials.is_empty() {
-                    1
-                } else {
-                    VERSION
-                },
+                version: version(world),
                 cells: cells(world),
                 portals: portals(world),
                 portal_corners,
@@ -163,6 +159,15 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
             },
             lights: placed.lights,
         },
+    }
+}
+
+/// Returns the lowest version that holds a world.
+fn version(world: &World) -> u64 {
+    if world.graph.specials.is_empty() {
+        1
+    } else {
+        VERSION
     }
 }
 

@@ -2,7 +2,7 @@
 
 use enfilade_geom::{DQuat, DVec3, Similarity};
 
-use super::json::{PassJson, SpecialJson, WayJson};
+use super::json::{Graph, PassJson, SpecialJson, WayJson};
 use super::rows::take_polygon;
 use super::{WireError, broken};
 use crate::{CellId, MonitorCamera, Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way};
@@ -62,8 +62,29 @@ fn written_pass(pass: &Pass) -> PassJson {
     }
 }
 
+/// Name of the vertices, for errors.
+pub(super) const CORNERS: &str = "the vertices of special portals";
+
+/// Reads all special portals; `bytes` are their vertices.
+pub(super) fn read_all(graph: &Graph, bytes: &[u8]) -> Result<Vec<SpecialPortal>, WireError> {
+    if graph.version < 2 && !(graph.specials.is_empty() && graph.special_corners.is_none()) {
+        return Err(broken("specials", "special portals need version 2"));
+    }
+    let (mut corners, rest) = bytes.as_chunks::<12>();
+    if !rest.is_empty() {
+        return Err(broken(CORNERS, "their buffer view is cut off"));
+    }
+    let specials = (graph.specials.iter().enumerate())
+        .map(|(i, s)| read(i, s, &mut corners))
+        .collect::<Result<_, _>>()?;
+    if !corners.is_empty() {
+        return Err(broken(CORNERS, "there are more than special portals use"));
+    }
+    Ok(specials)
+}
+
 /// Reads special portal `i`; takes its vertices from the front of `corners`.
-pub(super) fn read(
+fn read(
     i: usize,
     special: &SpecialJson,
     corners: &mut &[[u8; 12]],

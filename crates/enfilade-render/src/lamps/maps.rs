@@ -153,8 +153,9 @@ impl LampMaps {
     pub(crate) fn reaches(&self, lamp: &ActiveLamp, cells: &LampReach) -> bool {
         let reach = &self.slots[lamp.layer as usize / 6].reach;
         reach.iter().any(|(part, own)| {
-            let others = cells.iter().find(|c| c.0 == *part);
-            others.is_some_and(|(_, others)| own.iter().any(|c| others.binary_search(c).is_ok()))
+            // A part may be seen more than once, in special portals.
+            let mut others = cells.iter().filter(|c| c.0 == *part);
+            others.any(|(_, others)| own.iter().any(|c| others.binary_search(c).is_ok()))
         })
     }
 

@@ -28,6 +28,8 @@ struct Globals {
     root_x: vec4<f32>,
     root_y: vec4<f32>,
     root_z: vec4<f32>,
+    // Plane of the special portal by which the view comes: nothing nearer than `w` along the normal is drawn.
+    gate: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;

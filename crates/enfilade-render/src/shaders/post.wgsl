@@ -66,14 +66,20 @@ fn heat_map(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     return vec4(heat(drawn.a * 255.0 / 8.0), 1.0);
 }
 
+// True if the sky is in the picture already.
+override KEEPS_SKY: bool = false;
+
 @fragment
 fn finish(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     let p = vec2<i32>(clip.xy);
     let z = depth_at(p);
     // Only the sky is at the far end.
+    let drawn = textureLoad(color, p, 0);
     if z <= 0.0 {
+        if KEEPS_SKY {
+            return vec4(drawn.rgb, 1.0);
+        }
         return vec4(sky(p), 1.0);
     }
-    let drawn = textureLoad(color, p, 0);
     return vec4(drawn.rgb * open_sky(p, point_at(p, z), z), 1.0);
 }

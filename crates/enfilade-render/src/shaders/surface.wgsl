@@ -15,6 +15,8 @@ override EXPLAINS: bool = false;
 override IS_PROP: bool = false;
 // True if lamps shine.
 override HAS_LAMPS: bool = false;
+// True if the view may come by a special portal.
+override HAS_GATE: bool = false;
 
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
@@ -182,6 +184,15 @@ fn is_above_cut(in: Surface) -> bool {
     return dot(globals.root_y.xyz, in.relative) + globals.root_y.w > globals.origin.w;
 }
 
+// Drops what lies before the special portal by which the view comes.
+fn pass_gate(in: Surface) {
+    if HAS_GATE {
+        if dot(globals.gate.xyz, in.relative) < globals.gate.w {
+            discard;
+        }
+    }
+}
+
 fn cut(in: Surface, texel: vec4<f32>) {
     if is_above_cut(in) || in.color.a * texel.a < in.emissive.w {
         discard;
@@ -193,19 +204,24 @@ fn cut(in: Surface, texel: vec4<f32>) {
 
 @fragment
 fn plain(in: Surface) -> Drawn {
-    return drawn(in.clip, vec4(toned(shaded(in, vec4(1.0)).color.rgb), 1.0));
+    let c = shaded(in, vec4(1.0)).color;
+    pass_gate(in);
+    return drawn(in.clip, vec4(toned(c.rgb), 1.0));
 }
 
 @fragment
 fn textured(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
-    return drawn(in.clip, vec4(toned(shaded(in, texel).color.rgb), 1.0));
+    let c = shaded(in, texel).color;
+    pass_gate(in);
+    return drawn(in.clip, vec4(toned(c.rgb), 1.0));
 }
 
 @fragment
 fn masked(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let c = shaded(in, texel).color;
+    pass_gate(in);
     cut(in, texel);
     return drawn(in.clip, vec4(toned(c.rgb), 1.0));
 }
@@ -214,6 +230,7 @@ fn masked(in: Surface) -> Drawn {
 fn glass(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let s = shaded(in, texel);
+    pass_gate(in);
     cut(in, texel);
     // Schlick, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), for glass with two faces.
     let grazing = 1.0 - abs(dot(s.normal, s.toward_eye));
@@ -238,6 +255,7 @@ fn glass(in: Surface) -> Drawn {
 fn sheer(in: Surface) -> Drawn {
     let texel = textureSample(base_texture, base_sampler, in.uv);
     let c = shaded(in, texel).color;
+    pass_gate(in);
     cut(in, texel);
     return drawn(in.clip, vec4(toned(c.rgb), c.a));
 }
@@ -245,6 +263,7 @@ fn sheer(in: Surface) -> Drawn {
 // A step of brightness for each draw of a pixel.
 @fragment
 fn count(in: Surface) -> Drawn {
+    pass_gate(in);
     if is_above_cut(in) {
         discard;
     }

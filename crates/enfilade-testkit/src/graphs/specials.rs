@@ -1,9 +1,9 @@
 //! Special portals in made worlds: mirrors, teleporters and one-way places.
 
 use enfilade_cpg::{CellId, Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World};
-use enfilade_geom::{DQuat, DVec3, Similarity};
+use enfilade_geom::{DMat4, DQuat, DVec3, Similarity};
 
-use super::scaled_world;
+use super::{GridParams, room_grid, scaled_world};
 use crate::assembled::{Assembled, Standing, assembled};
 use crate::rng::Rng;
 
@@ -203,4 +203,103 @@ pub fn linked_copies(world: &World, portal: PortalId, map: &Similarity) -> World
         },
     ];
     world
+}
+
+fn point(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
+
+/// A room whose walls lead into each other through squares of 2 m in their middles: opposite ones, as in Gjørup 1999, section
+/// 3.4.2; or `turned`, those around the corner.
+#[must_use]
+pub fn endless_room(turned: bool) -> World {
+    let mut world = room_grid(&GridParams {
+        size: [1, 1, 1],
+        windows: 0.0,
+        furniture: 0,
+        outdoors: false,
+        ..GridParams::offices(1, 1)
+    });
+    let [low, high] = world.graph.cells[0].aabb.map(point);
+    // 2 m by 2 m in the middle of each of the four walls.
+    let middle = (low + high) * 0.5;
+    let half = (high - low) * 0.5;
+    let walls: Vec<(DVec3, DVec3)> = [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z]
+        .map(|n| (n, middle + n * (n.abs().dot(half) - 1e-3)))
+        .to_vec();
+    let pairs = if turned { [2, 3, 1, 0] } else { [1, 0, 3, 2] };
+    for (i, (normal, center)) in walls.iter().enumerate() {
+        let right = normal.cross(DVec3::Y);
+        let corners = [
+            -right - DVec3::Y,
+            DVec3::Y - right,
+            right + DVec3::Y,
+            right - DVec3::Y,
+        ];
+        // Out of one wall is into the other.
+        let (out, at) = walls[pairs[i]];
+        let turn = DQuat::from_rotation_y(normal.cross(-out).y.atan2(normal.dot(-out)));
+        let map = Similarity::rigid(turn, at - turn * *center);
+        world.graph.specials.push(SpecialPortal {
+            name: String::new(),
+            cell: CellId(0),
+            shape: SpecialShape::Surface {
+                normal: normal.as_vec3().to_array(),
+                pieces: vec![corners.map(|c| (*center + c).as_vec3().to_array()).to_vec()],
+            },
+            passes: vec![Pass::new(Way::Lead {
+                to: CellId(0),
+                map,
+                back: None,
+            })],
+        });
+    }
+    world
+}
+
+/// Returns the end of a segment, the matrix to there, and where and along which direction it passes which special portals: by
+/// matrices and planes alone.
+///
+/// # Panics
+///
+/// If a special portal does not lead anywhere.
+#[must_use]
+pub fn traced_step(
+    world: &World,
+    mut from: DVec3,
+    mut by: DVec3,
+) -> (DVec3, DMat4, Vec<(usize, DVec3, DVec3)>) {
+    let (mut whole, mut crossings) = (DMat4::IDENTITY, Vec::new());
+    loop {
+        let mut first: Option<(f64, usize)> = None;
+        for k in 0..world.graph.specials.len() {
+            let (normal, pieces) = world.graph.special_opening(SpecialId(k as u32));
+            let corners = &pieces[0].points;
+            let t = normal.dot(corners[0] - from) / normal.dot(by);
+            let p = from + by * t;
+            let [u, v] = [corners[1] - corners[0], corners[3] - corners[0]];
+            let [x, y] = [u, v].map(|e| e.dot(p - corners[0]) / e.length_squared());
+            let is_in = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
+            if normal.dot(by) > 0.0
+                && (0.0..1.0).contains(&t)
+                && is_in
+                && first.is_none_or(|f| t < f.0)
+            {
+                first = Some((t, k));
+            }
+        }
+        let Some((t, k)) = first else {
+            return (from + by, whole, crossings);
+        };
+        let Way::Lead { map, .. } = &world.graph.specials[k].passes[0].way else {
+            panic!("leads")
+        };
+        let matrix = map.matrix();
+        crossings.push((k, from + by * t, by.normalize()));
+        (from, by) = (
+            matrix.transform_point3(from + by * t),
+            matrix.transform_vector3(by * (1.0 - t)),
+        );
+        whole = matrix * whole;
+    }
 }

@@ -1,0 +1,550 @@
+//! Drawing of a tree of contexts, picture by picture.
+
+use enfilade_world::PartId;
+
+use super::{Content, Face, Layer, Node, Tree};
+use crate::formats::{COLOR, DEPTH_STENCIL};
+use crate::frame::Paint;
+use crate::gpu::{Gpu, RenderError};
+use crate::panes::{PanePicture, PanePipelines};
+use crate::pipelines::{CHOSEN, Layouts};
+use crate::props::PropDraw;
+use crate::renderer::{PartView, Renderer, Shown};
+use crate::resources::{Grown, color_attachment, texture};
+use crate::scene::GpuWorld;
+use crate::shadings::Shadings;
+use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage};
+
+/// Most sizes of pictures, and most pictures, that are kept from frame to frame.
+const MOST_KEPT: usize = 16;
+
+/// Targets and buffers for pictures with special portals, kept from frame to frame.
+pub(crate) struct ContextTargets {
+    targets: Vec<Targets>,
+    pictures: Vec<PanePicture>,
+    /// One per context of a picture.
+    skies: Vec<GlobalsBuffer>,
+    corners: Grown,
+    pipelines: Vec<(wgpu::TextureFormat, PanePipelines)>,
+}
+
+/// Intermediate targets of one size.
+struct Targets {
+    size: [u32; 2],
+    color: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    post: wgpu::BindGroup,
+}
+
+/// A world and its buffers.
+pub(crate) type StagedWorld<'a> = (&'a GpuWorld, &'a mut RenderStage);
+
+/// The choices of pipelines of a node, by part.
+type NodeShadings = Vec<Shadings>;
+
+/// A picture being drawn.
+struct Drawing<'a> {
+    tree: &'a Tree,
+    worlds: &'a [StagedWorld<'a>],
+    shadings: &'a [(usize, NodeShadings)],
+    /// Props by part.
+    props: &'a [(PartId, Vec<PropDraw>)],
+    /// The pictures of the tree, by number.
+    pictures: &'a [usize],
+    panes: &'a PanePipelines,
+    size: [u32; 2],
+}
+
+impl ContextTargets {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        Self {
+            targets: Vec::new(),
+            pictures: Vec::new(),
+            skies: Vec::new(),
+            corners: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
+            pipelines: Vec::new(),
+        }
+    }
+
+    /// Makes the targets of a size unless they exist, and moves them to the end.
+    fn resize(&mut self, gpu: &Gpu, layouts: &Layouts, size: [u32; 2]) {
+        if let Some(at) = self.targets.iter().position(|t| t.size == size) {
+            let own = self.targets.remove(at);
+            self.targets.push(own);
+            return;
+        }
+        if self.targets.len() == MOST_KEPT {
+            self.targets.remove(0);
+        }
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+        let whole = wgpu::TextureViewDescriptor::default();
+        let color = texture(gpu, "color", size, COLOR, usage).create_view(&whole);
+        let depth = texture(gpu, "depth", size, DEPTH_STENCIL, usage);
+        let read = depth.create_view(&wgpu::TextureViewDescriptor {
+            aspect: wgpu::TextureAspect::DepthOnly,
+            ..whole
+        });
+        let view = |binding, view| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view),
+        };
+        let post = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("post"),
+            layout: &layouts.post,
+            entries: &[view(0, &color), view(1, &read)],
+        });
+        self.targets.push(Targets {
+            size,
+            color,
+            depth: depth.create_view(&whole),
+            post,
+        });
+    }
+
+    /// Returns a picture for each size.
+    fn place(
+        &mut self,
+        gpu: &Gpu,
+        layouts: &Layouts,
+        format: wgpu::TextureFormat,
+        sizes: impl Iterator<Item = [u32; 2]>,
+    ) -> Vec<usize> {
+        if self.pictures.len() > MOST_KEPT {
+            self.pictures.clear();
+        }
+        let mut out = Vec::new();
+        for size in sizes {
+            let is_free = |i: &usize| self.pictures[*i].size == size && !out.contains(i);
+            let own = (0..self.pictures.len()).find(is_free);
+            out.push(own.unwrap_or_else(|| {
+                self.pictures
+                    .push(PanePicture::new(gpu, layouts, format, size));
+                self.pictures.len() - 1
+            }));
+        }
+        out
+    }
+
+    fn prepare(&mut self, gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) {
+        if !self.pipelines.iter().any(|p| p.0 == format) {
+            let made = PanePipelines::new(gpu, layouts, format);
+            self.pipelines.push((format, made));
+        }
+    }
+
+    fn panes(&self, format: wgpu::TextureFormat) -> Option<&PanePipelines> {
+        self.pipelines
+            .iter()
+            .find(|p| p.0 == format)
+            .map(|(_, made)| made)
+    }
+}
+
+impl Renderer {
+    /// Draws a tree to `output`, a texture of the renderer's format and of the size of its first picture. `worlds` by part.
+    pub(crate) fn draw_tree(
+        &mut self,
+        gpu: &Gpu,
+        worlds: &mut [StagedWorld<'_>],
+        tree: &Tree,
+        shown: &Shown<'_>,
+        output: &wgpu::TextureView,
+    ) -> Result<(), RenderError> {
+        let mut ids: Vec<PartId> = tree.parts().collect();
+        ids.sort_unstable();
+        ids.dedup();
+        for id in &ids {
+            let light = &mut worlds[id.0 as usize].1.light;
+            self.lamps.write_lit(gpu, *id, shown.lamps, light);
+        }
+        let props = self.props.write(gpu, shown.props, ids.iter().copied());
+        let props: Vec<(PartId, Vec<PropDraw>)> = ids.into_iter().zip(props).collect();
+        let corners = bytemuck::cast_slice(&tree.corners);
+        self.contexts.corners.write(gpu, corners);
+        for format in [COLOR, self.format()] {
+            self.contexts.prepare(gpu, &self.layouts, format);
+        }
+        let sizes = tree.pictures[1..].iter().map(|p| p.size);
+        let format = self.format();
+        let pictures = (self.contexts).place(gpu, &self.layouts, format, sizes);
+        for picture in (0..tree.pictures.len()).rev() {
+            gpu.check_picture(tree.pictures[picture].size)?;
+            self.draw_tree_picture(
+                gpu,
+                worlds,
+                (tree, picture),
+                shown,
+                (&props, &pictures),
+                output,
+            );
+        }
+        Ok(())
+    }
+
+    fn draw_tree_picture(
+        &mut self,
+        gpu: &Gpu,
+        worlds: &mut [StagedWorld<'_>],
+        (tree, picture): (&Tree, usize),
+        shown: &Shown<'_>,
+        (props, pictures): (&[(PartId, Vec<PropDraw>)], &[usize]),
+        output: &wgpu::TextureView,
+    ) {
+        let own = &tree.pictures[picture];
+        let size = own.size;
+        let exposed = Exposed {
+            style: &shown.style,
+            size,
+            sun: self.sun,
+            exposure: own.exposure,
+            day: shown.day,
+            lamps: shown.lamps,
+        };
+        let globals = Globals::new(&own.projection, &own.pose, &exposed);
+        self.camera.write(gpu, &globals);
+        let is_its = |(_, node): &(usize, &Node)| node.picture == picture;
+        let nodes: Vec<(usize, &Node)> = tree.nodes.iter().enumerate().filter(is_its).collect();
+        let mut shadings = Vec::new();
+        for (k, (index, node)) in nodes.iter().enumerate() {
+            if k == self.contexts.skies.len() {
+                let sky = GlobalsBuffer::new(gpu, &self.layouts);
+                self.contexts.skies.push(sky);
+            }
+            let sky = Globals::new(&node.sky.0, &node.sky.1, &exposed);
+            self.contexts.skies[k].write(gpu, &sky);
+            let mut of_node = Vec::new();
+            for part in &node.parts {
+                let (world, stage) = &mut worlds[part.id.0 as usize];
+                while stage.views.len() <= part.view {
+                    let view = self.stage_view(gpu, &stage.light, stage.explanation.as_ref());
+                    stage.views.push(view);
+                }
+                stage.write_globals_of(gpu, part.view, &part.projection, &exposed, part.gate);
+                stage.write_instances_of(gpu, part.view, world, &part.list);
+                let own = Shadings::of(&shown.style, &part.list, stage, shown.lamps.len());
+                let own = own.in_context();
+                own.prepare(gpu, &self.layouts, &mut self.pipelines, &part.list);
+                for prop in props_of(props, part.id) {
+                    let variant = own.prop(prop.span.is_smooth);
+                    self.pipelines.prepare(gpu, &self.layouts, variant);
+                }
+                of_node.push(own);
+            }
+            shadings.push((*index, of_node));
+        }
+        let marks = (picture == 0).then(|| self.write_marks(gpu, &[], shown, size));
+        self.contexts.resize(gpu, &self.layouts, size);
+        let Some(targets) = self.contexts.targets.last() else {
+            return;
+        };
+        let is_count = shown.style.paint == Paint::Overdraw;
+        let in_two = is_count || shown.style.dark_corners;
+        let output = match picture {
+            0 => output,
+            i => &self.contexts.pictures[pictures[i - 1]].view,
+        };
+        let formats = [if in_two { COLOR } else { self.format() }, self.format()];
+        let [Some(first), Some(second)] = formats.map(|f| self.contexts.panes(f)) else {
+            return;
+        };
+        let mut drawing = Drawing {
+            tree,
+            worlds,
+            shadings: &shadings,
+            props,
+            pictures,
+            panes: first,
+            size,
+        };
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("contexts"),
+            color_attachments: &[Some(color_attachment(
+                if in_two { &targets.color } else { output },
+                Some(wgpu::Color::TRANSPARENT),
+            ))],
+            depth_stencil_attachment: Some(depth_stencil_attachment(&targets.depth, true)),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        for k in 0..shadings.len() {
+            self.draw_context(&mut pass, &drawing, k, !is_count);
+        }
+        if in_two {
+            drop(pass);
+            let mut post = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("picture"),
+                color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
+                ..wgpu::RenderPassDescriptor::default()
+            });
+            post.set_pipeline(if is_count {
+                &self.pipelines.heat_map
+            } else {
+                &second.post
+            });
+            post.set_bind_group(0, &self.camera.group, &[]);
+            post.set_bind_group(1, &targets.post, &[]);
+            post.draw(0..3, 0..1);
+            drop(post);
+            pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("context glass"),
+                color_attachments: &[Some(color_attachment(output, None))],
+                depth_stencil_attachment: Some(depth_stencil_attachment(&targets.depth, false)),
+                ..wgpu::RenderPassDescriptor::default()
+            });
+        }
+        drawing.panes = second;
+        if !is_count {
+            let closes = closing(tree, &nodes);
+            // Children before parents.
+            for (k, node) in nodes.iter().enumerate().rev() {
+                self.draw_context_glass(&mut pass, &drawing, k);
+                if closes[k] {
+                    self.close_context(&mut pass, &drawing, node.0);
+                }
+            }
+        }
+        if let Some(marks) = marks {
+            self.draw_marks(
+                &mut pass,
+                &marks,
+                size,
+                [&second.marks, &second.marks_on_top],
+            );
+        }
+        drop(pass);
+        gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Draws the opaque surfaces of a context, opens the regions of those seen in it, and paints its sky.
+    fn draw_context(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        drawing: &Drawing<'_>,
+        k: usize,
+        has_sky: bool,
+    ) {
+        let (index, shadings) = &drawing.shadings[k];
+        let (tree, size, panes) = (drawing.tree, drawing.size, drawing.panes);
+        let node = &tree.nodes[*index];
+        pass.set_stencil_reference(node.region);
+        for (i, (part, shadings)) in node.parts.iter().zip(shadings).enumerate() {
+            let view = drawing.part(node, i);
+            self.draw_surfaces(pass, view, shadings, size);
+            let props = props_of(drawing.props, part.id);
+            self.draw_props(pass, view, shadings, props, size);
+        }
+        if has_sky {
+            for face in &node.faces {
+                match face.first.content {
+                    Content::Color => {
+                        self.draw_pane(pass, drawing, node, face, &face.first, &panes.fill)
+                    }
+                    Content::Monitor(_) => {
+                        self.draw_pane(pass, drawing, node, face, &face.first, &panes.monitor);
+                    }
+                    _ => {}
+                }
+            }
+        }
+        // All at their depths first, so that the nearest wins.
+        for (_, face) in tree.children(*index) {
+            self.draw_pane(pass, drawing, node, face, &face.first, &panes.depth);
+        }
+        for (child, face) in tree.children(*index) {
+            pass.set_stencil_reference(CHOSEN | node.region);
+            self.draw_pane(pass, drawing, node, face, &face.first, &panes.choose);
+            pass.set_stencil_reference(tree.nodes[child].region);
+            self.draw_screen(pass, &tree.nodes[child], &panes.open);
+        }
+        if has_sky {
+            pass.set_stencil_reference(node.region);
+            pass.set_bind_group(0, &self.contexts.skies[k].group, &[]);
+            let [x, y, w, h] = node.scissor;
+            pass.set_scissor_rect(x, y, w, h);
+            pass.set_pipeline(&panes.sky);
+            pass.draw(0..3, 0..1);
+        }
+    }
+
+    /// Draws the transparent surfaces of a context, far to near, with the special portals through which one sees.
+    fn draw_context_glass(&self, pass: &mut wgpu::RenderPass<'_>, drawing: &Drawing<'_>, k: usize) {
+        let (index, shadings) = &drawing.shadings[k];
+        let node = &drawing.tree.nodes[*index];
+        pass.set_stencil_reference(node.region);
+        // Distance; part, or none for a special portal; index.
+        let mut order: Vec<(f32, Option<usize>, usize)> = Vec::new();
+        for (i, part) in node.parts.iter().enumerate() {
+            let runs = part.list.transparent.iter().enumerate();
+            order.extend(runs.map(|(n, run)| (run.distance, Some(i), n)));
+        }
+        let panes = node.faces.iter().enumerate();
+        let panes = panes.filter(|(_, face)| face.is_blended());
+        order.extend(panes.map(|(n, face)| (face.distance, None, n)));
+        // Stable: the lists are sorted already.
+        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for group in order.chunk_by(|a, b| a.1 == b.1) {
+            if let Some(part) = group[0].1 {
+                let runs = group.iter().map(|g| g.2);
+                let view = drawing.part(node, part);
+                self.draw_panes(pass, view, &shadings[part], runs, drawing.size);
+                continue;
+            }
+            for (.., n) in group {
+                let face = &node.faces[*n];
+                if face.first.content == Content::Through && face.first.is_tinted {
+                    let tint = &drawing.panes.tint;
+                    self.draw_pane(pass, drawing, node, face, &face.first, tint);
+                }
+                self.draw_later(pass, drawing, node, face);
+            }
+        }
+    }
+
+    /// Gives a context's region back to the context in which it is seen, with the special portal's depth, tint and later passes.
+    fn close_context(&self, pass: &mut wgpu::RenderPass<'_>, drawing: &Drawing<'_>, index: usize) {
+        let (tree, panes) = (drawing.tree, drawing.panes);
+        let node = &tree.nodes[index];
+        let Some(parent) = node.parent else { return };
+        let above = &tree.nodes[parent];
+        let Some((_, face)) = tree.children(parent).find(|(child, _)| *child == index) else {
+            return;
+        };
+        pass.set_stencil_reference(CHOSEN | node.region);
+        self.draw_screen(pass, node, &panes.choose_region);
+        pass.set_stencil_reference(above.region);
+        self.draw_pane(pass, drawing, above, face, &face.first, &panes.close);
+        self.draw_later(pass, drawing, above, face);
+    }
+
+    fn draw_later(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        drawing: &Drawing<'_>,
+        node: &Node,
+        face: &Face,
+    ) {
+        for layer in &face.later {
+            let pipeline = match layer.content {
+                Content::Monitor(_) => &drawing.panes.over_monitor,
+                _ => &drawing.panes.over,
+            };
+            self.draw_pane(pass, drawing, node, face, layer, pipeline);
+        }
+    }
+
+    /// Draws the polygon of a special portal as a node sees it.
+    fn draw_pane(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        drawing: &Drawing<'_>,
+        node: &Node,
+        face: &Face,
+        layer: &Layer,
+        pipeline: &wgpu::RenderPipeline,
+    ) {
+        let [x, y, w, h] = match layer.content {
+            Content::Node(child) => drawing.tree.nodes[child].scissor,
+            _ => node.scissor,
+        };
+        pass.set_scissor_rect(x, y, w, h);
+        let view = drawing.part(node, face.part).view;
+        pass.set_bind_group(0, &view.globals.group, &[]);
+        if let Content::Seen(picture) | Content::Monitor(picture) = layer.content {
+            let picture = &self.contexts.pictures[drawing.pictures[picture - 1]];
+            pass.set_bind_group(1, &picture.group, &[]);
+        }
+        pass.set_vertex_buffer(0, self.contexts.corners.buffer.slice(..));
+        pass.set_pipeline(pipeline);
+        pass.draw(layer.corners.clone(), 0..1);
+    }
+
+    /// Draws to the whole part of the screen in which a node is seen.
+    fn draw_screen(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        node: &Node,
+        pipeline: &wgpu::RenderPipeline,
+    ) {
+        let [x, y, w, h] = node.scissor;
+        pass.set_scissor_rect(x, y, w, h);
+        pass.set_bind_group(0, &self.camera.group, &[]);
+        pass.set_pipeline(pipeline);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+impl<'a> Drawing<'a> {
+    /// Returns a part of a node, ready to draw.
+    fn part(&self, node: &'a Node, part: usize) -> PartView<'a> {
+        let part = &node.parts[part];
+        let (world, stage) = &self.worlds[part.id.0 as usize];
+        PartView {
+            world,
+            view: &stage.views[part.view],
+            list: &part.list,
+        }
+    }
+}
+
+impl Face {
+    /// Returns `true` if something is blended over it at its turn among transparent surfaces. What is seen in a region of
+    /// its own is followed by its later passes when that region is closed.
+    fn is_blended(&self) -> bool {
+        match self.first.content {
+            Content::Node(_) => false,
+            Content::Through => true,
+            _ => !self.later.is_empty(),
+        }
+    }
+}
+
+/// Returns for each node of a picture whether its region goes back to its parent: where something is drawn over it.
+fn closing(tree: &Tree, nodes: &[(usize, &Node)]) -> Vec<bool> {
+    let mut out: Vec<bool> = Vec::new();
+    for (index, node) in nodes {
+        let closes = node.parent.is_some_and(|parent| {
+            let above = &tree.nodes[parent];
+            let at = nodes.iter().position(|n| n.0 == parent);
+            let mut children = tree.children(parent);
+            let face = children.find(|(child, _)| child == index);
+            at.is_some_and(|at| out[at])
+                || above.parts.iter().any(|p| !p.list.transparent.is_empty())
+                || above.faces.iter().any(Face::is_blended)
+                || face.is_some_and(|(_, f)| f.first.is_tinted || !f.later.is_empty())
+        });
+        out.push(closes);
+    }
+    out
+}
+
+fn props_of(props: &[(PartId, Vec<PropDraw>)], part: PartId) -> &[PropDraw] {
+    let own = props.iter().find(|p| p.0 == part);
+    own.map_or(&[], |p| &p.1)
+}
+
+fn depth_stencil_attachment(
+    view: &wgpu::TextureView,
+    clears: bool,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: if clears {
+                wgpu::LoadOp::Clear(0.0)
+            } else {
+                wgpu::LoadOp::Load
+            },
+            store: wgpu::StoreOp::Store,
+        }),
+        stencil_ops: Some(wgpu::Operations {
+            load: if clears {
+                wgpu::LoadOp::Clear(0)
+            } else {
+                wgpu::LoadOp::Load
+            },
+            store: wgpu::StoreOp::Store,
+        }),
+    }
+}
