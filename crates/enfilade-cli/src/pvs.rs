@@ -10,7 +10,10 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{self, CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
-use enfilade::vis::{VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, see_all, see_parts};
+use enfilade::vis::{
+    VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, WorldVis, see_all, see_parts_through,
+    see_world,
+};
 
 use enfilade_verify::structural_triangles;
 
@@ -25,8 +28,8 @@ use enfilade_cli::values::{bytes, seconds};
 
 mod statistics;
 
-/// Computes the potentially visible set of a world or a Quake portal file: for each cell, the cells visible from it.
-/// Writes it as text.
+/// Computes the potentially visible set of a world or a Quake portal file: for each cell, the cells visible from it,
+/// directly or through special portals. Writes it as text.
 #[derive(clap::Args)]
 pub(crate) struct Pvs {
     /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM or Quake 3); `-` for standard input.
@@ -61,9 +64,13 @@ pub(crate) struct Pvs {
     /// Treat everything farther than this as hidden.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     far: Option<f64>,
-    /// Record why each pair counts as visible or hidden, for `enfilade verify --evidence`.
+    /// Record why each pair counts as visible or hidden, for `enfilade verify --evidence`. Refused for a world with
+    /// special portals.
     #[arg(long, value_name = "FILE")]
     evidence: Option<PathBuf>,
+    /// Most special portals on one line of sight. What longer lines show is bounded by the cells they may lead to.
+    #[arg(long, value_name = "N", default_value_t = VisConfig::default().max_specials)]
+    max_specials: u32,
     /// Save the search to this file every half minute and when --budget ends it, and continue from it next time;
     /// refused for another graph or other settings, removed when the search is done.
     #[arg(long, value_name = "FILE")]
@@ -110,6 +117,12 @@ struct PvsReport {
     complete: bool,
     lines: usize,
     steps: u64,
+    /// Absent if the world has no special portals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    specials: Option<Specials>,
+    /// Pairs of which the second does not see the first.
+    #[serde(skip)]
+    one_way: usize,
     seconds: f64,
     /// Mean numbers of triangles of walls and objects visible from a cell: those that its visible volumes meet, and
     /// those of whole cells. Absent without --parts, --volumes, --statistics and --mutual.
@@ -129,6 +142,17 @@ struct PvsReport {
     worst_names: Vec<String>,
 }
 
+/// What was seen through special portals.
+#[derive(serde::Serialize)]
+struct Specials {
+    /// Pairs of cells that see each other through special portals; some also see each other directly.
+    pairs: usize,
+    /// Chains of special portals looked into.
+    chains: u64,
+    /// Chains cut at the bound: all that they may lead to counts as visible.
+    cut_chains: u64,
+}
+
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
     watch(args.max_time, Some(args.max_memory))?;
     let (outputs, output) = outputs_of(args)?;
@@ -141,12 +165,15 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         );
     }
     let start = Instant::now();
-    let mut vis = compute(args, &input)?;
-    let mut report = report(&input, &vis, start.elapsed());
+    let found = compute(args, &input)?;
+    let mut report = report(&input, &found, start.elapsed());
+    let WorldVis {
+        mut vis, through, ..
+    } = found;
     if let Some(world) = &input.world
         && (args.parts || args.volumes || args.statistics.is_some() || args.mutual.is_some())
     {
-        add_parts(args, world, &mut vis.cells)?;
+        add_parts(args, world, &mut vis.cells, &through)?;
         report.seconds = start.elapsed().as_secs_f64();
     }
     let statistics = Statistics::new(&vis.cells, input.world.as_ref(), graph);
@@ -279,7 +306,7 @@ fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
     Ok((outputs, path))
 }
 
-fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
+fn compute(args: &Pvs, input: &Input) -> anyhow::Result<WorldVis> {
     let config = VisConfig {
         mode: match args.mode {
             PvsMode::Fast => VisMode::Fast,
@@ -287,6 +314,7 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         },
         far: args.far,
         max_memory: args.max_memory,
+        max_specials: args.max_specials,
         has_evidence: args.evidence.is_some(),
         ..VisConfig::default()
     };
@@ -322,9 +350,12 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         walls: input.walls.as_deref(),
         checkpoint,
     };
-    let answer = pool(args)?.install(|| see_all(&input.graph, &config, &mut context));
+    let answer = pool(args)?.install(|| match &input.world {
+        Some(world) => see_world(&world.graph, &config, &mut context),
+        None => see_all(&input.graph, &config, &mut context).map(WorldVis::of),
+    });
     bar.finish();
-    let vis = answer.with_context(|| match &args.checkpoint {
+    let found = answer.with_context(|| match &args.checkpoint {
         Some(path) => format!("{}, {}", name_of(&args.input), path.display()),
         None => name_of(&args.input),
     })?;
@@ -332,17 +363,22 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<VisOutput> {
         return Err(error.context("cannot save the search"));
     }
     if let Some(path) = &args.checkpoint
-        && vis.is_complete
+        && found.vis.is_complete
         && path.exists()
     {
         fs::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
     }
-    Ok(vis)
+    Ok(found)
 }
 
 /// Adds the visible parts for each pair of cells: volumes, and their contents.
-fn add_parts(args: &Pvs, world: &World, pvs: &mut cpg::Pvs) -> anyhow::Result<()> {
-    let (volumes, parts) = pool(args)?.install(|| see_parts(world, pvs))?;
+fn add_parts(
+    args: &Pvs,
+    world: &World,
+    pvs: &mut cpg::Pvs,
+    through: &cpg::Pvs,
+) -> anyhow::Result<()> {
+    let (volumes, parts) = pool(args)?.install(|| see_parts_through(world, pvs, through))?;
     pvs.parts = Some(parts);
     pvs.volumes = Some(volumes);
     Ok(())
@@ -364,7 +400,10 @@ fn read_checkpoint(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     }
 }
 
-fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
+fn report(input: &Input, found: &WorldVis, took: Duration) -> PvsReport {
+    let vis: &VisOutput = &found.vis;
+    let world = input.world.as_ref();
+    let has_specials = world.is_some_and(|w| !w.graph.specials.is_empty());
     let cells = vis.cells.n_cells();
     let pairs = vis.cells.n_pairs();
     let undecided = vis.undecided.n_pairs();
@@ -375,6 +414,11 @@ fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
     worst.sort_by_key(|&c| (std::cmp::Reverse(visible_cells[c]), c));
     worst.truncate(10);
     let mean = pairs as f64 / cells.max(1) as f64;
+    let is_one_way = |&(a, b): &(CellId, CellId)| !vis.cells.sees(b, a);
+    let one_way = match has_specials {
+        true => vis.cells.pairs().filter(is_one_way).count(),
+        false => 0,
+    };
     PvsReport {
         cells,
         portals: input.graph.portals.len(),
@@ -387,6 +431,12 @@ fn report(input: &Input, vis: &VisOutput, took: Duration) -> PvsReport {
         complete: vis.is_complete,
         lines: vis.witnesses.len(),
         steps: vis.n_steps,
+        specials: has_specials.then(|| Specials {
+            pairs: found.through.n_pairs(),
+            chains: found.n_chains,
+            cut_chains: found.n_cut,
+        }),
+        one_way,
         seconds: took.as_secs_f64(),
         mean_triangles: None,
         mean_triangles_of_cells: None,
@@ -410,7 +460,7 @@ fn notes(report: &PvsReport, mode: PvsMode) -> Vec<String> {
         format!("proved_visible_pairs {}", report.proved_visible),
         format!("mean_visible {:.3}", report.mean_visible),
         format!("mean_visible_percent {:.3}", report.mean_visible_percent),
-        "asymmetric_pairs 0".into(),
+        format!("asymmetric_pairs {}", report.one_way),
     ]
 }
 
@@ -441,6 +491,13 @@ fn print(mut out: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::
         writeln!(
             out,
             "a cell sees {seen:.0} of {n} triangles on average, {share:.1} %; the cells that it sees hold {of_cells:.0}"
+        )?;
+    }
+    if let Some(s) = &r.specials {
+        writeln!(
+            out,
+            "special portals: {} of the pairs through {} chains; {} more cut at the bound, of which all that they may lead to counts",
+            s.pairs, s.chains, s.cut_chains
         )?;
     }
     if !r.complete {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::cpg::{CellId, Pvs, SightGraph, World};
+use enfilade::cpg::{CellId, Pvs, World};
 use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};
-use enfilade::vis::{VisConfig, VisContext, see_all};
+use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, FOV, Gpu, RenderError, Studio, Style, good_camera, walk_cameras,
 };
@@ -121,8 +121,7 @@ fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
         walls: Some(&walls),
         checkpoint: None,
     };
-    let graph = SightGraph::of_graph(&world.graph);
-    let out = see_all(&graph, &VisConfig::default(), &mut context)?;
+    let out = see_world(&world.graph, &VisConfig::default(), &mut context)?.vis;
     if !out.is_complete {
         notes.push(
             "The visibility search did not finish: the matrix shows more than can be seen.".into(),

@@ -92,6 +92,18 @@ pub(crate) struct Path {
     pub(crate) ends: [DVec3; 2],
     /// The cells that it passes, each with the range of the segment in it, from 0 (start) to 1 (end). At least one.
     pub(crate) cells: Vec<(CellId, [f64; 2])>,
+    /// For each doorway that it passes, `true` if one does not look through it along the segment, and against it: its side
+    /// is a special portal that does not let through.
+    pub(crate) is_closed: Vec<[bool; 2]>,
+}
+
+impl Path {
+    /// Returns `true` if one looks along the path from its `from`th cell to its `to`th, either way.
+    pub(crate) fn is_open(&self, from: usize, to: usize) -> bool {
+        let is_back = usize::from(from > to);
+        let passed = from.min(to)..from.max(to);
+        self.is_closed[passed].iter().all(|closed| !closed[is_back])
+    }
 }
 
 /// Follows the segment through `crossings` to the cell of `b`, or returns where the portals do not lead there.
@@ -108,6 +120,7 @@ pub(crate) fn follow(
     let mut cell = start;
     let mut t = 0.0;
     let mut cells = Vec::with_capacity(crossings.len() + 1);
+    let mut is_closed = Vec::with_capacity(crossings.len());
     for k in 0..crossings.len() {
         subject.settle_order(cell, &mut crossings[k..]);
         let crossing = crossings[k];
@@ -131,12 +144,12 @@ pub(crate) fn follow(
         if cell != from {
             return Err(wrong(FailureKind::WrongSide, cell, from));
         }
-        if subject
-            .world
-            .pvs
-            .as_ref()
-            .is_some_and(|p| !p.sees(start, to))
-        {
+        let sides = view.is_closed;
+        let is_turned = !crossing.is_forward;
+        is_closed.push([usize::from(is_turned), usize::from(!is_turned)].map(|side| sides[side]));
+        let is_seen = is_closed.iter().all(|closed| !closed[0]);
+        let pvs = subject.world.pvs.as_ref().filter(|_| is_seen);
+        if pvs.is_some_and(|p| !p.sees(start, to)) {
             return Err(wrong(FailureKind::Hidden, start, to));
         }
         cells.push((cell, [t, crossing.t]));
@@ -147,7 +160,11 @@ pub(crate) fn follow(
     let end = subject.locator.locate(b);
     if end == Some(cell) {
         cells.push((cell, [t, 1.0]));
-        return Ok(Path { ends, cells });
+        return Ok(Path {
+            ends,
+            cells,
+            is_closed,
+        });
     }
     Err(locate_change(subject, a, b, [t, 1.0], cell, end))
 }

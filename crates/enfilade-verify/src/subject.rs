@@ -55,6 +55,14 @@ pub(crate) struct PortalView {
     pub(crate) normal: DVec3,
     /// Its triangles in [`Subject::portal_triangles`].
     pub(crate) fan: std::ops::Range<usize>,
+    /// For each of its cells, `true` if one does not look through it from there.
+    pub(crate) is_closed: [bool; 2],
+}
+
+/// Returns `true` if a special portal that does not let through covers a portal's side in a cell.
+pub(crate) fn is_closed(world: &World, portal: PortalId, cell: CellId) -> bool {
+    let special = world.graph.special_side(portal, cell);
+    special.is_some_and(|s| !world.graph.specials[s.idx()].is_through())
 }
 
 /// A crossing of a portal by a segment.
@@ -138,6 +146,9 @@ impl<'a> Subject<'a> {
                 cells: portal.cells,
                 normal: to_dvec(portal.normal),
                 fan: first..portal_triangles.len(),
+                is_closed: portal
+                    .cells
+                    .map(|cell| is_closed(world, PortalId(i as u32), cell)),
             });
         }
         let fans: Vec<Triangle> = portal_triangles.iter().map(|t| t.corners).collect();

@@ -4,14 +4,14 @@
 //! and rays are checked, and further lines are aimed at things that the file calls hidden. A file that stores too
 //! much as visible breaks no promise and is not found.
 
-use enfilade_cpg::{CellId, PartNumbers, Pvs, World};
+use enfilade_cpg::{CellId, PartNumbers, PortalId, Pvs, World};
 use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Triangle};
 
 use crate::details::triangles_of;
 use crate::report::{Break, Failure, FailureKind, Tally};
 use crate::rng::Rng;
 use crate::sealed::{Path, follow};
-use crate::subject::{Subject, point_of_triangle, to_dvec};
+use crate::subject::{Subject, is_closed, point_of_triangle, to_dvec};
 
 /// Attempts to find a target.
 const DRAWS: usize = 8;
@@ -168,7 +168,11 @@ impl<'a> Visible<'a> {
             });
             let points: Vec<DVec3> = points.collect();
             let [a, b] = portal.cells;
+            let id = PortalId(i as u32);
             for [from, to] in [[a, b], [b, a]] {
+                if is_closed(self.world, id, from) {
+                    continue;
+                }
                 let pair = self.pair(from, to);
                 if !pair.is_some_and(|pair| points.iter().all(|&p| self.holds(pair, p))) {
                     let [from, to] = [from, to].map(|c| &self.world.graph[c].name);
@@ -186,8 +190,12 @@ impl<'a> Visible<'a> {
     fn break_on(&self, path: &Path) -> Option<Break> {
         let cells = &path.cells;
         for (i, from) in cells.iter().enumerate() {
-            for to in &cells[i + 1..] {
-                for [eye, seen] in [[from, to], [to, from]] {
+            for (j, to) in cells.iter().enumerate().skip(i + 1) {
+                let both = [([i, j], [from, to]), ([j, i], [to, from])];
+                for (ends, [eye, seen]) in both {
+                    if !path.is_open(ends[0], ends[1]) {
+                        continue;
+                    }
                     let wrong = |kind, at| Break {
                         kind,
                         expected: Some(eye.0),
@@ -245,10 +253,13 @@ impl<'a> Visible<'a> {
             let mut parts = parts.iter();
             parts.any(|&p| self.lists(from, self.cells_of(subject, p), p))
         };
-        if let Some((from, _)) = path.cells.iter().find(|c| !is_seen(c.0)) {
+        let last_idx = path.cells.len() - 1;
+        let is_open = |i: &usize| path.is_open(*i, last_idx);
+        let eyes = (0..=last_idx).filter(is_open).map(|i| path.cells[i].0);
+        if let Some(from) = eyes.into_iter().find(|&c| !is_seen(c)) {
             let wrong = Break {
                 kind: FailureKind::HiddenPart,
-                expected: Some(*from),
+                expected: Some(from),
                 found: Some(last.0),
                 portal: None,
                 at: path.ends[1],

@@ -34,6 +34,11 @@ pub struct VisConfig {
     pub n_rays: usize,
     /// Most pieces that an opening is split into to settle one chain.
     pub max_pieces: u32,
+    /// Most special portals that one chain passes in [`crate::see_world`]. What longer ones show is bounded by the
+    /// cells that they might lead to.
+    pub max_specials: u32,
+    /// Most chains of special portals followed, for all cells together; the shortest first.
+    pub max_chains: usize,
     /// Record proofs in [`crate::VisOutput::evidence`]. About doubles the time.
     pub has_evidence: bool,
     /// Most memory that a graph may be estimated to need. Larger ones are refused before anything is allocated.
@@ -49,6 +54,8 @@ impl Default for VisConfig {
             far: None,
             n_rays: 12,
             max_pieces: 64,
+            max_specials: 4,
+            max_chains: 256,
             has_evidence: false,
             max_memory: 8 << 30,
         }
@@ -89,6 +96,11 @@ pub enum VisError {
         /// The reason.
         problem: &'static str,
     },
+    /// Evidence is requested of a graph with special portals.
+    #[error(
+        "evidence covers straight lines only, and the world has special portals; run without --evidence (has_evidence)"
+    )]
+    SpecialEvidence,
     /// A result could not be proved again: a bug. No evidence is written.
     #[error("the search could not repeat its proof (a bug); run without evidence")]
     Evidence,

@@ -12,10 +12,14 @@
 //!
 //! `search` runs the stages in rounds, so that results do not depend on threads.
 //!
+//! [`see_world`] does the same for a world's graph, special portals included: it searches the graph unfolded at them
+//! (`specials`, `unfold`).
+//!
 //! Afterwards [`see_parts`] finds the parts of each cell that can be seen: from the hourglasses of sequences of
 //! portals ([`Hourglasses`]), less the parts that walls hide from the first or the last of them (`shade`).
 //!
-//! **The answer is a superset of the truth.** It is symmetric, as sight is. A line that passes every opening on its
+//! **The answer is a superset of the truth.** It is symmetric, as sight is
+//! without special portals. A line that passes every opening on its
 //! way at least [`VisConfig::clearance`] inside its edges is never lost. Everything that neither a plane nor a line
 //! settles counts as visible and appears in [`VisOutput::undecided`].
 
@@ -42,8 +46,10 @@ mod rng;
 mod search;
 mod shade;
 mod sheets;
+mod specials;
 mod stabbing;
 mod tolerance;
+mod unfold;
 mod volumes;
 
 use std::time::Instant;
@@ -60,7 +66,8 @@ use sheets::Sheets;
 pub use config::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
 pub use hourglass::{Hourglass, Hourglasses};
 pub use output::{VisOutput, Witness};
-pub use parts::see_parts;
+pub use parts::{see_parts, see_parts_through};
+pub use specials::{WorldVis, see_world};
 pub use volumes::piece_faces;
 
 /// Lines tried between each two cells that only walls may hide from each other, and rounds of that, before beams.

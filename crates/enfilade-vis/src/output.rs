@@ -17,7 +17,8 @@ pub struct Witness {
 /// Precomputed visibility of a graph.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisOutput {
-    /// For each cell, the cells that might be seen from it, itself included. Symmetric.
+    /// For each cell, the cells that might be seen from it, itself included. Symmetric, unless special portals show
+    /// more ([`see_world`](crate::see_world)).
     pub cells: Pvs,
     /// For each cell, those of `cells` that no line proves. All others are certain.
     pub undecided: Pvs,

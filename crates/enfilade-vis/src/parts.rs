@@ -5,7 +5,8 @@
 //! from the cell itself.
 
 use enfilade_cpg::{
-    Batch, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes, World,
+    Batch, CellId, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes,
+    World,
 };
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Triangle, world_tolerance};
 use rayon::prelude::*;
@@ -22,7 +23,8 @@ const EPS: f64 = 1e-9;
 /// Returns the visible volumes for each pair of cells, in the order of `pvs`, and the triangles and objects that they
 /// meet, less those that walls hide from the first or the last portal on the way.
 ///
-/// `pvs` is the answer of [`see_all`](crate::see_all) for the world's graph, or any superset of the truth. Walls are
+/// `pvs` is the answer of [`see_world`](crate::see_world) for the world's graph, or any superset of the truth. A cell
+/// that sees a cell with a special portal sees all of what it sees; [`see_parts_through`] knows better. Walls are
 /// the world's opaque structural triangles; details hide nothing, as they may be moved.
 ///
 /// Time grows with the sequences of portals that lines may pass, and with the pairs of portals and parts in front of
@@ -36,8 +38,29 @@ pub fn see_parts(
     world: &World,
     pvs: &Pvs,
 ) -> Result<(VisibleVolumes, VisibleParts), SightGraphError> {
+    // Whoever sees a cell with a special portal may see anything of its row through it.
+    let has_special = |c: CellId| world.graph.specials.iter().any(|s| s.cell == c);
+    let rows = (0..pvs.n_cells() as u32).map(CellId).map(|cell| {
+        let sees_special = pvs.visible_from(cell).any(has_special);
+        let row = pvs.visible_from(cell).filter(move |_| sees_special);
+        row.map(|c| c.0)
+    });
+    see_parts_through(world, pvs, &Pvs::of_ascending(rows))
+}
+
+/// Does [`see_parts`] for a world with special portals, given the cells that each cell sees through them
+/// ([`WorldVis::through`](crate::WorldVis::through)): of those, everything counts as seen.
+///
+/// # Errors
+///
+/// A broken graph.
+pub fn see_parts_through(
+    world: &World,
+    pvs: &Pvs,
+    through: &Pvs,
+) -> Result<(VisibleVolumes, VisibleParts), SightGraphError> {
     let glasses = Hourglasses::new(&SightGraph::of_graph(&world.graph))?;
-    let (volumes, ends) = volumes_of(world, pvs, &glasses);
+    let (volumes, ends) = volumes_of(world, (pvs, through), &glasses);
     let (all, by_cell) = (all_parts(world), by_cell(world));
     let candidates = candidates(pvs, &volumes, &ends, (&all, &by_cell));
     let both = |&(ends, part): &([u32; 2], u32)| ends.map(|portal| (portal, part));

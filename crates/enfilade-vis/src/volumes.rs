@@ -35,10 +35,10 @@ const EPS: f64 = 1e-9;
 pub(crate) const ANY_PORTAL: u32 = u32::MAX;
 
 /// Returns the volumes of each pair of cells, and for each piece its first and its last portal: directions of the
-/// graph, or [`ANY_PORTAL`].
+/// graph, or [`ANY_PORTAL`]. Pairs of `through` are seen whole.
 pub(crate) fn volumes_of(
     world: &World,
-    pvs: &Pvs,
+    (pvs, through): (&Pvs, &Pvs),
     glasses: &Hourglasses,
 ) -> (VisibleVolumes, Vec<[u32; 2]>) {
     let dirs = glasses.dirs();
@@ -48,6 +48,7 @@ pub(crate) fn volumes_of(
     let walk = Walk {
         world,
         pvs,
+        through,
         glasses,
         might: &might,
         slack: world_tolerance(dirs.scale),
@@ -90,6 +91,8 @@ struct Piece {
 struct Walk<'a> {
     world: &'a World,
     pvs: &'a Pvs,
+    /// Pairs of which all is seen: through special portals.
+    through: &'a Pvs,
     glasses: &'a Hourglasses,
     might: &'a BitTable,
     /// Distance by which visible parts may lie outside their cell's box or behind planes: the world's tolerance.
@@ -114,7 +117,7 @@ impl Walk<'_> {
         let row = self.pvs.visible_from(enfilade_cpg::CellId(cell));
         let whole = || vec![self.whole(cell)];
         row.map(|to| {
-            if to.0 == cell {
+            if to.0 == cell || self.through.sees(enfilade_cpg::CellId(cell), to) {
                 whole()
             } else {
                 found.remove(&to.0).unwrap_or_default()
