@@ -119,7 +119,7 @@ struct PvsReport {
     steps: u64,
     /// Absent if the world has no special portals.
     #[serde(skip_serializing_if = "Option::is_none")]
-    specials: Option<Specials>,
+    specials: Option<SpecialChains>,
     /// Pairs of which the second does not see the first.
     #[serde(skip)]
     one_way: usize,
@@ -144,7 +144,7 @@ struct PvsReport {
 
 /// What was seen through special portals.
 #[derive(serde::Serialize)]
-struct Specials {
+struct SpecialChains {
     /// Pairs of cells that see each other through special portals; some also see each other directly.
     pairs: usize,
     /// Chains of special portals looked into.
@@ -431,7 +431,7 @@ fn report(input: &Input, found: &WorldVis, took: Duration) -> PvsReport {
         complete: vis.is_complete,
         lines: vis.witnesses.len(),
         steps: vis.n_steps,
-        specials: has_specials.then(|| Specials {
+        specials: has_specials.then(|| SpecialChains {
             pairs: found.through.n_pairs(),
             chains: found.n_chains,
             cut_chains: found.n_cut,

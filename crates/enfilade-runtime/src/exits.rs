@@ -28,7 +28,7 @@ pub(crate) struct Exit {
     pub(crate) normal: [f32; 3],
     /// The cell behind it; or [`SPECIAL`] plus the index of a special portal.
     pub(crate) to: u32,
-    /// [`NO_PORTAL`] for a special portal that is no side of a doorway.
+    /// [`NO_PORTAL`] for a special portal on a wall.
     pub(crate) portal: u32,
     pub(crate) first_corner: u32,
     pub(crate) n_corners: u32,

@@ -17,7 +17,7 @@ pub struct Standing<'a> {
     pub at: DVec3,
 }
 
-/// What a door to the surroundings leads to.
+/// End of a door to the surroundings.
 #[derive(Clone, Copy, Debug)]
 pub enum Beyond {
     /// A cell of the first world.
@@ -49,7 +49,7 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
         n_cells += standing.world.graph.cells.len() as u32;
     }
     for (i, standing) in all.iter().enumerate() {
-        // What is outside a cabin is in the shaft around it.
+        // The surroundings of a cabin are in the shaft around it.
         let around = doors.iter().find_map(|door| match door.2 {
             Beyond::Cell(cell) if door.0 == i => Some(cell),
             _ => None,

@@ -45,10 +45,10 @@ pub struct Traced {
     structure: Bvh,
     /// Linear color of each triangle. [Units: 1/255]
     colors: Vec<[u8; 3]>,
-    specials: Vec<Side>,
+    specials: Vec<TracedSide>,
 }
 
-struct Side {
+struct TracedSide {
     pieces: Vec<Vec<DVec3>>,
     normal: DVec3,
     passes: Vec<SidePass>,
@@ -63,7 +63,7 @@ enum Shows {
     Through,
     /// Matrix and offset applied to a ray.
     Place(DMat3, DVec3),
-    /// A camera, and the corner and edges of the rectangle that its picture fills.
+    /// A camera, and a vertex and the edges of the rectangle that its picture fills.
     Monitor(TracedCamera, [DVec3; 3]),
 }
 
@@ -315,7 +315,7 @@ impl TracedCamera {
     }
 }
 
-fn side(world: &World, id: SpecialId) -> Side {
+fn side(world: &World, id: SpecialId) -> TracedSide {
     let (normal, pieces) = world.graph.special_opening(id);
     let pieces: Vec<Vec<DVec3>> = pieces.into_iter().map(|p| p.points).collect();
     let passes = world.graph.specials[id.idx()].passes.iter().map(|pass| {
@@ -338,14 +338,14 @@ fn side(world: &World, id: SpecialId) -> Side {
             tint: pass.tint.map(f64::from),
         }
     });
-    Side {
+    TracedSide {
         passes: passes.collect(),
         normal,
         pieces,
     }
 }
 
-/// Returns the upright rectangle around polygons of a wall: its lower left corner and its edges to the right and up.
+/// Returns the upright rectangle around polygons of a wall: its lower left vertex and its edges to the right and up.
 fn rectangle(normal: DVec3, pieces: &[Vec<DVec3>]) -> [DVec3; 3] {
     let right = normal.cross(DVec3::Y).normalize();
     let up = right.cross(normal);

@@ -124,10 +124,10 @@ pub fn see_world(
 /// What is seen from the cells of the first layer that see a special portal.
 struct Rows<'a> {
     plain: &'a Pvs,
-    all: Vec<Row>,
+    all: Vec<SpecialRow>,
 }
 
-struct Row {
+struct SpecialRow {
     cell: u32,
     /// Nodes that might be seen.
     seen: BTreeSet<Node>,
@@ -148,7 +148,7 @@ impl<'a> Rows<'a> {
                 continue;
             }
             let own = plain.visible_from(cell).map(|c| (0, c.0)).collect();
-            let mut row = Row {
+            let mut row = SpecialRow {
                 cell: cell.0,
                 seen: BTreeSet::new(),
                 searched: own,

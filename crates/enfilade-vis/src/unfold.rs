@@ -33,7 +33,7 @@ pub(crate) enum Goal {
 }
 
 /// An opening that can only be looked through from one side.
-pub(crate) struct Gate {
+pub(crate) struct UnfoldedGate {
     pub(crate) cell: u32,
     pub(crate) goal: Goal,
     /// Special portal and doorway of which it is a side.
@@ -66,7 +66,7 @@ pub(crate) struct Unfolded {
     plain: Vec<(PortalId, SightPortal)>,
     /// For each cell, its `plain` of which it is the first cell.
     plain_of: Vec<Vec<u32>>,
-    pub(crate) gates: Vec<Gate>,
+    pub(crate) gates: Vec<UnfoldedGate>,
     /// For each cell, its gates.
     pub(crate) gates_of: Vec<Vec<u32>>,
     pub(crate) layers: Vec<Layer>,
@@ -92,7 +92,7 @@ impl Unfolded {
                 plain.push((portal, opening.clone()));
             } else if sides != [false; 2] {
                 let from = usize::from(sides[1]);
-                gates.push(Gate {
+                gates.push(UnfoldedGate {
                     cell: cells[from].0,
                     goal: Goal::Cell(cells[1 - from].0),
                     special: None,
@@ -272,7 +272,12 @@ impl Unfolded {
 }
 
 /// Adds what is seen in a special portal other than the cell behind it.
-fn add_gates(graph: &CellPortalGraph, all: &SightGraph, special: SpecialId, gates: &mut Vec<Gate>) {
+fn add_gates(
+    graph: &CellPortalGraph,
+    all: &SightGraph,
+    special: SpecialId,
+    gates: &mut Vec<UnfoldedGate>,
+) {
     let side = &graph.specials[special.idx()];
     let openings: Vec<SightPortal> = match side.portal() {
         Some(portal) => {
@@ -298,7 +303,7 @@ fn add_gates(graph: &CellPortalGraph, all: &SightGraph, special: SpecialId, gate
                 (Goal::Cameras(cells_at(graph, eye)), None)
             }
         };
-        gates.push(Gate {
+        gates.push(UnfoldedGate {
             cell: side.cell.0,
             goal,
             special: Some(special),

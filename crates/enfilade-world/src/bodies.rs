@@ -11,6 +11,7 @@
 //! | `kernel.rs` | one body, one triangle: contact, and time of first contact |
 //! | `flood.rs` | the cells and triangles on a body's way |
 //! | `carve.rs` | obstacles around special portals |
+//! | `images.rs`, `moving.rs` | a body beyond special portals, and in other frames |
 //! | `caster.rs` | casts and contacts |
 //! | `pairs.rs` | bodies that may touch each other |
 //! | `room.rs` | room for a walker, for maps of paths |
@@ -21,7 +22,9 @@ mod body;
 mod carve;
 mod caster;
 mod flood;
+mod images;
 mod kernel;
+mod moving;
 mod pairs;
 mod room;
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub struct Layout {
     exit_bounds: Vec<Aabb>,
     openings: Vec<OpeningShape>,
     specials: Vec<SpecialSide>,
-    /// By cell.
+    /// Pairs of a cell and a special portal that it sees, ascending.
     specials_by_cell: Vec<(CellId, SpecialId)>,
     /// Per piece its first vertex, and the number of all.
     first_corner: Vec<u32>,

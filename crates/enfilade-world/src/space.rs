@@ -23,19 +23,23 @@ use walls::Walls;
 
 pub(crate) use changes::Change;
 
+pub use context::{SeenVia, StoppedSpecial};
 pub use follow::Followed;
 pub use id::{PartId, Place};
-pub use look::{SeenContext, SeenVia, SpaceSeen, SpaceViewer, SpecialOptions, StoppedSpecial};
+pub use look::{SpaceViewer, SpecialOptions};
 pub use meet::Docking;
+pub use seen::{SeenContext, SpaceSeen};
 pub use sweep::Passing;
 
 mod changes;
+mod context;
 mod doors;
 mod follow;
 mod id;
 mod look;
 mod meet;
 mod neighbors;
+mod seen;
 mod sweep;
 pub(crate) mod walls;
 

@@ -23,7 +23,7 @@ fn far_away(rng: &mut Rng, scale: f64) -> Similarity {
 
 /// A world, and the same with a doorway that leads into a copy.
 fn twins(rng: &mut Rng, seed: u64, scale: f64) -> [World; 2] {
-    // Rooms around corners: a part of a room may be behind its own doorway.
+    // Concave rooms: a part of a room may be behind its own doorway.
     let rooms = |seed: u64| {
         room_grid(&GridParams {
             outdoors: false,

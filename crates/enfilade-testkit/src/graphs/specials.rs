@@ -210,7 +210,7 @@ fn point(p: [f32; 3]) -> DVec3 {
 }
 
 /// A room whose walls lead into each other through squares of 2 m in their middles: opposite ones, as in Gjørup 1999, section
-/// 3.4.2; or `turned`, those around the corner.
+/// 3.4.2; or `turned`, neighboring ones.
 #[must_use]
 pub fn endless_room(turned: bool) -> World {
     let mut world = room_grid(&GridParams {

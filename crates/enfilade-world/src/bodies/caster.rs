@@ -7,8 +7,9 @@ use enfilade_geom::{DVec3, Similarity, Triangle};
 use enfilade_runtime::{DetailId, Target};
 
 use super::body::Body;
-use super::flood::{BodyFlood, CastCounts, Motion};
+use super::flood::{BodyFlood, CastCounts};
 use super::kernel::{depth, point_of_contact, sweep};
+use super::moving::Motion;
 use crate::space::{PartId, Place, Space};
 
 /// A body that approaches slower than this fraction of its motion slides along instead of hitting.

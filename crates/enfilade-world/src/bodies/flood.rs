@@ -10,18 +10,19 @@
 //! which the door leads, and into the cells behind the doors that it meets, as far as these are within the docking tolerance.
 //!
 //! Special portals: a body that touches one from its front is also on its far side, as another *image*, in a frame of its own.
-//! Each image meets the obstacles on its side of the plane (`carve.rs`). Up to [`MAX_IMAGES`] follow each other.
+//! Each image meets the obstacles on its side of the plane (`carve.rs`). Up to 32 follow each other.
 //!
 //! In a cell, triangles are tested in the order in which the body's bounding box touches their boxes, so that those behind the
 //! impact are not tested at all. They are gathered first, [`BATCH`] at a time, which bounds the work behind it.
 
-use enfilade_cpg::{CellId, PortalId, SpecialId, Way};
+use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::{Aabb, DMat3, DVec3, Ray, Similarity, Triangle};
 use enfilade_runtime::{DetailId, Target};
 
-use super::body::{Body, BodyCore};
-use super::carve::Carver;
+use super::body::BodyCore;
+use super::images::{Image, ImagePlace, Images};
 use super::kernel::{boxes_meet, sweep};
+use super::moving::{Motion, Moving};
 use crate::space::walls::TriangleOf;
 use crate::space::{PartId, Place, Space};
 
@@ -29,8 +30,6 @@ use crate::space::{PartId, Place, Space};
 const SAME: f64 = 1e-12;
 /// Triangles gathered before they are tested. 32 is more than most rooms have on a body's way.
 const BATCH: usize = 32;
-/// Images of a body in one query; what lies behind further special portals is not met.
-const MAX_IMAGES: usize = 32;
 
 /// Cost of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,12 +51,9 @@ pub(super) struct BodyFlood {
     /// Per cell of all parts.
     reached: Vec<Reached>,
     question: u32,
-    waiting: Vec<Spot>,
+    waiting: Vec<ImagePlace>,
     places: Vec<Place>,
-    images: Vec<Image>,
-    /// Special portals that images touch.
-    touched: Vec<Touched>,
-    carver: Carver,
+    images: Images,
     carved: Vec<Triangle>,
     gathered: Vec<Gathered>,
     /// Doors to the surroundings of the current part that the body touches, with the times.
@@ -73,46 +69,6 @@ struct Reached {
     question: u32,
     is_done: bool,
     since: f64,
-}
-
-/// A place of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Spot {
-    image: usize,
-    place: Place,
-}
-
-/// A body on the far side of special portals.
-#[derive(Clone, Copy, Debug)]
-struct Image {
-    /// The part in whose frame it is, and the map there from the frame of the motion.
-    frame: PartId,
-    map: Similarity,
-    /// The plane beyond which it meets things, `normal · p >= height`, and the special portal that leads back.
-    far: Option<(DVec3, f64, Option<SpecialId>)>,
-}
-
-/// A special portal that an image touches from its front.
-#[derive(Clone, Copy, Debug)]
-struct Touched {
-    image: usize,
-    part: PartId,
-    special: SpecialId,
-}
-
-/// A body in the frame of a part.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Moving {
-    body: Body,
-    pub(super) core: BodyCore,
-    reach: DVec3,
-    /// The same, grown by the tolerance of openings.
-    grown: BodyCore,
-    grown_reach: DVec3,
-    from: DVec3,
-    pub(super) by: DVec3,
-    /// Map from the frame of the motion to that of the part.
-    pub(super) map: Similarity,
 }
 
 /// A triangle on the way: the time at which the boxes meet, and its vertices relative to the body's position on entering the
@@ -138,16 +94,6 @@ pub(super) struct Candidate<'a> {
     pub(super) since: f64,
 }
 
-/// A motion of a body in the frame of a part.
-pub(super) struct Motion<'a> {
-    pub(super) space: &'a Space,
-    pub(super) body: &'a Body,
-    pub(super) frame: PartId,
-    pub(super) from: DVec3,
-    pub(super) by: DVec3,
-    pub(super) place: Place,
-}
-
 /// A place that the body is in from `since` on, and the rest of its motion then.
 struct Stay {
     image: usize,
@@ -168,9 +114,7 @@ impl BodyFlood {
             question: 0,
             waiting: Vec::new(),
             places: Vec::new(),
-            images: Vec::new(),
-            touched: Vec::new(),
-            carver: Carver::default(),
+            images: Images::default(),
             carved: Vec::new(),
             gathered: Vec::with_capacity(BATCH),
             left_by: Vec::new(),
@@ -202,14 +146,10 @@ impl BodyFlood {
         if !motion.is_finite() {
             return;
         }
-        self.images.push(Image {
-            frame: motion.frame,
-            map: Similarity::IDENTITY,
-            far: None,
-        });
-        self.reach(space, Spot { image: 0, place }, 0.0);
+        self.images.begin(motion.frame);
+        self.reach(space, ImagePlace { image: 0, place }, 0.0);
         let (mut limit, mut is_met) = (1.0, false);
-        while let Some((Spot { image, place }, since)) = self.next_place(space, limit) {
+        while let Some((ImagePlace { image, place }, since)) = self.next_place(space, limit) {
             if image == 0 || !self.places.contains(&place) {
                 self.places.push(place);
             }
@@ -223,8 +163,13 @@ impl BodyFlood {
                 left: limit - since,
                 is_met,
             };
-            self.meet_specials(space, &moving, &stay);
-            self.set_cuts(space, &stay);
+            let mut images = std::mem::take(&mut self.images);
+            let spot = ImagePlace { image, place };
+            images.meet(space, &moving, spot, [since, stay.left], |spot, since| {
+                self.reach(space, spot, since);
+            });
+            images.set_cuts(space, image, place.part);
+            self.images = images;
             self.gather_walls(space, &moving, &mut stay, &mut visit);
             self.gather_objects(space, &moving, &mut stay, &mut counts, &mut visit);
             self.try_gathered(space, &moving, &mut stay, &mut visit);
@@ -233,7 +178,7 @@ impl BodyFlood {
             (limit, is_met) = (since + stay.left, stay.is_met);
         }
         self.counts.cells = self.places.len() as u32;
-        self.counts.images = self.images.len() as u32;
+        self.counts.images = self.images.all.len() as u32;
     }
 
     fn begin(&mut self, space: &Space) {
@@ -245,8 +190,6 @@ impl BodyFlood {
         if self.reached.len() < space.n_cells() {
             self.reached.resize(space.n_cells(), Reached::default());
         }
-        self.images.clear();
-        self.touched.clear();
         self.waiting.clear();
         self.places.clear();
         self.moving.clear();
@@ -259,7 +202,7 @@ impl BodyFlood {
         if let Some((_, known)) = self.moving.iter().find(|(k, _)| *k == key) {
             return *known;
         }
-        let Image { frame, map, .. } = self.images[image];
+        let Image { frame, map, .. } = self.images.all[image];
         let map = if part == frame {
             map
         } else {
@@ -270,15 +213,20 @@ impl BodyFlood {
         moving
     }
 
-    fn index(space: &Space, spot: Spot) -> usize {
-        let Spot { image, place } = spot;
+    fn index(space: &Space, spot: ImagePlace) -> usize {
+        let ImagePlace { image, place } = spot;
         let first = space.parts[place.part.idx()].first_cell as usize;
         image * space.n_cells() + first + place.cell.idx()
     }
 
     /// Records that a place is reached.
-    fn reach(&mut self, space: &Space, spot: Spot, since: f64) {
-        let known = &mut self.reached[Self::index(space, spot)];
+    fn reach(&mut self, space: &Space, spot: ImagePlace, since: f64) {
+        let at = Self::index(space, spot);
+        if at >= self.reached.len() {
+            let n = space.n_cells() * (spot.image + 1);
+            self.reached.resize(n, Reached::default());
+        }
+        let known = &mut self.reached[at];
         if known.question == self.question {
             if !known.is_done {
                 known.since = known.since.min(since);
@@ -293,22 +241,22 @@ impl BodyFlood {
         self.waiting.push(spot);
     }
 
-    fn is_done(&self, space: &Space, spot: Spot) -> bool {
-        let known = &self.reached[Self::index(space, spot)];
-        known.question == self.question && known.is_done
+    fn is_done(&self, space: &Space, spot: ImagePlace) -> bool {
+        let known = self.reached.get(Self::index(space, spot));
+        known.is_some_and(|known| known.question == self.question && known.is_done)
     }
 
     /// Returns `true` if the cell behind an opening is searched already, and nothing beyond it remains to be found.
     fn is_behind_done(&self, space: &Space, stay: &Stay, cell: CellId) -> bool {
         let (image, part) = (stay.image, stay.place.part);
         let place = Place { part, cell };
-        stay.border != Some(cell) && self.is_done(space, Spot { image, place })
+        stay.border != Some(cell) && self.is_done(space, ImagePlace { image, place })
     }
 
     /// Returns the place reached next, with its time; none that is reached after `limit`.
-    fn next_place(&mut self, space: &Space, limit: f64) -> Option<(Spot, f64)> {
-        let since = |p: &Spot| self.reached[Self::index(space, *p)].since;
-        let order = |&(_, a): &(usize, &Spot), &(_, b): &(usize, &Spot)| {
+    fn next_place(&mut self, space: &Space, limit: f64) -> Option<(ImagePlace, f64)> {
+        let since = |p: &ImagePlace| self.reached[Self::index(space, *p)].since;
+        let order = |&(_, a): &(usize, &ImagePlace), &(_, b): &(usize, &ImagePlace)| {
             since(a).total_cmp(&since(b)).then(a.cmp(b))
         };
         let (at, _) = self.waiting.iter().enumerate().min_by(order)?;
@@ -316,94 +264,6 @@ impl BodyFlood {
         let known = &mut self.reached[Self::index(space, spot)];
         known.is_done = true;
         (known.since <= limit).then_some((spot, known.since))
-    }
-
-    /// Continues on the far sides of the special portals of a cell that the body touches from their fronts.
-    fn meet_specials(&mut self, space: &Space, moving: &Moving, stay: &Stay) {
-        let Place { part, cell } = stay.place;
-        let own = &space.parts[part.idx()];
-        if own.layout.n_specials() == 0 {
-            return;
-        }
-        for special in own.layout.specials_of(cell) {
-            let Some((to, map)) = own.layout.passage(special) else {
-                continue;
-            };
-            let image = stay.image;
-            let Image { frame, far, .. } = self.images[image];
-            let is_back = far.is_some_and(|far| frame == part && far.2 == Some(special));
-            let is_known = |t: &Touched| t.image == image && t.part == part && t.special == special;
-            if is_back
-                || self.touched.iter().any(is_known)
-                || self.images.len() == MAX_IMAGES
-                || !space.is_special_open(part, special)
-            {
-                continue;
-            }
-            let opening = own.layout.special_opening(special);
-            let triangles = opening.pieces().flat_map(|piece| {
-                (2..piece.len()).map(move |k| [0, k - 1, k].map(|i| piece[i] - stay.start))
-            });
-            let touches = triangles.filter_map(|t| sweep(&moving.grown, moving.by, stay.left, &t));
-            let Some(after) = touches.map(|touch| touch.t).min_by(f64::total_cmp) else {
-                continue;
-            };
-            // From behind, its back is met.
-            let center = stay.start + moving.by * after;
-            if opening.height_of(center) > own.layout.tolerance() {
-                continue;
-            }
-            self.touched.push(Touched {
-                image,
-                part,
-                special,
-            });
-            let normal = map.direction(opening.normal());
-            let back = space.world(part).graph.specials[special.idx()]
-                .passes
-                .iter()
-                .find_map(|pass| match pass.way {
-                    Way::Lead { back, .. } => Some(back),
-                    _ => None,
-                });
-            self.images.push(Image {
-                frame: part,
-                map: map.after(&moving.map),
-                far: Some((
-                    normal,
-                    normal.dot(map.point(opening.center())),
-                    back.flatten(),
-                )),
-            });
-            let image = self.images.len() - 1;
-            let n = space.n_cells() * self.images.len();
-            if self.reached.len() < n {
-                self.reached.resize(n, Reached::default());
-            }
-            let place = Place { part, cell: to };
-            self.reach(space, Spot { image, place }, stay.since + after);
-        }
-    }
-
-    /// Sets the obstacles that count for an image in a part.
-    fn set_cuts(&mut self, space: &Space, stay: &Stay) {
-        self.carver.clear();
-        let part = stay.place.part;
-        let margin = space.layout(part).tolerance();
-        let image = &self.images[stay.image];
-        if let Some((normal, height, _)) = image.far {
-            let to = space.between(image.frame, part);
-            let (normal, through) = (to.direction(normal), to.point(normal * height));
-            self.carver.add_far(normal, normal.dot(through), margin);
-        }
-        for touched in self.touched.iter().filter(|t| t.image == stay.image) {
-            let opening = space.layout(touched.part).special_opening(touched.special);
-            let to = space.between(touched.part, part);
-            let normal = to.direction(opening.normal());
-            let height = normal.dot(to.point(opening.center()));
-            self.carver
-                .add_near(normal, height, margin, opening.pieces(), |p| to.point(p));
-        }
     }
 
     /// Continues beyond the doors by which the body leaves its part.
@@ -417,7 +277,7 @@ impl BodyFlood {
             };
             let image = stay.image;
             for &place in &door.leads_to {
-                self.reach(space, Spot { image, place }, since);
+                self.reach(space, ImagePlace { image, place }, since);
             }
             for &(other, portal) in &door.meets {
                 self.dock(motion, image, (other, portal), since);
@@ -452,7 +312,7 @@ impl BodyFlood {
             let part = other;
             for cell in std::iter::once(door.inner).chain(its.border) {
                 let place = Place { part, cell };
-                self.reach(space, Spot { image, place }, since + after);
+                self.reach(space, ImagePlace { image, place }, since + after);
             }
         }
     }
@@ -470,7 +330,11 @@ impl BodyFlood {
             let bounds = Aabb::new(hull.min - start, hull.max - start);
             if let Some(after) = boxes_meet(moving.grown_reach, moving.by, stay.left, &bounds) {
                 let (image, place) = (stay.image, Place { part, cell });
-                self.reach(space, Spot { image, place }, stay.since + after.max(0.0));
+                self.reach(
+                    space,
+                    ImagePlace { image, place },
+                    stay.since + after.max(0.0),
+                );
             }
         }
     }
@@ -581,13 +445,13 @@ impl BodyFlood {
         stay: &mut Stay,
         visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
     ) {
-        if self.carver.is_empty() {
+        if self.images.carver.is_empty() {
             let corners = corners.map(|p| p - stay.start);
             return self.gather_whole(space, what, (&corners, reach), moving, stay, visit);
         }
         let mut carved = std::mem::take(&mut self.carved);
         carved.clear();
-        self.carver.carve(corners, |t| carved.push(t));
+        self.images.carver.carve(corners, |t| carved.push(t));
         for t in &carved {
             let corners = t.map(|p| p - stay.start);
             self.gather_whole(space, what, (&corners, reach), moving, stay, visit);
@@ -652,7 +516,7 @@ impl BodyFlood {
                 if let Some(touch) = sweep(&moving.grown, moving.by, stay.left, &it.corners) {
                     let (part, since) = (stay.place.part, stay.since + touch.t);
                     let (image, place) = (stay.image, Place { part, cell });
-                    self.reach(space, Spot { image, place }, since);
+                    self.reach(space, ImagePlace { image, place }, since);
                     if stay.border == Some(cell) {
                         self.left_by.push((portal, since));
                     }
@@ -673,58 +537,5 @@ impl BodyFlood {
             }
         }
         self.gathered.clear();
-    }
-}
-
-impl<'a> Motion<'a> {
-    /// Makes a body at rest.
-    pub(super) fn rest(
-        space: &'a Space,
-        body: &'a Body,
-        (frame, at): (PartId, DVec3),
-        place: Place,
-    ) -> Self {
-        Self {
-            space,
-            body,
-            frame,
-            from: at,
-            by: DVec3::ZERO,
-            place,
-        }
-    }
-
-    fn is_finite(&self) -> bool {
-        self.body.is_finite() && self.from.is_finite() && self.by.is_finite()
-    }
-}
-
-impl Moving {
-    fn new(motion: &Motion<'_>, part: PartId, map: Similarity) -> Self {
-        let (mut body, mut from, mut by) = (*motion.body, motion.from, motion.by);
-        if map != Similarity::IDENTITY {
-            (body, from, by) = (body.mapped(&map), map.point(from), map.vector(by));
-        }
-        let core = BodyCore::of(&body);
-        let tolerance = motion.space.layout(part).tolerance();
-        let grown = BodyCore::of(&body.grown(tolerance));
-        Self {
-            body,
-            core,
-            reach: core.reach(),
-            grown,
-            grown_reach: grown.reach(),
-            from,
-            by,
-            map,
-        }
-    }
-
-    fn ray(&self, start: DVec3, t_max: f64) -> Ray {
-        Ray {
-            origin: start,
-            direction: self.by,
-            t_max,
-        }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Each part has its own table ([`PartHops`]), which motion does not change. The doors that currently lead from part to part join
 //! them: a small graph, searched by Dijkstra's algorithm at the query, with lengths from the tables between its doors. A part with
-//! one such door is no way through, so a lift at a floor costs the others nothing.
+//! one such door is not a way through, so a lift at a floor costs the others nothing.
 
 use enfilade_cpg::PortalId;
 
@@ -17,12 +17,12 @@ pub struct Hops {
     parts: Vec<PartHops>,
     /// Per part and portal to its surroundings, the length from the middle of the room to the door.
     thresholds: Vec<Vec<(PortalId, u32)>>,
-    links: Vec<Link>,
+    links: Vec<HopLink>,
     /// Per part, the number of its links.
     n_links: Vec<u32>,
     /// `true` if a path within a part may lead through others.
     has_ways_through: bool,
-    /// Of the links that matter, both ends in turn.
+    /// Ends of the links that matter, both in turn.
     ends: Vec<LinkEnd>,
     known: Option<u64>,
     moved: Vec<bool>,
@@ -39,7 +39,7 @@ struct LinkEnd {
 
 /// A door of a part that leads to a place of another.
 #[derive(Clone, Copy, Debug)]
-struct Link {
+struct HopLink {
     ends: [Place; 2],
     /// The door of the first end's part, and that of the second, if they meet.
     doors: [Option<PortalId>; 2],
@@ -153,7 +153,7 @@ impl Hops {
                 return None;
             }
             if let Some((link, end)) = link {
-                let Link { ends, doors, .. } = self.links[link];
+                let HopLink { ends, doors, .. } = self.links[link];
                 if ends[end] == from {
                     let own = if doors[end].is_some() { end } else { 1 - end };
                     return Some(Hop {
@@ -267,7 +267,7 @@ impl Hops {
                     let layout = &space.parts[place.part.idx()].layout;
                     let middle = layout.cell(place.cell).bounds.center();
                     let beyond = space.between(id, place.part).point(center).distance(middle);
-                    self.links.push(Link {
+                    self.links.push(HopLink {
                         ends: [own, place],
                         doors: [Some(portal), None],
                         length: sum(length, (beyond.min(4e5) * UNITS).round() as u32),
@@ -281,7 +281,7 @@ impl Hops {
                     let beyond = beyond.and_then(|all| all.iter().find(|own| own.0 == door));
                     let inner = its.iter().find(|d| d.portal == door).map(|d| d.inner);
                     if let Some((&(_, beyond), cell)) = beyond.zip(inner) {
-                        self.links.push(Link {
+                        self.links.push(HopLink {
                             ends: [own, Place { part: other, cell }],
                             doors: [Some(portal), Some(door)],
                             length: sum(length, beyond),

@@ -18,20 +18,20 @@ use enfilade_cpg::PortalId;
 pub struct PathSearch {
     joints: Joints,
     /// Per joint and side to which it leads.
-    gates: Vec<Gate>,
+    gates: Vec<JointGate>,
     /// The parts entered by the last search; the first `n_entries` count.
-    entries: Vec<Entry>,
+    entries: Vec<PartEntry>,
     n_entries: usize,
     near: Vec<(Place, f64)>,
     /// The first `n_legs` count.
-    legs: Vec<Leg>,
+    legs: Vec<PartLeg>,
     n_legs: usize,
     tools: Tools,
 }
 
 /// A joint in a search: the length up to it, and the entry from which it was reached.
 #[derive(Clone, Copy, Debug)]
-struct Gate {
+struct JointGate {
     length: f64,
     before: usize,
     is_done: bool,
@@ -39,7 +39,7 @@ struct Gate {
 
 /// A part entered by a search.
 #[derive(Clone, Debug)]
-struct Entry {
+struct PartEntry {
     start: Stand,
     /// Length up to its start. [Units: wu]
     offset: f64,
@@ -50,7 +50,7 @@ struct Entry {
 
 /// The part of a path in one part.
 #[derive(Clone, Debug)]
-struct Leg {
+struct PartLeg {
     part: PartId,
     bends: Vec<Bend>,
     /// Portals that it passes, and those of them whose leaves are in the way.
@@ -184,7 +184,7 @@ impl PathSearch {
     ) -> Option<usize> {
         self.joints.update(map, space, &mut self.tools.strides);
         self.gates.clear();
-        let far = Gate {
+        let far = JointGate {
             length: f64::INFINITY,
             before: 0,
             is_done: false,
@@ -209,7 +209,7 @@ impl PathSearch {
             let nearest =
                 open.min_by(|a, b| self.gates[*a].length.total_cmp(&self.gates[*b].length));
             next = nearest.and_then(|i| {
-                let Gate { length, before, .. } = self.gates[i];
+                let JointGate { length, before, .. } = self.gates[i];
                 self.gates[i].is_done = true;
                 let (joint, side) = (i / 2, i % 2);
                 let (at, floor) = self.joints.all[joint].middle()[side];
@@ -240,7 +240,7 @@ impl PathSearch {
         let at = self.n_entries;
         self.n_entries += 1;
         if self.entries.len() == at {
-            self.entries.push(Entry {
+            self.entries.push(PartEntry {
                 start,
                 offset,
                 via,
@@ -277,7 +277,7 @@ impl PathSearch {
                 continue;
             };
             let to = 1 - side;
-            // A part with one way in is no way through.
+            // A part with one way in is not a way through.
             let leads_on = |goal: Stand| {
                 let is_other =
                     |(k, other): (usize, &Joint)| k != i && other.parts.contains(&joint.parts[to]);
@@ -291,7 +291,7 @@ impl PathSearch {
             let cell = own.floors.floor(floor).cell;
             let mut length = entry.search.least(&own.ways, cell, &joint.lengths[side]);
             if cell == own.floors.floor(entry.start.floor).cell {
-                // Of the search from the start of this entry.
+                // The search from the start of this entry.
                 length = length.min(self.tools.strides.length(floor));
             }
             let length = entry.offset + length + joint.length;
@@ -315,7 +315,7 @@ impl PathSearch {
         loop {
             let entry = &self.entries[at];
             if self.legs.len() == self.n_legs {
-                self.legs.push(Leg {
+                self.legs.push(PartLeg {
                     part: entry.start.part,
                     bends: Vec::new(),
                     sequence: Vec::new(),
@@ -465,7 +465,7 @@ fn write_step(space: &Space, joint: &Joint, side: usize, to: DVec3, path: &mut P
     }
 }
 
-impl Leg {
+impl PartLeg {
     /// Writes its bends with another end, its last or its first, pulled taut; returns their length, infinite if there is none.
     fn with_end(
         &self,
@@ -525,7 +525,7 @@ impl Tools {
         &mut self,
         map: &WalkMap,
         space: &Space,
-        entry: &Entry,
+        entry: &PartEntry,
         (goal, edges): (Stand, &[u32]),
     ) -> f64 {
         let (own, layout) = (&map.parts[goal.part.idx()], space.layout(goal.part));
@@ -555,10 +555,10 @@ impl Tools {
         &mut self,
         map: &WalkMap,
         space: &Space,
-        entry: &Entry,
+        entry: &PartEntry,
         goal: Stand,
         may_pass: &mut impl FnMut(PartId, PortalId) -> bool,
-        leg: &mut Leg,
+        leg: &mut PartLeg,
     ) -> bool {
         let (own, layout) = (&map.parts[goal.part.idx()], space.layout(goal.part));
         let start = entry.start;
@@ -592,7 +592,7 @@ impl Tools {
         &mut self,
         own: &PartMap,
         layout: &Layout,
-        entry: &Entry,
+        entry: &PartEntry,
         (goal, edges): (u32, &[u32]),
         arrival: &Arrival,
     ) -> bool {
@@ -650,7 +650,7 @@ impl Tools {
     }
 
     /// Adds a leg to a path.
-    fn write(&mut self, own: &PartMap, leg: &Leg, path: &mut Path) {
+    fn write(&mut self, own: &PartMap, leg: &PartLeg, path: &mut Path) {
         let floors = &own.floors;
         let part = leg.part;
         let up = |p: DVec3, floor: u32| p.with_y(f64::from(floors.floor(floor).y));

@@ -129,7 +129,7 @@ impl WalkMap {
     }
 }
 
-/// Returns per object whether it stops walkers: if it counts, and is no leaf that moves.
+/// Returns per object whether it stops walkers: if it counts, and is not a leaf that moves.
 pub(super) fn stops_of(world: &World, mut counts: impl FnMut(DetailId) -> bool) -> Vec<bool> {
     let n = world.details.len() as u32;
     let mut stops: Vec<bool> = (0..n).map(|i| counts(DetailId(i))).collect();

@@ -138,12 +138,12 @@ pub(super) fn detour(rims: &[[DVec3; 2]], before: DVec3, at: DVec3, after: DVec3
 /// Losses at edges, tabulated.
 #[derive(Clone, Debug)]
 pub(super) struct EdgeLosses {
-    /// By the root of 2 π times the Fresnel number: in the shade, and in the clear.
+    /// Losses by the root of 2 π times the Fresnel number: in the shade, and in the clear.
     tables: [Vec<f64>; 2],
 }
 
 /// Number of entries of the tables per unit: linear between these, they are right to 1e-4 dB, and to 0.05 dB at the
-/// corners where losses reach nothing or the most.
+/// vertices where losses reach nothing or the most.
 const PER_UNIT: f64 = 128.0;
 
 impl EdgeLosses {
@@ -247,7 +247,7 @@ mod tests {
             tables.add(fresnel, || 0.5, &mut losses);
             for (k, loss) in losses.iter().enumerate() {
                 let least = 1.0 + 0.5 * edge_loss(fresnel * f64::from(1 << k));
-                // Where the curve ends in a corner it is cut.
+                // Where the curve ends in a vertex it is cut.
                 assert!((loss - least).abs() < 0.05, "{fresnel} {k}: {loss} {least}");
             }
         }

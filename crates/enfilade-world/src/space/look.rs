@@ -1,6 +1,6 @@
 //! Visibility in a world, in the worlds that move in it, and through special portals.
 //!
-//! Each part is followed by its own [`Viewer`], in its own frame. A view that leaves a part through one of its doors continues in
+//! Each part is followed by its own [`Viewer`](enfilade_runtime::Viewer), in its own frame. A view that leaves a part through one of its doors continues in
 //! the surrounding places behind the door, and in the doors that it meets; a view of a cell in which parts stand continues in
 //! these from outside. The part of the screen is passed on unchanged: it depends on the eye alone, not on the frame. Parts take
 //! turns until none has anything new, which ends because each adds only what it had not seen.
@@ -15,18 +15,19 @@
 
 use std::collections::BinaryHeap;
 
-use enfilade_cpg::{CellId, SpecialId, Way};
-use enfilade_geom::{DVec3, Similarity};
-use enfilade_runtime::{
-    Crossing, Gate, SeeOptions, Seen, SpecialView, StepQuestion, View, Viewer, Window,
-};
+use enfilade_cpg::Way;
+use enfilade_geom::Similarity;
+use enfilade_runtime::{SeeOptions, SpecialView, View, Window};
 
-use crate::space::{PartId, Place, Space};
+use super::context::{Context, SeenVia, StoppedSpecial, ViewBuffers};
+use super::seen::SpaceSeen;
+
+use crate::space::{PartId, Space};
 
 /// Bounds of the views through special portals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpecialOptions {
-    /// Number of contexts of one query, the direct view included. Each takes the memory of a [`Viewer`] for each part that it
+    /// Number of contexts of one query, the direct view included. Each takes the memory of a [`Viewer`](enfilade_runtime::Viewer) for each part that it
     /// reaches. [Limit: at least 1]
     pub max_contexts: usize,
     /// Smallest special portal looked into, as its share of the screen. Smaller ones are listed as
@@ -55,16 +56,7 @@ pub struct SpaceViewer {
     open: BinaryHeap<Open>,
     stopped: Vec<StoppedSpecial>,
     is_capped: bool,
-    buffers: Buffers,
-}
-
-#[derive(Default)]
-struct Buffers {
-    queue: Vec<(PartId, CellId, Window)>,
-    crossings: Vec<Crossing>,
-    views: Vec<SpecialView>,
-    /// Special portals in view of a context: by part, then by number.
-    found: Vec<(PartId, SpecialView)>,
+    buffers: ViewBuffers,
 }
 
 /// A context to look into. Ordered by its share of the screen, then by age.
@@ -87,59 +79,6 @@ impl PartialOrd for Open {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
     }
-}
-
-/// The worlds as seen by one eye, real or moved by special portals.
-struct Context {
-    parts: Vec<PartView>,
-    seen: Vec<PartId>,
-    /// The view, in the frame of a part.
-    view: Option<View>,
-    frame: PartId,
-    /// Map from that frame to the frame of the query: where things appear.
-    map: Similarity,
-    via: Option<SeenVia>,
-    back: Option<(PartId, SpecialId)>,
-    /// The plane beyond which the view begins, relative to the eye in `frame`.
-    gate: Option<(DVec3, f64)>,
-    /// Share of the query's screen that the whole screen of this context takes.
-    share: f64,
-    /// True if the view begins at the eye: for the query's own, and for cameras.
-    is_direct: bool,
-    /// Where the view of the current face begins.
-    starts: Vec<(CellId, Option<Window>)>,
-    rectangle: [f64; 4],
-}
-
-struct PartView {
-    /// Made when first needed.
-    viewer: Option<Viewer>,
-    /// In the part's frame; `None` until the query reaches the part.
-    view: Option<View>,
-    /// True if the current face was begun.
-    is_begun: bool,
-}
-
-/// The special portal in which a context is seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SeenVia {
-    /// Index of the context that sees it.
-    pub parent: usize,
-    /// Its part.
-    pub part: PartId,
-    /// The special portal.
-    pub special: SpecialId,
-    /// Index of the pass that shows this context.
-    pub pass: usize,
-}
-
-/// A special portal that was not looked into.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StoppedSpecial {
-    /// The special portal, and the context that sees it.
-    pub via: SeenVia,
-    /// Its share of the screen.
-    pub share: f32,
 }
 
 /// A rectangle around nothing.
@@ -171,7 +110,7 @@ impl SpaceViewer {
             open: BinaryHeap::new(),
             stopped: Vec::new(),
             is_capped: false,
-            buffers: Buffers::default(),
+            buffers: ViewBuffers::default(),
         }
     }
 
@@ -210,7 +149,11 @@ impl SpaceViewer {
         for context in &mut self.contexts[..self.n_contexts] {
             context.seen.sort_unstable();
         }
-        SpaceSeen { viewer: self }
+        SpaceSeen {
+            contexts: &self.contexts[..self.n_contexts],
+            stopped: &self.stopped,
+            is_capped: self.is_capped,
+        }
     }
 
     /// Adds a context that has seen nothing yet; `map` maps the frame of part `frame` to that of the query.
@@ -350,7 +293,7 @@ impl SpaceViewer {
             let aspect = (right.length() / up.length()) as f32;
             let view =
                 View::perspective(camera.eye, camera.toward, camera.up, camera.fov_y, aspect);
-            // A camera that is no camera shows nothing.
+            // A camera without direction shows nothing.
             if let (None, Ok(view)) = (known, view) {
                 let context = self.add_context(part, view, Similarity::IDENTITY);
                 let own = &mut self.contexts[context];
@@ -412,254 +355,5 @@ impl SpaceViewer {
             own.gate = None;
         }
         self.open.push(Open { share, context });
-    }
-}
-
-impl Context {
-    fn begin_face(&mut self) {
-        for &id in &self.seen {
-            self.parts[id.idx()].is_begun = false;
-        }
-    }
-
-    /// Adds the eye in a cell of a part, or in no cell.
-    fn add_eye(
-        &mut self,
-        space: &Space,
-        options: &SeeOptions,
-        face: usize,
-        part: PartId,
-        cell: Option<CellId>,
-        buffers: &mut Buffers,
-    ) {
-        self.turn(space, options, face, part, buffers, |viewer, question| {
-            viewer.add_eye(question, cell);
-        });
-        let (Some(cell), Some(eye)) = (cell, self.view.as_ref().map(View::exact_eye)) else {
-            return;
-        };
-        // An eye in the seam of two parts is in both.
-        let eye = space.between(self.frame, part).point(eye);
-        let queue = &mut buffers.queue;
-        space.for_each_beyond(Place { part, cell }, eye, |other, portal, cell| {
-            if space.parts[other.idx()].state.is_open(portal) {
-                queue.push((other, cell, Window::screen()));
-            }
-        });
-    }
-
-    /// Follows everything queued, and what it leads to.
-    fn follow(&mut self, space: &Space, options: &SeeOptions, face: usize, buffers: &mut Buffers) {
-        while let Some((id, cell, window)) = buffers.queue.pop() {
-            self.turn(space, options, face, id, buffers, |viewer, question| {
-                viewer.add_window(question, cell, &window);
-            });
-        }
-    }
-
-    /// Gives a part its turn: begins it if necessary, adds to its view, follows it, and queues the continuations elsewhere.
-    fn turn(
-        &mut self,
-        space: &Space,
-        options: &SeeOptions,
-        face: usize,
-        id: PartId,
-        buffers: &mut Buffers,
-        add: impl FnOnce(&mut Viewer, &StepQuestion<'_>),
-    ) {
-        let Some(of_frame) = &self.view else { return };
-        while self.parts.len() <= id.idx() {
-            self.parts.push(PartView {
-                viewer: None,
-                view: None,
-                is_begun: false,
-            });
-        }
-        let own = &mut self.parts[id.idx()];
-        let sight = &space.parts[id.idx()].sight;
-        let viewer = (own.viewer).get_or_insert_with(|| Viewer::with_options(sight, *options));
-        let to_frame: Similarity = space.between(id, self.frame).into();
-        if own.view.is_none() {
-            own.view = Some(of_frame.in_frame(&to_frame));
-            viewer.begin_steps();
-            own.is_begun = false;
-            self.seen.push(id);
-        }
-        let part = &space.parts[id.idx()];
-        let question = StepQuestion {
-            sight,
-            state: &part.state,
-            view: own.view.as_ref().unwrap_or(of_frame),
-            face,
-            border: part.border,
-            is_watched: &part.has_guests,
-            gate: (!self.is_direct).then(|| Gate {
-                back: self.back.filter(|back| back.0 == id).map(|back| back.1),
-                plane: (self.gate).map(|(n, h)| (to_frame.turn.conjugate() * n, h)),
-            }),
-        };
-        if !own.is_begun {
-            own.is_begun = true;
-            viewer.begin_face(&question);
-        }
-        add(viewer, &question);
-        viewer.advance(&question);
-        viewer.take_crossings(&mut buffers.crossings);
-        viewer.take_specials(&mut buffers.views);
-        let views = buffers.views.drain(..).map(|view| (id, view));
-        buffers.found.extend(views);
-        hand_on(space, id, buffers);
-    }
-}
-
-/// Queues the continuations in other parts.
-fn hand_on(space: &Space, from: PartId, buffers: &mut Buffers) {
-    let own = &space.parts[from.idx()];
-    let queue = &mut buffers.queue;
-    let mut add = |to: PartId, cell: CellId, window: &Window| {
-        let map = space.between(to, from).into();
-        queue.push((to, cell, window.in_frame(&map)));
-    };
-    for crossing in buffers.crossings.drain(..) {
-        let window = &crossing.window;
-        if own.border != Some(crossing.cell) {
-            for &guest in &own.guests[crossing.cell.idx()] {
-                if let Some(border) = space.parts[guest.idx()].border {
-                    add(guest, border, window);
-                }
-            }
-            continue;
-        }
-        let is_way = |portal| crossing.via.is_none_or(|via| via == portal);
-        for door in own.doors.iter().filter(|d| is_way(d.portal)) {
-            for place in &door.leads_to {
-                add(place.part, place.cell, window);
-            }
-            for &(other, portal) in &door.meets {
-                let its = &space.parts[other.idx()];
-                if let Some(border) = its.border {
-                    // Its door may be nearer than the one that the view leaves by.
-                    let radius = its.layout.opening(portal).radius();
-                    add(other, border, &window.earlier(space.docking.depth(radius)));
-                }
-            }
-        }
-    }
-}
-
-/// The answer to a view, context by context and part by part.
-#[derive(Clone, Copy)]
-pub struct SpaceSeen<'a> {
-    viewer: &'a SpaceViewer,
-}
-
-/// What is seen directly, or in one special portal.
-#[derive(Clone, Copy)]
-pub struct SeenContext<'a> {
-    context: &'a Context,
-}
-
-impl<'a> SpaceSeen<'a> {
-    /// Returns the visible parts, ascending, each with its visible contents in its own frame: draw them at its
-    /// [pose](Space::pose). The border cell of a part stands for its outside. Without what is seen in special portals.
-    pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
-        let own = &self.viewer.contexts[0];
-        own.seen.iter().map(|id| (*id, own.answer(*id)))
-    }
-
-    /// Returns the visible contents of one part; `None` if nothing of it is seen directly.
-    #[must_use]
-    pub fn of_part(&self, part: PartId) -> Option<Seen<'a>> {
-        self.context(0).of_part(part)
-    }
-
-    /// Returns the direct view, and then what is seen in special portals, each after the context that sees it.
-    pub fn contexts(&self) -> impl ExactSizeIterator<Item = SeenContext<'a>> + use<'a> {
-        let all = &self.viewer.contexts[..self.viewer.n_contexts];
-        all.iter().map(|context| SeenContext { context })
-    }
-
-    /// Returns one context.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such context.
-    #[must_use]
-    pub fn context(&self, index: usize) -> SeenContext<'a> {
-        let context = &self.viewer.contexts[..self.viewer.n_contexts][index];
-        SeenContext { context }
-    }
-
-    /// Returns the special portals in view that were not looked into: too small, or one too many.
-    #[must_use]
-    pub fn stopped_specials(&self) -> &'a [StoppedSpecial] {
-        &self.viewer.stopped
-    }
-
-    /// Returns `true` if special portals were not looked into because there were
-    /// [too many contexts](SpecialOptions::max_contexts).
-    #[must_use]
-    pub fn is_capped(&self) -> bool {
-        self.viewer.is_capped
-    }
-}
-
-impl Context {
-    fn answer(&self, part: PartId) -> Seen<'_> {
-        let viewer = self.parts[part.idx()].viewer.as_ref();
-        viewer.expect("a seen part has a viewer").answer()
-    }
-}
-
-impl<'a> SeenContext<'a> {
-    /// Returns the special portal that it is seen in; `None` for the direct view.
-    #[must_use]
-    pub fn via(&self) -> Option<SeenVia> {
-        self.context.via
-    }
-
-    /// Returns the part in whose frame [its view](SeenContext::view) is.
-    #[must_use]
-    pub fn frame(&self) -> PartId {
-        self.context.frame
-    }
-
-    /// Returns the view: that of the query, or of the eye moved by special portals.
-    #[must_use]
-    pub fn view(&self) -> &'a View {
-        self.context.view.as_ref().expect("a context has a view")
-    }
-
-    /// Returns the map from the frame of [its part](SeenContext::frame) to the frame of the query: where things appear. The
-    /// identity for a monitor, whose picture is apart.
-    #[must_use]
-    pub fn map(&self) -> &'a Similarity {
-        &self.context.map
-    }
-
-    /// Returns the plane beyond which things are seen: its normal, away from the eye, and its distance from the eye, in the
-    /// frame of [its part](SeenContext::frame). `None` if the eye may be on it, and for direct views. [Units: wu]
-    #[must_use]
-    pub fn plane(&self) -> Option<(DVec3, f64)> {
-        self.context.gate
-    }
-
-    /// Returns the rectangle of the screen around it: `[left, bottom, right, top]`, -1 to 1.
-    #[must_use]
-    pub fn rectangle(&self) -> [f64; 4] {
-        self.context.rectangle
-    }
-
-    /// Returns the visible parts, ascending, each with its visible contents in its own frame.
-    pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
-        let own = self.context;
-        own.seen.iter().map(|id| (*id, own.answer(*id)))
-    }
-
-    /// Returns the visible contents of one part; `None` if nothing of it is seen.
-    #[must_use]
-    pub fn of_part(&self, part: PartId) -> Option<Seen<'a>> {
-        let is_seen = self.context.seen.binary_search(&part).is_ok();
-        is_seen.then(|| self.context.answer(part))
     }
 }
