@@ -4,6 +4,7 @@
 
 mod passing;
 mod pictures;
+mod pvs;
 
 use crate::living::{baked, made};
 use crate::rows::Row;
@@ -26,5 +27,6 @@ pub(crate) const ROWS: &[Row] = &[
         &["facing-mirrors", "endless", "turned", "ring-100"],
         passing::recursion,
     ),
+    baked("PVS", BUILDINGS, pvs::pvs),
     made("bad input", &["offices-4"], passing::bad_input),
 ];
