@@ -8,10 +8,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::{Allowance, DVec3};
-use enfilade::runtime::{Sight, SightState};
 use enfilade::world::{
-    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Layout, Listener,
-    Reverb, Transmission, at_ears, test_sound,
+    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Listener, PartId,
+    Reverb, Space, Transmission, at_ears, test_sound,
 };
 
 use self::materials::{Absorption, Absorptions, Given, given, tell};
@@ -227,7 +226,7 @@ impl HeardWalk<'_> {
                 rows.push(HeardLine {
                     seconds: time,
                     position: at.to_array(),
-                    cell: cell.0,
+                    cell: cell.cell.0,
                     length: heard.map(|h| h.length),
                     direction: toward.to_array(),
                     gain_db: decibels(gain),

@@ -7,8 +7,8 @@ use anyhow::{Context, ensure};
 use enfilade::bake::{BakeConfig, BakeContext, bake};
 use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Ray, Triangle};
 use enfilade::world::{
-    Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Pose, Space,
-    Transmission, WalkMap, Walker,
+    Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Place, Pose,
+    Space, Transmission, WalkMap, Walker,
 };
 use enfilade::{CellId, PortalId, PortalKind, World};
 use enfilade_testkit::{Beyond, Rng, Standing, assembled, chamber, lift_tower};
@@ -33,6 +33,9 @@ const SQUARES: f64 = 3.0;
 /// Of a sound, in decibels and in length: a door is pushed into the other by up to a centimeter and 1°, two at its edges, and
 /// levels change by up to a decibel per centimeter of way. [Units: dB, wu]
 const HEARD: [f64; 2] = [1.0, 0.03];
+
+/// Width and height by which a gangway is smaller than its doorway, more than it is shifted. [Units: wu]
+const FREE: f64 = 0.14;
 
 /// A building and a cabin at its door.
 struct Site {
@@ -113,14 +116,15 @@ fn at_entrance(world: &World) -> anyhow::Result<Site> {
     } else {
         -opening.normal()
     };
-    let room = DVec3::new(width + 1.4, height + 0.4, 2.6);
-    let cabin = chamber(room, [0.7, 0.7 + width], height);
+    // A gangway that fits into the doorway: the opening is within the wall, which would stand in a wider room.
+    let room = DVec3::new(width - FREE, height - FREE, 3.0);
+    let cabin = chamber(room, [0.01, room.x - 0.01], room.y - 0.01);
     let sill = opening.center().with_y(opening.bounds().min.y);
     // Its door is in its wall of greatest z.
     let turn = DQuat::from_rotation_y((-out.x).atan2(-out.z));
     let home = Pose {
         turn,
-        at: sill - turn * DVec3::new(0.5 * room.x, 0.0, room.z),
+        at: sill - turn * DVec3::new(0.5 * room.x, -0.02, room.z),
     };
     let cabin = space.add_part(cabin, PartId::ROOT, middle.after(&home))?;
     site(
@@ -234,7 +238,7 @@ impl Site {
         let layout = self.space.layout(self.cabin);
         let opening = layout.opening(self.door);
         let inside = layout.cell(self.room).bounds;
-        let bounds = Aabb::new(inside.min + 0.3, inside.max - 0.3);
+        let bounds = inside.expanded(-0.3);
         let from = rng.point_in(&bounds);
         let through = rng.point_in(&opening.bounds().expanded(-0.02));
         let through = through - opening.normal() * opening.height_of(through);
@@ -365,7 +369,19 @@ impl Site {
                 continue;
             }
             let all = |_, _| true;
-            let ends = [own[0], (self.building, to)];
+            // The cabin may be where the point is.
+            let there = self.space.locate(self.building, to);
+            // In the air of a shaft, the nearest floor may be its own or the cabin's.
+            let is_shaft = |place: Place| match self.beyond {
+                Beyond::Cell(cell) => (place.part, place.cell) == (self.building, cell),
+                Beyond::Door(..) => false,
+            };
+            if there.is_some_and(is_shaft) {
+                continue;
+            }
+            let part = there.map_or(self.building, |place| place.part);
+            let goal = self.space.between(self.building, part).point(to);
+            let ends = [own[0], (part, goal)];
             let found = search.find(map, &self.space, ends, all, &mut path);
             let ends = [own[1], (PartId::ROOT, to)];
             let one_found = one_search.find(&one_map, &one, ends, all, &mut one_path);
@@ -424,7 +440,7 @@ impl Site {
         let inside = self.space.layout(self.cabin).cell(self.room).bounds;
         let layout = self.space.layout(self.building);
         for id in 0..SOUNDS {
-            let at = rng.point_in(&inside.expanded(-0.3));
+            let at = rng.point_in(&inside.expanded(-0.2));
             let cell = CellId(rng.below(layout.n_cells()) as u32);
             let source = rng.point_in(&layout.cell(cell).bounds);
             let there = [

@@ -22,8 +22,8 @@ pub(crate) struct Joined {
     first: Vec<[u32; 2]>,
     /// Per portal, the one that it meets.
     pub(crate) docked: Vec<Option<PortalId>>,
-    /// Doors of parts that lead to a cell of their host, with the cell.
-    pub(crate) hosted: Vec<(PortalId, CellId)>,
+    /// Doors of parts that lead to a cell of their host, ascending, with the cell, and how far before the door its air begins.
+    pub(crate) hosted: Vec<(PortalId, CellId, f64)>,
 }
 
 impl Joined {
@@ -204,13 +204,17 @@ impl Joined {
                     ),
                 ];
                 self.dock(ends, exits);
-            } else if let Some(to) =
-                place_before(space, id, door.portal).filter(|p| p.part.idx() < self.n_parts())
-            {
+                continue;
+            }
+            // A door may be pushed into what is before it, as far as docking takes for no distance.
+            let offs = [0.0, space.docking.gap];
+            let before = |off| Some((place_before(space, id, door.portal, off)?, off));
+            let before = offs.into_iter().find_map(before);
+            if let Some((to, off)) = before.filter(|b| b.0.part.idx() < self.n_parts()) {
                 let to = self.cell(to);
                 self.lead(portal, inner, to, exits);
                 exits[to.idx()].push(Exit { portal, to: inner });
-                self.hosted.push((portal, to));
+                self.hosted.push((portal, to, off));
             }
         }
     }
@@ -242,8 +246,8 @@ impl Joined {
     }
 }
 
-/// Returns the place around a part before the middle of one of its doors: beyond what docking takes for no distance.
-fn place_before(space: &Space, id: PartId, portal: PortalId) -> Option<Place> {
+/// Returns the place around a part before the middle of one of its doors, at a distance.
+fn place_before(space: &Space, id: PartId, portal: PortalId, off: f64) -> Option<Place> {
     let part = &space.parts[id.idx()];
     let opening = part.layout.opening(portal);
     let out = if part.border == Some(opening.cells()[1]) {
@@ -254,7 +258,7 @@ fn place_before(space: &Space, id: PartId, portal: PortalId) -> Option<Place> {
     let middle = opening.pieces().next().map_or(opening.center(), |piece| {
         piece.iter().sum::<enfilade_geom::DVec3>() / piece.len() as f64
     });
-    let off = space.docking.gap + part.layout.tolerance();
+    let off = off + 2.0 * part.layout.tolerance();
     let p = part.local.point(middle + opening.normal() * (out * off));
     let (mut host, mut p) = (part.host, p);
     loop {

@@ -27,8 +27,6 @@ pub(super) struct SoundGraph {
     /// Per portal, `true` for the wider one of two that meet.
     is_spare: Vec<bool>,
     poses: Vec<Pose>,
-    /// Distance by which doors may be pushed into what is before them. [Units: wu]
-    gap: f64,
 }
 
 impl SoundGraph {
@@ -73,7 +71,6 @@ impl SoundGraph {
             bounds,
             is_spare,
             poses,
-            gap: space.docking().gap,
             joined,
         };
         graph.add_hosts(parts);
@@ -158,8 +155,10 @@ impl SoundGraph {
         p: DVec3,
     ) -> DVec3 {
         let off = self.place_of(parts, cell).map_or(0.0, |(place, own)| {
-            let is_own = self.joined.of_portal(portal).0 == place.part;
-            own.geodesics.off() + if is_own { 0.0 } else { self.gap }
+            let hosted = &self.joined.hosted;
+            let known = hosted.binary_search_by_key(&portal, |h| h.0).ok();
+            let before = known.filter(|_| self.joined.of_portal(portal).0 != place.part);
+            own.geodesics.off() + before.map_or(0.0, |k| hosted[k].2)
         });
         into_cell(&self.joined.layout.opening(portal), cell, p, off)
     }
