@@ -134,12 +134,26 @@ fn a_kept_listener_follows_parts_that_move() {
     let mut kept = Listener::new();
     let mut rng = Rng::new(5);
     let [ears, source] = [0, 1].map(|k| site.place(k, &mut rng)[0]);
+    // In the open, which the building's door leads to once the cabin is gone.
+    let open = Place {
+        part: PartId::ROOT,
+        cell: CellId(0),
+    };
+    let outside = (open, site.middle.point(DVec3::new(-2.0, 1.0, 8.0)));
     let mut levels = Vec::new();
     for k in 0..40 {
         let away = Pose::from_translation(DVec3::Z * 0.05 * f64::from(k));
         let pose = site.middle.after(&away).after(&site.home);
         site.space.set_pose(site.parts[1], pose).unwrap();
         kept.listen(&acoustics, &site.space, ears.0, ears.1);
+        let heard = kept.hear(&acoustics, 1, outside.0, outside.1);
+        let fresh = hear(&site.space, &acoustics, [ears, outside]);
+        assert_eq!(
+            heard.is_some(),
+            fresh.is_some(),
+            "{k}: {heard:?} not {fresh:?}"
+        );
+        assert_eq!(heard.is_some(), k > 0, "{k}: {heard:?}");
         let heard = kept.hear(&acoustics, 0, source.0, source.1).unwrap();
         let fresh = hear(&site.space, &acoustics, [ears, source]).unwrap();
         assert!(

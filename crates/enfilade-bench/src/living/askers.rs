@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use anyhow::{Context, ensure};
 use enfilade::bake::{BakeConfig, BakeContext, bake};
-use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Ray, Triangle};
+use enfilade::geom::{Bvh, DQuat, DVec3, Ray, Triangle};
 use enfilade::world::{
     Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Place, Pose,
     Space, Transmission, WalkMap, Walker,
