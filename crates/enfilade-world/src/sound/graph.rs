@@ -64,6 +64,7 @@ impl SoundGraph {
             }
         }
         let mut graph = Self {
+            joined,
             ways,
             first_rim,
             rims,
@@ -71,7 +72,6 @@ impl SoundGraph {
             bounds,
             is_spare,
             poses,
-            joined,
         };
         graph.add_hosts(parts);
         graph
