@@ -8,10 +8,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::{Allowance, DVec3};
-use enfilade::runtime::{Sight, SightState};
 use enfilade::world::{
-    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Layout, Listener,
-    Reverb, Transmission, at_ears, test_sound,
+    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Listener, PartId,
+    Reverb, Space, Transmission, at_ears, test_sound,
 };
 
 use self::materials::{Absorption, Absorptions, Given, given, tell};
@@ -171,18 +170,23 @@ impl HeardWalk<'_> {
         allowance: &Allowance,
         mut each: impl FnMut(&AudioBlock) -> anyhow::Result<()>,
     ) -> anyhow::Result<HeardWhole> {
-        let layout = Layout::new(world);
-        let sight = Sight::build(world).with_context(|| args.world.display().to_string())?;
-        let mut state = SightState::new(&sight);
-        self.opened.iter().for_each(|&p| state.open(p));
-        args.closed.iter().for_each(|&p| state.close(PortalId(p)));
-        let acoustics = Acoustics::new(&layout, world, &Transmission::default());
+        let root = PartId::ROOT;
+        let mut space =
+            Space::new(world.clone()).with_context(|| args.world.display().to_string())?;
+        self.opened.iter().for_each(|&p| space.open(root, p));
+        args.closed
+            .iter()
+            .for_each(|&p| space.close(root, PortalId(p)));
+        let acoustics = Acoustics::new(&space, &Transmission::default());
         let absorptions = Absorptions::new(world, &args.absorption)?;
-        let reverb = Reverb::new(&layout, world, DecayLaw::Kuttruff, |m| absorptions.of(m));
+        let reverb = Reverb::new(&space, DecayLaw::Kuttruff, |_, m| absorptions.of(m));
         let source = self.source;
-        let source_cell = layout.locate(source).context("the source is in no cell")?;
+        let source_cell = space
+            .locate(root, source)
+            .context("the source is in no cell")?;
         let mut fields = DiffuseFields::new();
-        fields.solve(&reverb, source_cell, |p| acoustics.transmitted(&state, p));
+        let passes = |part, portal| acoustics.transmitted(&space, part, portal);
+        fields.solve(&reverb, &space, source_cell, passes);
         let (mut ears, mut rows) = (Listener::new(), Vec::new());
         let mut before: Option<AudioBlock> = None;
         let mut is_row_due = 0.0;
@@ -193,17 +197,17 @@ impl HeardWalk<'_> {
             let time = k as f64 * self.seconds_of_block;
             let (at, ahead) = place(self.points, time * SPEED, source);
             // In solid matter, such as a door frame, the last sound continues.
-            let Some(cell) = layout.locate(at) else {
+            let Some(cell) = space.locate(root, at) else {
                 match &before {
                     Some(last) => each(last)?,
                     None => bail!("the listener starts in no cell, at {at}"),
                 }
                 continue;
             };
-            ears.listen(&acoustics, &state, cell, at);
-            let heard = ears.hear(&acoustics, &layout, 0, source_cell, source);
+            ears.listen(&acoustics, &space, cell, at);
+            let heard = ears.hear(&acoustics, 0, source_cell, source);
             // Too faint, it keeps its delay.
-            let way = ears.shortest(&acoustics, &layout, 0, source_cell, source);
+            let way = ears.shortest(&acoustics, 0, source_cell, source);
             let (toward, gain) = heard.map_or((DVec3::ZERO, 0.0), |h| (h.direction, h.gain));
             let (room, rt60) = (fields.gain(cell), fields.rt60(cell));
             let follow = |of: fn(&AudioBlock) -> f64, now| {
@@ -222,7 +226,7 @@ impl HeardWalk<'_> {
                 rows.push(HeardLine {
                     seconds: time,
                     position: at.to_array(),
-                    cell: cell.0,
+                    cell: cell.cell.0,
                     length: heard.map(|h| h.length),
                     direction: toward.to_array(),
                     gain_db: decibels(gain),

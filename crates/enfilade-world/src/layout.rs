@@ -3,6 +3,10 @@
 use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, SpecialId, Way, World};
 use enfilade_geom::{Aabb, DVec3, Plane, Similarity, Winding, world_tolerance};
 
+mod joined;
+
+pub(crate) use joined::Joined;
+
 /// The cells and portals of a world in double precision, in contiguous arrays.
 ///
 /// Made once. A portal's opening is its convex pieces, not the outline around them: a shape that touches only the outline does

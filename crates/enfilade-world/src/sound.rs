@@ -22,6 +22,7 @@ mod auralize;
 mod blocks;
 mod ears;
 mod edge;
+mod graph;
 mod listener;
 mod materials;
 mod pieces;
@@ -29,13 +30,16 @@ mod reverb;
 mod route;
 mod taut;
 
-use enfilade_cpg::{FittingPart, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DVec3, Winding};
-use enfilade_runtime::SightState;
+use std::sync::Arc;
+
+use enfilade_cpg::{FittingPart, PortalId, PortalKind};
+use enfilade_geom::{DVec3, Winding};
 
 use crate::layout::Layout;
 use crate::paths::{Geodesics, Sampling, Ways};
 use crate::sound::edge::EdgeLosses;
+use crate::sound::graph::SoundGraph;
+use crate::space::{PartId, Space};
 
 pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};
 pub use ears::at_ears;
@@ -66,21 +70,28 @@ impl Default for Transmission {
     }
 }
 
-/// Acoustic data of a world. Made once, read by all listeners.
+/// Acoustic data of a space's parts. Made once, read by all listeners; motion does not change it.
 #[derive(Clone, Debug)]
 pub struct Acoustics {
+    parts: Vec<PartSound>,
+    /// Per portal of all parts, the energy that passes it while shut.
+    shut: Vec<f64>,
+    has_pane: Vec<bool>,
+    /// Per part the number of portals before its own.
+    first_portal: Vec<u32>,
+    /// All parts as they stood when it was made.
+    graph: Arc<SoundGraph>,
+    edge_losses: EdgeLosses,
+}
+
+/// Acoustic data of a part, in its frame.
+#[derive(Clone, Debug)]
+struct PartSound {
     ways: Ways,
     geodesics: Geodesics,
     /// Per portal, edges with wall beside them, and the number of all.
     first_rim: Vec<u32>,
     rims: Vec<[DVec3; 2]>,
-    /// Per portal, the energy that passes it while shut.
-    shut: Vec<f64>,
-    has_pane: Vec<bool>,
-    /// Per portal, the area of its opening, and the box around it. [Units: wu², wu]
-    area: Vec<f64>,
-    bounds: Vec<Aabb>,
-    edge_losses: EdgeLosses,
 }
 
 /// Area of a first Fresnel zone of 500 Hz, divided by π, where both ends are a meter and a half away. [Units: wu²]
@@ -90,34 +101,31 @@ const N_BANDS: usize = 6;
 /// Centers of the octave bands, those in which materials are measured (ISO 354). [Units: Hz]
 pub const OCTAVES: [f64; N_BANDS] = [125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0];
 impl Acoustics {
-    /// Prepares a world. Lengths around the walls of concave cells take a second or two for a large building.
+    /// Prepares all parts of a space; those that are added later are silent. Lengths around the walls of concave cells take a
+    /// second or two for a large building.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, transmission: &Transmission) -> Self {
-        let mut ways = Ways::new(layout, Sampling::default());
-        let geodesics = Geodesics::new(layout, world, &mut ways);
-        let (mut first_rim, mut rims) = (vec![0], Vec::new());
+    pub fn new(space: &Space, transmission: &Transmission) -> Self {
+        let (mut parts, mut first_portal) = (Vec::new(), Vec::new());
         let (mut shut, mut has_pane) = (Vec::new(), Vec::new());
-        for (i, portal) in world.graph.portals.iter().enumerate() {
-            add_rims(layout, PortalId(i as u32), &mut rims);
-            first_rim.push(rims.len() as u32);
-            let loss = match portal.kind {
-                PortalKind::Door => transmission.door,
-                PortalKind::Window => transmission.window,
-                PortalKind::Open | PortalKind::Crack => transmission.other,
-            };
-            shut.push(10f64.powf(-0.1 * loss));
-            has_pane.push(portal.fittings.iter().any(|f| f.part == FittingPart::Pane));
+        for part in (0..space.n_parts() as u32).map(PartId) {
+            parts.push(PartSound::new(space, part));
+            first_portal.push(shut.len() as u32);
+            for portal in &space.world(part).graph.portals {
+                let loss = match portal.kind {
+                    PortalKind::Door => transmission.door,
+                    PortalKind::Window => transmission.window,
+                    PortalKind::Open | PortalKind::Crack => transmission.other,
+                };
+                shut.push(10f64.powf(-0.1 * loss));
+                has_pane.push(portal.fittings.iter().any(|f| f.part == FittingPart::Pane));
+            }
         }
-        let portals = (0..layout.n_portals() as u32).map(PortalId);
         Self {
-            area: portals.clone().map(|p| layout.opening(p).area()).collect(),
-            bounds: portals.map(|p| *layout.opening(p).bounds()).collect(),
-            ways,
-            geodesics,
-            first_rim,
-            rims,
+            graph: Arc::new(SoundGraph::new(space, &parts)),
+            parts,
             shut,
             has_pane,
+            first_portal,
             edge_losses: EdgeLosses::new(),
         }
     }
@@ -127,10 +135,11 @@ impl Acoustics {
     ///
     /// # Panics
     ///
-    /// If there is no such portal.
+    /// If there is no such portal, or the part was added later.
     #[must_use]
-    pub fn open_share(&self, state: &SightState, portal: PortalId) -> f64 {
-        if self.has_pane[portal.idx()] || !state.is_open(portal) {
+    pub fn open_share(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
+        let state = space.state(part);
+        if self.has_pane[self.index(part, portal)] || !state.is_open(portal) {
             return 0.0;
         }
         f64::from(state.leaves(portal).unwrap_or(1.0))
@@ -140,33 +149,62 @@ impl Acoustics {
     ///
     /// # Panics
     ///
-    /// If there is no such portal.
+    /// As [`Acoustics::open_share`].
     #[must_use]
-    pub fn transmitted(&self, state: &SightState, portal: PortalId) -> f64 {
-        let open = self.open_share(state, portal);
-        open + (1.0 - open) * self.shut[portal.idx()]
+    pub fn transmitted(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
+        let open = self.open_share(space, part, portal);
+        open + (1.0 - open) * self.shut[self.index(part, portal)]
     }
 
-    /// Returns the length that a portal adds when sequences are compared, a meter for each decibel of the loss through its clear
-    /// area and its leaf at mid frequencies. [Units: wu]
-    fn toll(&self, state: &SightState, portal: PortalId) -> f64 {
-        let (open, shut) = (
-            self.open_share(state, portal),
-            self.shut[portal.idx()].max(1e-12),
-        );
-        let area = open * self.area[portal.idx()];
-        let free = area * area / (area * area + MID_ZONE * MID_ZONE);
-        -10.0 * (free + (1.0 - free) * shut).log10()
+    fn index(&self, part: PartId, portal: PortalId) -> usize {
+        self.first_portal[part.idx()] as usize + portal.idx()
     }
+}
 
-    /// Returns how much louder a portal may let through what it did before, when its clear share changes. [Units: dB]
-    fn rise(&self, portal: PortalId, before: f64, open: f64) -> f64 {
-        if open <= before {
-            return 0.0;
+/// Returns the length that a gate adds when sequences are compared, a meter for each decibel of the loss through its clear area
+/// and its leaf at mid frequencies. [Units: wu]
+fn toll(area: f64, (open, leaf): (f64, f64)) -> f64 {
+    let (shut, area) = (leaf.max(1e-12), open * area);
+    let free = area * area / (area * area + MID_ZONE * MID_ZONE);
+    -10.0 * (free + (1.0 - free) * shut).log10()
+}
+
+/// Returns how much louder a gate may let through what it did before, when its clear share or its leaf changes. [Units: dB]
+fn rise((before, leaf_before): (f64, f64), (open, leaf): (f64, f64)) -> f64 {
+    if open <= before && leaf <= leaf_before {
+        return 0.0;
+    }
+    let most = -10.0 * leaf.min(leaf_before).max(1e-30).log10();
+    // Through a small hole, energy is as the square of its area.
+    let clear = if open <= before {
+        0.0
+    } else {
+        20.0 * (open / before).log10()
+    };
+    let through = if leaf <= leaf_before {
+        0.0
+    } else {
+        10.0 * (leaf / leaf_before).log10()
+    };
+    clear.max(through).min(most)
+}
+
+impl PartSound {
+    fn new(space: &Space, part: PartId) -> Self {
+        let layout = space.layout(part);
+        let mut ways = Ways::new(layout, Sampling::default());
+        let geodesics = Geodesics::new(space, part, &mut ways);
+        let (mut first_rim, mut rims) = (vec![0], Vec::new());
+        for portal in (0..layout.n_portals() as u32).map(PortalId) {
+            add_rims(layout, portal, &mut rims);
+            first_rim.push(rims.len() as u32);
         }
-        let most = -10.0 * self.shut[portal.idx()].max(1e-30).log10();
-        // Through a small hole, energy is as the square of its area.
-        (20.0 * (open / before).log10()).min(most)
+        Self {
+            ways,
+            geodesics,
+            first_rim,
+            rims,
+        }
     }
 
     fn rims(&self, portal: PortalId) -> &[[DVec3; 2]] {

@@ -5,10 +5,10 @@
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::{Bvh, DVec3, Triangle};
 use enfilade_testkit::{GridParams, Rng, room_grid};
-use enfilade_world::{Geodesics, Layout, LengthSearch, Sampling, Ways};
+use enfilade_world::{Geodesics, Layout, LengthSearch, PartId, Sampling, Space, Ways};
 
 /// One storey of rooms, many of them concave.
-fn rooms(seed: u64) -> (World, Layout, Ways, Geodesics) {
+fn rooms(seed: u64) -> (World, Space, Ways, Geodesics) {
     let world = room_grid(&GridParams {
         size: [5, 1, 5],
         doors: 0.7,
@@ -18,10 +18,10 @@ fn rooms(seed: u64) -> (World, Layout, Ways, Geodesics) {
         outdoors: false,
         ..GridParams::offices(25, seed)
     });
-    let layout = Layout::new(&world);
-    let mut ways = Ways::new(&layout, Sampling::default());
-    let geodesics = Geodesics::new(&layout, &world, &mut ways);
-    (world, layout, ways, geodesics)
+    let space = Space::new(world.clone()).unwrap();
+    let mut ways = Ways::new(space.layout(PartId::ROOT), Sampling::default());
+    let geodesics = Geodesics::new(&space, PartId::ROOT, &mut ways);
+    (world, space, ways, geodesics)
 }
 
 fn walls(world: &World) -> Vec<Triangle> {
@@ -104,18 +104,19 @@ fn by_visibility(
 fn ways_within_a_cell_bend_about_its_edges() {
     let (mut bends, mut n_bent, mut n_cells) = (Vec::new(), 0, 0);
     for seed in 0..8 {
-        let (world, layout, _, geodesics) = rooms(seed);
+        let (world, space, _, geodesics) = rooms(seed);
+        let layout = space.layout(PartId::ROOT);
         let walls = walls(&world);
         let (bvh, corners) = (Bvh::build(&walls), corners_in_plan(&walls));
         let mut rng = Rng::new(seed);
         for cell in (0..layout.n_cells() as u32).map(CellId) {
             n_cells += usize::from(geodesics.is_concave(cell));
             for _ in 0..20 {
-                let ends = points_in(&layout, cell, &mut rng);
+                let ends = points_in(layout, cell, &mut rng);
                 let length = geodesics
                     .way(cell, ends, &mut bends)
                     .expect("cells are connected");
-                let least = by_visibility(&layout, cell, &bvh, &corners, ends);
+                let least = by_visibility(layout, cell, &bvh, &corners, ends);
                 assert!(
                     length < 1.001 * least + 0.01,
                     "{cell} seed {seed}: {length} {least} {ends:?}"
@@ -140,8 +141,10 @@ fn ways_within_a_cell_bend_about_its_edges() {
 #[test]
 fn boxes_are_not_concave() {
     let world = room_grid(&GridParams::offices(30, 1));
-    let layout = Layout::new(&world);
-    let geodesics = Geodesics::new(&layout, &world, &mut Ways::new(&layout, Sampling::MIDDLES));
+    let space = Space::new(world.clone()).unwrap();
+    let layout = space.layout(PartId::ROOT);
+    let mut ways = Ways::new(layout, Sampling::MIDDLES);
+    let geodesics = Geodesics::new(&space, PartId::ROOT, &mut ways);
     for cell in (0..layout.n_cells() as u32).map(CellId) {
         assert_eq!(
             geodesics.is_concave(cell),
@@ -157,10 +160,11 @@ fn searches_walk_around_walls_of_a_cell() {
     let (mut search, mut arrivals, mut lengths) = (LengthSearch::new(), Vec::new(), Vec::new());
     let (mut bends, mut n_bent) = (Vec::new(), 0);
     for seed in 0..8 {
-        let (_, layout, ways, geodesics) = rooms(seed);
+        let (_, space, ways, geodesics) = rooms(seed);
+        let layout = space.layout(PartId::ROOT);
         let mut rng = Rng::new(seed);
         for cell in (0..layout.n_cells() as u32).map(CellId) {
-            let [from, _] = points_in(&layout, cell, &mut rng);
+            let [from, _] = points_in(layout, cell, &mut rng);
             geodesics.lengths_from(&ways, cell, from, &mut lengths);
             assert_eq!(lengths.len(), ways.points_of(cell).count());
             for ((_, p), &length) in ways.points_of(cell).zip(&lengths) {
@@ -180,7 +184,7 @@ fn searches_walk_around_walls_of_a_cell() {
                 assert!(own.length <= least + 1e-9);
             }
             let other = CellId(rng.below(layout.n_cells()) as u32);
-            let [to, _] = points_in(&layout, other, &mut rng);
+            let [to, _] = points_in(layout, other, &mut rng);
             geodesics.lengths_from(&ways, other, to, &mut lengths);
             let direct = geodesics.way(cell, [from, to], &mut bends);
             let last = |place: usize, _| {

@@ -5,15 +5,12 @@ mod cone;
 use cone::least_length;
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::DVec3;
-use enfilade_runtime::{Sight, SightState};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
-use enfilade_world::{Acoustics, Heard, Layout, Listener, Transmission};
+use enfilade_world::{Acoustics, Heard, Layout, Listener, PartId, Place, Space, Transmission};
 
 struct Site {
-    world: World,
-    layout: Layout,
+    space: Space,
     acoustics: Acoustics,
-    state: SightState,
 }
 
 fn site(params: &GridParams) -> Site {
@@ -21,14 +18,16 @@ fn site(params: &GridParams) -> Site {
 }
 
 fn site_of(world: World) -> Site {
-    let layout = Layout::new(&world);
-    let acoustics = Acoustics::new(&layout, &world, &Transmission::default());
-    let state = SightState::new(&Sight::build(&world).unwrap());
-    Site {
-        world,
-        layout,
-        acoustics,
-        state,
+    let space = Space::new(world).unwrap();
+    let acoustics = Acoustics::new(&space, &Transmission::default());
+    Site { space, acoustics }
+}
+
+/// A cell of the root.
+fn place(cell: CellId) -> Place {
+    Place {
+        part: PartId::ROOT,
+        cell,
     }
 }
 
@@ -43,13 +42,17 @@ fn rooms(n: usize, seed: u64) -> GridParams {
 }
 
 impl Site {
+    fn layout(&self) -> &Layout {
+        self.space.layout(PartId::ROOT)
+    }
+
     fn place(&self, rng: &mut Rng) -> (CellId, DVec3) {
         loop {
-            let cell = CellId(rng.below(self.layout.n_cells()) as u32);
-            let bounds = self.layout.cell(cell).bounds;
+            let cell = CellId(rng.below(self.layout().n_cells()) as u32);
+            let bounds = self.layout().cell(cell).bounds;
             let share = DVec3::from([0; 3].map(|_| rng.range(0.05, 0.95)));
             let at = bounds.min + (bounds.max - bounds.min) * share;
-            if self.layout.locate(at) == Some(cell) {
+            if self.layout().locate(at) == Some(cell) {
                 return (cell, at);
             }
         }
@@ -57,8 +60,8 @@ impl Site {
 
     fn hear(&self, listener: (CellId, DVec3), source: (CellId, DVec3)) -> Option<Heard> {
         let mut ears = Listener::new();
-        ears.listen(&self.acoustics, &self.state, listener.0, listener.1);
-        ears.hear(&self.acoustics, &self.layout, 0, source.0, source.1)
+        ears.listen(&self.acoustics, &self.space, place(listener.0), listener.1);
+        ears.hear(&self.acoustics, 0, place(source.0), source.1)
     }
 
     /// The least length over all sequences of at most `most` portals, and that sequence: depth first, cut off if the string
@@ -94,11 +97,11 @@ impl Site {
         if chain.len() == most {
             return;
         }
-        for exit in self.layout.exits(cell) {
+        for exit in self.layout().exits(cell) {
             if used.contains(&exit.portal) {
                 continue;
             }
-            let pieces: Vec<_> = self.layout.opening(exit.portal).pieces().collect();
+            let pieces: Vec<_> = self.layout().opening(exit.portal).pieces().collect();
             assert_eq!(pieces.len(), 1, "openings of these worlds are rectangles");
             chain.push(pieces[0].to_vec());
             used.push(exit.portal);
@@ -119,8 +122,8 @@ fn the_shortest_of_all_sequences_is_found() {
         for _ in 0..12 {
             let (listener, source) = (site.place(&mut rng), site.place(&mut rng));
             let mut ears = Listener::new();
-            ears.listen(&site.acoustics, &site.state, listener.0, listener.1);
-            let found = ears.shortest(&site.acoustics, &site.layout, 0, source.0, source.1);
+            ears.listen(&site.acoustics, &site.space, place(listener.0), listener.1);
+            let found = ears.shortest(&site.acoustics, 0, place(source.0), source.1);
             let Some((length, nearest)) = found else {
                 continue;
             };
@@ -168,20 +171,20 @@ fn sound_goes_around_a_building() {
         ..GridParams::offices(6, 1)
     });
     let mut walls = enfilade_geom::Aabb::EMPTY;
-    for b in &closed.world.batches {
+    for b in &closed.space.world(PartId::ROOT).batches {
         for p in b.primitive.triangles().flatten() {
             walls = walls.including(p);
         }
     }
     let (low, high) = (walls.min, walls.max);
     let mut rng = Rng::new(3);
-    let outdoors = closed.layout.outdoors().expect("there is an outdoors");
+    let outdoors = closed.layout().outdoors().expect("there is an outdoors");
     for _ in 0..20 {
         let ends = [low.z - 1.5, high.z + 1.5]
             .map(|z| DVec3::new(rng.range(low.x, high.x), rng.range(low.y, high.y), z));
         assert!(
             ends.iter()
-                .all(|p| closed.layout.locate(*p) == Some(outdoors))
+                .all(|p| closed.layout().locate(*p) == Some(outdoors))
         );
         let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
         let mut least = f64::INFINITY;
@@ -217,18 +220,18 @@ fn walking_through_doorways_changes_the_level_little_by_little() {
     let mut n_checked = 0;
     for seed in 0..4 {
         let site = site(&rooms(16, seed));
-        for p in (0..site.layout.n_portals() as u32).map(PortalId) {
-            let opening = site.layout.opening(p);
+        for p in (0..site.layout().n_portals() as u32).map(PortalId) {
+            let opening = site.layout().opening(p);
             let source = site.place(&mut rng);
             let mut before: Option<Heard> = None;
             for k in -150..150 {
                 let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.01;
-                let Some(cell) = site.layout.locate(at) else {
+                let Some(cell) = site.layout().locate(at) else {
                     continue;
                 };
                 let mut ears = Listener::new();
-                ears.listen(&site.acoustics, &site.state, cell, at);
-                let heard = ears.hear(&site.acoustics, &site.layout, 0, source.0, source.1);
+                ears.listen(&site.acoustics, &site.space, place(cell), at);
+                let heard = ears.hear(&site.acoustics, 0, place(source.0), source.1);
                 let Some(heard) = heard else { break };
                 if let Some(before) = before {
                     n_checked += 1;
@@ -274,17 +277,17 @@ fn a_walking_listener_hears_as_a_new_one() {
             merges,
             ..rooms(36, seed)
         });
-        for p in (0..site.layout.n_portals() as u32).map(PortalId) {
-            let opening = site.layout.opening(p);
+        for p in (0..site.layout().n_portals() as u32).map(PortalId) {
+            let opening = site.layout().opening(p);
             let source = site.place(&mut rng);
             let mut walker = Listener::new();
             for k in -50..50 {
                 let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.02;
-                let Some(cell) = site.layout.locate(at) else {
+                let Some(cell) = site.layout().locate(at) else {
                     continue;
                 };
-                walker.listen(&site.acoustics, &site.state, cell, at);
-                let heard = walker.hear(&site.acoustics, &site.layout, 0, source.0, source.1);
+                walker.listen(&site.acoustics, &site.space, place(cell), at);
+                let heard = walker.hear(&site.acoustics, 0, place(source.0), source.1);
                 let fresh = site.hear((cell, at), source);
                 assert!(
                     apart(heard, fresh) < 1e-6,
@@ -304,10 +307,10 @@ fn a_walking_listener_hears_as_a_new_one() {
 fn a_listener_hears_doors_that_swing_as_a_new_one() {
     let mut rng = Rng::new(5);
     let mut site = site_of(with_doors(room_grid(&rooms(36, 1)), |_| false));
-    let portals = (0..site.layout.n_portals() as u32).map(PortalId);
+    let portals = (0..site.layout().n_portals() as u32).map(PortalId);
     portals.clone().for_each(|p| {
-        site.state.open(p);
-        site.state.set_leaves(p, 1.0);
+        site.space.open(PartId::ROOT, p);
+        site.space.set_leaves(PartId::ROOT, p, 1.0);
     });
     let mut n = 0;
     for p in portals {
@@ -315,14 +318,14 @@ fn a_listener_hears_doors_that_swing_as_a_new_one() {
         let mut ears = Listener::new();
         for k in 0..60 {
             let open = (0.5 - 0.5 * (f64::from(k) * 0.1).cos()) as f32;
-            site.state.set_leaves(p, open);
-            ears.listen(&site.acoustics, &site.state, here.0, here.1);
-            let heard = ears.hear(&site.acoustics, &site.layout, 0, there.0, there.1);
+            site.space.set_leaves(PartId::ROOT, p, open);
+            ears.listen(&site.acoustics, &site.space, place(here.0), here.1);
+            let heard = ears.hear(&site.acoustics, 0, place(there.0), there.1);
             let fresh = site.hear(here, there);
             assert!(apart(heard, fresh) < 1e-6, "{p:?} {k}: {heard:?} {fresh:?}");
             n += usize::from(heard.is_some());
         }
-        site.state.set_leaves(p, 1.0);
+        site.space.set_leaves(PartId::ROOT, p, 1.0);
     }
     assert!(n > 500, "{n}");
 }
@@ -332,16 +335,16 @@ fn a_listener_hears_doors_that_swing_as_a_new_one() {
 fn a_door_that_shuts_takes_its_loss() {
     let mut two = site(&GridParams::two_rooms());
     let door = PortalId(0);
-    let middle = two.layout.opening(door).center();
-    let normal = two.layout.opening(door).normal();
+    let middle = two.layout().opening(door).center();
+    let normal = two.layout().opening(door).normal();
     let ends = [-1.0, 1.0].map(|k| middle + normal * k);
-    let places = ends.map(|p| (two.layout.locate(p).unwrap(), p));
+    let places = ends.map(|p| (two.layout().locate(p).unwrap(), p));
     let open = two.hear(places[0], places[1]).unwrap();
-    two.state.close(door);
+    two.space.close(PartId::ROOT, door);
     let shut = two.hear(places[0], places[1]).unwrap();
     assert!((open.length - 2.0).abs() < 1e-9 && (shut.length - 2.0).abs() < 1e-9);
     let loss = 20.0 * (open.gain / shut.gain).log10();
-    let kind = two.world.graph.portals[0].kind;
+    let kind = two.space.world(PartId::ROOT).graph.portals[0].kind;
     assert!((27.0..=30.5).contains(&loss), "{loss} dB of {kind:?}");
 }
 
@@ -353,14 +356,14 @@ fn hearing_allocates_nothing_once_warm() {
     let sources: Vec<_> = (0..16).map(|_| site.place(&mut rng)).collect();
     let mut ears = Listener::new();
     let walk = |ears: &mut Listener| {
-        for p in (0..site.layout.n_portals() as u32).map(PortalId) {
-            let at = site.layout.opening(p).center() + site.layout.opening(p).normal() * 0.3;
-            let Some(cell) = site.layout.locate(at) else {
+        for p in (0..site.layout().n_portals() as u32).map(PortalId) {
+            let at = site.layout().opening(p).center() + site.layout().opening(p).normal() * 0.3;
+            let Some(cell) = site.layout().locate(at) else {
                 continue;
             };
-            ears.listen(&site.acoustics, &site.state, cell, at);
+            ears.listen(&site.acoustics, &site.space, place(cell), at);
             for (id, source) in sources.iter().enumerate() {
-                ears.hear(&site.acoustics, &site.layout, id, source.0, source.1);
+                ears.hear(&site.acoustics, id, place(source.0), source.1);
             }
         }
     };

@@ -14,18 +14,14 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
     let mut space = Space::new(world)?;
     let (root, door) = (PartId::ROOT, PortalId(0));
-    let acoustics = Acoustics::new(
-        space.layout(root),
-        space.world(root),
-        &Transmission::default(),
-    );
+    let acoustics = Acoustics::new(&space, &Transmission::default());
 
     // The radio stands in the second room, the listener in the first, beside the doorway.
     let opening = space.layout(root).opening(door);
     let (middle, ahead) = (opening.center(), opening.normal());
     let ears = middle - ahead * 1.5 + DVec3::Z * 0.5;
     let radio = middle + ahead * 2.0;
-    let [here, there] = [ears, radio].map(|p| space.layout(root).locate(p));
+    let [here, there] = [ears, radio].map(|p| space.locate(root, p));
     let (here, there) = (
         here.ok_or("ears in a wall")?,
         there.ok_or("radio in a wall")?,
@@ -35,10 +31,9 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let mut levels = Vec::new();
     for percent in (0..=100).step_by(20) {
         space.set_leaves(root, door, percent as f32 / 100.0);
-        let (layout, state) = (space.layout(root), space.state(root));
-        listener.listen(&acoustics, state, here, ears);
+        listener.listen(&acoustics, &space, here, ears);
         let heard = listener
-            .hear(&acoustics, layout, 0, there, radio)
+            .hear(&acoustics, 0, there, radio)
             .ok_or("nothing is heard")?;
         let level = 20.0 * heard.gain.log10();
         println!(

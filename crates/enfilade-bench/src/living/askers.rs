@@ -5,9 +5,10 @@ use std::f64::consts::PI;
 
 use anyhow::{Context, ensure};
 use enfilade::bake::{BakeConfig, BakeContext, bake};
-use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Ray, Triangle};
+use enfilade::geom::{Bvh, DQuat, DVec3, Ray, Triangle};
 use enfilade::world::{
-    Agent, Body, Cast, Caster, PartId, Path, PathSearch, Pose, Space, WalkMap, Walker,
+    Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Place, Pose,
+    Space, Transmission, WalkMap, Walker,
 };
 use enfilade::{CellId, PortalId, PortalKind, World};
 use enfilade_testkit::{Beyond, Rng, Standing, assembled, chamber, lift_tower};
@@ -17,8 +18,9 @@ use crate::rows::Figure;
 /// Number of poses, and of those at which walks and paths are compared: each makes a map of the whole building.
 const POSES: usize = 1000;
 const WALKS: usize = 10;
-/// Casts and lines of sight at each pose.
+/// Casts and lines of sight at each pose, and sources heard at each of the latter.
 const CASTS: usize = 4;
+const SOUNDS: usize = 16;
 /// Greatest difference of an impact: the triangles are the same, in frames of `f64`. [Units: wu]
 const EXACT: f64 = 1e-5;
 /// Of a walker: the vertices of one world are rounded to `f32`, a thousandth of this, and each step slides along what the last one
@@ -27,6 +29,13 @@ const WALKED: f64 = 5e-3;
 /// Of a path, in squares of its floors: lines bend at walls where squares do, up to 0.7 squares off, and those of the two maps are
 /// turned and shifted. Two ends of walls at the door, from both sides.
 const SQUARES: f64 = 3.0;
+
+/// Of a sound, in decibels and in length: a door is pushed into the other by up to a centimeter and 1°, two at its edges, and
+/// levels change by up to a decibel per centimeter of way. [Units: dB, wu]
+const HEARD: [f64; 2] = [1.0, 0.03];
+
+/// Width and height by which a gangway is smaller than its doorway, more than it is shifted. [Units: wu]
+const FREE: f64 = 0.14;
 
 /// A building and a cabin at its door.
 struct Site {
@@ -48,13 +57,13 @@ struct Site {
 }
 
 /// Kinds of questions.
-const NAMES: [&str; 4] = ["casts", "lines of sight", "walks", "paths"];
+const NAMES: [&str; 5] = ["casts", "lines of sight", "walks", "paths", "sounds"];
 
 /// Counts the answers that differ.
 #[derive(Default)]
 struct Counts {
-    /// Of casts, lines of sight, walks and paths: asked, through the door, different.
-    kinds: [[usize; 3]; 4],
+    /// Of each kind: asked, through the door, different.
+    kinds: [[usize; 3]; 5],
     notes: Vec<String>,
 }
 
@@ -107,14 +116,15 @@ fn at_entrance(world: &World) -> anyhow::Result<Site> {
     } else {
         -opening.normal()
     };
-    let room = DVec3::new(width + 1.4, height + 0.4, 2.6);
-    let cabin = chamber(room, [0.7, 0.7 + width], height);
+    // A gangway that fits into the doorway: the opening is within the wall, which would stand in a wider room.
+    let room = DVec3::new(width - FREE, height - FREE, 3.0);
+    let cabin = chamber(room, [0.01, room.x - 0.01], room.y - 0.01);
     let sill = opening.center().with_y(opening.bounds().min.y);
     // Its door is in its wall of greatest z.
     let turn = DQuat::from_rotation_y((-out.x).atan2(-out.z));
     let home = Pose {
         turn,
-        at: sill - turn * DVec3::new(0.5 * room.x, 0.0, room.z),
+        at: sill - turn * DVec3::new(0.5 * room.x, -0.02, room.z),
     };
     let cabin = space.add_part(cabin, PartId::ROOT, middle.after(&home))?;
     site(
@@ -201,7 +211,11 @@ impl Site {
     fn set_pose(&mut self, rng: &mut Rng) -> anyhow::Result<Pose> {
         let (by, turn) = self.off;
         let stop = self.stops[rng.below(self.stops.len())];
-        let shift = DVec3::from_array(by.map(|x| rng.range(-x, x)));
+        let mut shift = DVec3::from_array(by.map(|x| rng.range(-x, x)));
+        // A shaft's floor would stand in the room of a cabin that is sunk into it: two solids in one place have no answer.
+        if stop == self.stops[0] {
+            shift.y = shift.y.abs();
+        }
         // About the middle of its door, along its own axes.
         let sill = self.space.layout(self.cabin).opening(self.door).center();
         let turned = Pose::about(sill, DVec3::Y, rng.range(-turn, turn));
@@ -224,7 +238,7 @@ impl Site {
         let layout = self.space.layout(self.cabin);
         let opening = layout.opening(self.door);
         let inside = layout.cell(self.room).bounds;
-        let bounds = Aabb::new(inside.min + 0.3, inside.max - 0.3);
+        let bounds = inside.expanded(-0.3);
         let from = rng.point_in(&bounds);
         let through = rng.point_in(&opening.bounds().expanded(-0.02));
         let through = through - opening.normal() * opening.height_of(through);
@@ -321,7 +335,7 @@ impl Site {
     fn walk(
         &self,
         rel: &Pose,
-        map: &WalkMap,
+        (map, acoustics): (&WalkMap, &Acoustics),
         rng: &mut Rng,
         counts: &mut Counts,
     ) -> anyhow::Result<()> {
@@ -355,7 +369,19 @@ impl Site {
                 continue;
             }
             let all = |_, _| true;
-            let ends = [own[0], (self.building, to)];
+            // The cabin may be where the point is.
+            let there = self.space.locate(self.building, to);
+            // In the air of a shaft, the nearest floor may be its own or the cabin's.
+            let is_shaft = |place: Place| match self.beyond {
+                Beyond::Cell(cell) => (place.part, place.cell) == (self.building, cell),
+                Beyond::Door(..) => false,
+            };
+            if there.is_some_and(is_shaft) {
+                continue;
+            }
+            let part = there.map_or(self.building, |place| place.part);
+            let goal = self.space.between(self.building, part).point(to);
+            let ends = [own[0], (part, goal)];
             let found = search.find(map, &self.space, ends, all, &mut path);
             let ends = [own[1], (PartId::ROOT, to)];
             let one_found = one_search.find(&one_map, &one, ends, all, &mut one_path);
@@ -374,6 +400,7 @@ impl Site {
                 });
             }
         }
+        self.hear(rel, acoustics, &one, rng, counts);
         // Straight out through the door, a little aslant.
         let up = DVec3::Y * agent.eye;
         let mut walker = Walker::new(agent, own[0].0, own[0].1 + up);
@@ -398,14 +425,73 @@ impl Site {
     }
 }
 
+impl Site {
+    /// Listens in the cabin to sources in the building, in both.
+    fn hear(
+        &self,
+        rel: &Pose,
+        acoustics: &Acoustics,
+        one: &Space,
+        rng: &mut Rng,
+        counts: &mut Counts,
+    ) {
+        let of_one = Acoustics::new(one, &Transmission::default());
+        let (mut ears, mut one_ears) = (Listener::new(), Listener::new());
+        let inside = self.space.layout(self.cabin).cell(self.room).bounds;
+        let layout = self.space.layout(self.building);
+        for id in 0..SOUNDS {
+            let at = rng.point_in(&inside.expanded(-0.2));
+            let cell = CellId(rng.below(layout.n_cells()) as u32);
+            let source = rng.point_in(&layout.cell(cell).bounds);
+            let there = [
+                self.space.locate(self.building, source),
+                one.locate(PartId::ROOT, source),
+            ];
+            let here = [
+                self.space.locate(self.cabin, at),
+                one.locate(PartId::ROOT, rel.point(at)),
+            ];
+            let ([Some(here), Some(one_here)], [Some(there), Some(one_there)]) = (here, there)
+            else {
+                continue;
+            };
+            if layout.cell(cell).is_outdoor || there.part != self.building {
+                continue;
+            }
+            ears.listen(acoustics, &self.space, here, at);
+            one_ears.listen(&of_one, one, one_here, rel.point(at));
+            let found = ears.hear(acoustics, id, there, source);
+            let known = one_ears.hear(&of_one, id, one_there, source);
+            let is_same = match (&found, &known) {
+                (Some(a), Some(b)) => {
+                    let level = 20.0 * (a.gain / b.gain).log10();
+                    level.abs() < HEARD[0] && (a.length - b.length).abs() < HEARD[1]
+                }
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            counts.add(4, found.is_some(), is_same, || {
+                let told = |heard: Option<Heard>| {
+                    heard.map(|h| format!("{:.2} dB {:.3} m", 20.0 * h.gain.log10(), h.length))
+                };
+                format!(
+                    "of {source:.2} at {at:.2}: {:?} not {:?}",
+                    told(found),
+                    told(known)
+                )
+            });
+        }
+    }
+}
+
 fn measure(mut site: Site) -> anyhow::Result<Figure> {
     let (mut rng, mut caster, mut counts) = (Rng::new(5), Caster::new(), Counts::default());
     let map = WalkMap::new(&site.space, Agent::default());
+    let acoustics = Acoustics::new(&site.space, &Transmission::default());
     for i in 0..POSES {
         let rel = site.set_pose(&mut rng)?;
         site.cast(&rel, &mut caster, &mut rng, &mut counts);
         if i % (POSES / WALKS) == 0 {
-            site.walk(&rel, &map, &mut rng, &mut counts)?;
+            site.walk(&rel, (&map, &acoustics), &mut rng, &mut counts)?;
         }
     }
     let told = NAMES

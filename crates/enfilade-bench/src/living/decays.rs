@@ -3,7 +3,7 @@
 use anyhow::Context;
 use enfilade::CellId;
 use enfilade::PortalId;
-use enfilade::world::{DecayLaw, DiffuseFields, Layout, Reverb};
+use enfilade::world::{DecayLaw, DiffuseFields, PartId, Place, Reverb, Space};
 use enfilade_testkit::{GridParams, room_grid};
 
 use crate::rows::Figure;
@@ -19,8 +19,8 @@ fn room([x, z, height]: [f64; 3], opening: f64, absorption: f64) -> (f64, f64, f
 
 /// Compares RT60 of shoe boxes and of coupled rooms, heard in both: the worst relative error.
 pub(super) fn rt60(_: &str) -> anyhow::Result<Figure> {
-    let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
-    let door = layout.opening(PortalId(0)).area();
+    let space = Space::new(room_grid(&GridParams::two_rooms()))?;
+    let door = space.layout(PartId::ROOT).opening(PortalId(0)).area();
     let mut fields = DiffuseFields::new();
     let (mut worst, mut place, mut n, mut n_above) = (0.0, String::new(), 0, 0);
     for line in TRACED.lines().skip(1) {
@@ -33,18 +33,22 @@ pub(super) fn rt60(_: &str) -> anyhow::Result<Figure> {
         anyhow::ensure!(share < 1.01, "{opening} m² is more than the door's {door}");
         let first = room([*x, *z, *height], *opening, *absorption);
         let other = room([second.max(1.0), *z, *height], *opening, *absorption);
-        let reverb = Reverb::of_rooms(&layout, DecayLaw::Kuttruff, &[first, other]);
-        fields.solve(&reverb, CellId(0), |_| share);
-        for (cell, time) in [CellId(0), CellId(1)].into_iter().zip(times) {
+        let reverb = Reverb::of_rooms(&space, DecayLaw::Kuttruff, &[first, other]);
+        let places = [0, 1].map(|cell| Place {
+            part: PartId::ROOT,
+            cell: CellId(cell),
+        });
+        fields.solve(&reverb, &space, places[0], |_, _| share);
+        for (room, time) in places.into_iter().zip(times) {
             if *time == 0.0 {
                 continue;
             }
             n += 1;
-            let off = (fields.rt60(cell) / time - 1.0).abs();
+            let off = (fields.rt60(room) / time - 1.0).abs();
             n_above += usize::from(off > 0.1);
             if off > worst {
                 worst = off;
-                place = format!("{line}: {:.3} s in {cell}", fields.rt60(cell));
+                place = format!("{line}: {:.3} s in {}", fields.rt60(room), room.cell);
             }
         }
     }

@@ -25,13 +25,13 @@ fn wrong(world: &World, pairs: &str) -> anyhow::Result<Figure> {
         let numbers: Result<Vec<f64>, _> = line.split(',').map(str::parse).collect();
         let row = numbers.with_context(|| line.to_owned())?;
         let [from, to] = [DVec3::from_slice(&row), DVec3::from_slice(&row[3..])];
-        let (Some(here), Some(there)) = (site.layout.locate(from), site.layout.locate(to)) else {
+        let (Some(here), Some(there)) = (site.locate(from), site.locate(to)) else {
             n_outside += 1;
             continue;
         };
         let mut ears = Listener::new();
-        ears.listen(&site.acoustics, &site.state, here, from);
-        match ears.shortest(&site.acoustics, &site.layout, 0, there, to) {
+        ears.listen(&site.acoustics, &site.space, here, from);
+        match ears.shortest(&site.acoustics, 0, there, to) {
             Some((length, _)) => ratios.push(length / row[6]),
             None => n_lost += 1,
         }

@@ -6,8 +6,8 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::Context;
 use enfilade::cpg::PortalKind;
 use enfilade::geom::DVec3;
-use enfilade::world::{Heard, Listener};
-use enfilade::{CellId, PortalId, World};
+use enfilade::world::{Heard, Listener, PartId, Place};
+use enfilade::{PortalId, World};
 use enfilade_testkit::Rng;
 
 use super::sound::Office;
@@ -68,9 +68,9 @@ const BARS: [f64; 3] = [1.0, 5.0, 0.02];
 
 /// Portals to walk through.
 fn doorways(site: &Office) -> Vec<PortalId> {
-    let portals = (0..site.layout.n_portals() as u32).map(PortalId);
+    let portals = (0..site.layout().n_portals() as u32).map(PortalId);
     let is_doorway = |p: &PortalId| {
-        let opening = site.layout.opening(*p);
+        let opening = site.layout().opening(*p);
         let is_upright = opening.normal().y.abs() < 0.1;
         let kinds = [PortalKind::Door, PortalKind::Open];
         is_upright && kinds.contains(&opening.kind()) && opening.area() >= DOORWAY
@@ -99,26 +99,26 @@ fn walk(
     site: &Office,
     door: PortalId,
     share: f32,
-    sources: &[(CellId, DVec3)],
+    sources: &[(Place, DVec3)],
     jumps: &mut Jumps,
 ) -> anyhow::Result<()> {
-    let opening = site.layout.opening(door);
+    let opening = site.layout().opening(door);
     let mut before: Vec<Option<Heard>> = vec![None; sources.len()];
     let mut ears = Listener::new();
     for k in -REACH..REACH {
         let at = opening.center() + opening.normal() * (f64::from(k) + 0.5) * 0.01;
-        let cell = site.layout.locate(at);
-        let Some(cell) = cell.filter(|c| opening.cells().contains(c)) else {
+        let place = site.locate(at);
+        let Some(place) = place.filter(|p| opening.cells().contains(&p.cell)) else {
             before.fill(None);
             continue;
         };
-        ears.listen(&site.acoustics, &site.state, cell, at);
+        ears.listen(&site.acoustics, &site.space, place, at);
         for (id, &source) in sources.iter().enumerate() {
-            let heard = ears.hear(&site.acoustics, &site.layout, id, source.0, source.1);
+            let heard = ears.hear(&site.acoustics, id, source.0, source.1);
             if k % 29 == 0 {
                 let mut fresh = Listener::new();
-                fresh.listen(&site.acoustics, &site.state, cell, at);
-                let other = fresh.hear(&site.acoustics, &site.layout, id, source.0, source.1);
+                fresh.listen(&site.acoustics, &site.space, place, at);
+                let other = fresh.hear(&site.acoustics, id, source.0, source.1);
                 ensure_same(heard, other)?;
             }
             let place = || {
@@ -142,9 +142,9 @@ fn jumps_of(site: &mut Office) -> anyhow::Result<Jumps> {
     let mut jumps = Jumps::default();
     for share in [1.0, 0.5] {
         for &p in &doors {
-            if site.layout.opening(p).kind() == PortalKind::Door {
-                site.state.open(p);
-                site.state.set_leaves(p, share);
+            if site.layout().opening(p).kind() == PortalKind::Door {
+                site.space.open(PartId::ROOT, p);
+                site.space.set_leaves(PartId::ROOT, p, share);
             }
         }
         for k in 0..N_WALKS / 2 / N_SOURCES {

@@ -5,9 +5,10 @@ use std::time::Instant;
 use anyhow::Context;
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, Reverb, TautString, Transmission,
+    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, PartId, Place, Reverb, Space, TautString,
+    Transmission,
 };
-use enfilade::{CellId, PortalId, Sight, SightState, World};
+use enfilade::{CellId, PortalId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 
 use crate::rows::Figure;
@@ -23,21 +24,19 @@ fn office_grid(n: usize, seed: u64) -> World {
 }
 
 pub(super) struct Office {
-    pub(super) layout: Layout,
+    pub(super) space: Space,
     pub(super) acoustics: Acoustics,
-    pub(super) state: SightState,
 }
 
 impl Office {
     pub(super) fn new(world: &World) -> anyhow::Result<Self> {
-        let layout = Layout::new(world);
-        let acoustics = Acoustics::new(&layout, world, &Transmission::default());
-        let state = SightState::new(&Sight::build(world)?);
-        Ok(Self {
-            layout,
-            acoustics,
-            state,
-        })
+        let space = Space::new(world.clone())?;
+        let acoustics = Acoustics::new(&space, &Transmission::default());
+        Ok(Self { space, acoustics })
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        self.space.layout(PartId::ROOT)
     }
 
     pub(super) fn offices(n: usize, seed: u64) -> anyhow::Result<Self> {
@@ -46,20 +45,25 @@ impl Office {
 
     /// Opens all that can be opened.
     pub(super) fn open_all(&mut self) {
-        for portal in (0..self.layout.n_portals() as u32).map(PortalId) {
-            self.state.open(portal);
-            self.state.set_leaves(portal, 1.0);
+        for portal in (0..self.layout().n_portals() as u32).map(PortalId) {
+            self.space.open(PartId::ROOT, portal);
+            self.space.set_leaves(PartId::ROOT, portal, 1.0);
         }
     }
 
-    pub(super) fn place(&self, rng: &mut Rng) -> Option<(CellId, DVec3)> {
-        let indoors = |c: &CellId| !self.layout.cell(*c).is_outdoor;
+    pub(super) fn locate(&self, at: DVec3) -> Option<Place> {
+        self.space.locate(PartId::ROOT, at)
+    }
+
+    pub(super) fn place(&self, rng: &mut Rng) -> Option<(Place, DVec3)> {
+        let indoors = |c: &CellId| !self.layout().cell(*c).is_outdoor;
         (0..10_000).find_map(|_| {
-            let cell = CellId(rng.below(self.layout.n_cells()) as u32);
-            let bounds = self.layout.cell(cell).bounds;
+            let cell = CellId(rng.below(self.layout().n_cells()) as u32);
+            let bounds = self.layout().cell(cell).bounds;
             let share = DVec3::from([0; 3].map(|_| rng.range(0.05, 0.95)));
             let at = bounds.min + (bounds.max - bounds.min) * share;
-            Some((cell, at)).filter(|_| indoors(&cell) && self.layout.locate(at) == Some(cell))
+            let place = self.locate(at)?;
+            Some((place, at)).filter(|_| indoors(&cell) && place.cell == cell)
         })
     }
 }
@@ -76,17 +80,17 @@ fn worst(name: &str) -> anyhow::Result<(f64, f64, usize)> {
             let from = site.place(&mut rng).context("no place")?;
             let to = site.place(&mut rng).context("no place")?;
             let mut ears = Listener::new();
-            ears.listen(&site.acoustics, &site.state, from.0, from.1);
-            let found = ears.shortest(&site.acoustics, &site.layout, 0, to.0, to.1);
+            ears.listen(&site.acoustics, &site.space, from.0, from.1);
+            let found = ears.shortest(&site.acoustics, 0, to.0, to.1);
             let Some((found, nearest)) = found else {
                 continue;
             };
             let mut best = (f64::INFINITY, DVec3::ZERO);
             let mut string = TautString::new();
             least(
-                &site.layout,
-                from,
-                to,
+                site.layout(),
+                (from.0.cell, from.1),
+                (to.0.cell, to.1),
                 &mut Vec::new(),
                 &mut string,
                 &mut best,
@@ -151,9 +155,13 @@ pub(super) fn direction(name: &str) -> anyhow::Result<Figure> {
 
 /// Compares levels of coupled rooms with the closed-form balance of energy: worst relative error.
 pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
-    let layout = Layout::new(&room_grid(&GridParams::two_rooms()));
-    let door = layout.opening(PortalId(0)).area();
+    let space = Space::new(room_grid(&GridParams::two_rooms()))?;
+    let door = space.layout(PartId::ROOT).opening(PortalId(0)).area();
     let mut rng = Rng::new(2);
+    let at = |cell: u32| Place {
+        part: PartId::ROOT,
+        cell: CellId(cell),
+    };
     let mut fields = DiffuseFields::new();
     let mut value: f64 = 0.0;
     for _ in 0..1000 {
@@ -164,14 +172,14 @@ pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
                 rng.range(0.02, 0.5),
             )
         });
-        let reverb = Reverb::of_rooms(&layout, DecayLaw::Sabine, &room);
+        let reverb = Reverb::of_rooms(&space, DecayLaw::Sabine, &room);
         let share = rng.unit();
-        fields.solve(&reverb, CellId(0), |_| share);
+        fields.solve(&reverb, &space, at(0), |_, _| share);
         let s = door * share;
         let [m, n] = room.map(|r| r.1 * r.2 + s);
         let det = m * n - s * s;
         let w = [n / det, s / det];
-        let off = [0, 1].map(|k| fields.density(CellId(k)) / w[k as usize]);
+        let off = [0, 1].map(|k| fields.density(at(k)) / w[k as usize]);
         value = off.iter().fold(value, |most, x| most.max((x - 1.0).abs()));
     }
     Ok(Figure {
@@ -197,12 +205,13 @@ fn walk(is_door_moving: bool, most: f64) -> anyhow::Result<Figure> {
     site.open_all();
     let mut rng = Rng::new(3);
     let sources: Vec<_> = (0..64).filter_map(|_| site.place(&mut rng)).collect();
-    let portals = (0..site.layout.n_portals() as u32).map(PortalId);
-    let middle = PortalId((site.layout.n_portals() / 2) as u32);
-    let opening = site.layout.opening(middle);
+    let portals = (0..site.layout().n_portals() as u32).map(PortalId);
+    let middle = PortalId((site.layout().n_portals() / 2) as u32);
+    let opening = site.layout().opening(middle);
     let (center, normal) = (opening.center(), opening.normal());
-    let far = |p: &PortalId| site.layout.opening(*p).center().distance(center);
-    let others = portals.filter(|p| *p != middle && site.state.leaves(*p).is_some());
+    let far = |p: &PortalId| site.layout().opening(*p).center().distance(center);
+    let others =
+        portals.filter(|p| *p != middle && site.space.state(PartId::ROOT).leaves(*p).is_some());
     let door = others
         .min_by(|a, b| far(a).total_cmp(&far(b)))
         .context("no door")?;
@@ -211,19 +220,19 @@ fn walk(is_door_moving: bool, most: f64) -> anyhow::Result<Figure> {
     let (mut first, mut n_heard) = (0.0, 0);
     for k in -100..100 {
         let at = center + normal * (f64::from(k) + 0.5) * 0.02;
-        let Some(cell) = site.layout.locate(at) else {
+        let Some(place) = site.locate(at) else {
             continue;
         };
         if is_door_moving {
             let share = 0.5 + 0.5 * (f64::from(k) * 0.03).sin();
-            site.state.set_leaves(door, share as f32);
+            site.space.set_leaves(PartId::ROOT, door, share as f32);
         }
         let before = ears.n_searches();
         let start = Instant::now();
-        ears.listen(&site.acoustics, &site.state, cell, at);
+        ears.listen(&site.acoustics, &site.space, place, at);
         n_heard = 0;
         for (id, source) in sources.iter().enumerate() {
-            let heard = ears.hear(&site.acoustics, &site.layout, id, source.0, source.1);
+            let heard = ears.hear(&site.acoustics, id, source.0, source.1);
             n_heard += usize::from(std::hint::black_box(heard).is_some());
         }
         let micros = start.elapsed().as_secs_f64() * 1e6 / sources.len() as f64;

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use enfilade::geom::{DVec3, triangle_area_normal};
-use enfilade::world::{DecayLaw, Layout, Reverb};
+use enfilade::world::{DecayLaw, PartId, Place, Reverb, Space};
 use enfilade::{CellId, World};
 use serde_json::Value;
 
@@ -37,8 +37,9 @@ pub(super) fn areas(world: &World, name: &str) -> anyhow::Result<Figure> {
     let folder = folder_of(name).context("no folder")?;
     let text = std::fs::read_to_string(folder.join("truth.json"))?;
     let truth: Value = serde_json::from_str(&text)?;
-    let layout = Layout::new(world);
-    let reverb = Reverb::new(&layout, world, DecayLaw::Eyring, |_| [0.1; 6]);
+    let space = Space::new(world.clone())?;
+    let layout = space.layout(PartId::ROOT);
+    let reverb = Reverb::new(&space, DecayLaw::Eyring, |_, _| [0.1; 6]);
     let mut rooms_of: Vec<Vec<&Value>> = vec![Vec::new(); layout.n_cells()];
     let rooms = truth["rooms"].as_array().context("no rooms")?;
     for room in rooms {
@@ -62,7 +63,11 @@ pub(super) fn areas(world: &World, name: &str) -> anyhow::Result<Figure> {
         let exits = layout.exits(cell).iter();
         let openings: f64 = exits.map(|e| layout.opening(e.portal).area()).sum();
         let all = surface(room).context("no mesh")?;
-        let ratio = (reverb.area(cell) + openings) / all;
+        let ratio = (reverb.area(Place {
+            part: PartId::ROOT,
+            cell,
+        }) + openings)
+            / all;
         ratios.push(ratio);
         // Where the cell itself is another space than the room, such as one with the hollow above its ceiling.
         let volume = layout.cell(cell).volume / room["volume"].as_f64().context("no volume")?;

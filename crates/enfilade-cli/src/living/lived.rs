@@ -149,10 +149,8 @@ impl Lived {
             people: People::new(&space, &file.people, world_file),
             viewer: SpaceViewer::new(&space),
             awake: AwakeCells::new(layout.n_cells(), LINGER),
-            acoustics: (!file.sounds.is_empty()).then(|| {
-                let world = space.world(PartId::ROOT);
-                Acoustics::new(layout, world, &Transmission::default())
-            }),
+            acoustics: (!file.sounds.is_empty())
+                .then(|| Acoustics::new(&space, &Transmission::default())),
             listener: Listener::new(),
             near: Vec::new(),
             seen_lamps: Vec::new(),
@@ -341,25 +339,27 @@ impl Lived {
         (space, seen, &self.seen_lamps)
     }
 
-    /// Returns the sounds that reach the player, loudest first; none in a lift, whose walls no sound passes.
+    /// Returns the sounds that reach the player, loudest first, wherever the player is: in a lift, through its door.
     fn hear(&mut self, player: &Player) -> Vec<Heard> {
         let mut heard = Vec::new();
-        if player.frame != PartId::ROOT {
-            return heard;
-        }
-        let layout = self.space.layout(PartId::ROOT);
-        let state = self.space.state(PartId::ROOT);
         let Some(acoustics) = &self.acoustics else {
             return heard;
         };
-        let Some(here) = layout.locate(player.eye) else {
+        let Some(here) = self.space.locate(player.frame, player.eye) else {
             return heard;
         };
-        self.listener.listen(acoustics, state, here, player.eye);
+        let ears = self
+            .space
+            .between(player.frame, here.part)
+            .point(player.eye);
+        self.listener.listen(acoustics, &self.space, here, ears);
         for (i, sound) in self.file.sounds.iter().enumerate() {
             let at = DVec3::from_array(sound.at);
-            let there = layout.locate(at);
-            let found = there.and_then(|there| self.listener.hear(acoustics, layout, i, there, at));
+            let there = self.space.locate(PartId::ROOT, at);
+            let found = there.and_then(|there| {
+                let at = self.space.between(PartId::ROOT, there.part).point(at);
+                self.listener.hear(acoustics, i, there, at)
+            });
             if let Some(found) = found {
                 heard.push(Heard {
                     name: sound.name.clone(),

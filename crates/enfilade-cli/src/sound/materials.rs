@@ -117,7 +117,7 @@ impl Absorptions {
 
     /// Returns those with walls indoors, the largest first.
     pub(super) fn by_area(mut self, reverb: &Reverb) -> Vec<Absorption> {
-        for (material, area) in reverb.surfaces() {
+        for (_, material, area) in reverb.surfaces() {
             let known = material.and_then(|m| self.by_material.get_mut(m as usize));
             known.unwrap_or(&mut self.without).area += area;
         }

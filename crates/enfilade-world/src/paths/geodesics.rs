@@ -15,6 +15,7 @@ use enfilade_geom::{Bvh, DVec3, Triangle};
 use crate::layout::{Layout, Opening};
 use crate::paths::edges::{Corner, corners as corners_of};
 use crate::paths::search::Ways;
+use crate::space::{PartId, Space};
 
 /// Distance between points along an edge. [Units: wu]
 const SPACING: f64 = 1.0;
@@ -31,7 +32,7 @@ const OFF: f64 = 1e-3;
 /// Number of times that each bend of a path slides.
 const SLIDES: usize = 24;
 
-/// Path graphs of the concave cells of a world. Made once.
+/// Path graphs of the concave cells of a part. Made once.
 #[derive(Clone, Debug)]
 pub struct Geodesics {
     /// Per cell; `None` where lines between any two points stay in the air, or are assumed to.
@@ -88,10 +89,15 @@ struct Concave {
 }
 
 impl Geodesics {
-    /// Prepares a world, for the points of `ways`, and stores the lengths between them in all concave cells there. Takes
+    /// Prepares a part, for the points of its `ways` in its own frame, and stores the lengths between them in all concave cells there. Takes
     /// milliseconds for a cell with tens of `Corner`s, a second for one with hundreds.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such part.
     #[must_use]
-    pub fn new(layout: &Layout, world: &World, ways: &mut Ways) -> Self {
+    pub fn new(space: &Space, part: PartId, ways: &mut Ways) -> Self {
+        let (layout, world) = (space.layout(part), space.world(part));
         let off = OFF.max(8.0 * layout.tolerance());
         let mut cells = Vec::new();
         for cell in (0..layout.n_cells() as u32).map(CellId) {

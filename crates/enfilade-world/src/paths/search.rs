@@ -16,6 +16,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
@@ -40,8 +41,36 @@ pub struct Ways {
     place: Vec<[u32; 2]>,
     /// Per cell the number of its points.
     n_points: Vec<u32>,
-    /// Per cell, lengths between its points, row by row; empty if they are straight.
-    bent: Vec<Vec<f64>>,
+    /// Per cell, lengths between its points; empty if they are straight.
+    bent: Vec<Bent>,
+}
+
+/// Lengths within a cell, row by row: shared ones between its first points, and those from each of the others to all.
+#[derive(Clone, Debug, Default)]
+struct Bent {
+    n: usize,
+    shared: Arc<Vec<f64>>,
+    added: Vec<f64>,
+}
+
+impl Bent {
+    fn is_empty(&self) -> bool {
+        self.shared.is_empty() && self.added.is_empty()
+    }
+
+    /// Returns the length between two of `n_all` points.
+    #[inline]
+    fn length(&self, n_all: usize, from: usize, to: usize) -> f64 {
+        if from < self.n && to < self.n {
+            return self.shared[from * self.n + to];
+        }
+        let (later, other) = if from < self.n {
+            (to, from)
+        } else {
+            (from, to)
+        };
+        self.added[(later - self.n) * n_all + other]
+    }
 }
 
 impl Ways {
@@ -80,7 +109,7 @@ impl Ways {
             n_points.push(n);
         }
         Self {
-            bent: vec![Vec::new(); n_points.len()],
+            bent: vec![Bent::default(); n_points.len()],
             first_point,
             points,
             portal,
@@ -101,7 +130,31 @@ impl Ways {
     pub fn set_lengths(&mut self, cell: CellId, lengths: Vec<f64>) {
         let n = self.n_points[cell.idx()] as usize;
         assert_eq!(lengths.len(), n * n, "a length for each pair of points");
-        self.bent[cell.idx()] = lengths;
+        self.bent[cell.idx()] = Bent {
+            n,
+            shared: Arc::new(lengths),
+            added: Vec::new(),
+        };
+    }
+
+    /// Sets the lengths within a cell to those of another world's, which has the first of its points; `added` has a row for each
+    /// of the others, with a length to each of all. Copies nothing.
+    pub(crate) fn share_lengths(
+        &mut self,
+        cell: CellId,
+        (of, own): (&Self, CellId),
+        added: Vec<f64>,
+    ) {
+        self.bent[cell.idx()] = Bent {
+            n: of.n_points[own.idx()] as usize,
+            shared: of.bent[own.idx()].shared.clone(),
+            added,
+        };
+    }
+
+    /// Returns the number of a cell's points.
+    pub(crate) fn n_points(&self, cell: CellId) -> usize {
+        self.n_points[cell.idx()] as usize
     }
 
     /// Returns the points of a cell's portals, in the order of its exits, each with its portal. [Units: wu]
@@ -145,9 +198,12 @@ impl Ways {
     pub fn length(&self, cell: CellId, from: usize, to: usize) -> f64 {
         let n = self.n_points[cell.idx()] as usize;
         let point = |k: usize| self.points_of(cell).nth(k).expect("a point of the cell").1;
-        let bent = self.bent[cell.idx()].get(from * n + to);
-        bent.copied()
-            .unwrap_or_else(|| point(from).distance(point(to)))
+        let bent = &self.bent[cell.idx()];
+        if bent.is_empty() {
+            point(from).distance(point(to))
+        } else {
+            bent.length(n, from, to)
+        }
     }
 
     /// Returns the lengths from one point of a cell to those of one of its portals, in order.
@@ -161,14 +217,14 @@ impl Ways {
         let portal = self.portal[from as usize] as usize;
         let row =
             self.place[portal][side(self.cells[portal], cell)] + from - self.first_point[portal];
-        let first = (row * self.n_points[cell.idx()]
-            + self.place[to.idx()][side(self.cells[to.idx()], cell)]) as usize;
-        let at = self.points[from as usize];
+        let n = self.n_points[cell.idx()] as usize;
+        let first = self.place[to.idx()][side(self.cells[to.idx()], cell)] as usize;
+        let (at, is_straight) = (self.points[from as usize], table.is_empty());
         (self.range(to)).enumerate().map(move |(i, k)| {
-            if table.is_empty() {
+            if is_straight {
                 at.distance(self.points[k as usize])
             } else {
-                table[first + i]
+                table.length(n, row as usize, first + i)
             }
         })
     }

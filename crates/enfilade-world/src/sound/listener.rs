@@ -1,13 +1,16 @@
 //! A pair of ears: searches sequences of openings from it, and adds up what is heard along them.
 
+use std::sync::Arc;
+
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
-use enfilade_runtime::SightState;
 
-use crate::layout::{Exit, Layout};
+use crate::layout::Exit;
 use crate::paths::{Corner, End, LengthSearch, Limit, Seen, Sequences};
+use crate::sound::graph::SoundGraph;
 use crate::sound::route::{Puller, Route, Spot};
-use crate::sound::{Acoustics, Heard, N_BANDS};
+use crate::sound::{Acoustics, Heard, N_BANDS, rise, toll};
+use crate::space::{Place, Space};
 
 /// Level below which nothing is heard, relative to that at one meter in the open: sources of 100 dB there, as loud as power tools,
 /// are at the threshold of hearing (ISO 389-7). [Units: dB]
@@ -114,6 +117,14 @@ impl Source {
 /// have become shorter, and a source that is too faint to be heard is not asked until it may have become louder.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
+    /// All parts as they stand, and the acoustics for which they are.
+    graph: Option<Arc<SoundGraph>>,
+    of: Option<Arc<SoundGraph>>,
+    /// The last change of the space that it knows.
+    known: Option<u64>,
+    moved_parts: Vec<bool>,
+    /// The place of the ears.
+    place: Option<Place>,
     search: LengthSearch,
     /// `true` if that is to be done again.
     is_stale: bool,
@@ -125,7 +136,8 @@ pub struct Listener {
     /// From there to the points of its cell.
     lengths: Vec<f64>,
     here: Option<Spot>,
-    open: Vec<f64>,
+    /// Per portal, its clear share, and what the rest lets through.
+    gates: Vec<(f64, f64)>,
     /// Per portal, the length that it adds when sequences are compared: far from it, from here, and at the last search.
     tolls: Vec<f64>,
     near_tolls: Vec<f64>,
@@ -151,14 +163,65 @@ impl Listener {
         Self::default()
     }
 
-    /// Sets the position of the ears, in `cell`, and the state of doors. O(portals), plus an occasional search. [Units: wu]
+    /// Sets the position of the ears, in the frame of their place's part, and takes over the state of doors and parts. O(portals),
+    /// plus an occasional search; allocates when parts have moved. [Units: wu]
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
-    pub fn listen(&mut self, acoustics: &Acoustics, state: &SightState, cell: CellId, at: DVec3) {
+    /// If there is no such place.
+    pub fn listen(&mut self, acoustics: &Acoustics, space: &Space, place: Place, at: DVec3) {
+        self.update(acoustics, space);
+        let graph = self.graph.clone();
+        let is_known = place.part.idx() < acoustics.parts.len();
+        let Some(graph) = graph.filter(|_| is_known) else {
+            (self.here, self.searched) = (None, None);
+            return;
+        };
+        self.place = Some(place);
+        let (cell, at) = (graph.joined.cell(place), graph.to_root(place.part, at));
+        self.listen_at(acoustics, space, &graph, Spot { cell, at });
+    }
+
+    /// Takes over the poses of parts that have moved.
+    fn update(&mut self, acoustics: &Acoustics, space: &Space) {
+        let known = self.of.as_ref();
+        let is_new = !known.is_some_and(|of| Arc::ptr_eq(of, &acoustics.graph));
+        if is_new {
+            self.of = Some(acoustics.graph.clone());
+            self.known = None;
+        }
+        let n = acoustics.parts.len();
+        if n == 1 {
+            if is_new {
+                self.graph = self.of.clone();
+                self.forget();
+            }
+            return;
+        }
+        if space.moved_since(&mut self.known, &mut self.moved_parts) {
+            let moved = self.moved_parts.iter().take(n);
+            if is_new || moved.skip(1).any(|moved| *moved) {
+                self.graph = Some(Arc::new(SoundGraph::new(space, &acoustics.parts)));
+                self.forget();
+            }
+        }
+    }
+
+    /// Forgets all that depends on where parts stand.
+    fn forget(&mut self) {
+        (self.here, self.searched) = (None, None);
+        self.gates.fill((f64::NAN, f64::NAN));
+        self.searched_tolls.fill(f64::INFINITY);
+        for source in &mut self.sources {
+            (source.n_routes, source.measured, source.place) = (0, None, None);
+            source.quiet = None;
+        }
+    }
+
+    fn listen_at(&mut self, acoustics: &Acoustics, space: &Space, graph: &SoundGraph, here: Spot) {
+        let Spot { cell, at } = here;
         let before = self.here.replace(Spot { cell, at }).filter(|b| {
-            let mut exits = acoustics.ways.exits_of(b.cell).iter();
+            let mut exits = graph.ways.exits_of(b.cell).iter();
             b.at.distance(at) < STRIDE && (cell == b.cell || exits.any(|e| e.to == cell))
         });
         match before {
@@ -169,20 +232,25 @@ impl Listener {
         for list in [&mut self.tolls, &mut self.near_tolls] {
             list.resize(n, 0.0);
         }
-        self.open.resize(n, f64::NAN);
+        self.gates.resize(n, (f64::NAN, f64::NAN));
         self.searched_tolls.resize(n, f64::INFINITY);
         self.time += 1;
         let mut swung = 0.0;
         let mut moved = self.searched.map_or(f64::INFINITY, |s| s.1.distance(at));
         for i in 0..n {
             let portal = PortalId(i as u32);
-            let open = acoustics.open_share(state, portal);
-            if self.open[i] != open {
-                self.risen += acoustics.rise(portal, self.open[i], open);
-                self.open[i] = open;
-                self.tolls[i] = acoustics.toll(state, portal);
+            let gate = acoustics.gate(space, graph, portal);
+            if self.gates[i] != gate {
+                self.risen += rise(self.gates[i], gate);
+                self.gates[i] = gate;
+                let is_spare = graph.is_spare(portal);
+                self.tolls[i] = if is_spare {
+                    0.0
+                } else {
+                    toll(graph.area[i], gate)
+                };
             }
-            let square = acoustics.bounds[i].distance_squared(at);
+            let square = graph.bounds[i].distance_squared(at);
             let share = (square / (NEAR * NEAR)).min(1.0).sqrt();
             self.near_tolls[i] = share * self.tolls[i];
             let change = (self.near_tolls[i] - self.searched_tolls[i]).abs();
@@ -203,8 +271,8 @@ impl Listener {
         self.moved.clear();
         self.is_stale = true;
         self.n_searches += 1;
-        let ways = &acoustics.ways;
-        lengths_from(acoustics, cell, at, &mut self.lengths);
+        let ways = &graph.ways;
+        lengths_from(acoustics, graph, cell, at, &mut self.lengths);
         let lengths = &self.lengths;
         let first = |place: usize, _| lengths[place];
         self.shortest
@@ -226,22 +294,22 @@ impl Listener {
     }
 
     /// Searches anew if doors have moved.
-    fn search(&mut self, acoustics: &Acoustics) {
+    fn search(&mut self, graph: &SoundGraph) {
         if let Some((cell, at)) = self.searched.filter(|_| self.is_stale) {
             self.is_stale = false;
             let (lengths, tolls) = (&self.lengths, &self.searched_tolls);
             let first = |place: usize, _| lengths[place];
             let pass = |exit: Exit| Some(tolls[exit.portal.idx()]);
-            (self.search).run_from(&acoustics.ways, cell, at, first, FIRST_REACH, pass);
+            (self.search).run_from(&graph.ways, cell, at, first, FIRST_REACH, pass);
         }
     }
 
     /// Returns `true` if a door that has moved since a source's sequences were found may have changed which ones they are.
-    fn is_changed(&self, acoustics: &Acoustics, source: &Source, ends: [Spot; 2]) -> bool {
+    fn is_changed(&self, graph: &SoundGraph, source: &Source, ends: [Spot; 2]) -> bool {
         let most = source.best * HEARD.longest[0] + HEARD.longest[1];
         let moved = self.moved.iter().filter(|m| m.1 > source.time);
         let mut lengths = moved.map(|(portal, _)| {
-            let bounds = &acoustics.bounds[portal.idx()];
+            let bounds = &graph.bounds[portal.idx()];
             let squares = ends.map(|e| bounds.distance_squared(e.at));
             squares[0].sqrt() + squares[1].sqrt()
         });
@@ -254,30 +322,32 @@ impl Listener {
         self.n_searches
     }
 
-    /// Returns a source in `cell` as heard. `id` numbers sources from 0, without large gaps. `None` before the first
+    /// Returns a source as heard, in directions of the frame of the listener's part. The source is given by its place, and its
+    /// position in the frame of that place's part. `id` numbers sources from 0, without large gaps. `None` before the first
     /// [`Listener::listen`], if no path exists, and if it is fainter than 100 dB below its level at a meter. [Units: wu]
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
+    /// If there is no such place.
     pub fn hear(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
         id: usize,
-        cell: CellId,
+        place: Place,
         at: DVec3,
     ) -> Option<Heard> {
-        let there = Spot { cell, at };
+        let graph = &self.graph.clone()?;
+        let there = spot(graph, place, at)?;
+        let Spot { cell, at } = there;
         if let Some(Some((spot, until))) = self.sources.get(id).map(|s| s.quiet) {
             let come = STEEPEST * spot.at.distance(at);
             if spot.cell == cell && self.risen + come < until {
                 return None;
             }
         }
-        let ends = self.choose_routes(acoustics, id, there)?;
-        self.pull_heard(acoustics, layout, id, ends);
-        let energy = self.sum_up(acoustics, layout, id, ends);
+        let ends = self.choose_routes(acoustics, graph, id, there)?;
+        self.pull_heard(acoustics, graph, id, ends);
+        let energy = self.sum_up(acoustics, graph, id, ends);
         let level = energy.map_or(f64::NEG_INFINITY, |h| 20.0 * h.gain.log10());
         let source = &mut self.sources[id];
         if level < FAINTEST {
@@ -285,12 +355,13 @@ impl Listener {
             return None;
         }
         source.quiet = None;
-        let (length, nearest) = self.pull_shortest(acoustics, layout, id, ends)?;
+        let (length, nearest) = self.pull_shortest(acoustics, graph, id, ends)?;
         let heard = energy?;
+        let part = self.place?.part;
         Some(Heard {
             length,
-            nearest,
-            direction: heard.direction.normalize_or(nearest),
+            nearest: graph.toward(part, nearest),
+            direction: graph.toward(part, heard.direction.normalize_or(nearest)),
             ..heard
         })
     }
@@ -300,23 +371,26 @@ impl Listener {
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
+    /// If there is no such place.
     pub fn shortest(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
         id: usize,
-        cell: CellId,
+        place: Place,
         at: DVec3,
     ) -> Option<(f64, DVec3)> {
-        let ends = self.choose_routes(acoustics, id, Spot { cell, at })?;
-        self.pull_shortest(acoustics, layout, id, ends)
+        let graph = &self.graph.clone()?;
+        let there = spot(graph, place, at)?;
+        let ends = self.choose_routes(acoustics, graph, id, there)?;
+        let (length, nearest) = self.pull_shortest(acoustics, graph, id, ends)?;
+        Some((length, graph.toward(self.place?.part, nearest)))
     }
 
     /// Finds the sequences of a source, unless they are kept. Returns both ends.
     fn choose_routes(
         &mut self,
         acoustics: &Acoustics,
+        graph: &SoundGraph,
         id: usize,
         there: Spot,
     ) -> Option<[Spot; 2]> {
@@ -329,20 +403,21 @@ impl Listener {
         let is_near = |p: Spot| p.cell == there.cell && p.at.distance(there.at) < KEPT;
         if source.search == self.n_searches && source.place.is_some_and(is_near) {
             let source = &self.sources[id];
-            if !self.is_changed(acoustics, source, ends) {
+            if !self.is_changed(graph, source, ends) {
                 return Some(ends);
             }
         }
-        self.search(acoustics);
+        self.search(graph);
         let source = &mut self.sources[id];
-        let (ways, geodesics) = (&acoustics.ways, &acoustics.geodesics);
+        let ways = &graph.ways;
         if source.measured != Some((there.cell, there.at)) {
             source.measured = Some((there.cell, there.at));
-            lengths_from(acoustics, there.cell, there.at, &mut source.lengths);
+            lengths_from(acoustics, graph, there.cell, there.at, &mut source.lengths);
         }
         let mut direct = f64::INFINITY;
         if there.cell == cell {
-            let found = geodesics.way_with(cell, [at, there.at], &mut self.seen, &mut self.bends);
+            let (line, seen) = ([at, there.at], &mut self.seen);
+            let found = graph.way(&acoustics.parts, cell, line, seen, &mut self.bends);
             direct = found.unwrap_or(f64::INFINITY);
         }
         (source.search, source.place, source.time) = (self.n_searches, Some(there), self.time);
@@ -369,14 +444,22 @@ impl Listener {
                 source.best = self.sequences.least();
             }
             for found in 0..n {
-                source.add_route(&mut n_known, is_heard, self.sequences.portals(found));
+                let portals = self.sequences.portals(found);
+                let portals = portals.filter(|p| !graph.is_spare(p.0));
+                source.add_route(&mut n_known, is_heard, portals);
             }
         }
         Some(ends)
     }
 
     /// Pulls the strings that may be heard.
-    fn pull_heard(&mut self, acoustics: &Acoustics, layout: &Layout, id: usize, ends: [Spot; 2]) {
+    fn pull_heard(
+        &mut self,
+        acoustics: &Acoustics,
+        graph: &SoundGraph,
+        id: usize,
+        ends: [Spot; 2],
+    ) {
         let source = &mut self.sources[id];
         let routes = &mut source.routes[..source.n_routes];
         let n_heard = routes.iter().filter(|r| r.is_heard).count();
@@ -394,7 +477,7 @@ impl Listener {
                     (1.0 + FADED[0]) * most + FADED[1]
                 };
                 if low <= longest {
-                    self.puller.pull(acoustics, layout, ends, route);
+                    self.puller.pull(acoustics, graph, ends, route);
                     most = most.min(route.length + toll);
                 }
             }
@@ -404,7 +487,7 @@ impl Listener {
     fn pull_shortest(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
+        graph: &SoundGraph,
         id: usize,
         ends: [Spot; 2],
     ) -> Option<(f64, DVec3)> {
@@ -413,7 +496,7 @@ impl Listener {
         for route in &mut source.routes[..source.n_routes] {
             let least = best.map_or(f64::INFINITY, |b: (f64, DVec3)| b.0);
             if route.bounds(ends).0 < least {
-                self.puller.pull(acoustics, layout, ends, route);
+                self.puller.pull(acoustics, graph, ends, route);
                 if route.length < least {
                     best = Some((route.length, route.toward));
                 }
@@ -426,7 +509,7 @@ impl Listener {
     fn sum_up(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
+        graph: &SoundGraph,
         id: usize,
         ends: [Spot; 2],
     ) -> Option<Heard> {
@@ -456,7 +539,7 @@ impl Listener {
             };
             route.fade = fade;
             if fade > 0.0 && route.quiet <= self.risen {
-                route.energy = (self.puller).energy(acoustics, layout, ends, &self.open, route);
+                route.energy = (self.puller).energy(acoustics, graph, ends, &self.gates, route);
                 loudest = loudest.max(fade * route.energy.iter().sum::<f64>());
             }
         }
@@ -489,16 +572,28 @@ impl Listener {
     }
 }
 
+/// Returns a place in the graph; `None` in a part that it does not know.
+fn spot(graph: &SoundGraph, place: Place, at: DVec3) -> Option<Spot> {
+    (place.part.idx() < graph.joined.n_parts()).then(|| Spot {
+        cell: graph.joined.cell(place),
+        at: graph.to_root(place.part, at),
+    })
+}
+
 /// Writes the lengths from a place to the points of its cell. Openings close by are crossed at any point of them, not only at those,
 /// which are a meter apart: less than the distance from the opening to the nearest of them, so that sequences through an
 /// opening in which one stands do not seem longer than others.
-fn lengths_from(acoustics: &Acoustics, cell: CellId, at: DVec3, lengths: &mut Vec<f64>) {
-    let ways = &acoustics.ways;
-    (acoustics.geodesics).lengths_from(ways, cell, at, lengths);
+fn lengths_from(
+    acoustics: &Acoustics,
+    graph: &SoundGraph,
+    cell: CellId,
+    at: DVec3,
+    lengths: &mut Vec<f64>,
+) {
+    let ways = &graph.ways;
+    graph.lengths_from(&acoustics.parts, cell, at, lengths);
     for exit in ways.exits_of(cell) {
-        let distance = acoustics.bounds[exit.portal.idx()]
-            .distance_squared(at)
-            .sqrt();
+        let distance = graph.bounds[exit.portal.idx()].distance_squared(at).sqrt();
         if distance >= NEAR {
             continue;
         }

@@ -11,11 +11,12 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{CellId, PortalId, World};
+use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::{Triangle, triangle_area_normal};
 
-use crate::layout::Layout;
+use crate::layout::{Joined, Layout};
 use crate::sound::N_BANDS;
+use crate::space::{PartId, Place, Space};
 
 /// Speed of sound in air at 20 °C. [Units: wu/s]
 pub const SPEED_OF_SOUND: f64 = 343.2;
@@ -35,14 +36,16 @@ pub enum DecayLaw {
 /// Half the variance of free paths, by their mean squared.
 const HALF_VARIANCE: f64 = 0.18;
 
-/// Volume and absorption of each cell. Made once.
+/// Volume and absorption of each cell of all parts. Made once; motion does not change it.
 #[derive(Clone, Debug)]
 pub struct Reverb {
+    /// Part by part, without those added later.
     rooms: Vec<Room>,
-    portals: Vec<Coupling>,
+    /// Per part, the index of its first cell.
+    first_cell: Vec<u32>,
     law: DecayLaw,
-    /// Per material, the area of walls indoors.
-    surfaces: BTreeMap<Option<u32>, f64>,
+    /// Per part and material, the area of walls indoors.
+    surfaces: BTreeMap<(PartId, Option<u32>), f64>,
 }
 
 /// The walls of a cell.
@@ -54,6 +57,7 @@ struct Room {
     absorbed: [f64; N_BANDS],
 }
 
+/// Two cells, and the clear area between them.
 #[derive(Clone, Copy, Debug)]
 struct Coupling {
     cells: [CellId; 2],
@@ -61,24 +65,55 @@ struct Coupling {
 }
 
 impl Reverb {
-    /// Computes the rooms of a world's structure. `absorption` returns the coefficients of a material in
-    /// [octave bands](crate::OCTAVES), such as [those assumed](crate::Assumed) for its name; `None` for triangles without one. A wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
+    /// Computes the rooms of the structure of all parts. `absorption` returns the coefficients of a material of a part in
+    /// [octave bands](crate::OCTAVES), such as [those assumed](crate::Assumed) for its name; `None` for triangles without one. A
+    /// wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
     /// O(area) in pieces of a quarter of a meter, at most some thousands a triangle.
     #[must_use]
     pub fn new(
-        layout: &Layout,
-        world: &World,
+        space: &Space,
         law: DecayLaw,
-        absorption: impl Fn(Option<u32>) -> [f64; N_BANDS],
+        absorption: impl Fn(PartId, Option<u32>) -> [f64; N_BANDS],
     ) -> Self {
-        let mut rooms = vec![Room::default(); layout.n_cells()];
-        for (i, room) in rooms.iter_mut().enumerate() {
-            room.volume = layout.cell(CellId(i as u32)).volume;
+        let mut reverb = Self {
+            rooms: Vec::new(),
+            first_cell: Vec::new(),
+            law,
+            surfaces: BTreeMap::new(),
+        };
+        for part in (0..space.n_parts() as u32).map(PartId) {
+            let layout = space.layout(part);
+            let first = reverb.rooms.len();
+            reverb.first_cell.push(first as u32);
+            for cell in (0..layout.n_cells() as u32).map(CellId) {
+                let volume = layout.cell(cell).volume;
+                reverb.rooms.push(Room {
+                    volume,
+                    ..Room::default()
+                });
+            }
+            reverb.add_walls(space, part, first, &absorption);
+            for (i, room) in reverb.rooms[first..].iter_mut().enumerate() {
+                if layout.cell(CellId(i as u32)).is_outdoor {
+                    room.absorbed = [OPEN_AIR; N_BANDS];
+                }
+            }
         }
-        let mut surfaces = BTreeMap::new();
+        reverb
+    }
+
+    fn add_walls(
+        &mut self,
+        space: &Space,
+        part: PartId,
+        first: usize,
+        absorption: &impl Fn(PartId, Option<u32>) -> [f64; N_BANDS],
+    ) {
+        let (layout, world) = (space.layout(part), space.world(part));
+        let rooms = &mut self.rooms[first..];
         for batch in world.batches.iter().filter(|b| !b.cells.is_empty()) {
             let material = batch.primitive.material;
-            let alpha = absorption(material).map(|a| a.clamp(0.0, 1.0));
+            let alpha = absorption(part, material).map(|a| a.clamp(0.0, 1.0));
             let mut indoors = 0.0;
             for triangle in batch.primitive.triangles() {
                 each_piece(layout, &batch.cells, triangle, |cell, area| {
@@ -92,37 +127,24 @@ impl Reverb {
                     }
                 });
             }
-            *surfaces.entry(material).or_insert(0.0) += indoors;
-        }
-        let portals = (0..layout.n_portals() as u32).map(|p| {
-            let opening = layout.opening(PortalId(p));
-            Coupling {
-                cells: opening.cells(),
-                area: opening.area(),
-            }
-        });
-        for (i, room) in rooms.iter_mut().enumerate() {
-            if layout.cell(CellId(i as u32)).is_outdoor {
-                room.absorbed = [OPEN_AIR; N_BANDS];
-            }
-        }
-        Self {
-            rooms,
-            portals: portals.collect(),
-            law,
-            surfaces,
+            *self.surfaces.entry((part, material)).or_insert(0.0) += indoors;
         }
     }
 
-    /// Makes rooms given by volume, area of walls and mean coefficient, coupled by the portals of `layout`. [Units: wu³, wu²]
+    /// Makes rooms given by volume, area of walls and mean coefficient, for the cells of all parts, part by part. [Units: wu³, wu²]
     ///
     /// # Panics
     ///
     /// If there is not one per cell.
     #[must_use]
-    pub fn of_rooms(layout: &Layout, law: DecayLaw, rooms: &[(f64, f64, f64)]) -> Self {
-        assert_eq!(rooms.len(), layout.n_cells(), "one for each cell");
-        let mut reverb = Self::new(layout, &World::default(), law, |_| [0.1; N_BANDS]);
+    pub fn of_rooms(space: &Space, law: DecayLaw, rooms: &[(f64, f64, f64)]) -> Self {
+        assert_eq!(rooms.len(), space.n_cells(), "one for each cell");
+        let mut reverb = Self {
+            rooms: vec![Room::default(); rooms.len()],
+            first_cell: space.parts.iter().map(|part| part.first_cell).collect(),
+            law,
+            surfaces: BTreeMap::new(),
+        };
         for (room, &(volume, area, alpha)) in reverb.rooms.iter_mut().zip(rooms) {
             *room = Room {
                 volume,
@@ -137,27 +159,34 @@ impl Reverb {
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
+    /// If there is no such place.
     #[must_use]
-    pub fn area(&self, cell: CellId) -> f64 {
-        self.rooms[cell.idx()].area
+    pub fn area(&self, place: Place) -> f64 {
+        self.rooms[self.index(place)].area
     }
 
-    /// Returns the area of walls indoors of each material, `None` for those without one. [Units: wu²]
-    pub fn surfaces(&self) -> impl Iterator<Item = (Option<u32>, f64)> {
+    fn index(&self, place: Place) -> usize {
+        self.first_cell[place.part.idx()] as usize + place.cell.idx()
+    }
+
+    /// Returns the area of walls indoors of each part and material, `None` for those without one. [Units: wu²]
+    pub fn surfaces(&self) -> impl Iterator<Item = (PartId, Option<u32>, f64)> {
         self.surfaces
             .iter()
-            .map(|(material, area)| (*material, *area))
+            .map(|((part, material), area)| (*part, *material, *area))
     }
 
     /// Returns the fully absorbing area equivalent to the cell's walls, in octave bands. [Units: wu²]
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
+    /// If there is no such place.
     #[must_use]
-    pub fn absorbing_area(&self, cell: CellId) -> [f64; N_BANDS] {
-        let room = &self.rooms[cell.idx()];
+    pub fn absorbing_area(&self, place: Place) -> [f64; N_BANDS] {
+        self.absorbing(&self.rooms[self.index(place)])
+    }
+
+    fn absorbing(&self, room: &Room) -> [f64; N_BANDS] {
         let least = room.area.max(1e-9);
         room.absorbed.map(|absorbed| {
             let mean = (absorbed / least).clamp(1e-3, 0.999);
@@ -181,13 +210,13 @@ impl Reverb {
     }
 
     /// Writes the total loss per second of each cell's field, divided by its energy density. [Units: wu³/s]
-    fn losses(&self, absorbing: &[f64], open: &[f64], w: &[f64], out: &mut [f64]) {
+    fn losses(&self, absorbing: &[f64], portals: &[Coupling], w: &[f64], out: &mut [f64]) {
         for (i, out) in out.iter_mut().enumerate() {
             *out = absorbing[i] * w[i];
         }
-        for (p, share) in self.portals.iter().zip(open) {
+        for p in portals {
             let [a, b] = p.cells.map(CellId::idx);
-            let flow = p.area * share * (w[a] - w[b]);
+            let flow = p.area * (w[a] - w[b]);
             out[a] += flow;
             out[b] -= flow;
         }
@@ -246,7 +275,9 @@ const OPEN_AIR: f64 = 1e6;
 /// The diffuse fields of all cells, with reusable buffers: allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct DiffuseFields {
-    open: Vec<f64>,
+    portals: Vec<Coupling>,
+    /// Per part, the index of its first cell.
+    first_cell: Vec<u32>,
     /// Absorbing area of each cell in the band that is solved.
     absorbing: Vec<f64>,
     right: Vec<f64>,
@@ -269,35 +300,84 @@ impl DiffuseFields {
         Self::default()
     }
 
-    /// Solves for a steady source in `cell`. `open` returns the fraction of a portal's area that lets sound through, 0 to 1.
-    /// O(portals · steps), at most some steps per cell.
+    /// Solves for a steady source in a place. `open` returns the fraction of a portal's area that lets sound through, 0 to 1: of
+    /// doors of parts that meet, the product of both counts. Rooms are coupled as the parts stand. O(portals · steps), at most
+    /// some steps per cell; allocates if there are several parts.
     ///
     /// # Panics
     ///
-    /// If there is no such cell.
-    pub fn solve(&mut self, reverb: &Reverb, cell: CellId, open: impl Fn(PortalId) -> f64) {
+    /// If there is no such place.
+    pub fn solve(
+        &mut self,
+        reverb: &Reverb,
+        space: &Space,
+        place: Place,
+        open: impl Fn(PartId, PortalId) -> f64,
+    ) {
         let n = reverb.n_cells();
-        self.open.clear();
-        let portals = (0..reverb.portals.len() as u32).map(PortalId);
-        self.open.extend(portals.map(|p| open(p).clamp(0.0, 1.0)));
+        self.first_cell.clone_from(&reverb.first_cell);
+        self.couple(reverb, space, |part, portal| {
+            open(part, portal).clamp(0.0, 1.0)
+        });
         for field in [&mut self.steady, &mut self.times] {
             field.clear();
             field.resize(n, [0.0; N_BANDS]);
         }
         for band in 0..N_BANDS {
             self.absorbing.clear();
-            let cells = (0..n as u32).map(CellId);
-            (self.absorbing).extend(cells.map(|c| reverb.absorbing_area(c)[band]));
+            let rooms = reverb.rooms.iter();
+            (self.absorbing).extend(rooms.map(|room| reverb.absorbing(room)[band]));
             self.inertia.clear();
             self.inertia.resize(n, 0.0);
             self.right.clear();
             self.right.resize(n, 0.0);
-            self.right[cell.idx()] = 1.0;
+            self.right[reverb.index(place)] = 1.0;
             self.balance(reverb, 1e-24);
             for (steady, level) in self.steady.iter_mut().zip(&self.level) {
                 steady[band] = level.max(0.0);
             }
             self.decay(reverb, band);
+        }
+    }
+
+    /// Finds the openings between rooms.
+    fn couple(&mut self, reverb: &Reverb, space: &Space, open: impl Fn(PartId, PortalId) -> f64) {
+        self.portals.clear();
+        let n_parts = reverb.first_cell.len();
+        if n_parts == 1 {
+            let layout = space.layout(PartId::ROOT);
+            for portal in (0..layout.n_portals() as u32).map(PortalId) {
+                let opening = layout.opening(portal);
+                self.portals.push(Coupling {
+                    cells: opening.cells(),
+                    area: opening.area() * open(PartId::ROOT, portal),
+                });
+            }
+            return;
+        }
+        let joined = Joined::new(space, n_parts);
+        let is_place = |cell: CellId| {
+            let place = joined.place(cell);
+            place.is_some_and(|p| space.parts[p.part.idx()].border != Some(p.cell))
+        };
+        for portal in (0..joined.layout.n_portals() as u32).map(PortalId) {
+            let opening = joined.layout.opening(portal);
+            let (part, own) = joined.of_portal(portal);
+            let (mut cells, mut area) = (opening.cells(), opening.area() * open(part, own));
+            if let Some(other) = joined.docked[portal.idx()] {
+                if other < portal {
+                    continue;
+                }
+                let (part, its) = joined.of_portal(other);
+                let width = joined.layout.opening(other).area().min(opening.area());
+                area *= open(part, its) * width / opening.area().max(1e-9);
+                let seam = usize::from(joined.place(cells[0]).is_some());
+                cells[seam] = joined.behind(portal, cells[1 - seam]);
+            }
+            // A door in front of a wall leads nowhere.
+            if cells.into_iter().all(is_place) {
+                self.portals.push(Coupling { cells, area });
+            }
         }
     }
 
@@ -317,7 +397,12 @@ impl DiffuseFields {
         let (mut time, mut step) = (0.0, FIRST_STEP / fastest.max(1e-3));
         for _ in 0..MOST_STEPS {
             let share = SPEED_OF_SOUND * step / 8.0;
-            reverb.losses(&self.absorbing, &self.open, &self.level, &mut self.product);
+            reverb.losses(
+                &self.absorbing,
+                &self.portals,
+                &self.level,
+                &mut self.product,
+            );
             for (i, room) in reverb.rooms.iter().enumerate() {
                 self.inertia[i] = room.volume / share;
                 self.right[i] = self.inertia[i] * self.level[i] - self.product[i];
@@ -361,7 +446,7 @@ impl DiffuseFields {
             for (i, x) in self.direction.iter_mut().enumerate() {
                 *x *= scale(i);
             }
-            reverb.losses(absorbing, &self.open, &self.direction, &mut self.product);
+            reverb.losses(absorbing, &self.portals, &self.direction, &mut self.product);
             for i in 0..n {
                 self.product[i] += self.inertia[i] * self.direction[i];
                 self.direction[i] /= scale(i);
@@ -389,10 +474,10 @@ impl DiffuseFields {
     ///
     /// # Panics
     ///
-    /// If there is no such cell, or nothing was solved.
+    /// If there is no such place, or nothing was solved.
     #[must_use]
-    pub fn rt60(&self, cell: CellId) -> f64 {
-        let bands = self.rt60_bands(cell);
+    pub fn rt60(&self, place: Place) -> f64 {
+        let bands = self.rt60_bands(place);
         0.5 * (bands[2] + bands[3])
     }
 
@@ -400,10 +485,10 @@ impl DiffuseFields {
     ///
     /// # Panics
     ///
-    /// If there is no such cell, or nothing was solved.
+    /// If there is no such place, or nothing was solved.
     #[must_use]
-    pub fn rt60_bands(&self, cell: CellId) -> [f64; N_BANDS] {
-        self.times[cell.idx()]
+    pub fn rt60_bands(&self, place: Place) -> [f64; N_BANDS] {
+        self.times[self.index(place)]
     }
 
     /// Returns the amplitude of a cell's field, relative to the source's free field at a distance of 1: its energy is `16 π`
@@ -411,20 +496,24 @@ impl DiffuseFields {
     ///
     /// # Panics
     ///
-    /// If there is no such cell, or nothing was solved.
+    /// If there is no such place, or nothing was solved.
     #[must_use]
-    pub fn gain(&self, cell: CellId) -> f64 {
-        (16.0 * std::f64::consts::PI * self.density(cell).max(0.0)).sqrt()
+    pub fn gain(&self, place: Place) -> f64 {
+        (16.0 * std::f64::consts::PI * self.density(place).max(0.0)).sqrt()
     }
 
     /// Returns the energy density divided by 4 / c times the source's power, the mean over the bands. [Units: 1/wu²]
     ///
     /// # Panics
     ///
-    /// If there is no such cell, or nothing was solved.
+    /// If there is no such place, or nothing was solved.
     #[must_use]
-    pub fn density(&self, cell: CellId) -> f64 {
-        self.steady[cell.idx()].iter().sum::<f64>() / N_BANDS as f64
+    pub fn density(&self, place: Place) -> f64 {
+        self.steady[self.index(place)].iter().sum::<f64>() / N_BANDS as f64
+    }
+
+    fn index(&self, place: Place) -> usize {
+        self.first_cell[place.part.idx()] as usize + place.cell.idx()
     }
 }
 
@@ -482,53 +571,59 @@ mod tests {
     use super::*;
     use enfilade_testkit::{GridParams, room_grid};
 
-    fn two_rooms() -> (Layout, f64) {
-        let world = room_grid(&GridParams::two_rooms());
-        let layout = Layout::new(&world);
-        let door = layout.opening(PortalId(0)).area();
-        (layout, door)
+    fn two_rooms() -> (Space, f64) {
+        let space = Space::new(room_grid(&GridParams::two_rooms())).unwrap();
+        let door = space.layout(PartId::ROOT).opening(PortalId(0)).area();
+        (space, door)
+    }
+
+    fn at(cell: u32) -> Place {
+        Place {
+            part: PartId::ROOT,
+            cell: CellId(cell),
+        }
     }
 
     /// W11: a single room follows Sabine.
     #[test]
     fn a_closed_room_rings_as_sabine_says() {
-        let (layout, _) = two_rooms();
+        let (space, _) = two_rooms();
         let reverb = Reverb::of_rooms(
-            &layout,
+            &space,
             DecayLaw::Sabine,
             &[(100.0, 130.0, 0.1), (50.0, 90.0, 0.2)],
         );
         let mut fields = DiffuseFields::new();
-        fields.solve(&reverb, CellId(0), |_| 0.0);
+        fields.solve(&reverb, &space, at(0), |_, _| 0.0);
         let sabine = 24.0 * 10f64.ln() / SPEED_OF_SOUND * 100.0 / 13.0;
         assert!(
-            (fields.rt60(CellId(0)) / sabine - 1.0).abs() < 0.005,
+            (fields.rt60(at(0)) / sabine - 1.0).abs() < 0.005,
             "{}",
-            fields.rt60(CellId(0))
+            fields.rt60(at(0))
         );
-        assert!((fields.density(CellId(0)) * 13.0 - 1.0).abs() < 1e-9);
-        assert_eq!(fields.gain(CellId(1)), 0.0);
+        assert!((fields.density(at(0)) * 13.0 - 1.0).abs() < 1e-9);
+        assert_eq!(fields.gain(at(1)), 0.0);
     }
 
     /// W11: two rooms and a door, against the balance of two equations in closed form.
     #[test]
     fn coupled_rooms_balance() {
-        let (layout, door) = two_rooms();
+        let (space, door) = two_rooms();
         let (v, a) = ([100.0, 50.0], [13.0, 18.0]);
         let reverb = Reverb::of_rooms(
-            &layout,
+            &space,
             DecayLaw::Sabine,
             &[(v[0], 130.0, 0.1), (v[1], 90.0, 0.2)],
         );
         let mut fields = DiffuseFields::new();
         for share in [0.0, 0.3, 1.0] {
             let s = door * share;
-            fields.solve(&reverb, CellId(0), |_| share);
+            fields.solve(&reverb, &space, at(0), |_, _| share);
             let (m00, m11) = (a[0] + s, a[1] + s);
             let det = m00 * m11 - s * s;
             let w = [m11 / det, s / det];
             for k in 0..2 {
-                let got = fields.density(CellId(k as u32));
+                let got = fields.density(at(k as u32));
                 assert!((got - w[k]).abs() < 1e-9 * w[0], "{got} {}", w[k]);
             }
             // The decay is a sum of two exponentials, in each room.
@@ -547,7 +642,7 @@ mod tests {
                 let left = |t: f64| late * (-slow * t).exp() + (w[i] - late) * (-fast * t).exp();
                 let level = |t: f64| 10.0 * (left(t) / w[i]).log10();
                 if w[i] == 0.0 {
-                    assert_eq!(fields.rt60(CellId(i as u32)), 0.0);
+                    assert_eq!(fields.rt60(at(i as u32)), 0.0);
                     continue;
                 }
                 let times: Vec<f64> = (0..200_000).map(|n| f64::from(n) * 1e-5).collect();
@@ -560,7 +655,7 @@ mod tests {
                     (n, st, sl, stt, stl) = (n + 1.0, st + t, sl + l, stt + t * t, stl + t * l);
                 }
                 let time = -60.0 * (n * stt - st * st) / (n * stl - st * sl);
-                let got = fields.rt60(CellId(i as u32));
+                let got = fields.rt60(at(i as u32));
                 assert!(
                     (got / time - 1.0).abs() < 0.005,
                     "room {i}, {share}: {got} {time}"
@@ -572,11 +667,12 @@ mod tests {
     /// W11: walls without thickness belong to the cells in front of them.
     #[test]
     fn a_rooms_walls_are_its_box_less_its_doors() {
-        let world = room_grid(&GridParams::two_rooms());
-        let layout = Layout::new(&world);
-        let reverb = Reverb::new(&layout, &world, DecayLaw::Eyring, |_| [0.2; N_BANDS]);
-        for c in [CellId(0), CellId(1)] {
-            let size = layout.cell(c).bounds.max - layout.cell(c).bounds.min;
+        let (space, _) = two_rooms();
+        let layout = space.layout(PartId::ROOT);
+        let reverb = Reverb::new(&space, DecayLaw::Eyring, |_, _| [0.2; N_BANDS]);
+        for c in [at(0), at(1)] {
+            let bounds = layout.cell(c.cell).bounds;
+            let size = bounds.max - bounds.min;
             let all = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
             let walls = all - layout.opening(PortalId(0)).area();
             assert!(

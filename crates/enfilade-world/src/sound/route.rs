@@ -4,10 +4,11 @@ use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 
 use crate::layout::Layout;
-use crate::paths::{Corner, Seen, into_cell};
+use crate::paths::{Corner, Seen};
 use crate::sound::edge::{
     arrival_direction, bend_loss, detour, straight_end, through_area, wall_share,
 };
+use crate::sound::graph::SoundGraph;
 use crate::sound::reverb::SPEED_OF_SOUND;
 use crate::sound::taut::TautString;
 use crate::sound::{Acoustics, N_BANDS, OCTAVES};
@@ -123,7 +124,7 @@ impl Puller {
     pub(super) fn pull(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
+        graph: &SoundGraph,
         [from, to]: [Spot; 2],
         route: &mut Route,
     ) {
@@ -134,10 +135,11 @@ impl Puller {
         // First through the portals alone, where there is one shortest string, whatever was before: so is what follows.
         route.gates.retain(|gate| matches!(gate, Gate::Portal(_)));
         route.points.clone_from(&route.plain);
+        let layout = &graph.joined.layout;
         self.tighten(layout, [from, to], route);
         route.plain.clone_from(&route.points);
         for _ in 0..ROUNDS {
-            if !self.bend(acoustics, layout, [from, to], route) {
+            if !self.bend(acoustics, graph, [from, to], route) {
                 break;
             }
             self.tighten(layout, [from, to], route);
@@ -164,13 +166,13 @@ impl Puller {
     fn bend(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
+        graph: &SoundGraph,
         [from, to]: [Spot; 2],
         route: &mut Route,
     ) -> bool {
         self.gates.clear();
         self.points.clear();
-        let geodesics = &acoustics.geodesics;
+        let parts = &acoustics.parts;
         let (mut cell, mut at, mut through) = (from.cell, from.at, None);
         let nexts = route.gates.iter().zip(&route.points);
         let nexts = nexts.filter_map(|(gate, p)| match gate {
@@ -178,14 +180,14 @@ impl Puller {
             Gate::Edge(_) => None,
         });
         for (portal, p) in nexts.chain([(None, to.at)]) {
-            if geodesics.is_concave(cell) {
+            if graph.is_concave(parts, cell) {
                 let inside = |portal: Option<PortalId>, p: DVec3| match portal {
-                    Some(portal) => into_cell(&layout.opening(portal), cell, p, geodesics.off()),
+                    Some(portal) => graph.off_door(parts, portal, cell, p),
                     None => p,
                 };
                 let ends = [inside(through, at), inside(portal, p)];
                 // Without a path, as through a slit thinner than points are kept off walls, it stays straight.
-                let found = geodesics.way_with(cell, ends, &mut self.seen, &mut self.bends);
+                let found = graph.way(parts, cell, ends, &mut self.seen, &mut self.bends);
                 if found.is_some() {
                     self.gates
                         .extend(self.bends.iter().map(|b| Gate::Edge(b.edge)));
@@ -195,8 +197,7 @@ impl Puller {
             if let Some(portal) = portal {
                 self.gates.push(Gate::Portal(portal));
                 self.points.push(p);
-                let cells = layout.opening(portal).cells();
-                cell = cells[usize::from(cells[0] == cell)];
+                cell = graph.joined.behind(portal, cell);
             }
             (at, through) = (p, portal);
         }
@@ -208,13 +209,14 @@ impl Puller {
         true
     }
 
-    /// Returns the energy along a route, by octave band. `open` has the clear share of each portal.
+    /// Returns the energy along a route, by octave band. `gates` has the clear share of each portal, and what the rest lets
+    /// through.
     pub(super) fn energy(
         &mut self,
         acoustics: &Acoustics,
-        layout: &Layout,
+        graph: &SoundGraph,
         [from, to]: [Spot; 2],
-        open: &[f64],
+        gates: &[(f64, f64)],
         route: &Route,
     ) -> [f64; N_BANDS] {
         self.set_crossings([from, to], route);
@@ -231,16 +233,17 @@ impl Puller {
             let back = self.crossings[..=i].iter().rev().copied();
             let before = straight_end(at, back);
             let after = straight_end(at, self.crossings[i + 2..].iter().copied());
-            let opening = layout.opening(portal);
-            let rims = acoustics.rims(portal);
+            let opening = graph.joined.layout.opening(portal);
+            let rims = graph.rims(portal);
             let beside = || wall_share(&opening, rims, before) * wall_share(&opening, rims, after);
             let fresnel = 2.0 * detour(rims, before, at, after) / LONGEST_WAVE;
             (acoustics.edge_losses).add(fresnel, beside, &mut losses);
-            let area = opening.area() * open[portal.idx()];
+            let (open, leaf) = gates[portal.idx()];
+            let area = opening.area() * open;
             let free = through_area(area, LONGEST_WAVE, before, at, after);
             for (energy, free) in energy.iter_mut().zip(free) {
                 // Sound through the leaf passes its whole area.
-                *energy *= free + (1.0 - free) * acoustics.shut[portal.idx()];
+                *energy *= free + (1.0 - free) * leaf;
             }
         }
         for (energy, loss) in energy.iter_mut().zip(losses) {
