@@ -142,7 +142,7 @@ struct PvsReport {
     worst_names: Vec<String>,
 }
 
-/// What was seen through special portals.
+/// Counts of what was seen through special portals.
 #[derive(serde::Serialize)]
 struct SpecialChains {
     /// Pairs of cells that see each other through special portals; some also see each other directly.

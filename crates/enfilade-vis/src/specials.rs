@@ -85,7 +85,7 @@ pub fn see_world(
     let mut is_complete = vis.is_complete;
     let scale = Dirs::new(&unfolded.graph(&rows.nodes())).scale;
     let clearance = config.clearance.unwrap_or(1e-8 * scale);
-    // What is opened and not searched in the end is a bound: all that its first cell sees.
+    // A layer that is opened and not searched in the end is a bound: all that its first cell sees.
     loop {
         let nodes = rows.nodes();
         let sight = unfolded.graph(&nodes);
@@ -121,7 +121,7 @@ pub fn see_world(
     Ok(rows.output(&unfolded, vis, context.walls.is_some()))
 }
 
-/// What is seen from the cells of the first layer that see a special portal.
+/// Cells seen from those of the first layer that see a special portal.
 struct Rows<'a> {
     plain: &'a Pvs,
     all: Vec<SpecialRow>,
@@ -265,7 +265,7 @@ impl<'a> Rows<'a> {
         let n = self.plain.n_cells();
         let mut through = bits::BitTable::new(n, n);
         let mut proved = bits::BitTable::new(n, n);
-        // Who sees what the cameras in which cells see.
+        // Cells that see what the cameras in which cells see.
         let mut watched: BTreeSet<(usize, usize)> = BTreeSet::new();
         for row in &self.all {
             let a = row.cell as usize;

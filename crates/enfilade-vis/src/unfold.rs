@@ -25,7 +25,7 @@ const EYE_MARGIN: f64 = 1e-4;
 /// A cell in a layer.
 pub(crate) type Node = (u32, u32);
 
-/// What is seen in an opening that can only be looked through from one side.
+/// View of an opening that can only be looked through from one side.
 pub(crate) enum Goal {
     Cell(u32),
     /// The picture of a camera in one of these cells.

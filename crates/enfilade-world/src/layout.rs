@@ -3,31 +3,27 @@
 use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, SpecialId, Way, World};
 use enfilade_geom::{Aabb, DVec3, Plane, Similarity, Winding, world_tolerance};
 
-mod joined;
-
-pub(crate) use joined::Joined;
-
 /// The cells and portals of a world in double precision, in contiguous arrays.
 ///
 /// Made once. A portal's opening is its convex pieces, not the outline around them: a shape that touches only the outline does
 /// not touch the opening.
 #[derive(Clone, Debug)]
 pub struct Layout {
-    cells: Vec<CellShape>,
+    pub(crate) cells: Vec<CellShape>,
     /// Per cell its first exit, and the number of all.
-    first_exit: Vec<u32>,
-    exits: Vec<Exit>,
+    pub(crate) first_exit: Vec<u32>,
+    pub(crate) exits: Vec<Exit>,
     /// Per exit, the box around its opening; contiguous, for distance bounds to all of them.
-    exit_bounds: Vec<Aabb>,
-    openings: Vec<OpeningShape>,
-    specials: Vec<SpecialSide>,
+    pub(crate) exit_bounds: Vec<Aabb>,
+    pub(crate) openings: Vec<OpeningShape>,
+    pub(crate) specials: Vec<SpecialSide>,
     /// Pairs of a cell and a special portal that it sees, ascending.
-    specials_by_cell: Vec<(CellId, SpecialId)>,
+    pub(crate) specials_by_cell: Vec<(CellId, SpecialId)>,
     /// Per piece its first vertex, and the number of all.
-    first_corner: Vec<u32>,
-    corners: Vec<DVec3>,
-    locator: Locator,
-    tolerance: f64,
+    pub(crate) first_corner: Vec<u32>,
+    pub(crate) corners: Vec<DVec3>,
+    pub(crate) locator: Locator,
+    pub(crate) tolerance: f64,
 }
 
 /// Extent of a cell.
@@ -51,20 +47,20 @@ pub struct Exit {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct OpeningShape {
-    cells: [CellId; 2],
-    kind: PortalKind,
-    normal: DVec3,
-    center: DVec3,
-    radius: f64,
-    area: f64,
-    bounds: Aabb,
-    pieces: [u32; 2],
+pub(crate) struct OpeningShape {
+    pub(crate) cells: [CellId; 2],
+    pub(crate) kind: PortalKind,
+    pub(crate) normal: DVec3,
+    pub(crate) center: DVec3,
+    pub(crate) radius: f64,
+    pub(crate) area: f64,
+    pub(crate) bounds: Aabb,
+    pub(crate) pieces: [u32; 2],
 }
 
 /// A special portal in a layout.
 #[derive(Clone, Debug)]
-struct SpecialSide {
+pub(crate) struct SpecialSide {
     shape: OpeningShape,
     portal: Option<PortalId>,
     /// Per pass, from the side of those who look to the side that is seen.

@@ -20,6 +20,7 @@ use crate::layout::Exit;
 use crate::space::PartId;
 
 pub use edges::Corner;
+pub(crate) use ends::{End, Limit};
 pub use floors::Floors;
 pub use geodesics::Geodesics;
 pub(crate) use geodesics::{Seen, into_cell};
@@ -28,18 +29,22 @@ pub use kept::{KeptMapError, WalkMapKey};
 pub use path_follower::{PathFollower, Progress};
 pub use path_search::PathSearch;
 pub use sampling::Sampling;
-pub use search::{Arrival, LengthSearch, PassedPortal, Ways};
-pub(crate) use sequences::{End, Limit, Sequences};
+pub use search::{Arrival, LengthSearch, PassedPortal};
+pub(crate) use sequences::Sequences;
 pub use walk_map::WalkMap;
+pub use ways::Ways;
 
 mod all_pairs;
 mod columns;
 mod edges;
+mod ends;
 mod floors;
 mod geodesics;
+mod grounds;
 mod hops;
 mod joints;
 mod kept;
+mod legs;
 mod part_hops;
 mod path_follower;
 mod path_search;
@@ -51,6 +56,7 @@ mod solid;
 mod strides;
 mod trees;
 mod walk_map;
+mod ways;
 
 /// A path found. Reuse it, so that a search need not allocate.
 #[derive(Clone, Debug, Default)]

@@ -23,14 +23,14 @@ const CASTS: usize = 4;
 const SOUNDS: usize = 16;
 /// Greatest difference of an impact: the triangles are the same, in frames of `f64`. [Units: wu]
 const EXACT: f64 = 1e-5;
-/// Of a walker: the vertices of one world are rounded to `f32`, a thousandth of this, and each step slides along what the last one
+/// Tolerance of a walker: the vertices of one world are rounded to `f32`, a thousandth of this, and each step slides along what the last one
 /// left. [Units: wu]
 const WALKED: f64 = 5e-3;
-/// Of a path, in squares of its floors: lines bend at walls where squares do, up to 0.7 squares off, and those of the two maps are
+/// Tolerance of a path, in squares of its floors: lines bend at walls where squares do, up to 0.7 squares off, and those of the two maps are
 /// turned and shifted. Two ends of walls at the door, from both sides.
 const SQUARES: f64 = 3.0;
 
-/// Of a sound, in decibels and in length: a door is pushed into the other by up to a centimeter and 1°, two at its edges, and
+/// Tolerance of a sound, in decibels and in length: a door is pushed into the other by up to a centimeter and 1°, two at its edges, and
 /// levels change by up to a decibel per centimeter of way. [Units: dB, wu]
 const HEARD: [f64; 2] = [1.0, 0.03];
 
@@ -38,7 +38,7 @@ const HEARD: [f64; 2] = [1.0, 0.03];
 const FREE: f64 = 0.14;
 
 /// A building and a cabin at its door.
-struct Site {
+struct DockSite {
     space: Space,
     building: PartId,
     cabin: PartId,
@@ -62,7 +62,7 @@ const NAMES: [&str; 5] = ["casts", "lines of sight", "walks", "paths", "sounds"]
 /// Counts the answers that differ.
 #[derive(Default)]
 struct Counts {
-    /// Of each kind: asked, through the door, different.
+    /// Counts of each kind: asked, through the door, different.
     kinds: [[usize; 3]; 5],
     notes: Vec<String>,
 }
@@ -87,7 +87,7 @@ impl Counts {
 }
 
 /// Returns a building among nothing, and a cabin of its own at its widest door.
-fn at_entrance(world: &World) -> anyhow::Result<Site> {
+fn at_entrance(world: &World) -> anyhow::Result<DockSite> {
     let root = chamber(DVec3::new(600.0, 100.0, 600.0), [1.0, 2.0], 2.0);
     let mut space = Space::new(root)?;
     let middle = Pose::from_translation(DVec3::new(300.0, 50.0, 300.0));
@@ -137,7 +137,7 @@ fn at_entrance(world: &World) -> anyhow::Result<Site> {
 }
 
 /// Returns the tower of the demo with its lift.
-fn in_tower() -> anyhow::Result<Site> {
+fn in_tower() -> anyhow::Result<DockSite> {
     let models = lift_tower();
     let baked = |scene| -> anyhow::Result<World> {
         Ok(bake(scene, &BakeConfig::default(), &BakeContext::default())?.world)
@@ -160,7 +160,7 @@ fn site(
     beyond: Beyond,
     home: Pose,
     off: ([f64; 3], f64),
-) -> anyhow::Result<Site> {
+) -> anyhow::Result<DockSite> {
     for part in [building, cabin] {
         for portal in (0..space.layout(part).n_portals() as u32).map(PortalId) {
             space.open(part, portal);
@@ -173,7 +173,7 @@ fn site(
         .exits(outdoors)
         .first()
         .context("a cabin with a door")?;
-    Ok(Site {
+    Ok(DockSite {
         door: door.portal,
         room: door.to,
         stops: vec![0.0],
@@ -206,7 +206,7 @@ fn triangles(space: &Space, part: PartId) -> Vec<Triangle> {
     all
 }
 
-impl Site {
+impl DockSite {
     /// Moves the building anywhere, and the cabin to its door; returns the cabin's pose in the building's frame.
     fn set_pose(&mut self, rng: &mut Rng) -> anyhow::Result<Pose> {
         let (by, turn) = self.off;
@@ -425,7 +425,7 @@ impl Site {
     }
 }
 
-impl Site {
+impl DockSite {
     /// Listens in the cabin to sources in the building, in both.
     fn hear(
         &self,
@@ -483,7 +483,7 @@ impl Site {
     }
 }
 
-fn measure(mut site: Site) -> anyhow::Result<Figure> {
+fn measure(mut site: DockSite) -> anyhow::Result<Figure> {
     let (mut rng, mut caster, mut counts) = (Rng::new(5), Caster::new(), Counts::default());
     let map = WalkMap::new(&site.space, Agent::default());
     let acoustics = Acoustics::new(&site.space, &Transmission::default());

@@ -15,7 +15,7 @@ use crate::rows::Figure;
 /// Doorways of a building, one after the other: those at these shares of the list of doorways indoors.
 const DOORWAYS: usize = 3;
 
-/// Corners of doorways are put on this grid, so that those of a copy are exact in `f32`, too. Otherwise a copy's doorways of one wall
+/// Grid on which vertices of doorways are put, so that those of a copy are exact in `f32`, too. Otherwise a copy's doorways of one wall
 /// are not in one plane as those of the building are, and see each other. [Units: wu]
 const GRID: f32 = 1.0 / 16384.0;
 

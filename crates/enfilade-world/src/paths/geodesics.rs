@@ -14,7 +14,7 @@ use enfilade_geom::{Bvh, DVec3, Triangle};
 
 use crate::layout::{Layout, Opening};
 use crate::paths::edges::{Corner, corners as corners_of};
-use crate::paths::search::Ways;
+use crate::paths::ways::Ways;
 use crate::space::{PartId, Space};
 
 /// Distance between points along an edge. [Units: wu]

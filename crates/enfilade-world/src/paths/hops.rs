@@ -26,6 +26,8 @@ pub struct Hops {
     ends: Vec<LinkEnd>,
     known: Option<u64>,
     moved: Vec<bool>,
+    /// Doors of parts that have moved: the part, and the indices of the threshold and the door.
+    joined: Vec<(PartId, usize, usize)>,
 }
 
 /// An end of a link in a search.
@@ -90,6 +92,7 @@ impl Hops {
             ends: Vec::new(),
             known: None,
             moved: Vec::new(),
+            joined: Vec::new(),
         }
     }
 
@@ -254,47 +257,62 @@ impl Hops {
         let n_parts = self.parts.len();
         for id in (1..n_parts as u32).map(PartId).filter(|p| has_moved(*p)) {
             let part = &space.parts[id.idx()];
-            let open = self.thresholds[id.idx()].iter();
-            for (&(portal, length), door) in
-                open.filter_map(|own| Some((own, part.doors.iter().find(|d| d.portal == own.0)?)))
-            {
-                let own = Place {
-                    part: id,
-                    cell: door.inner,
-                };
-                let center = part.layout.opening(portal).center();
-                for &place in &door.leads_to {
-                    let layout = &space.parts[place.part.idx()].layout;
-                    let middle = layout.cell(place.cell).bounds.center();
-                    let beyond = space.between(id, place.part).point(center).distance(middle);
-                    self.links.push(HopLink {
-                        ends: [own, place],
-                        doors: [Some(portal), None],
-                        length: sum(length, (beyond.min(4e5) * UNITS).round() as u32),
-                    });
-                }
-                // If both have moved, once.
-                let is_first = |other: PartId| !has_moved(other) || id < other;
-                for &(other, door) in door.meets.iter().filter(|m| is_first(m.0)) {
-                    let its = &space.parts[other.idx()].doors;
-                    let beyond = self.thresholds.get(other.idx());
-                    let beyond = beyond.and_then(|all| all.iter().find(|own| own.0 == door));
-                    let inner = its.iter().find(|d| d.portal == door).map(|d| d.inner);
-                    if let Some((&(_, beyond), cell)) = beyond.zip(inner) {
-                        self.links.push(HopLink {
-                            ends: [own, Place { part: other, cell }],
-                            doors: [Some(portal), Some(door)],
-                            length: sum(length, beyond),
-                        });
-                    }
+            let _open = self.thresholds[id.idx()].iter();
+            for (k, &(portal, _)) in self.thresholds[id.idx()].iter().enumerate() {
+                if let Some(door) = part.doors.iter().position(|d| d.portal == portal) {
+                    self.joined.push((id, k, door));
                 }
             }
         }
+        let mut joined = std::mem::take(&mut self.joined);
+        for (id, threshold, door) in joined.drain(..) {
+            self.link(space, id, threshold, door);
+        }
+        self.joined = joined;
         (self.links).retain(|link| link.ends.iter().all(|end| end.part.idx() < n_parts));
         self.n_links.fill(0);
         for end in self.links.iter().flat_map(|link| link.ends) {
             self.n_links[end.part.idx()] += 1;
         }
         self.has_ways_through = self.n_links.iter().skip(1).any(|n| *n > 1);
+    }
+
+    /// Adds the links of a door of a part that has moved.
+    fn link(&mut self, space: &Space, id: PartId, threshold: usize, door: usize) {
+        let (portal, length) = self.thresholds[id.idx()][threshold];
+        let part = &space.parts[id.idx()];
+        let door = &part.doors[door];
+        let own = Place {
+            part: id,
+            cell: door.inner,
+        };
+        let center = part.layout.opening(portal).center();
+        for &place in &door.leads_to {
+            let layout = &space.parts[place.part.idx()].layout;
+            let middle = layout.cell(place.cell).bounds.center();
+            let beyond = space.between(id, place.part).point(center).distance(middle);
+            self.links.push(HopLink {
+                ends: [own, place],
+                doors: [Some(portal), None],
+                length: sum(length, (beyond.min(4e5) * UNITS).round() as u32),
+            });
+        }
+        // If both have moved, once.
+        for &(other, door) in &door.meets {
+            if self.moved[other.idx()] && id >= other {
+                continue;
+            }
+            let its = &space.parts[other.idx()].doors;
+            let beyond = self.thresholds.get(other.idx());
+            let beyond = beyond.and_then(|all| all.iter().find(|own| own.0 == door));
+            let inner = its.iter().find(|d| d.portal == door).map(|d| d.inner);
+            if let Some((&(_, beyond), cell)) = beyond.zip(inner) {
+                self.links.push(HopLink {
+                    ends: [own, Place { part: other, cell }],
+                    doors: [Some(portal), Some(door)],
+                    length: sum(length, beyond),
+                });
+            }
+        }
     }
 }

@@ -18,9 +18,10 @@ use enfilade_geom::DVec3;
 use enfilade_runtime::DetailId;
 
 use super::columns::Squares;
-use super::floors::{Crossing, Floor, Floors, MAX_SQUARES, NONE, first_of};
-use super::search::Ways;
+use super::floors::{Crossing, Floor, Floors};
+use super::grounds::{MAX_SQUARES, NONE, first_of};
 use super::walk_map::{PartMap, WalkMap, stops_of};
+use super::ways::Ways;
 use crate::bodies::Agent;
 use crate::layout::Layout;
 use crate::space::{PartId, Space};

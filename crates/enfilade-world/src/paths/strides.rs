@@ -11,7 +11,8 @@ use std::collections::BinaryHeap;
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 
-use crate::paths::floors::{Floors, Hindrance, NONE};
+use crate::paths::floors::{Floors, Hindrance};
+use crate::paths::grounds::NONE;
 
 /// A search over the floors of one cell, with reusable buffers.
 #[derive(Clone, Debug, Default)]

@@ -7,8 +7,8 @@ use enfilade_geom::DVec3;
 use enfilade_runtime::DetailId;
 
 use super::floors::Floors;
-use super::search::Ways;
 use super::strides::Strides;
+use super::ways::Ways;
 use crate::bodies::Agent;
 use crate::layout::Layout;
 use crate::space::{PartId, Space};

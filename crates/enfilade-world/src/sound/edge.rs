@@ -6,7 +6,7 @@
 use enfilade_geom::DVec3;
 
 use crate::layout::Opening;
-use crate::sound::N_BANDS;
+use crate::sound::bands::N_BANDS;
 
 /// Angle of a bend from which on it is a source of its own: some 30°, over which the field behind an edge passes from that of the
 /// source to that of the edge (Kouyoumjian & Pathak 1974). [Units: rad]

@@ -7,11 +7,10 @@
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::layout::Joined;
 use crate::paths::{Corner, Seen, Ways, into_cell};
 use crate::pose::Pose;
-use crate::sound::{Acoustics, PartSound};
-use crate::space::{PartId, Place, Space};
+use crate::sound::part::PartSound;
+use crate::space::{Joined, PartId, Place, Space};
 
 /// Cells and portals of all parts at one instant.
 #[derive(Clone, Debug)]
@@ -217,27 +216,6 @@ impl SoundGraph {
             }
         }
         length
-    }
-}
-
-impl Acoustics {
-    /// Returns the clear share of a gate, and the energy that the rest lets through: of two doors that meet, for both together.
-    pub(super) fn gate(&self, space: &Space, graph: &SoundGraph, portal: PortalId) -> (f64, f64) {
-        let of = |portal: PortalId| {
-            let (part, own) = graph.joined.of_portal(portal);
-            (self.open_share(space, part, own), self.shut[portal.idx()])
-        };
-        let (open, shut) = of(portal);
-        match graph.joined.docked[portal.idx()] {
-            None => (open, shut),
-            Some(_) if graph.is_spare(portal) => (1.0, 1.0),
-            // Where the other is clear, the own leaf; behind the other's leaf, what passes here.
-            Some(other) => {
-                let (clear, leaf) = of(other);
-                let behind = leaf * (open + (1.0 - open) * shut);
-                (open * clear, clear * shut + (1.0 - clear) * behind)
-            }
-        }
     }
 }
 

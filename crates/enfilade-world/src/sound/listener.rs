@@ -7,9 +7,10 @@ use enfilade_geom::DVec3;
 
 use crate::layout::Exit;
 use crate::paths::{Corner, End, LengthSearch, Limit, Seen, Sequences};
+use crate::sound::acoustics::{Acoustics, Heard, rise, toll};
+use crate::sound::bands::N_BANDS;
 use crate::sound::graph::SoundGraph;
 use crate::sound::route::{Puller, Route, Spot};
-use crate::sound::{Acoustics, Heard, N_BANDS, rise, toll};
 use crate::space::{Place, Space};
 
 /// Level below which nothing is heard, relative to that at one meter in the open: sources of 100 dB there, as loud as power tools,
@@ -463,7 +464,7 @@ impl Listener {
         let source = &mut self.sources[id];
         let routes = &mut source.routes[..source.n_routes];
         let n_heard = routes.iter().filter(|r| r.is_heard).count();
-        // What was the best comes first, so that others need not be pulled.
+        // The former best comes first, so that others need not be pulled.
         let known = |r: &Route| r.bounds(ends).1 + r.toll(&self.near_tolls);
         let mut most =
             (routes.iter().filter(|r| r.is_heard).map(known)).fold(f64::INFINITY, f64::min);
@@ -527,7 +528,7 @@ impl Listener {
             let (_, next, _) = totals.select_nth_unstable_by(N_HEARD, f64::total_cmp);
             cut = cut.min(*next - best);
         }
-        // What is too faint in any case is not evaluated.
+        // Sequences too faint in any case are not evaluated.
         let mut loudest: f64 = 0.0;
         for route in source.routes_mut().filter(|r| is_pulled(r)) {
             let total = route.length + route.toll(tolls);

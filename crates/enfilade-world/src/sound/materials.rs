@@ -4,7 +4,7 @@
 //! Egan's, "Architectural Acoustics" (1988). A model rarely says more than a word, and IFC often no more than the class of an
 //! element: what follows is what is built most, and [`Assumed::is_guess`] tells where not even a word was known.
 
-use crate::sound::N_BANDS;
+use crate::sound::bands::N_BANDS;
 
 /// Absorption assumed for a material.
 #[derive(Clone, Copy, Debug, PartialEq)]

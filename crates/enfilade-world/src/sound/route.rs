@@ -5,13 +5,14 @@ use enfilade_geom::DVec3;
 
 use crate::layout::Layout;
 use crate::paths::{Corner, Seen};
+use crate::sound::acoustics::Acoustics;
+use crate::sound::bands::{N_BANDS, OCTAVES};
 use crate::sound::edge::{
     arrival_direction, bend_loss, detour, straight_end, through_area, wall_share,
 };
 use crate::sound::graph::SoundGraph;
 use crate::sound::reverb::SPEED_OF_SOUND;
 use crate::sound::taut::TautString;
-use crate::sound::{Acoustics, N_BANDS, OCTAVES};
 
 /// Rounds of finding the bends of a string and pulling it taut; bends move the crossings, and crossings the bends.
 const ROUNDS: usize = 3;

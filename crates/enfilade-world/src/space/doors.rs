@@ -16,8 +16,8 @@ impl Space {
         self.changes.since(known)
     }
 
-    /// Marks the parts that have moved after change number `known`, with all that stand in them; all parts if these changes are no
-    /// longer kept, or `known` is `None`. Sets `known` to the number of all so far; returns `true` if any has moved.
+    /// Marks the parts that have moved after change number `known`, with all that stand in them; all parts if these changes were
+    /// dropped, or `known` is `None`. Sets `known` to the number of all so far; returns `true` if any has moved.
     pub(crate) fn moved_since(&self, known: &mut Option<u64>, moved: &mut Vec<bool>) -> bool {
         if *known == Some(self.changes.number()) {
             return false;

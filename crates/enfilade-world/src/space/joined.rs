@@ -11,8 +11,8 @@
 use enfilade_cpg::{CellId, Locator, PortalId};
 use enfilade_geom::Aabb;
 
-use super::{CellShape, Exit, Layout, OpeningShape};
-use crate::space::{PartId, Place, Space};
+use super::{PartId, Place, Space};
+use crate::layout::{CellShape, Exit, Layout, OpeningShape};
 
 /// One layout of all parts.
 #[derive(Clone, Debug)]
