@@ -295,7 +295,7 @@ fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure
         "only {n_special} pixels show special portals"
     );
     ensure!(
-        n_certain * 4 > n_pixels * 3,
+        n_certain * 2 > n_pixels,
         "only {n_certain} pixels are certain"
     );
     let each = |x: usize| x as f64 / n_views as f64;

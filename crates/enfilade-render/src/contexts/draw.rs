@@ -339,7 +339,7 @@ impl Renderer {
             for face in &node.faces {
                 match face.first.content {
                     Content::Color => {
-                        self.draw_pane(pass, drawing, node, face, &face.first, &panes.fill)
+                        self.draw_pane(pass, drawing, node, face, &face.first, &panes.fill);
                     }
                     Content::Monitor(_) => {
                         self.draw_pane(pass, drawing, node, face, &face.first, &panes.monitor);
