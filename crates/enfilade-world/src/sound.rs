@@ -31,6 +31,7 @@ mod part;
 mod pieces;
 mod reverb;
 mod route;
+mod starts;
 mod taut;
 
 pub use acoustics::{Acoustics, Heard, Transmission};

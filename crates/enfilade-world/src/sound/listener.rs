@@ -11,6 +11,7 @@ use crate::sound::acoustics::{Acoustics, Heard, rise, toll};
 use crate::sound::bands::N_BANDS;
 use crate::sound::graph::SoundGraph;
 use crate::sound::route::{Puller, Route, Spot};
+use crate::sound::starts::{NEAR, lengths_from, spot};
 use crate::space::{Place, Space};
 
 /// Level below which nothing is heard, relative to that at one meter in the open: sources of 100 dB there, as loud as power tools,
@@ -46,12 +47,6 @@ const KEPT: f64 = 0.25;
 const SWUNG: f64 = 0.5;
 /// Length up to which openings are searched at first. [Units: wu]
 const FIRST_REACH: f64 = 24.0;
-/// Distance from an opening within which its toll fades to nothing, so that it does not matter on which side of it one is.
-/// [Units: wu]
-const NEAR: f64 = 2.0;
-
-/// Greatest distance of a point of an opening from those at which searches cross it. [Units: wu]
-const APART: f64 = 0.71;
 
 #[derive(Clone, Debug, Default)]
 struct Source {
@@ -570,37 +565,5 @@ impl Listener {
         heard.gain = (energy.iter().sum::<f64>() / N_BANDS as f64).sqrt();
         heard.bands = energy.map(f64::sqrt);
         Some(heard)
-    }
-}
-
-/// Returns a place in the graph; `None` in a part that it does not know.
-fn spot(graph: &SoundGraph, place: Place, at: DVec3) -> Option<Spot> {
-    (place.part.idx() < graph.joined.n_parts()).then(|| Spot {
-        cell: graph.joined.cell(place),
-        at: graph.to_root(place.part, at),
-    })
-}
-
-/// Writes the lengths from a place to the points of its cell. Openings close by are crossed at any point of them, not only at those,
-/// which are a meter apart: less than the distance from the opening to the nearest of them, so that sequences through an
-/// opening in which one stands do not seem longer than others.
-fn lengths_from(
-    acoustics: &Acoustics,
-    graph: &SoundGraph,
-    cell: CellId,
-    at: DVec3,
-    lengths: &mut Vec<f64>,
-) {
-    let ways = &graph.ways;
-    graph.lengths_from(&acoustics.parts, cell, at, lengths);
-    for exit in ways.exits_of(cell) {
-        let distance = graph.bounds[exit.portal.idx()].distance_squared(at).sqrt();
-        if distance >= NEAR {
-            continue;
-        }
-        let own = &mut lengths[ways.places(exit.portal, cell)];
-        let nearest = own.iter().copied().fold(f64::INFINITY, f64::min);
-        let extra = (nearest - distance).clamp(0.0, APART) * (1.0 - distance / NEAR);
-        own.iter_mut().for_each(|length| *length -= extra);
     }
 }
