@@ -1,4 +1,4 @@
-//! What a picture shows through special portals: its contexts as a tree of draws.
+//! Contents of pictures through special portals: contexts as a tree of draws.
 //!
 //! A context that is seen in the first pass of a special portal is drawn into the same picture, into the region of the special
 //! portal's polygon, by the camera moved by the context's map and clipped to beyond the polygon's plane: depths are continuous
@@ -26,8 +26,6 @@ use crate::pipelines::REGION;
 use crate::space::{SpaceCounts, SpaceShot, view_in};
 use crate::stage::NO_GATE;
 use crate::studio::{Studio, world_of};
-
-pub(crate) use draw::{ContextTargets, StagedWorld};
 
 /// Most contexts drawn into one picture beside its own.
 const MOST_REGIONS: u32 = REGION;
@@ -93,7 +91,7 @@ struct Layer {
 
 #[derive(Clone, Copy, PartialEq)]
 enum Content {
-    /// What is behind it, drawn already.
+    /// The cell behind it, drawn already.
     Through,
     /// A node of the same picture.
     Node(usize),
@@ -306,23 +304,13 @@ impl Studio {
         children: &HashMap<ViaKey, usize>,
         answer: SpaceSeen<'_>,
     ) {
-        let back = context.via().and_then(|via| {
-            let side = &space.world(via.part).graph.specials[via.special.idx()];
-            let back = match &side.passes[via.pass].way {
-                Way::Lead { back, .. } => *back,
-                Way::Monitor(_) => None,
-                _ => Some(via.special),
-            };
-            Some((via.part, back?))
-        });
+        let back = back_of(space, context);
         for (id, seen) in context.parts() {
             let graph = &space.world(id).graph;
-            let Some(part) = tree.nodes[node].parts.iter().position(|p| p.id == id) else {
+            let part = tree.nodes[node].parts.iter().position(|p| p.id == id);
+            let Some(part) = part.filter(|_| !graph.specials.is_empty()) else {
                 continue;
             };
-            if graph.specials.is_empty() {
-                continue;
-            }
             let counts = seen.counts();
             let is_everywhere = counts.is_eye_lost || counts.is_capped;
             let is_seen = |special: &SpecialId| {
@@ -330,98 +318,126 @@ impl Studio {
                 is_everywhere || seen.cells().contains(&cell)
             };
             for special in graph.special_ids().filter(is_seen) {
-                if Some((id, special)) == back {
-                    continue;
+                let key = (index, id, special);
+                if back != Some((id, special)) {
+                    self.add_face(tree, space, context, (node, part), key, children, answer);
                 }
-                let pane = pane_of(tree, space, (node, part), context, special);
-                if pane.height() < -2.0 * pane.tolerance {
-                    continue;
-                }
-                let key = |pass| (index, id, special, pass);
-                let side = &graph.specials[special.idx()];
-                let is_stopped = || {
-                    let mut stopped = answer.stopped_specials().iter().map(|s| s.via);
-                    stopped.any(|v| (v.parent, v.part, v.special, v.pass) == key(0))
-                };
-                let child = |pass: usize, it: &Pass| {
-                    let node = *children.get(&key(pass))?;
-                    Some(match it.way {
-                        Way::Monitor(_) => Content::Monitor(tree.nodes[node].picture),
-                        _ if pass > 0 => Content::Seen(tree.nodes[node].picture),
-                        _ => Content::Node(node),
-                    })
-                };
-                let first = match &side.passes[0].way {
-                    Way::Through => Some(Content::Through),
-                    way => child(0, &side.passes[0]).or_else(|| {
-                        let is_shut = match way {
-                            Way::Lead { to, .. } => space.state(id).is_locked(*to),
-                            Way::Monitor(_) => true,
-                            _ => false,
-                        };
-                        // Those that are left out are in view; of others, nothing is.
-                        let is_left_out = answer.contexts().any(|c| {
-                            c.via()
-                                .is_some_and(|v| key(0) == (v.parent, v.part, v.special, v.pass))
-                        });
-                        (is_shut || is_left_out || is_stopped()).then_some(Content::Color)
-                    }),
-                };
-                let Some(first) = first else { continue };
-                let mut layers = Vec::new();
-                for (pass, it) in side.passes.iter().enumerate() {
-                    let content = if pass == 0 {
-                        Some(first)
-                    } else {
-                        child(pass, it)
-                    };
-                    let Some(content) = content else { continue };
-                    let mut color = it.tint;
-                    if content == Content::Color {
-                        let looks = &world_of(&self.world, &self.parts, id).cell_looks;
-                        let to = side.leads_to().map_or(side.cell, |(to, _)| to);
-                        let look = match it.way {
-                            Way::Monitor(_) => OFF,
-                            _ => looks.get(to.idx()).copied().unwrap_or_default(),
-                        };
-                        for k in 0..3 {
-                            color[k] *= look[k];
-                        }
-                    }
-                    if pass == 0 {
-                        color[3] = 1.0;
-                    }
-                    let corners = pane.corners(color);
-                    layers.push((content, it.tint[..3] != [1.0; 3], corners));
-                }
-                let eye = pane.projection.exact_origin();
-                let distance = pane.opening.center().distance(eye) as f32;
-                if layers[0].2.is_empty() {
-                    continue;
-                }
-                let mut layers = layers.into_iter().map(|(content, is_tinted, corners)| {
-                    let start = tree.corners.len() as u32;
-                    tree.corners.extend(corners);
-                    Layer {
-                        content,
-                        is_tinted,
-                        corners: start..tree.corners.len() as u32,
-                    }
-                });
-                let Some(first) = layers.next() else { continue };
-                let later: Vec<Layer> = layers.collect();
-                if first.content == Content::Through && !first.is_tinted && later.is_empty() {
-                    continue;
-                }
-                tree.nodes[node].faces.push(Face {
-                    part,
-                    distance,
-                    first,
-                    later,
-                });
             }
         }
     }
+
+    /// Adds a special portal as a part of a node sees it, unless it shows nothing of its own.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one place of a tree, and the answer that it is made from"
+    )]
+    fn add_face(
+        &self,
+        tree: &mut Tree,
+        space: &Space,
+        context: &SeenContext<'_>,
+        (node, part): (usize, usize),
+        (index, id, special): (usize, PartId, SpecialId),
+        children: &HashMap<ViaKey, usize>,
+        answer: SpaceSeen<'_>,
+    ) {
+        let pane = pane_of(tree, space, (node, part), context, special);
+        if pane.height() < -2.0 * pane.tolerance {
+            return;
+        }
+        let key = |pass| (index, id, special, pass);
+        let side = &space.world(id).graph.specials[special.idx()];
+        let child = |pass: usize, it: &Pass| {
+            let node = *children.get(&key(pass))?;
+            Some(match it.way {
+                Way::Monitor(_) => Content::Monitor(tree.nodes[node].picture),
+                _ if pass > 0 => Content::Seen(tree.nodes[node].picture),
+                _ => Content::Node(node),
+            })
+        };
+        let first = match &side.passes[0].way {
+            Way::Through => Some(Content::Through),
+            way => child(0, &side.passes[0]).or_else(|| {
+                let is_shut = match way {
+                    Way::Lead { to, .. } => space.state(id).is_locked(*to),
+                    Way::Monitor(_) => true,
+                    _ => false,
+                };
+                // Those that are left out are in view; of others, nothing is.
+                (is_shut || is_left_out(answer, key(0))).then_some(Content::Color)
+            }),
+        };
+        let Some(first) = first else { return };
+        let mut layers = Vec::new();
+        for (pass, it) in side.passes.iter().enumerate() {
+            let content = if pass == 0 {
+                Some(first)
+            } else {
+                child(pass, it)
+            };
+            let Some(content) = content else { continue };
+            let mut color = it.tint;
+            if content == Content::Color {
+                let looks = &world_of(&self.world, &self.parts, id).cell_looks;
+                let to = side.leads_to().map_or(side.cell, |(to, _)| to);
+                let look = match it.way {
+                    Way::Monitor(_) => OFF,
+                    _ => looks.get(to.idx()).copied().unwrap_or_default(),
+                };
+                for k in 0..3 {
+                    color[k] *= look[k];
+                }
+            }
+            if pass == 0 {
+                color[3] = 1.0;
+            }
+            layers.push((content, it.tint[..3] != [1.0; 3], pane.corners(color)));
+        }
+        let eye = pane.projection.exact_origin();
+        let distance = pane.opening.center().distance(eye) as f32;
+        if layers[0].2.is_empty() {
+            return;
+        }
+        let mut layers = layers.into_iter().map(|(content, is_tinted, corners)| {
+            let start = tree.corners.len() as u32;
+            tree.corners.extend(corners);
+            Layer {
+                content,
+                is_tinted,
+                corners: start..tree.corners.len() as u32,
+            }
+        });
+        let Some(first) = layers.next() else { return };
+        let later: Vec<Layer> = layers.collect();
+        if first.content == Content::Through && !first.is_tinted && later.is_empty() {
+            return;
+        }
+        tree.nodes[node].faces.push(Face {
+            part,
+            distance,
+            first,
+            later,
+        });
+    }
+}
+
+/// Returns the special portal by which a context would look back to where its view comes from.
+fn back_of(space: &Space, context: &SeenContext<'_>) -> Option<(PartId, SpecialId)> {
+    let via = context.via()?;
+    let side = &space.world(via.part).graph.specials[via.special.idx()];
+    let back = match &side.passes[via.pass].way {
+        Way::Lead { back, .. } => *back,
+        Way::Monitor(_) => None,
+        _ => Some(via.special),
+    };
+    Some((via.part, back?))
+}
+
+/// Returns `true` if a pass of a special portal is in view, and too small or one too many.
+fn is_left_out(answer: SpaceSeen<'_>, key: ViaKey) -> bool {
+    let stopped = answer.stopped_specials().iter().map(|s| s.via);
+    let mut all = stopped.chain(answer.contexts().filter_map(|c| c.via()));
+    all.any(|v| (v.parent, v.part, v.special, v.pass) == key)
 }
 
 /// Returns the polygon of a special portal as a part of a node sees it.

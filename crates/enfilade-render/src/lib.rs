@@ -67,6 +67,7 @@
 //! surfaces directly only, and props cast no shadows. Metalness, roughness and normal maps are ignored.
 
 mod camera;
+mod context_targets;
 mod contexts;
 mod explain;
 mod formats;
@@ -91,6 +92,7 @@ mod resources;
 mod scale;
 mod scene;
 mod shadings;
+mod shown;
 mod space;
 mod stage;
 mod studio;

@@ -13,10 +13,11 @@ use crate::lamps::{
     brightness_at, chosen_lamps, face_projection,
 };
 use crate::list::{RenderList, Shot, Sparing};
-use crate::renderer::{DrawnPart, Renderer};
+use crate::renderer::Renderer;
 use crate::resources::depth_attachment;
 use crate::scene::GpuWorld;
 use crate::shadings::set_buffers;
+use crate::shown::DrawnPart;
 use crate::space::SpaceShot;
 use crate::stage::{Exposed, Globals};
 use crate::studio::{Studio, drawn_parts, world_of};

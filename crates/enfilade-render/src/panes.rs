@@ -39,7 +39,7 @@ pub(crate) const PANE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBu
 /// A special portal's polygon as seen from an eye.
 pub(crate) struct Pane<'a> {
     pub(crate) opening: Opening<'a>,
-    /// Corner and edges, to the right and up, of the rectangle that a monitor's picture fills.
+    /// A vertex and the edges, to the right and up, of the rectangle that a monitor's picture fills.
     pub(crate) rectangle: [DVec3; 3],
     /// In the frame of the opening.
     pub(crate) projection: &'a Projection,
@@ -145,7 +145,6 @@ impl PanePipelines {
     pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) -> Self {
         use wgpu::CompareFunction::{Always, Equal, GreaterEqual, NotEqual};
         let module = shader(gpu, "panes", &[SKY, include_str!("shaders/panes.wgsl")]);
-        let post = shader(gpu, "post", &[SKY, include_str!("shaders/post.wgsl")]);
         let in_region = |writes| Stencil {
             writes,
             ..Stencil::IN_REGION
@@ -155,19 +154,6 @@ impl PanePipelines {
             compare: NotEqual,
             reads: CHOSEN,
             writes: REGION | CHOSEN,
-        };
-        let multiply = wgpu::BlendComponent {
-            src_factor: wgpu::BlendFactor::Dst,
-            dst_factor: wgpu::BlendFactor::Zero,
-            operation: wgpu::BlendOperation::Add,
-        };
-        let multiply = wgpu::BlendState {
-            color: multiply,
-            alpha: wgpu::BlendComponent {
-                src_factor: wgpu::BlendFactor::Zero,
-                dst_factor: wgpu::BlendFactor::One,
-                operation: wgpu::BlendOperation::Add,
-            },
         };
         let polygon = Kind {
             label: "pane",
@@ -197,21 +183,7 @@ impl PanePipelines {
             buffers: &[],
             ..polygon
         };
-        let lines = shader(gpu, "lines", &[include_str!("shaders/lines.wgsl")]);
-        let marks = Kind {
-            label: "marks",
-            module: &lines,
-            vertex: "corner",
-            fragment: Some("mark"),
-            buffers: &[MARK_LAYOUT],
-            stencil: Some(Stencil {
-                compare: Always,
-                reads: 0,
-                writes: 0,
-            }),
-            layouts: polygon.layouts,
-            ..over
-        };
+        let [marks, marks_on_top] = marks(gpu, layouts, format);
         let make = |kind| pipeline(gpu, &kind);
         Self {
             depth: make(Kind {
@@ -246,13 +218,13 @@ impl PanePipelines {
                 ..screen
             }),
             close: make(Kind {
-                target: Some((format, Some(multiply))),
+                target: Some((format, Some(multiply()))),
                 depth: Some((true, Always)),
                 stencil: Some(chosen),
                 ..polygon
             }),
             tint: make(Kind {
-                target: Some((format, Some(multiply))),
+                target: Some((format, Some(multiply()))),
                 depth: Some((false, GreaterEqual)),
                 ..polygon
             }),
@@ -261,25 +233,69 @@ impl PanePipelines {
                 fragment: Some("seen_through"),
                 ..over
             }),
-            marks_on_top: make(Kind {
-                depth: Some((false, Always)),
-                ..marks
-            }),
-            marks: make(marks),
-            post: make(Kind {
-                label: "post",
-                module: &post,
-                vertex: "whole",
-                fragment: Some("finish"),
-                layouts: &[&layouts.globals, &layouts.post],
-                buffers: &[],
-                depth: None,
-                constants: &[("KEEPS_SKY", 1.0)],
-                stencil: None,
-                ..polygon
-            }),
+            marks,
+            marks_on_top,
+            post: post(gpu, layouts, format),
         }
     }
+}
+
+/// Returns the blending that multiplies by the color drawn.
+fn multiply() -> wgpu::BlendState {
+    let component = |src_factor, dst_factor| wgpu::BlendComponent {
+        src_factor,
+        dst_factor,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: component(wgpu::BlendFactor::Dst, wgpu::BlendFactor::Zero),
+        alpha: component(wgpu::BlendFactor::Zero, wgpu::BlendFactor::One),
+    }
+}
+
+/// Makes the pipelines of marks: hidden by surfaces, and on top.
+fn marks(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) -> [wgpu::RenderPipeline; 2] {
+    use wgpu::CompareFunction::{Always, GreaterEqual};
+    let lines = shader(gpu, "lines", &[include_str!("shaders/lines.wgsl")]);
+    [GreaterEqual, Always].map(|compare| {
+        let kind = Kind {
+            label: "marks",
+            module: &lines,
+            vertex: "corner",
+            fragment: Some("mark"),
+            layouts: &[&layouts.globals],
+            buffers: &[MARK_LAYOUT],
+            target: Some((format, Some(wgpu::BlendState::ALPHA_BLENDING))),
+            depth: Some((false, compare)),
+            constants: &[],
+            stencil: Some(Stencil {
+                compare: Always,
+                reads: 0,
+                writes: 0,
+            }),
+            writes_color: true,
+        };
+        pipeline(gpu, &kind)
+    })
+}
+
+/// Makes the pipeline of the effects of a whole picture that has its sky.
+fn post(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) -> wgpu::RenderPipeline {
+    let module = shader(gpu, "post", &[SKY, include_str!("shaders/post.wgsl")]);
+    let kind = Kind {
+        label: "post",
+        module: &module,
+        vertex: "whole",
+        fragment: Some("finish"),
+        layouts: &[&layouts.globals, &layouts.post],
+        buffers: &[],
+        target: Some((format, None)),
+        depth: None,
+        constants: &[("KEEPS_SKY", 1.0)],
+        stencil: None,
+        writes_color: true,
+    };
+    pipeline(gpu, &kind)
 }
 
 /// A picture to be shown in a polygon.

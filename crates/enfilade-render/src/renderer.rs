@@ -2,24 +2,24 @@
 
 use std::ops::Range;
 
-use enfilade_world::{PartId, Pose};
+use enfilade_world::Pose;
 use glam::{Mat4, Vec3};
 
 use crate::camera::Projection;
-use crate::contexts::ContextTargets;
+use crate::context_targets::ContextTargets;
 use crate::formats::{COLOR, DEPTH};
 use crate::frame::{Paint, Style};
 use crate::gpu::{Gpu, RenderError};
-use crate::lamps::{ActiveLamp, LampMaps};
+use crate::lamps::LampMaps;
 use crate::light::Light;
-use crate::list::{RenderList, Run};
+use crate::list::Run;
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::pipelines::{Layouts, Pipelines};
-use crate::props::{Prop, PropDraw, PropMeshes};
+use crate::props::{PropDraw, PropMeshes};
 use crate::resources::{Grown, bound, color_attachment, depth_attachment, read_texture, texture};
-use crate::scene::GpuWorld;
 use crate::shadings::{Shadings, draw_runs, set_buffers};
+use crate::shown::{DrawnPart, PartView, Shown};
 use crate::stage::{
     Exposed, Globals, GlobalsBuffer, RenderStage, StageView, Sunlight, lamp_buffer,
 };
@@ -33,59 +33,6 @@ pub(crate) struct Targets {
     pub(crate) color: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     post: wgpu::BindGroup,
-}
-
-/// One world of a frame.
-pub(crate) struct DrawnPart<'a> {
-    pub(crate) id: PartId,
-    pub(crate) world: &'a GpuWorld,
-    pub(crate) stage: &'a mut RenderStage,
-    pub(crate) list: &'a RenderList,
-}
-
-impl DrawnPart<'_> {
-    fn as_view(&self) -> PartView<'_> {
-        PartView {
-            world: self.world,
-            view: self.stage.first(),
-            list: self.list,
-        }
-    }
-}
-
-/// One world of a frame, ready to draw.
-#[derive(Clone, Copy)]
-pub(crate) struct PartView<'a> {
-    pub(crate) world: &'a GpuWorld,
-    pub(crate) view: &'a StageView,
-    pub(crate) list: &'a RenderList,
-}
-
-/// A frame apart from its worlds.
-#[derive(Clone, Copy)]
-pub(crate) struct Shown<'a> {
-    /// The projection in the frame of the camera.
-    pub(crate) projection: Projection,
-    /// Motion from that frame to that of the first world.
-    pub(crate) pose: Pose,
-    pub(crate) style: Style,
-    pub(crate) marks: &'a [Mark],
-    pub(crate) props: &'a [Prop],
-    pub(crate) lamps: &'a [ActiveLamp],
-    pub(crate) exposure: f32,
-    /// Share of the daylight that is left, 0 to 1.
-    pub(crate) day: f32,
-}
-
-impl Shown<'_> {
-    /// Returns the projection in the frame of a world.
-    fn projection_in(&self, stage: &RenderStage) -> Projection {
-        if stage.pose == self.pose {
-            return self.projection;
-        }
-        let motion = self.pose.inverse().after(&stage.pose);
-        self.projection.in_frame(&motion)
-    }
 }
 
 /// Draws worlds; one for each texture format.

@@ -17,8 +17,9 @@ use crate::list::{RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::props::{Prop, PropMesh};
-use crate::renderer::{Shown, read_picture};
+use crate::renderer::read_picture;
 use crate::scene::GpuWorld;
+use crate::shown::Shown;
 use crate::studio::{Studio, StudioPart, StudioTarget, drawn_parts, staged_worlds, world_of};
 
 /// A view of a space of worlds.

@@ -201,6 +201,9 @@ impl RenderStage {
     }
 }
 
+/// A world and its buffers.
+pub(crate) type StagedWorld<'a> = (&'a GpuWorld, &'a mut RenderStage);
+
 /// Makes a buffer of the lamps of a frame.
 pub(crate) fn lamp_buffer(gpu: &Gpu) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {

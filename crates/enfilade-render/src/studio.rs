@@ -5,7 +5,6 @@ use enfilade_runtime::{Sight, SightState, View, Viewer};
 use enfilade_world::{PartId, Pose, Space, SpaceViewer};
 
 use crate::camera::Camera;
-use crate::contexts::StagedWorld;
 use crate::explain::Explanation;
 use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
@@ -15,9 +14,10 @@ use crate::light::{Light, sun_of};
 use crate::list::{Lister, RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::renderer::{DrawnPart, Renderer, Shown};
+use crate::renderer::Renderer;
 use crate::scene::GpuWorld;
-use crate::stage::RenderStage;
+use crate::shown::{DrawnPart, Shown};
+use crate::stage::{RenderStage, StagedWorld};
 
 /// The part of a world that is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

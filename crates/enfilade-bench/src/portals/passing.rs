@@ -370,27 +370,27 @@ pub(super) fn bad_input(_: &str) -> anyhow::Result<Figure> {
         ("no passes", |s| s.passes.clear()),
         ("a cell that is not there", |s| s.cell = CellId(99)),
         ("a doorway that is not there", |s| {
-            s.shape = SpecialShape::Portal(PortalId(999))
+            s.shape = SpecialShape::Portal(PortalId(999));
         }),
         ("through a wall", |s| s.passes[0].way = Way::Through),
         ("a tint of 2", |s| s.passes[0].tint[1] = 2.0),
         ("a share of the first pass", |s| s.passes[0].tint[3] = 0.5),
         ("a tint that is no number", |s| {
-            s.passes[0].tint[0] = f32::NAN
+            s.passes[0].tint[0] = f32::NAN;
         }),
         ("a target that is not there", |s| *lead(s).0 = CellId(99)),
         ("a rotation that is none", |s| {
-            lead(s).1.turn = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.5)
+            lead(s).1.turn = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.5);
         }),
         ("a place at infinity", |s| lead(s).1.at.x = f64::INFINITY),
         ("a scale of 0", |s| lead(s).1.scale = 0.0),
         ("another size", |s| lead(s).1.scale = 1.1),
         ("another place", |s| lead(s).1.at.y += 0.05),
         ("a way back that is not there", |s| {
-            *lead(s).2 = Some(SpecialId(99))
+            *lead(s).2 = Some(SpecialId(99));
         }),
         ("a way back by a mirror", |s| {
-            *lead(s).2 = Some(SpecialId(0))
+            *lead(s).2 = Some(SpecialId(0));
         }),
         ("a bent polygon", |s| {
             if let SpecialShape::Surface { pieces, .. } = &mut s.shape {

@@ -3,41 +3,18 @@
 use enfilade_world::PartId;
 
 use super::{Content, Face, Layer, Node, Tree};
-use crate::formats::{COLOR, DEPTH_STENCIL};
+use crate::context_targets::ContextTarget;
+use crate::formats::COLOR;
 use crate::frame::Paint;
 use crate::gpu::{Gpu, RenderError};
-use crate::panes::{PanePicture, PanePipelines};
-use crate::pipelines::{CHOSEN, Layouts};
+use crate::panes::PanePipelines;
+use crate::pipelines::CHOSEN;
 use crate::props::PropDraw;
-use crate::renderer::{PartView, Renderer, Shown};
-use crate::resources::{Grown, color_attachment, texture};
-use crate::scene::GpuWorld;
+use crate::renderer::Renderer;
+use crate::resources::color_attachment;
 use crate::shadings::Shadings;
-use crate::stage::{Exposed, Globals, GlobalsBuffer, RenderStage};
-
-/// Most sizes of pictures, and most pictures, that are kept from frame to frame.
-const MOST_KEPT: usize = 16;
-
-/// Targets and buffers for pictures with special portals, kept from frame to frame.
-pub(crate) struct ContextTargets {
-    targets: Vec<Targets>,
-    pictures: Vec<PanePicture>,
-    /// One per context of a picture.
-    skies: Vec<GlobalsBuffer>,
-    corners: Grown,
-    pipelines: Vec<(wgpu::TextureFormat, PanePipelines)>,
-}
-
-/// Intermediate targets of one size.
-struct Targets {
-    size: [u32; 2],
-    color: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    post: wgpu::BindGroup,
-}
-
-/// A world and its buffers.
-pub(crate) type StagedWorld<'a> = (&'a GpuWorld, &'a mut RenderStage);
+use crate::shown::{PartView, Shown};
+use crate::stage::{Exposed, Globals, GlobalsBuffer, StagedWorld};
 
 /// The choices of pipelines of a node, by part.
 type NodeShadings = Vec<Shadings>;
@@ -53,91 +30,6 @@ struct Drawing<'a> {
     pictures: &'a [usize],
     panes: &'a PanePipelines,
     size: [u32; 2],
-}
-
-impl ContextTargets {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
-        Self {
-            targets: Vec::new(),
-            pictures: Vec::new(),
-            skies: Vec::new(),
-            corners: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
-            pipelines: Vec::new(),
-        }
-    }
-
-    /// Makes the targets of a size unless they exist, and moves them to the end.
-    fn resize(&mut self, gpu: &Gpu, layouts: &Layouts, size: [u32; 2]) {
-        if let Some(at) = self.targets.iter().position(|t| t.size == size) {
-            let own = self.targets.remove(at);
-            self.targets.push(own);
-            return;
-        }
-        if self.targets.len() == MOST_KEPT {
-            self.targets.remove(0);
-        }
-        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
-        let whole = wgpu::TextureViewDescriptor::default();
-        let color = texture(gpu, "color", size, COLOR, usage).create_view(&whole);
-        let depth = texture(gpu, "depth", size, DEPTH_STENCIL, usage);
-        let read = depth.create_view(&wgpu::TextureViewDescriptor {
-            aspect: wgpu::TextureAspect::DepthOnly,
-            ..whole
-        });
-        let view = |binding, view| wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(view),
-        };
-        let post = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("post"),
-            layout: &layouts.post,
-            entries: &[view(0, &color), view(1, &read)],
-        });
-        self.targets.push(Targets {
-            size,
-            color,
-            depth: depth.create_view(&whole),
-            post,
-        });
-    }
-
-    /// Returns a picture for each size.
-    fn place(
-        &mut self,
-        gpu: &Gpu,
-        layouts: &Layouts,
-        format: wgpu::TextureFormat,
-        sizes: impl Iterator<Item = [u32; 2]>,
-    ) -> Vec<usize> {
-        if self.pictures.len() > MOST_KEPT {
-            self.pictures.clear();
-        }
-        let mut out = Vec::new();
-        for size in sizes {
-            let is_free = |i: &usize| self.pictures[*i].size == size && !out.contains(i);
-            let own = (0..self.pictures.len()).find(is_free);
-            out.push(own.unwrap_or_else(|| {
-                self.pictures
-                    .push(PanePicture::new(gpu, layouts, format, size));
-                self.pictures.len() - 1
-            }));
-        }
-        out
-    }
-
-    fn prepare(&mut self, gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) {
-        if !self.pipelines.iter().any(|p| p.0 == format) {
-            let made = PanePipelines::new(gpu, layouts, format);
-            self.pipelines.push((format, made));
-        }
-    }
-
-    fn panes(&self, format: wgpu::TextureFormat) -> Option<&PanePipelines> {
-        self.pipelines
-            .iter()
-            .find(|p| p.0 == format)
-            .map(|(_, made)| made)
-    }
 }
 
 impl Renderer {
@@ -204,34 +96,7 @@ impl Renderer {
         self.camera.write(gpu, &globals);
         let is_its = |(_, node): &(usize, &Node)| node.picture == picture;
         let nodes: Vec<(usize, &Node)> = tree.nodes.iter().enumerate().filter(is_its).collect();
-        let mut shadings = Vec::new();
-        for (k, (index, node)) in nodes.iter().enumerate() {
-            if k == self.contexts.skies.len() {
-                let sky = GlobalsBuffer::new(gpu, &self.layouts);
-                self.contexts.skies.push(sky);
-            }
-            let sky = Globals::new(&node.sky.0, &node.sky.1, &exposed);
-            self.contexts.skies[k].write(gpu, &sky);
-            let mut of_node = Vec::new();
-            for part in &node.parts {
-                let (world, stage) = &mut worlds[part.id.0 as usize];
-                while stage.views.len() <= part.view {
-                    let view = self.stage_view(gpu, &stage.light, stage.explanation.as_ref());
-                    stage.views.push(view);
-                }
-                stage.write_globals_of(gpu, part.view, &part.projection, &exposed, part.gate);
-                stage.write_instances_of(gpu, part.view, world, &part.list);
-                let own = Shadings::of(&shown.style, &part.list, stage, shown.lamps.len());
-                let own = own.in_context();
-                own.prepare(gpu, &self.layouts, &mut self.pipelines, &part.list);
-                for prop in props_of(props, part.id) {
-                    let variant = own.prop(prop.span.is_smooth);
-                    self.pipelines.prepare(gpu, &self.layouts, variant);
-                }
-                of_node.push(own);
-            }
-            shadings.push((*index, of_node));
-        }
+        let shadings = self.prepare_nodes(gpu, worlds, &nodes, &exposed, props);
         let marks = (picture == 0).then(|| self.write_marks(gpu, &[], shown, size));
         self.contexts.resize(gpu, &self.layouts, size);
         let Some(targets) = self.contexts.targets.last() else {
@@ -273,20 +138,12 @@ impl Renderer {
         }
         if in_two {
             drop(pass);
-            let mut post = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("picture"),
-                color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
-                ..wgpu::RenderPassDescriptor::default()
-            });
-            post.set_pipeline(if is_count {
+            let pipeline = if is_count {
                 &self.pipelines.heat_map
             } else {
                 &second.post
-            });
-            post.set_bind_group(0, &self.camera.group, &[]);
-            post.set_bind_group(1, &targets.post, &[]);
-            post.draw(0..3, 0..1);
-            drop(post);
+            };
+            self.finish_surfaces(&mut encoder, targets, pipeline, output);
             pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("context glass"),
                 color_attachments: &[Some(color_attachment(output, None))],
@@ -315,6 +172,65 @@ impl Renderer {
         }
         drop(pass);
         gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Writes the parameters of all nodes of a picture, and prepares their pipelines.
+    fn prepare_nodes(
+        &mut self,
+        gpu: &Gpu,
+        worlds: &mut [StagedWorld<'_>],
+        nodes: &[(usize, &Node)],
+        exposed: &Exposed<'_>,
+        props: &[(PartId, Vec<PropDraw>)],
+    ) -> Vec<(usize, NodeShadings)> {
+        let mut shadings = Vec::new();
+        for (k, (index, node)) in nodes.iter().enumerate() {
+            if k == self.contexts.skies.len() {
+                let sky = GlobalsBuffer::new(gpu, &self.layouts);
+                self.contexts.skies.push(sky);
+            }
+            let sky = Globals::new(&node.sky.0, &node.sky.1, exposed);
+            self.contexts.skies[k].write(gpu, &sky);
+            let mut of_node = Vec::new();
+            for part in &node.parts {
+                let (world, stage) = &mut worlds[part.id.0 as usize];
+                while stage.views.len() <= part.view {
+                    let view = self.stage_view(gpu, &stage.light, stage.explanation.as_ref());
+                    stage.views.push(view);
+                }
+                stage.write_globals_of(gpu, part.view, &part.projection, exposed, part.gate);
+                stage.write_instances_of(gpu, part.view, world, &part.list);
+                let own = Shadings::of(exposed.style, &part.list, stage, exposed.lamps.len());
+                let own = own.in_context();
+                own.prepare(gpu, &self.layouts, &mut self.pipelines, &part.list);
+                for prop in props_of(props, part.id) {
+                    let variant = own.prop(prop.span.is_smooth);
+                    self.pipelines.prepare(gpu, &self.layouts, variant);
+                }
+                of_node.push(own);
+            }
+            shadings.push((*index, of_node));
+        }
+        shadings
+    }
+
+    /// Draws the image of the surfaces to `output`, with ambient occlusion or as counts.
+    fn finish_surfaces(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &ContextTarget,
+        pipeline: &wgpu::RenderPipeline,
+        output: &wgpu::TextureView,
+    ) {
+        let mut post = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        post.set_pipeline(pipeline);
+        post.set_bind_group(0, &self.camera.group, &[]);
+        post.set_bind_group(1, &targets.post, &[]);
+        post.draw(0..3, 0..1);
     }
 
     /// Draws the opaque surfaces of a context, opens the regions of those seen in it, and paints its sky.
