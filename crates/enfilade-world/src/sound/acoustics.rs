@@ -150,7 +150,7 @@ pub struct Heard {
     pub direction: DVec3,
     /// Amplitude relative to that at one meter in the open, without the room's reverberation: the mean over the bands by energy.
     pub gain: f64,
-    /// The same in each [octave band](OCTAVES).
+    /// The same in each [octave band](crate::OCTAVES).
     pub bands: [f64; N_BANDS],
     /// Number of paths counted.
     pub n_ways: u32,

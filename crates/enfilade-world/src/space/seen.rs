@@ -22,7 +22,7 @@ pub struct SeenContext<'a> {
 
 impl<'a> SpaceSeen<'a> {
     /// Returns the visible parts, ascending, each with its visible contents in its own frame: draw them at its
-    /// [pose](Space::pose). The border cell of a part stands for its outside. Without what is seen in special portals.
+    /// [pose](crate::Space::pose). The border cell of a part stands for its outside. Without what is seen in special portals.
     pub fn parts(&self) -> impl ExactSizeIterator<Item = (PartId, Seen<'a>)> + use<'a> {
         let own = &self.contexts[0];
         own.seen.iter().map(|id| (*id, own.answer(*id)))
@@ -57,7 +57,7 @@ impl<'a> SpaceSeen<'a> {
     }
 
     /// Returns `true` if special portals were not looked into because there were
-    /// [too many contexts](SpecialOptions::max_contexts).
+    /// [too many contexts](crate::SpecialOptions::max_contexts).
     #[must_use]
     pub fn is_capped(&self) -> bool {
         self.is_capped
