@@ -3,7 +3,6 @@
 
 mod common;
 
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -29,12 +28,15 @@ fn house(name: &str, script: &str) -> (PathBuf, IfcConverter) {
     )
     .unwrap();
     let program = folder.join("convert.sh");
-    std::fs::write(
-        &program,
-        format!("#!/bin/sh\nset -e\ncd \"$(dirname \"$0\")\"\n{script}\n"),
-    )
-    .unwrap();
-    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let text = format!("#!/bin/sh\nset -e\ncd \"$(dirname \"$0\")\"\n{script}\n");
+    std::fs::write(folder.join("text"), text).unwrap();
+    // Copied by another process: a program that this one has open for writing, or that a child of another test has inherited
+    // open, cannot be run.
+    let copied = std::process::Command::new("install")
+        .args(["-m", "755"])
+        .args([&folder.join("text"), &program])
+        .status();
+    assert!(copied.unwrap().success());
     let converter = IfcConverter::new(program, folder.join("temporary"));
     (folder, converter)
 }
