@@ -44,6 +44,7 @@ fn row(pvs: &Pvs, cell: u32, n: u32) -> Vec<u32> {
     row
 }
 
+// Covers Q8.
 #[test]
 fn a_doorway_that_leads_into_a_copy_shows_what_the_world_itself_does() {
     let mut rng = Rng::new(7);
