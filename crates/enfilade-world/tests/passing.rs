@@ -1,7 +1,8 @@
 //! Points and bodies that pass special portals meet what they would meet without them.
 
-use enfilade_cpg::{PortalId, SpecialId, SpecialPortal, SpecialShape, World};
-use enfilade_geom::{DQuat, DVec3, Similarity};
+use enfilade_cpg::{DetailObject, PortalId, SpecialId, SpecialPortal, SpecialShape, World};
+use enfilade_geom::scene::{Mesh, Primitive};
+use enfilade_geom::{Aabb, DMat4, DQuat, DVec3, Similarity};
 use enfilade_testkit::{GridParams, Rng, endless_room, linked_copies, room_grid, traced_step};
 use enfilade_world::{Agent, Body, Cast, Caster, PartId, Place, Space, Walker};
 
@@ -366,5 +367,65 @@ fn a_step_that_ends_in_the_opening_passes_with_the_next_one() {
         ];
         let n: u32 = steps.iter().map(|s| s.n_passed).sum();
         assert_eq!(n, 1, "{id}");
+    }
+}
+
+/// Adds a box to both rooms of a doorway.
+fn add_box(world: &mut World, bounds: Aabb) {
+    let corners = bounds.triangles();
+    let positions: Vec<[f32; 3]> = corners
+        .iter()
+        .flatten()
+        .map(|p| p.as_vec3().to_array())
+        .collect();
+    let primitives = vec![Primitive {
+        indices: (0..positions.len() as u32).collect(),
+        positions,
+        ..Primitive::default()
+    }];
+    let mesh = world.detail_meshes.len() as u32;
+    world.detail_meshes.push(Mesh {
+        primitives,
+        ..Mesh::default()
+    });
+    world.details.push(DetailObject {
+        name: String::new(),
+        mesh,
+        transform: DMat4::IDENTITY.to_cols_array().map(|x| x as f32),
+        cells: world.graph.portals[0].cells.to_vec(),
+        source: None,
+        part_of: None,
+    });
+}
+
+// Covers W8.
+#[test]
+fn a_leaf_with_a_face_in_the_plane_of_a_doorway_stops_what_comes() {
+    let mut world = room_grid(&GridParams::two_rooms());
+    let space = Space::new(world.clone()).unwrap();
+    let door = space.layout(ROOT).opening(PortalId(0));
+    let (bounds, normal, center) = (*door.bounds(), door.normal(), door.center());
+    add_box(
+        &mut world,
+        bounds.union(Aabb::new(
+            bounds.min + normal * 0.04,
+            bounds.max + normal * 0.04,
+        )),
+    );
+    let mut rng = Rng::new(3);
+    let linked = linked_copies(&world, PortalId(0), &far_away(&mut rng, 1.0));
+    let mut caster = Caster::new();
+    for world in [world, linked] {
+        let space = Space::new(world).unwrap();
+        let from = center - normal;
+        let cast = Cast {
+            body: &Body::Sphere { radius: 0.1 },
+            frame: ROOT,
+            from,
+            by: normal * 2.0,
+            place: space.locate(ROOT, from).expect("a room"),
+        };
+        let impact = caster.cast(&space, &cast).expect("the leaf");
+        assert!((impact.t - 0.45).abs() < 1e-5, "{impact:?}");
     }
 }

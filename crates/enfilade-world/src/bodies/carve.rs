@@ -90,7 +90,7 @@ impl Carver {
         cut
     }
 
-    /// Adds the far side of an opening: what lies beyond its plane, `normal · p >= height`, counts.
+    /// Adds the far side of an opening: what lies beyond its plane by more than a margin, `normal · p >= height + margin`, counts.
     pub(super) fn add_far(&mut self, normal: DVec3, height: f64, margin: f64) {
         self.add(normal, height, margin, false);
     }

@@ -26,6 +26,8 @@ pub(super) struct Image {
     pub(super) map: Similarity,
     /// The plane beyond which it meets things, `normal · p >= height`, and the special portal that leads back.
     far: Option<(DVec3, f64, Option<SpecialId>)>,
+    /// True if it passed a doorway, not an opening made in a wall.
+    is_doorway: bool,
 }
 
 /// A special portal that an image touches from its front.
@@ -54,6 +56,7 @@ impl Images {
             frame,
             map: Similarity::IDENTITY,
             far: None,
+            is_doorway: false,
         });
     }
 
@@ -115,6 +118,7 @@ impl Images {
             self.all.push(Image {
                 frame: part,
                 map: map.after(&moving.map),
+                is_doorway: own.layout.portal_of_special(special).is_some(),
                 far: Some((
                     normal,
                     normal.dot(map.point(opening.center())),
@@ -135,6 +139,8 @@ impl Images {
         if let Some((normal, height, _)) = own.far {
             let to = space.between(own.frame, part);
             let (normal, through) = (to.direction(normal), to.point(normal * height));
+            // In the plane of a doorway may be its leaf, which counts as beyond; in that of a wall, the wall itself.
+            let margin = if own.is_doorway { -margin } else { margin };
             self.carver.add_far(normal, normal.dot(through), margin);
         }
         for touched in self.touched.iter().filter(|t| t.image == image) {
