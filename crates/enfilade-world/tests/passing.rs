@@ -163,7 +163,7 @@ fn steps_through_many_special_portals_end_at_the_right_place_and_lead_back() {
             let angle = rng.range(0.0, std::f64::consts::TAU);
             let along = DVec3::new(angle.cos(), 0.0, angle.sin());
             let by = along * rng.range(0.0, 80.0);
-            let (end, whole, crossings) = traced_step(&world, from, by);
+            let (end, whole, crossings, _) = traced_step(&world, from, by);
             let n_passed = crossings.len() as u32;
             if n_passed > 20 {
                 continue;
@@ -271,7 +271,7 @@ fn a_ball_that_fits_through_an_opening_does_not_catch_on_the_wall_behind_it() {
                 inward.dot(p - a) > radius / slant + 1e-3
             })
         };
-        let (end, _, crossings) = traced_step(&world, from, by);
+        let (end, _, crossings, _) = traced_step(&world, from, by);
         let inside =
             |p: DVec3| p.cmpgt(low + radius + 0.01).all() && p.cmplt(high - radius - 0.01).all();
         let all_fit = crossings

@@ -257,8 +257,8 @@ pub fn endless_room(turned: bool) -> World {
     world
 }
 
-/// Returns the end of a segment, the matrix to there, and where and along which direction it passes which special portals: by
-/// matrices and planes alone.
+/// Returns the end of a segment, the matrix to there, and where and along which direction it passes which special portals,
+/// and how near it comes to a rim: by matrices and planes alone.
 ///
 /// # Panics
 ///
@@ -268,8 +268,9 @@ pub fn traced_step(
     world: &World,
     mut from: DVec3,
     mut by: DVec3,
-) -> (DVec3, DMat4, Vec<(usize, DVec3, DVec3)>) {
+) -> (DVec3, DMat4, Vec<(usize, DVec3, DVec3)>, f64) {
     let (mut whole, mut crossings) = (DMat4::IDENTITY, Vec::new());
+    let mut nearest = f64::INFINITY;
     loop {
         let mut first: Option<(f64, usize)> = None;
         for k in 0..world.graph.specials.len() {
@@ -280,16 +281,19 @@ pub fn traced_step(
             let [u, v] = [corners[1] - corners[0], corners[3] - corners[0]];
             let [x, y] = [u, v].map(|e| e.dot(p - corners[0]) / e.length_squared());
             let is_in = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
-            if normal.dot(by) > 0.0
-                && (0.0..1.0).contains(&t)
-                && is_in
-                && first.is_none_or(|f| t < f.0)
-            {
+            let is_met = normal.dot(by) > 0.0 && (0.0..1.0).contains(&t);
+            // From the nearest rim, inside or outside.
+            let off = |x: f64, edge: DVec3| x.min(1.0 - x) * edge.length();
+            let off = off(x, u).min(off(y, v)).abs();
+            if is_met {
+                nearest = nearest.min(off);
+            }
+            if is_met && is_in && first.is_none_or(|f| t < f.0) {
                 first = Some((t, k));
             }
         }
         let Some((t, k)) = first else {
-            return (from + by, whole, crossings);
+            return (from + by, whole, crossings, nearest);
         };
         let Way::Lead { map, .. } = &world.graph.specials[k].passes[0].way else {
             panic!("leads")
