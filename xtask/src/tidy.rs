@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 18] = [
+const FENCES: [Fence; 19] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -104,6 +104,12 @@ const FENCES: [Fence; 18] = [
         words: &["std::fs", "std::thread", "std::time"],
     },
     Fence {
+        name: "enfilade-stream",
+        siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-runtime"],
+        not: &["rayon", "anyhow"],
+        words: &["std::time::Instant"],
+    },
+    Fence {
         name: "enfilade-verify",
         siblings: &["enfilade-geom", "enfilade-cpg"],
         not: &["anyhow"],
@@ -135,6 +141,7 @@ const FENCES: [Fence; 18] = [
             "enfilade-bake",
             "enfilade-runtime",
             "enfilade-render",
+            "enfilade-stream",
             "enfilade-verify",
             "enfilade-vis",
             "enfilade-world",

@@ -1,0 +1,11 @@
+//! Worlds larger than memory: pieces of a world, fetched as they come into view and kept within a budget.
+//!
+//! A packed world is a small head, always in memory (graph, locator, potentially visible set, boxes, sizes, mean
+//! colors), and *pieces*: the triangles of a set of cells, a mesh of objects, a picture. [`Catalog`] lists the pieces and
+//! the cells that need them. A [`Source`] fetches pieces from wherever they are; it never blocks. After Dirkse (2002), §4.
+
+mod catalog;
+mod source;
+
+pub use catalog::{Catalog, Piece, PieceId};
+pub use source::{FetchError, Reply, Source};
