@@ -7,13 +7,15 @@ use crate::pipelines::Layouts;
 use crate::resources::{Grown, texture};
 use crate::stage::GlobalsBuffer;
 
-/// Most sizes of pictures, and most pictures, that are kept from frame to frame.
+/// Most sizes of pictures, and most pictures beside those of the last frame, that are kept from frame to frame.
 const MOST_KEPT: usize = 16;
 
 /// Targets and buffers for pictures with special portals, kept from frame to frame.
 pub(crate) struct ContextTargets {
     pub(crate) targets: Vec<ContextTarget>,
     pub(crate) pictures: Vec<PanePicture>,
+    /// For each picture, whether the last frame showed it.
+    is_used: Vec<bool>,
     /// One per context of a picture.
     pub(crate) skies: Vec<GlobalsBuffer>,
     pub(crate) corners: Grown,
@@ -26,6 +28,8 @@ pub(crate) struct ContextTarget {
     pub(crate) color: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     pub(crate) post: wgpu::BindGroup,
+    /// Whole pictures of which a part is kept, if any was drawn yet.
+    pub(crate) whole: Option<PanePicture>,
 }
 
 impl ContextTargets {
@@ -33,6 +37,7 @@ impl ContextTargets {
         Self {
             targets: Vec::new(),
             pictures: Vec::new(),
+            is_used: Vec::new(),
             skies: Vec::new(),
             corners: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
             pipelines: Vec::new(),
@@ -71,7 +76,17 @@ impl ContextTargets {
             color,
             depth: depth.create_view(&whole),
             post,
+            whole: None,
         });
+    }
+
+    /// Makes the whole picture of the last size, of which a part will be kept.
+    pub(crate) fn add_whole(&mut self, gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) {
+        if let Some(target) = self.targets.last_mut() {
+            let size = target.size;
+            let make = || PanePicture::new(gpu, layouts, format, size);
+            target.whole.get_or_insert_with(make);
+        }
     }
 
     /// Returns a picture for each size.
@@ -83,17 +98,23 @@ impl ContextTargets {
         sizes: impl Iterator<Item = [u32; 2]>,
     ) -> Vec<usize> {
         if self.pictures.len() > MOST_KEPT {
-            self.pictures.clear();
+            let mut is_used = self.is_used.drain(..);
+            self.pictures.retain(|_| is_used.next().unwrap_or(false));
         }
+        self.is_used.clear();
+        self.is_used.resize(self.pictures.len(), false);
         let mut out = Vec::new();
         for size in sizes {
-            let is_free = |i: &usize| self.pictures[*i].size == size && !out.contains(i);
+            let is_free = |i: &usize| self.pictures[*i].size == size && !self.is_used[*i];
             let own = (0..self.pictures.len()).find(is_free);
-            out.push(own.unwrap_or_else(|| {
+            let own = own.unwrap_or_else(|| {
                 self.pictures
                     .push(PanePicture::new(gpu, layouts, format, size));
+                self.is_used.push(false);
                 self.pictures.len() - 1
-            }));
+            });
+            self.is_used[own] = true;
+            out.push(own);
         }
         out
     }

@@ -5,9 +5,10 @@
 //! there. A later pass, which is blended over the first, and the picture of a monitor are pictures of their own, drawn before
 //! the one that shows them.
 //!
-//! A picture holds at most [127 regions](MOST_REGIONS), and a frame [few pictures](MOST_PICTURES), one in another at most
-//! [twice](MOST_NESTED). What is beyond these limits, or was [not looked into](enfilade_world::SpaceSeen::stopped_specials), is
-//! filled with one color, or left out if it would be blended over something. The counts tell.
+//! A picture holds at most [127 regions](MOST_REGIONS). What is beyond this limit, or was
+//! [not looked into](enfilade_world::SpaceSeen::stopped_specials), is filled with one color, or left out if it would be blended over
+//! something. The counts tell. Of a later pass the rectangle around the special portal is kept, so that the memory of all pictures
+//! is bounded by [`max_apart`](enfilade_world::SpecialOptions::max_apart).
 
 mod draw;
 
@@ -29,10 +30,8 @@ use crate::studio::{Studio, world_of};
 
 /// Most contexts drawn into one picture beside its own.
 const MOST_REGIONS: u32 = REGION;
-/// Most pictures of a frame.
-const MOST_PICTURES: usize = 9;
-/// Most pictures around a picture.
-const MOST_NESTED: usize = 2;
+/// Step of the sizes of textures that keep a part of a picture. [Units: px]
+const ROOM_STEP: u32 = 64;
 /// Height of the pictures of the smallest monitors. [Units: px]
 const LEAST_HEIGHT: u32 = 32;
 /// Linear color of a monitor that shows nothing.
@@ -109,8 +108,27 @@ struct TreePicture {
     projection: Projection,
     pose: Pose,
     exposure: f32,
-    n_nested: usize,
+    /// The part of it that is shown.
+    kept: Scissor,
     n_regions: u32,
+}
+
+impl TreePicture {
+    /// Returns `true` if only a part of it is shown.
+    fn is_cut(&self) -> bool {
+        self.kept != [0, 0, self.size[0], self.size[1]]
+    }
+
+    /// Returns the size of the texture that keeps it, in steps, so that those of one frame serve the next.
+    fn room(&self) -> [u32; 2] {
+        let [.., w, h] = self.kept;
+        let step = |n: u32, most: u32| n.max(1).next_multiple_of(ROOM_STEP).min(most);
+        if self.is_cut() {
+            [step(w, self.size[0]), step(h, self.size[1])]
+        } else {
+            self.size
+        }
+    }
 }
 
 /// Key of a context: that of its parent, part, special portal, pass.
@@ -134,7 +152,7 @@ impl Studio {
                 projection,
                 pose: *shot.space.pose(shot.frame),
                 exposure: self.exposure(shot, shot.frame, projection.exact_origin()),
-                n_nested: 0,
+                kept: [0, 0, size[0], size[1]],
                 n_regions: 0,
             }],
             corners: Vec::new(),
@@ -200,20 +218,19 @@ impl Studio {
                         projection,
                         pose: *space.pose(via.part),
                         exposure: self.exposure(shot, via.part, eye),
-                        n_nested: own.n_nested + 1,
+                        kept: [0, 0, width as u32, height],
                         n_regions: 0,
                     })
                 }
                 _ if via.pass > 0 => Some(TreePicture {
-                    n_nested: own.n_nested + 1,
+                    kept: scissor(context.rectangle(), own.size),
                     n_regions: 0,
                     ..*own
                 }),
                 _ => None,
             };
             if let Some(made) = made {
-                let is_full = tree.pictures.len() == MOST_PICTURES || made.n_nested > MOST_NESTED;
-                if is_full || self.gpu.check_picture(made.size).is_err() {
+                if self.gpu.check_picture(made.size).is_err() {
                     return Ok(None);
                 }
                 picture = tree.pictures.len();
@@ -391,7 +408,11 @@ impl Studio {
             if pass == 0 {
                 color[3] = 1.0;
             }
-            layers.push((content, it.tint[..3] != [1.0; 3], pane.corners(color)));
+            let corners = match content {
+                Content::Seen(picture) => pane.corners_at(color, tree.pictures[picture].kept),
+                _ => pane.corners(color),
+            };
+            layers.push((content, it.tint[..3] != [1.0; 3], corners));
         }
         let eye = pane.projection.exact_origin();
         let distance = pane.opening.center().distance(eye) as f32;

@@ -9,6 +9,7 @@ use enfilade_world::Opening;
 
 use crate::camera::{Camera, Projection};
 use crate::gpu::Gpu;
+use crate::list::Scissor;
 use crate::pipelines::{
     CHOSEN, Kind, Layouts, MARK_LAYOUT, NEARER, REGION, SKY, Stencil, pipeline, shader,
 };
@@ -25,6 +26,7 @@ const LIFT: f64 = 2e-5;
 pub(crate) struct PaneCorner {
     /// Relative to the eye; w: 1 before the near plane.
     position: [f32; 4],
+    /// Place in a monitor's picture, or the first pixel of a picture that was kept.
     uv: [f32; 2],
     /// Linear factors; the last is the share by which it covers what was there.
     color: [f32; 4],
@@ -53,6 +55,13 @@ impl Pane<'_> {
     /// Returns the height of the eye before the plane. [Units: wu]
     pub(crate) fn height(&self) -> f64 {
         -self.opening.height_of(self.projection.exact_origin())
+    }
+
+    /// Returns the triangles of the polygon, to be shown with a picture of the same camera of which only a part was kept.
+    pub(crate) fn corners_at(&self, color: [f32; 4], [x, y, ..]: Scissor) -> Vec<PaneCorner> {
+        let uv = [x as f32, y as f32];
+        let corners = self.corners(color).into_iter();
+        corners.map(|corner| PaneCorner { uv, ..corner }).collect()
     }
 
     /// Returns the triangles of the polygon.
@@ -301,6 +310,7 @@ fn post(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) -> wgpu::Rend
 /// A picture to be shown in a polygon.
 pub(crate) struct PanePicture {
     pub(crate) size: [u32; 2],
+    texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
     pub(crate) group: wgpu::BindGroup,
 }
@@ -312,7 +322,9 @@ impl PanePicture {
         format: wgpu::TextureFormat,
         size: [u32; 2],
     ) -> Self {
-        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC
+            | wgpu::TextureUsages::COPY_DST;
         let texture = crate::resources::texture(gpu, "pane", size, format, usage);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -334,6 +346,28 @@ impl PanePicture {
                 },
             ],
         });
-        Self { size, view, group }
+        Self {
+            size,
+            texture,
+            view,
+            group,
+        }
+    }
+
+    /// Copies a part of `from`, which it must hold, to its first pixels.
+    pub(crate) fn copy(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        from: &Self,
+        [x, y, width, height]: Scissor,
+    ) {
+        let mut source = from.texture.as_image_copy();
+        source.origin = wgpu::Origin3d { x, y, z: 0 };
+        let size = wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        };
+        encoder.copy_texture_to_texture(source, self.texture.as_image_copy(), size);
     }
 }

@@ -67,6 +67,7 @@ impl Scene {
         let mut viewer = SpaceViewer::new(&space);
         viewer.specials_mut().max_contexts = 100;
         viewer.specials_mut().min_share = 1e-4;
+        viewer.specials_mut().max_apart = 1e3;
         Self {
             traced: Traced::new(&world),
             world,
@@ -93,7 +94,7 @@ impl Scene {
             lamps: None,
         };
         let (picture, counts) = self.studio.space_picture(&shot, self.size).unwrap();
-        (picture, counts, chains(&self.world, &seen))
+        (picture, counts, chains(&seen))
     }
 
     /// Draws a picture and counts its pixels. A color may differ by a step of 255; by three if `blends` pictures of pictures.
@@ -144,32 +145,18 @@ impl Scene {
     }
 }
 
-/// Returns the chains of special portals that are drawn: eight pictures of later passes and monitors at most, one in
-/// another twice at most.
-fn chains(world: &World, seen: &SpaceSeen<'_>) -> HashSet<Chain> {
-    let is_apart = |&(special, pass): &(u32, usize)| {
-        let way = &world.graph.specials[special as usize].passes[pass].way;
-        pass > 0 || matches!(way, Way::Monitor(_))
-    };
-    let mut all: Vec<Option<Chain>> = Vec::new();
-    let mut n_apart = 0;
+/// Returns the chains of special portals that are looked into.
+fn chains(seen: &SpaceSeen<'_>) -> HashSet<Chain> {
+    let mut all: Vec<Chain> = Vec::new();
     for context in seen.contexts() {
-        let chain = context.via().map_or_else(
-            || Some(Vec::new()),
-            |via| {
-                let mut chain = all[via.parent].clone()?;
-                chain.push((via.special.0, via.pass));
-                if chain.last().is_some_and(is_apart) {
-                    let is_deep = chain.iter().filter(|at| is_apart(at)).count() > 2;
-                    n_apart += usize::from(!is_deep);
-                    return (!is_deep && n_apart <= 8).then_some(chain);
-                }
-                Some(chain)
-            },
-        );
+        let chain = context.via().map_or_else(Vec::new, |via| {
+            let mut chain = all[via.parent].clone();
+            chain.push((via.special.0, via.pass));
+            chain
+        });
         all.push(chain);
     }
-    all.into_iter().flatten().collect()
+    all.into_iter().collect()
 }
 
 fn traced_camera(camera: &Camera, size: [u32; 2]) -> TracedCamera {
@@ -389,6 +376,7 @@ fn facing_mirrors_end_and_the_counts_tell() {
         *scene.viewer.specials_mut() = enfilade_world::SpecialOptions {
             max_contexts: most,
             min_share: share,
+            ..Default::default()
         };
         let mut pixels = Pixels::default();
         let counts = scene.check(

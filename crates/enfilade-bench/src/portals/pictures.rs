@@ -226,6 +226,7 @@ fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure
     let mut viewer = SpaceViewer::new(&space);
     viewer.specials_mut().max_contexts = 100;
     viewer.specials_mut().min_share = 1e-4;
+    viewer.specials_mut().max_apart = 1e3;
     let mut rng = Rng::new(21);
     let [
         mut n_certain,
@@ -265,7 +266,7 @@ fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure
         time += start.elapsed();
         n_contexts += counts.n_contexts;
         n_left_out += counts.n_left_out;
-        let known = chains(&world, &seen);
+        let known = chains(&seen);
         let own = traced_camera(&camera);
         for i in 0..SIZE[0] * SIZE[1] {
             let depth = Cell::new(0);
@@ -345,30 +346,16 @@ fn traced_camera(camera: &Camera) -> TracedCamera {
     }
 }
 
-/// Returns the chains of special portals that are drawn: of later passes, eight pictures at most, one in another twice at
-/// most.
-fn chains(world: &World, seen: &SpaceSeen<'_>) -> HashSet<Chain> {
-    let is_apart = |&(special, pass): &(u32, usize)| {
-        let way = &world.graph.specials[special as usize].passes[pass].way;
-        pass > 0 || matches!(way, Way::Monitor(_))
-    };
-    let mut all: Vec<Option<Chain>> = Vec::new();
-    let mut n_apart = 0;
+/// Returns the chains of special portals that are looked into.
+fn chains(seen: &SpaceSeen<'_>) -> HashSet<Chain> {
+    let mut all: Vec<Chain> = Vec::new();
     for context in seen.contexts() {
-        let chain = context.via().map_or_else(
-            || Some(Vec::new()),
-            |via| {
-                let mut chain = all[via.parent].clone()?;
-                chain.push((via.special.0, via.pass));
-                if chain.last().is_some_and(is_apart) {
-                    let is_deep = chain.iter().filter(|at| is_apart(at)).count() > 2;
-                    n_apart += usize::from(!is_deep);
-                    return (!is_deep && n_apart <= 8).then_some(chain);
-                }
-                Some(chain)
-            },
-        );
+        let chain = context.via().map_or_else(Vec::new, |via| {
+            let mut chain = all[via.parent].clone();
+            chain.push((via.special.0, via.pass));
+            chain
+        });
         all.push(chain);
     }
-    all.into_iter().flatten().collect()
+    all.into_iter().collect()
 }

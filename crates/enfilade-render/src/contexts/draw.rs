@@ -2,7 +2,7 @@
 
 use enfilade_world::PartId;
 
-use super::{Content, Face, Layer, Node, Tree};
+use super::{Content, Face, Layer, Node, Tree, TreePicture};
 use crate::context_targets::ContextTarget;
 use crate::formats::COLOR;
 use crate::frame::Paint;
@@ -56,7 +56,7 @@ impl Renderer {
         for format in [COLOR, self.format()] {
             self.contexts.prepare(gpu, &self.layouts, format);
         }
-        let sizes = tree.pictures[1..].iter().map(|p| p.size);
+        let sizes = tree.pictures[1..].iter().map(TreePicture::room);
         let format = self.format();
         let pictures = (self.contexts).place(gpu, &self.layouts, format, sizes);
         for picture in (0..tree.pictures.len()).rev() {
@@ -99,15 +99,19 @@ impl Renderer {
         let shadings = self.prepare_nodes(gpu, worlds, &nodes, &exposed, props);
         let marks = (picture == 0).then(|| self.write_marks(gpu, &[], shown, size));
         self.contexts.resize(gpu, &self.layouts, size);
+        if own.is_cut() {
+            let format = self.format();
+            self.contexts.add_whole(gpu, &self.layouts, format);
+        }
         let Some(targets) = self.contexts.targets.last() else {
             return;
         };
         let is_count = shown.style.paint == Paint::Overdraw;
         let in_two = is_count || shown.style.dark_corners;
-        let output = match picture {
-            0 => output,
-            i => &self.contexts.pictures[pictures[i - 1]].view,
-        };
+        let kept = picture.checked_sub(1);
+        let kept = kept.map(|i| &self.contexts.pictures[pictures[i]]);
+        let whole = targets.whole.as_ref().filter(|_| own.is_cut());
+        let output = whole.or(kept).map_or(output, |picture| &picture.view);
         let formats = [if in_two { COLOR } else { self.format() }, self.format()];
         let [Some(first), Some(second)] = formats.map(|f| self.contexts.panes(f)) else {
             return;
@@ -171,6 +175,9 @@ impl Renderer {
             );
         }
         drop(pass);
+        if let (Some(kept), Some(whole)) = (kept, whole) {
+            kept.copy(&mut encoder, whole, own.kept);
+        }
         gpu.queue.submit([encoder.finish()]);
     }
 
@@ -362,6 +369,7 @@ impl Renderer {
     ) {
         let [x, y, w, h] = match layer.content {
             Content::Node(child) => drawing.tree.nodes[child].scissor,
+            Content::Seen(picture) => drawing.tree.pictures[picture].kept,
             _ => node.scissor,
         };
         pass.set_scissor_rect(x, y, w, h);

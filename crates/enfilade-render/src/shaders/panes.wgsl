@@ -32,10 +32,10 @@ fn shown(in: Pane) -> Drawn {
     return drawn(in.clip, vec4(texel.rgb * in.color.rgb, in.color.a));
 }
 
-// A picture of the same camera.
+// A picture of the same camera, from its pixel `uv` on.
 @fragment
 fn seen_through(in: Pane) -> Drawn {
-    let texel = textureLoad(picture, vec2<i32>(in.clip.xy), 0);
+    let texel = textureLoad(picture, vec2<i32>(in.clip.xy) - vec2<i32>(round(in.uv)), 0);
     return drawn(in.clip, vec4(texel.rgb * in.color.rgb, in.color.a));
 }
 

@@ -33,14 +33,18 @@ pub struct SpecialOptions {
     /// Smallest special portal looked into, as its share of the screen. Smaller ones are listed as
     /// [stopped](SpaceSeen::stopped_specials). [Limit: 0 to 1]
     pub min_share: f32,
+    /// Total area of the rectangles around what is drawn apart, and so takes memory for pictures: later passes, which are blended
+    /// over the first, and monitors. What is beyond it is listed as stopped. [Units: screens]
+    pub max_apart: f32,
 }
 
 impl Default for SpecialOptions {
-    /// 64 contexts, and a share of 1/4096: 15 by 30 pixels of a picture of 1280 by 720.
+    /// 64 contexts, a share of 1/4096, which is 15 by 15 pixels of a picture of 1280 by 720, and four screens of pictures.
     fn default() -> Self {
         Self {
             max_contexts: 64,
             min_share: 1.0 / 4096.0,
+            max_apart: 4.0,
         }
     }
 }
@@ -56,6 +60,8 @@ pub struct SpaceViewer {
     open: BinaryHeap<Open>,
     stopped: Vec<StoppedSpecial>,
     is_capped: bool,
+    /// Total area of the rectangles around what is drawn apart. [Units: screens]
+    apart: f64,
     buffers: ViewBuffers,
 }
 
@@ -110,6 +116,7 @@ impl SpaceViewer {
             open: BinaryHeap::new(),
             stopped: Vec::new(),
             is_capped: false,
+            apart: 0.0,
             buffers: ViewBuffers::default(),
         }
     }
@@ -131,6 +138,7 @@ impl SpaceViewer {
         self.n_contexts = 0;
         self.stopped.clear();
         self.is_capped = false;
+        self.apart = 0.0;
         let root = self.add_context(frame, view.clone(), Similarity::IDENTITY);
         for face in 0..view.n_faces() {
             self.open.clear();
@@ -276,8 +284,17 @@ impl SpaceViewer {
         let known = self.contexts[..self.n_contexts]
             .iter()
             .position(|c| c.via == Some(via));
+        let own = &space.parts[part.idx()];
+        let side = &own.world.graph.specials[special.idx()];
+        let way = &side.passes[pass].way;
+        let around = rectangle_of(views);
+        let [l, b, r, t] = around;
+        let area = (r - l).max(0.0) * (t - b).max(0.0) * 0.25 * self.contexts[parent].share;
+        let is_apart = pass > 0 || matches!(way, Way::Monitor(_));
+        let apart = self.apart + if is_apart { area } else { 0.0 };
         if known.is_none() {
-            let is_full = self.n_contexts >= self.specials.max_contexts;
+            let is_full = self.n_contexts >= self.specials.max_contexts
+                || apart > f64::from(self.specials.max_apart);
             if is_full || share < f64::from(self.specials.min_share) {
                 self.is_capped |= is_full;
                 let share = share as f32;
@@ -285,9 +302,6 @@ impl SpaceViewer {
                 return;
             }
         }
-        let own = &space.parts[part.idx()];
-        let side = &own.world.graph.specials[special.idx()];
-        let way = &side.passes[pass].way;
         if let Way::Monitor(camera) = way {
             let [_, right, up] = own.layout.special_rectangle(special);
             let aspect = (right.length() / up.length()) as f32;
@@ -298,6 +312,7 @@ impl SpaceViewer {
                 let context = self.add_context(part, view, Similarity::IDENTITY);
                 let own = &mut self.contexts[context];
                 (own.via, own.share) = (Some(via), share);
+                self.apart = apart;
                 own.begin_face();
                 self.open.push(Open { share, context });
             }
@@ -336,6 +351,7 @@ impl SpaceViewer {
                 own.back = back.map(|back| (part, back));
                 own.is_direct = false;
                 own.rectangle = NOTHING;
+                self.apart = apart;
                 context
             }
         };
@@ -346,14 +362,23 @@ impl SpaceViewer {
             let window = view.window.in_frame(&appears);
             own.gate = window.plane();
             own.starts.push((to, (!view.is_at_eye).then_some(window)));
-            let [left, bottom, right, top] = window.rectangle();
-            let [l, b, r, t] = own.rectangle;
-            own.rectangle = [l.min(left), b.min(bottom), r.max(right), t.max(top)];
         }
+        own.rectangle = joined(own.rectangle, around);
         // One piece of it near the eye leaves no plane for the others either.
         if views.iter().any(|v| v.1.window.plane().is_none()) {
             own.gate = None;
         }
         self.open.push(Open { share, context });
     }
+}
+
+/// Returns the rectangle of the screen around a special portal.
+fn rectangle_of(views: &[(PartId, SpecialView)]) -> [f64; 4] {
+    let each = views.iter().map(|(_, view)| view.window.rectangle());
+    each.fold(NOTHING, joined)
+}
+
+/// Returns the rectangle around two.
+fn joined([l, b, r, t]: [f64; 4], [left, bottom, right, top]: [f64; 4]) -> [f64; 4] {
+    [l.min(left), b.min(bottom), r.max(right), t.max(top)]
 }
