@@ -28,7 +28,7 @@ pub(crate) struct ContextTarget {
     pub(crate) color: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     pub(crate) post: wgpu::BindGroup,
-    /// Whole pictures of which a part is kept, if any was drawn yet.
+    /// A whole picture, of which a part is kept or colors are rounded, if any was drawn yet.
     pub(crate) whole: Option<PanePicture>,
 }
 
@@ -80,12 +80,12 @@ impl ContextTargets {
         });
     }
 
-    /// Makes the whole picture of the last size, of which a part will be kept.
+    /// Makes the whole picture of the last size, unless it exists.
     pub(crate) fn add_whole(&mut self, gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) {
         if let Some(target) = self.targets.last_mut() {
-            let size = target.size;
-            let make = || PanePicture::new(gpu, layouts, format, size);
-            target.whole.get_or_insert_with(make);
+            if target.whole.as_ref().is_none_or(|w| w.format != format) {
+                target.whole = Some(PanePicture::new(gpu, layouts, format, target.size));
+            }
         }
     }
 
@@ -105,7 +105,8 @@ impl ContextTargets {
         self.is_used.resize(self.pictures.len(), false);
         let mut out = Vec::new();
         for size in sizes {
-            let is_free = |i: &usize| self.pictures[*i].size == size && !self.is_used[*i];
+            let fits = |picture: &PanePicture| picture.size == size && picture.format == format;
+            let is_free = |i: &usize| fits(&self.pictures[*i]) && !self.is_used[*i];
             let own = (0..self.pictures.len()).find(is_free);
             let own = own.unwrap_or_else(|| {
                 self.pictures

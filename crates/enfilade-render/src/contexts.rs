@@ -544,6 +544,12 @@ impl Tree {
         }
     }
 
+    /// Returns `true` if layers are blended over each other.
+    fn blends(&self) -> bool {
+        let faces = || self.nodes.iter().flat_map(|n| &n.faces);
+        faces().any(|f| f.first.is_tinted || !f.later.is_empty())
+    }
+
     fn parts(&self) -> impl Iterator<Item = PartId> {
         self.nodes.iter().flat_map(|n| n.parts.iter().map(|p| p.id))
     }

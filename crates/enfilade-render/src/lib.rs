@@ -69,6 +69,7 @@
 mod camera;
 mod context_targets;
 mod contexts;
+mod copies;
 mod explain;
 mod formats;
 mod frame;

@@ -79,9 +79,11 @@ impl Pane<'_> {
             if let Some((n, h)) = self.gate {
                 points = clipped(&points, |p| n.dot(p) - h);
             }
-            let far = clipped(&points, |p| ahead.dot(p) * lift - near);
-            // With an overlap, so that rounding leaves no seam.
-            let close = clipped(&points, |p| 1.01 * near - ahead.dot(p) * lift);
+            // Parted beyond the near plane, so that the adapter cuts neither: both then have the same vertices at the seam, which
+            // leaves no gap, and nothing is blended twice.
+            let depth = |p: DVec3| ahead.dot(p) * lift - 1.01 * near;
+            let far = clipped(&points, depth);
+            let close = clipped(&points, |p| -depth(p));
             let close = clipped(&close, |p| ahead.dot(p) - 1e-3 * AT_EYE);
             for (polygon, is_close) in [(far, false), (close, true)] {
                 let corner = |p: DVec3| {
@@ -143,6 +145,8 @@ pub(crate) struct PanePipelines {
     pub(crate) over_monitor: wgpu::RenderPipeline,
     /// The same, with a picture of this camera's.
     pub(crate) over: wgpu::RenderPipeline,
+    /// Copies a picture.
+    pub(crate) copy: wgpu::RenderPipeline,
     /// Marks hidden by surfaces.
     pub(crate) marks: wgpu::RenderPipeline,
     pub(crate) marks_on_top: wgpu::RenderPipeline,
@@ -242,6 +246,15 @@ impl PanePipelines {
                 fragment: Some("seen_through"),
                 ..over
             }),
+            copy: make(Kind {
+                label: "copy",
+                fragment: Some("copied"),
+                depth: None,
+                stencil: None,
+                buffers: &[],
+                vertex: "whole",
+                ..pictured
+            }),
             marks,
             marks_on_top,
             post: post(gpu, layouts, format),
@@ -310,6 +323,7 @@ fn post(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) -> wgpu::Rend
 /// A picture to be shown in a polygon.
 pub(crate) struct PanePicture {
     pub(crate) size: [u32; 2],
+    pub(crate) format: wgpu::TextureFormat,
     texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
     pub(crate) group: wgpu::BindGroup,
@@ -348,6 +362,7 @@ impl PanePicture {
         });
         Self {
             size,
+            format,
             texture,
             view,
             group,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::formats::{COLOR, DEPTH, DEPTH_STENCIL, ID};
+use crate::formats::{BLENDED, COLOR, DEPTH, DEPTH_STENCIL, ID};
 use crate::gpu::Gpu;
 use crate::scene::{CORNER_LAYOUT, INSTANCE_LAYOUT, texture_layout};
 
@@ -38,6 +38,17 @@ pub(crate) enum Shading {
     Count,
 }
 
+/// The target of a pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Canvas {
+    /// The intermediate target of the post pass.
+    Surfaces,
+    /// The picture.
+    Output,
+    /// A picture of finer colors, in which layers are blended.
+    Blended,
+}
+
 /// Differences between surface pipelines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Variant {
@@ -49,8 +60,7 @@ pub(crate) struct Variant {
     /// True if the color is that of the instance.
     pub(crate) is_prop: bool,
     pub(crate) has_lamps: bool,
-    /// True if it draws to the output, not to the intermediate target of the post pass.
-    pub(crate) is_last: bool,
+    pub(crate) canvas: Canvas,
     /// True if it draws in the region of one context: see `contexts.rs`.
     pub(crate) is_in_context: bool,
 }
@@ -511,7 +521,11 @@ impl Pipelines {
                 ("count", Some(both), true)
             }
         };
-        let format = if variant.is_last { self.output } else { COLOR };
+        let format = match variant.canvas {
+            Canvas::Surfaces => COLOR,
+            Canvas::Output => self.output,
+            Canvas::Blended => BLENDED,
+        };
         let number = |b: bool| f64::from(u8::from(b));
         let made = pipeline(
             gpu,

@@ -1,10 +1,11 @@
 //! Things that move through worlds as copies of simple meshes: people, balls, boxes.
 
 use enfilade_geom::scene::Primitive;
+use enfilade_geom::{Aabb, DVec3};
 use enfilade_world::{PartId, Pose};
-use glam::{Mat4, Quat, Vec3};
-use wgpu::util::DeviceExt;
+use glam::{Quat, Vec3};
 
+use crate::copies::PropCopy;
 use crate::gpu::Gpu;
 use crate::resources::Grown;
 use crate::scene::{Corner, Finish, Instance, Span};
@@ -52,15 +53,6 @@ impl Default for Prop {
     }
 }
 
-impl Prop {
-    fn instance(&self) -> Instance {
-        let turn = self.pose.turn.as_quat();
-        let at = self.pose.at.as_vec3();
-        let placed = Mat4::from_scale_rotation_translation(self.size.into(), turn, at);
-        Instance::of_prop(&placed, self.color, self.glow)
-    }
-}
-
 /// Copies of one mesh in one world: a range of the buffer of instances.
 pub(crate) struct PropDraw {
     pub(crate) span: Span,
@@ -72,8 +64,12 @@ pub(crate) struct PropMeshes {
     corners: Vec<Corner>,
     indices: Vec<u32>,
     spans: Vec<Span>,
-    vertex_buffer: wgpu::Buffer,
-    index_buffer: wgpu::Buffer,
+    /// For each mesh, the center and radius of a sphere around it.
+    spheres: Vec<(DVec3, f64)>,
+    vertex_buffer: Grown,
+    index_buffer: Grown,
+    /// Numbers of vertices and indices of whole meshes; cut ones, of the current frame, follow.
+    n_whole: [usize; 2],
     instances: Grown,
     drawn: Vec<Instance>,
 }
@@ -86,46 +82,92 @@ impl PropMeshes {
         let spans = (meshes.iter())
             .map(|mesh| add(mesh, &mut corners, &mut indices))
             .collect();
-        let [vertex_buffer, index_buffer] = upload(gpu, &corners, &indices);
-        Self {
+        let mut out = Self {
+            n_whole: [corners.len(), indices.len()],
             corners,
             indices,
             spans,
-            vertex_buffer,
-            index_buffer,
+            spheres: meshes.iter().map(sphere_around).collect(),
+            vertex_buffer: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
+            index_buffer: Grown::new(gpu, wgpu::BufferUsages::INDEX),
             instances: Grown::new(gpu, wgpu::BufferUsages::VERTEX),
             drawn: Vec::new(),
-        }
+        };
+        out.upload(gpu);
+        out
     }
 
     pub(crate) fn add(&mut self, gpu: &Gpu, mesh: &Primitive) -> PropMesh {
+        self.drop_cut();
         let span = add(mesh, &mut self.corners, &mut self.indices);
         self.spans.push(span);
-        [self.vertex_buffer, self.index_buffer] = upload(gpu, &self.corners, &self.indices);
+        self.spheres.push(sphere_around(mesh));
+        self.n_whole = [self.corners.len(), self.indices.len()];
+        self.upload(gpu);
         PropMesh(self.spans.len() as u32 - 1)
     }
 
-    /// Writes the instances of props; returns their draws for each of `parts`. Props in other parts are left out.
+    fn drop_cut(&mut self) {
+        self.corners.truncate(self.n_whole[0]);
+        self.indices.truncate(self.n_whole[1]);
+    }
+
+    fn upload(&mut self, gpu: &Gpu) {
+        self.vertex_buffer
+            .write(gpu, bytemuck::cast_slice(&self.corners));
+        self.index_buffer
+            .write(gpu, bytemuck::cast_slice(&self.indices));
+    }
+
+    /// Returns the center and radius of a sphere around a mesh; of nothing for one that does not exist.
+    pub(crate) fn sphere(&self, mesh: PropMesh) -> (DVec3, f64) {
+        let own = self.spheres.get(mesh.0 as usize);
+        own.copied().unwrap_or((DVec3::ZERO, 0.0))
+    }
+
+    /// Writes the instances of copies of props; returns their draws for each of `parts`. Copies in other parts are left out.
     pub(crate) fn write(
         &mut self,
         gpu: &Gpu,
-        props: &[Prop],
+        copies: &[PropCopy],
         parts: impl Iterator<Item = PartId>,
     ) -> Vec<Vec<PropDraw>> {
         self.drawn.clear();
+        self.drop_cut();
         let mut out = Vec::new();
         for part in parts {
             let mut draws = Vec::new();
+            let its = || copies.iter().filter(|c| c.prop.part == part);
             for (number, &span) in (0..).map(PropMesh).zip(&self.spans) {
                 let first = self.drawn.len() as u32;
-                let is_its = |p: &&Prop| p.part == part && p.mesh == number;
-                (self.drawn).extend(props.iter().filter(is_its).map(Prop::instance));
+                let whole = its().filter(|c| c.prop.mesh == number && c.cuts.is_empty());
+                self.drawn.extend(whole.map(PropCopy::instance));
                 let instances = first..self.drawn.len() as u32;
                 if !instances.is_empty() {
                     draws.push(PropDraw { span, instances });
                 }
             }
+            for copy in its().filter(|c| !c.cuts.is_empty()) {
+                let Some(whole) = self.spans.get(copy.prop.mesh.0 as usize) else {
+                    continue;
+                };
+                let first = self.indices.len() as u32;
+                copy.cut(whole, &mut self.corners, &mut self.indices);
+                let number = self.drawn.len() as u32;
+                self.drawn.push(copy.instance());
+                draws.push(PropDraw {
+                    span: Span {
+                        first,
+                        n: self.indices.len() as u32 - first,
+                        ..*whole
+                    },
+                    instances: number..number + 1,
+                });
+            }
             out.push(draws);
+        }
+        if self.indices.len() > self.n_whole[1] {
+            self.upload(gpu);
         }
         if !self.drawn.is_empty() {
             self.instances.write(gpu, bytemuck::cast_slice(&self.drawn));
@@ -134,8 +176,11 @@ impl PropMeshes {
     }
 
     pub(crate) fn set_buffers(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_index_buffer(self.index_buffer.slice(..), wgpu::IndexFormat::Uint32);
-        pass.set_vertex_buffer(0, self.vertex_buffer.slice(..));
+        pass.set_index_buffer(
+            self.index_buffer.buffer.slice(..),
+            wgpu::IndexFormat::Uint32,
+        );
+        pass.set_vertex_buffer(0, self.vertex_buffer.buffer.slice(..));
         pass.set_vertex_buffer(1, self.instances.buffer.slice(..));
     }
 }
@@ -162,19 +207,17 @@ fn add(mesh: &Primitive, corners: &mut Vec<Corner>, indices: &mut Vec<u32>) -> S
     }
 }
 
-fn upload(gpu: &Gpu, corners: &[Corner], indices: &[u32]) -> [wgpu::Buffer; 2] {
-    let buffer = |contents: &[u8], usage| {
-        gpu.device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("props"),
-                contents,
-                usage,
-            })
+/// Returns the center and radius of a sphere around a mesh.
+fn sphere_around(mesh: &Primitive) -> (DVec3, f64) {
+    let points = || mesh.positions.iter().map(|p| Vec3::from(*p).as_dvec3());
+    let middle = Aabb::of_points(&points().collect::<Vec<_>>()).center();
+    let middle = if middle.is_finite() {
+        middle
+    } else {
+        DVec3::ZERO
     };
-    [
-        buffer(bytemuck::cast_slice(corners), wgpu::BufferUsages::VERTEX),
-        buffer(bytemuck::cast_slice(indices), wgpu::BufferUsages::INDEX),
-    ]
+    let radius = points().map(|p| p.distance(middle)).fold(0.0, f64::max);
+    (middle, radius)
 }
 
 /// Sides of a ring of the meshes below.

@@ -3,7 +3,7 @@
 use crate::frame::{Paint, Style};
 use crate::gpu::Gpu;
 use crate::list::{RenderList, Run};
-use crate::pipelines::{Layouts, Pipelines, Shading, Variant};
+use crate::pipelines::{Canvas, Layouts, Pipelines, Shading, Variant};
 use crate::resources::Grown;
 use crate::scene::{Finish, GpuWorld};
 use crate::stage::RenderStage;
@@ -17,7 +17,8 @@ pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, ins
 /// The pipelines of a frame.
 pub(crate) struct Shadings {
     pub(crate) is_count: bool,
-    is_last: bool,
+    /// The target of opaque surfaces, and that of transparent ones.
+    canvases: [Canvas; 2],
     casts_shadows: bool,
     /// True if light is known by place.
     has_light: bool,
@@ -40,7 +41,11 @@ impl Shadings {
         let is_reasoned = |&key: &u32| key & !crate::list::INSTANCE_MASK != 0;
         Self {
             is_count,
-            is_last: !is_count && !style.dark_corners,
+            canvases: if is_count || style.dark_corners {
+                [Canvas::Surfaces, Canvas::Output]
+            } else {
+                [Canvas::Output; 2]
+            },
             casts_shadows: style.shadows,
             has_light: style.daylight && stage.light.is_known(),
             explains: stage.explanation.is_some()
@@ -52,15 +57,20 @@ impl Shadings {
         }
     }
 
-    /// Returns the same pipelines, drawing in the region of one context.
-    pub(crate) fn in_context(self) -> Self {
+    /// Returns the same pipelines, drawing in the region of one context, of a picture of finer colors if it `blends`.
+    pub(crate) fn in_context(self, blends: bool) -> Self {
+        let finer = |canvas| match canvas {
+            Canvas::Output if blends => Canvas::Blended,
+            canvas => canvas,
+        };
         Self {
             is_in_context: true,
+            canvases: self.canvases.map(finer),
             ..self
         }
     }
 
-    fn variant(&self, shading: Shading, is_smooth: bool, is_last: bool) -> Variant {
+    fn variant(&self, shading: Shading, is_smooth: bool, canvas: Canvas) -> Variant {
         if self.is_count {
             return Variant {
                 shading: Shading::Count,
@@ -70,7 +80,7 @@ impl Shadings {
                 explains: false,
                 is_prop: false,
                 has_lamps: false,
-                is_last: false,
+                canvas: Canvas::Surfaces,
                 is_in_context: self.is_in_context,
             };
         }
@@ -82,7 +92,7 @@ impl Shadings {
             explains: self.explains,
             is_prop: false,
             has_lamps: self.has_lamps,
-            is_last,
+            canvas,
             is_in_context: self.is_in_context,
         }
     }
@@ -96,7 +106,7 @@ impl Shadings {
         };
         Variant {
             is_prop: !self.is_count,
-            ..self.variant(shading, is_smooth, self.is_last)
+            ..self.variant(shading, is_smooth, self.canvases[0])
         }
     }
 
@@ -106,7 +116,7 @@ impl Shadings {
             Finish::Textured if !self.has_cut => Shading::Textured,
             _ => Shading::Masked,
         };
-        self.variant(shading, run.is_smooth, self.is_last)
+        self.variant(shading, run.is_smooth, self.canvases[0])
     }
 
     pub(crate) fn glass(&self, run: &Run) -> Variant {
@@ -116,7 +126,7 @@ impl Shadings {
         } else {
             Shading::Sheer
         };
-        self.variant(shading, run.is_smooth, true)
+        self.variant(shading, run.is_smooth, self.canvases[1])
     }
 
     /// Makes the pipelines that a list needs.

@@ -3,11 +3,11 @@
 use enfilade_world::{PartId, Pose};
 
 use crate::camera::Projection;
+use crate::copies::PropCopy;
 use crate::frame::Style;
 use crate::lamps::ActiveLamp;
 use crate::list::RenderList;
 use crate::marks::Mark;
-use crate::props::Prop;
 use crate::scene::GpuWorld;
 use crate::stage::{RenderStage, StageView};
 
@@ -46,7 +46,7 @@ pub(crate) struct Shown<'a> {
     pub(crate) pose: Pose,
     pub(crate) style: Style,
     pub(crate) marks: &'a [Mark],
-    pub(crate) props: &'a [Prop],
+    pub(crate) props: &'a [PropCopy],
     pub(crate) lamps: &'a [ActiveLamp],
     pub(crate) exposure: f32,
     /// Share of the daylight that is left, 0 to 1.

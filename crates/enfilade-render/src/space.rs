@@ -9,6 +9,7 @@ use enfilade_world::{PartId, Pose, Space, SpaceSeen, SpaceViewer};
 use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
+use crate::copies::{PropCopy, copies};
 use crate::frame::Style;
 use crate::gpu::RenderError;
 use crate::lamps::ActiveLamp;
@@ -125,7 +126,8 @@ impl Studio {
         }
         let lists = self.space_lists(shot, size)?;
         let lamps = self.space_lamps(shot, shot.seen);
-        let shown = self.space_shown(shot, &lamps, size)?;
+        let props = self.prop_copies(shot);
+        let shown = self.space_shown(shot, (&lamps, &props), size)?;
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
         (self.renderer).draw(&self.gpu, &mut parts, &shown, output, size)?;
         let missed = |s: SpaceSeen<'_>| s.contexts().len() - 1 + s.stopped_specials().len();
@@ -168,7 +170,8 @@ impl Studio {
         let drawn = match self.tree(shot, answer, shot.seen.is_none(), size)? {
             Some(tree) => {
                 let lamps = self.space_lamps(shot, Some(answer));
-                let shown = self.space_shown(shot, &lamps, size)?;
+                let props = self.prop_copies(shot);
+                let shown = self.space_shown(shot, (&lamps, &props), size)?;
                 let mut worlds = staged_worlds(&self.world, &mut self.stage, &mut self.parts);
                 (self.renderer).draw_tree(&self.gpu, &mut worlds, &tree, &shown, output)?;
                 Some(tree.counts())
@@ -299,11 +302,17 @@ impl Studio {
         Ok(lists.collect())
     }
 
+    /// Returns the props, on both sides of special portals.
+    fn prop_copies(&self, shot: &SpaceShot<'_>) -> Vec<PropCopy> {
+        let sphere = |mesh| self.renderer.props.sphere(mesh);
+        copies(shot.space, shot.props, sphere)
+    }
+
     /// Returns the frame apart from its worlds.
     fn space_shown<'s>(
         &self,
         shot: &SpaceShot<'s>,
-        lamps: &'s [ActiveLamp],
+        (lamps, props): (&'s [ActiveLamp], &'s [PropCopy]),
         size: [u32; 2],
     ) -> Result<Shown<'s>, RenderError> {
         let projection = shot.camera.projection(size[0] as f32 / size[1] as f32)?;
@@ -314,7 +323,7 @@ impl Studio {
             pose: *shot.space.pose(shot.frame),
             style: shot.style,
             marks: shot.marks,
-            props: shot.props,
+            props,
             lamps,
             day: self.day,
             exposure,

@@ -97,14 +97,8 @@ impl Scene {
         (picture, counts, chains(&seen))
     }
 
-    /// Draws a picture and counts its pixels. A color may differ by a step of 255; by three if `blends` pictures of pictures.
-    fn check(
-        &mut self,
-        camera: Camera,
-        blends: bool,
-        name: &str,
-        pixels: &mut Pixels,
-    ) -> SpaceCounts {
+    /// Draws a picture and counts its pixels. A color may differ by a step of 255.
+    fn check(&mut self, camera: Camera, name: &str, pixels: &mut Pixels) -> SpaceCounts {
         let (picture, counts, known) = self.draw(camera);
         show(name, &picture);
         let traced = traced_camera(&camera, self.size);
@@ -124,12 +118,7 @@ impl Scene {
             pixels.n_decided += 1;
             pixels.n_special += usize::from(depth.get() > 0);
             let found = &picture.rgba[4 * i as usize..][..3];
-            // Blends of blends round more than once.
-            let steps = if blends && depth.get() > 1 { 3 } else { 1 };
-            let differs = found
-                .iter()
-                .zip(expected)
-                .any(|(a, b)| a.abs_diff(b) > steps);
+            let differs = found.iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 1);
             if differs {
                 if n_wrong == 0 {
                     eprintln!("{name} at {at:?}: {found:?}, not {expected:?}");
@@ -227,13 +216,13 @@ fn only(mut world: World, is_wanted: impl Fn(&Way) -> bool) -> World {
     world
 }
 
-fn check_views(scene: &mut Scene, n: usize, blends: bool, name: &str, seed: u64) -> Pixels {
+fn check_views(scene: &mut Scene, n: usize, name: &str, seed: u64) -> Pixels {
     let mut rng = Rng::new(seed);
     let mut pixels = Pixels::default();
     for i in 0..n {
         let special = SpecialId((i % scene.world.graph.specials.len()) as u32);
         let camera = camera_before(&scene.world, special, &mut rng);
-        scene.check(camera, blends, &format!("{name}-{seed}-{i}"), &mut pixels);
+        scene.check(camera, &format!("{name}-{seed}-{i}"), &mut pixels);
     }
     eprintln!("{name}: {pixels:?}");
     pixels
@@ -246,7 +235,7 @@ fn mirrors_show_what_rays_find() {
             *way == Way::Mirror
         });
         let mut scene = Scene::new(world);
-        let pixels = check_views(&mut scene, 14, false, "mirrors", seed);
+        let pixels = check_views(&mut scene, 14, "mirrors", seed);
         assert_eq!(pixels.n_wrong, 0, "{pixels:?}");
         assert!(
             pixels.n_decided * 10 > pixels.n * 8 && pixels.n_special * 8 > pixels.n,
@@ -260,7 +249,7 @@ fn teleporters_show_the_place_they_lead_to_turned_and_scaled() {
     for seed in 1..4 {
         let is_lead = |way: &Way| matches!(way, Way::Lead { .. });
         let mut scene = Scene::new(only(with_specials(offices(4, seed), 3, seed), is_lead));
-        let pixels = check_views(&mut scene, 18, false, "teleporters", seed);
+        let pixels = check_views(&mut scene, 18, "teleporters", seed);
         assert_eq!(pixels.n_wrong, 0, "{pixels:?}");
         assert!(
             pixels.n_decided * 10 > pixels.n * 8 && pixels.n_special * 8 > pixels.n,
@@ -302,7 +291,7 @@ fn tints_and_later_passes_are_those_of_two_pictures() {
         tinted(Way::Mirror, [1.0, 1.0, 1.0, 0.3]),
     ];
     let mut scene = Scene::new(with_panes(world, &glass));
-    let pixels = check_views(&mut scene, 40, true, "passes", 5);
+    let pixels = check_views(&mut scene, 40, "passes", 5);
     assert_eq!(pixels.n_wrong, 0, "{pixels:?}");
     assert!(pixels.n_special * 8 > pixels.n, "{pixels:?}");
 }
@@ -335,7 +324,7 @@ fn monitors_show_the_picture_of_their_camera() {
         let middle = pieces[0].mean();
         let eye = middle - normal * rng.range(0.6, 2.0) + right * rng.range(-0.4, 0.4);
         let camera = Camera::looking_at(eye.as_vec3().to_array(), middle.as_vec3().to_array());
-        scene.check(camera, false, &format!("monitors-{i}"), &mut pixels);
+        scene.check(camera, &format!("monitors-{i}"), &mut pixels);
     }
     assert_eq!(pixels.n_wrong, 0, "{pixels:?}");
     assert!(pixels.n_special * 20 > pixels.n, "{pixels:?}");
@@ -379,12 +368,7 @@ fn facing_mirrors_end_and_the_counts_tell() {
             ..Default::default()
         };
         let mut pixels = Pixels::default();
-        let counts = scene.check(
-            camera,
-            false,
-            &format!("facing-{most}-{share}"),
-            &mut pixels,
-        );
+        let counts = scene.check(camera, &format!("facing-{most}-{share}"), &mut pixels);
         assert_eq!(pixels.n_wrong, 0);
         assert!(counts.n_left_out >= 1, "{counts:?}");
         assert!(counts.n_contexts <= most.min(128), "{counts:?}");
@@ -427,7 +411,7 @@ fn an_eye_walks_through_a_teleporter_without_a_flicker() {
                 toward: toward.as_vec3().to_array(),
                 fov_y: 1.2,
             };
-            scene.check(camera, false, &format!("walk-{seed}-{i}"), &mut pixels);
+            scene.check(camera, &format!("walk-{seed}-{i}"), &mut pixels);
         }
         assert_eq!(pixels.n_wrong, 0, "{pixels:?}");
         assert!(pixels.n_decided * 10 > pixels.n * 8, "{pixels:?}");

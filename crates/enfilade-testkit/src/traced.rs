@@ -23,6 +23,10 @@ const COINCIDENT: f64 = 2e-4;
 /// Relative distance of a special portal and a surface between which rounding decides.
 const IN_WALL: f64 = 5e-5;
 
+/// Distances behind a special portal's plane up to which surfaces count as in it, and so as before it, and from which on as
+/// behind it: rounding decides between. [Units: wu]
+const IN_PLANE: [f64; 2] = [5e-5, 3e-4];
+
 /// Share of a monitor's picture within which its colors must agree.
 const BLUR: f64 = 0.04;
 
@@ -165,7 +169,8 @@ impl Traced {
             let [x, y] =
                 [(0, dx), (1, dy)].map(|(k, d)| (f64::from(at[k]) + 0.5 + d) / f64::from(size[k]));
             let ray = camera.ray(x, y);
-            self.color(ray, &mut Vec::new(), is_known)
+            let linear = self.color(ray, &mut Vec::new(), is_known)?;
+            Some(linear.map(encoded))
         };
         let first = color(0.0, 0.0)?;
         let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
@@ -173,13 +178,13 @@ impl Traced {
         corners.into_iter().all(agrees).then_some(first)
     }
 
-    /// Returns the color along a ray; `None` if rounding decides.
+    /// Returns the linear color along a ray; `None` if rounding decides.
     fn color(
         &self,
         mut ray: Ray,
         chain: &mut Chain,
         is_known: &dyn Fn(&Chain) -> bool,
-    ) -> Option<[u8; 3]> {
+    ) -> Option<[f64; 3]> {
         ray.t_max = f64::INFINITY;
         let wall = self.structure.closest_hit(&ray, |_| false);
         // A little on: a special portal may lie in a wall.
@@ -195,7 +200,7 @@ impl Traced {
             return self.color_in(i, &ray, t, chain, is_known);
         }
         let Some(hit) = wall else {
-            return Some([0; 3]);
+            return Some([0.0; 3]);
         };
         let color = self.colors[hit.triangle as usize];
         // Behind it, nothing of another color is as near.
@@ -213,12 +218,12 @@ impl Traced {
         t: f64,
         chain: &mut Chain,
         is_known: &dyn Fn(&Chain) -> bool,
-    ) -> Option<[u8; 3]> {
+    ) -> Option<[f64; 3]> {
         if chain.len() == DEEPEST {
             return None;
         }
         let on = ray.origin + ray.direction * t;
-        let mut out = [0; 3];
+        let mut out = [0.0; 3];
         for (pass, own) in self.specials[special].passes.iter().enumerate() {
             let mut shown = |own: &SidePass| {
                 let mut next = Ray {
@@ -236,7 +241,9 @@ impl Traced {
                     Shows::Place(linear, offset) => {
                         next.origin = *linear * on + *offset;
                         next.direction = *linear * ray.direction;
-                        self.color(next, chain, is_known)
+                        let normal = (*linear * self.specials[special].normal).normalize();
+                        let next = self.behind(next, normal);
+                        next.and_then(|ray| self.color(ray, chain, is_known))
                     }
                     Shows::Monitor(camera, [corner, right, up]) => {
                         let [u, v] =
@@ -264,15 +271,26 @@ impl Traced {
             let [r, g, b, share] = own.tint;
             let tint = [r, g, b];
             for k in 0..3 {
-                let above = linear(color[k]) * tint[k];
+                let above = color[k] * tint[k];
                 out[k] = if pass == 0 {
-                    encoded(above)
+                    above
                 } else {
-                    encoded(linear(out[k]) * (1.0 - share) + above * share)
+                    out[k] * (1.0 - share) + above * share
                 };
             }
         }
         Some(out)
+    }
+
+    /// Returns a ray that begins in a plane, from behind the surfaces in it on; `None` if one is neither in it nor behind it.
+    fn behind(&self, mut ray: Ray, normal: DVec3) -> Option<Ray> {
+        let along = normal.dot(ray.direction).abs();
+        let [first, last] = IN_PLANE.map(|distance| distance / along);
+        ray.origin += ray.direction * first;
+        ray.t_max = last - first;
+        let is_clear = self.structure.closest_hit(&ray, |_| false).is_none();
+        ray.t_max = f64::INFINITY;
+        is_clear.then_some(ray)
     }
 
     /// Returns the special portal but one that a ray meets first, before `t_max`.
@@ -395,11 +413,11 @@ fn emitted(material: &Material) -> [u8; 3] {
     })
 }
 
-/// Returns the bytes of a surface that emits a color, as the renderer compresses bright values.
-fn toned(color: [u8; 3]) -> [u8; 3] {
+/// Returns the linear color of a surface that emits a color, as the renderer compresses bright values.
+fn toned(color: [u8; 3]) -> [f64; 3] {
     let c = color.map(|x| f64::from(x) / 255.0);
     let most = c[0].max(c[1]).max(c[2]);
-    c.map(|x| encoded(x / (1.0 + 0.28 * most)))
+    c.map(|x| x / (1.0 + 0.28 * most))
 }
 
 fn encoded(x: f64) -> u8 {
@@ -409,13 +427,4 @@ fn encoded(x: f64) -> u8 {
         1.055 * x.powf(1.0 / 2.4) - 0.055
     };
     (s.clamp(0.0, 1.0) * 255.0).round() as u8
-}
-
-fn linear(byte: u8) -> f64 {
-    let s = f64::from(byte) / 255.0;
-    if s <= 0.040_45 {
-        s / 12.92
-    } else {
-        ((s + 0.055) / 1.055).powf(2.4)
-    }
 }

@@ -44,6 +44,6 @@ pub use sound::{
 };
 pub use space::{
     Docking, Followed, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen,
-    SpaceViewer, SpecialOptions, StoppedSpecial,
+    SpaceViewer, SpecialImage, SpecialOptions, StoppedSpecial,
 };
 pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

@@ -20,9 +20,9 @@ use enfilade_testkit::{
 use crate::rows::Figure;
 
 /// Views of a generated world.
-const MADE_VIEWS: usize = 400;
+const MADE_VIEWS: usize = 1000;
 /// Views of each building.
-const VIEWS: usize = 200;
+const VIEWS: usize = 1000;
 const SIZE: [u32; 2] = [96, 72];
 const ROOT: PartId = PartId::ROOT;
 
@@ -31,12 +31,12 @@ const MOST_SPECIALS: usize = 40;
 
 pub(super) fn mirrors_in(scene: &str) -> anyhow::Result<Figure> {
     let world = keep(made(scene)?, |way| *way == Way::Mirror);
-    compared(world, MADE_VIEWS, false)
+    compared(world, MADE_VIEWS)
 }
 
 pub(super) fn teleporters_in(scene: &str) -> anyhow::Result<Figure> {
     let world = keep(made(scene)?, |way| matches!(way, Way::Lead { .. }));
-    compared(world, MADE_VIEWS, false)
+    compared(world, MADE_VIEWS)
 }
 
 pub(super) fn passes_in(scene: &str) -> anyhow::Result<Figure> {
@@ -52,7 +52,7 @@ pub(super) fn passes_in(scene: &str) -> anyhow::Result<Figure> {
         let cell = world.graph[portal].cells[0];
         add(&mut world, portal, cell, glass());
     }
-    compared(world, MADE_VIEWS, true)
+    compared(world, MADE_VIEWS)
 }
 
 pub(super) fn mirrors(world: &World) -> anyhow::Result<Figure> {
@@ -62,7 +62,7 @@ pub(super) fn mirrors(world: &World) -> anyhow::Result<Figure> {
             add(&mut world, portal, cell, vec![Pass::new(Way::Mirror)]);
         }
     }
-    compared(world, VIEWS, false)
+    compared(world, VIEWS)
 }
 
 pub(super) fn teleporters(world: &World) -> anyhow::Result<Figure> {
@@ -75,7 +75,7 @@ pub(super) fn teleporters(world: &World) -> anyhow::Result<Figure> {
             add(&mut world, portal, cell, vec![Pass::new(lead)]);
         }
     }
-    compared(world, VIEWS, false)
+    compared(world, VIEWS)
 }
 
 pub(super) fn passes(world: &World) -> anyhow::Result<Figure> {
@@ -92,7 +92,7 @@ pub(super) fn passes(world: &World) -> anyhow::Result<Figure> {
         ];
         add(&mut world, portal, second, passes);
     }
-    compared(world, VIEWS, true)
+    compared(world, VIEWS)
 }
 
 fn made(scene: &str) -> anyhow::Result<World> {
@@ -214,7 +214,7 @@ fn lead(world: &World, (from, cell): (PortalId, CellId), goal: PortalId) -> Way 
 }
 
 /// Counts the certain pixels that differ.
-fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure> {
+fn compared(world: World, n_views: usize) -> anyhow::Result<Figure> {
     let world = painted(world, 251);
     ensure!(!world.graph.specials.is_empty(), "no doorway is special");
     let is_valid = world.graph.validate();
@@ -280,13 +280,8 @@ fn compared(world: World, n_views: usize, blends: bool) -> anyhow::Result<Figure
             };
             n_certain += 1;
             n_special += usize::from(depth.get() > 0);
-            // Blends of blends round more than once.
-            let steps = if blends && depth.get() > 1 { 3 } else { 1 };
             let found = &picture.rgba[4 * i as usize..][..3];
-            let differs = found
-                .iter()
-                .zip(expected)
-                .any(|(a, b)| a.abs_diff(b) > steps);
+            let differs = found.iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 1);
             n_wrong += usize::from(differs);
         }
     }

@@ -4,7 +4,7 @@ use enfilade_world::PartId;
 
 use super::{Content, Face, Layer, Node, Tree, TreePicture};
 use crate::context_targets::ContextTarget;
-use crate::formats::COLOR;
+use crate::formats::{BLENDED, COLOR};
 use crate::frame::Paint;
 use crate::gpu::{Gpu, RenderError};
 use crate::panes::PanePipelines;
@@ -53,18 +53,22 @@ impl Renderer {
         let props: Vec<(PartId, Vec<PropDraw>)> = ids.into_iter().zip(props).collect();
         let corners = bytemuck::cast_slice(&tree.corners);
         self.contexts.corners.write(gpu, corners);
-        for format in [COLOR, self.format()] {
+        let format = if tree.blends() && shown.style.paint != Paint::Overdraw {
+            BLENDED
+        } else {
+            self.format()
+        };
+        for format in [COLOR, self.format(), format] {
             self.contexts.prepare(gpu, &self.layouts, format);
         }
         let sizes = tree.pictures[1..].iter().map(TreePicture::room);
-        let format = self.format();
         let pictures = (self.contexts).place(gpu, &self.layouts, format, sizes);
         for picture in (0..tree.pictures.len()).rev() {
             gpu.check_picture(tree.pictures[picture].size)?;
             self.draw_tree_picture(
                 gpu,
                 worlds,
-                (tree, picture),
+                (tree, picture, format),
                 shown,
                 (&props, &pictures),
                 output,
@@ -77,7 +81,7 @@ impl Renderer {
         &mut self,
         gpu: &Gpu,
         worlds: &mut [StagedWorld<'_>],
-        (tree, picture): (&Tree, usize),
+        (tree, picture, format): (&Tree, usize, wgpu::TextureFormat),
         shown: &Shown<'_>,
         (props, pictures): (&[(PartId, Vec<PropDraw>)], &[usize]),
         output: &wgpu::TextureView,
@@ -96,11 +100,12 @@ impl Renderer {
         self.camera.write(gpu, &globals);
         let is_its = |(_, node): &(usize, &Node)| node.picture == picture;
         let nodes: Vec<(usize, &Node)> = tree.nodes.iter().enumerate().filter(is_its).collect();
-        let shadings = self.prepare_nodes(gpu, worlds, &nodes, &exposed, props);
+        let blends = format == BLENDED;
+        let shadings = self.prepare_nodes(gpu, worlds, &nodes, &exposed, props, blends);
         let marks = (picture == 0).then(|| self.write_marks(gpu, &[], shown, size));
         self.contexts.resize(gpu, &self.layouts, size);
-        if own.is_cut() {
-            let format = self.format();
+        let is_rounded = picture == 0 && format != self.format();
+        if own.is_cut() || is_rounded {
             self.contexts.add_whole(gpu, &self.layouts, format);
         }
         let Some(targets) = self.contexts.targets.last() else {
@@ -110,9 +115,11 @@ impl Renderer {
         let in_two = is_count || shown.style.dark_corners;
         let kept = picture.checked_sub(1);
         let kept = kept.map(|i| &self.contexts.pictures[pictures[i]]);
-        let whole = targets.whole.as_ref().filter(|_| own.is_cut());
+        let whole = targets.whole.as_ref();
+        let whole = whole.filter(|_| own.is_cut() || is_rounded);
+        let result = output;
         let output = whole.or(kept).map_or(output, |picture| &picture.view);
-        let formats = [if in_two { COLOR } else { self.format() }, self.format()];
+        let formats = [if in_two { COLOR } else { format }, format];
         let [Some(first), Some(second)] = formats.map(|f| self.contexts.panes(f)) else {
             return;
         };
@@ -178,6 +185,18 @@ impl Renderer {
         if let (Some(kept), Some(whole)) = (kept, whole) {
             kept.copy(&mut encoder, whole, own.kept);
         }
+        if let (None, Some(whole), Some(panes)) = (kept, whole, self.contexts.panes(self.format()))
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("rounded"),
+                color_attachments: &[Some(color_attachment(result, Some(wgpu::Color::BLACK)))],
+                ..wgpu::RenderPassDescriptor::default()
+            });
+            pass.set_pipeline(&panes.copy);
+            pass.set_bind_group(0, &self.camera.group, &[]);
+            pass.set_bind_group(1, &whole.group, &[]);
+            pass.draw(0..3, 0..1);
+        }
         gpu.queue.submit([encoder.finish()]);
     }
 
@@ -189,6 +208,7 @@ impl Renderer {
         nodes: &[(usize, &Node)],
         exposed: &Exposed<'_>,
         props: &[(PartId, Vec<PropDraw>)],
+        blends: bool,
     ) -> Vec<(usize, NodeShadings)> {
         let mut shadings = Vec::new();
         for (k, (index, node)) in nodes.iter().enumerate() {
@@ -208,7 +228,7 @@ impl Renderer {
                 stage.write_globals_of(gpu, part.view, &part.projection, exposed, part.gate);
                 stage.write_instances_of(gpu, part.view, world, &part.list);
                 let own = Shadings::of(exposed.style, &part.list, stage, exposed.lamps.len());
-                let own = own.in_context();
+                let own = own.in_context(blends);
                 own.prepare(gpu, &self.layouts, &mut self.pipelines, &part.list);
                 for prop in props_of(props, part.id) {
                     let variant = own.prop(prop.span.is_smooth);

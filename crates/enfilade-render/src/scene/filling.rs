@@ -39,6 +39,22 @@ impl Corner {
             cell: 0,
         }
     }
+
+    pub(crate) fn position(&self) -> [f32; 3] {
+        self.position
+    }
+
+    /// Returns the vertex at a share of the way to another of the same surface.
+    pub(crate) fn between(&self, other: &Self, share: f32) -> Self {
+        let lerp = |a: f32, b: f32| a + (b - a) * share;
+        let normal = |k: usize| lerp(self.normal[k].into(), other.normal[k].into());
+        Self {
+            position: [0, 1, 2].map(|k| lerp(self.position[k], other.position[k])),
+            normal: [0, 1, 2, 3].map(|k| normal(k).round() as i8),
+            uv: [0, 1].map(|k| lerp(self.uv[k], other.uv[k])),
+            ..*self
+        }
+    }
 }
 
 fn packed_normal(n: [f32; 3]) -> [i8; 4] {

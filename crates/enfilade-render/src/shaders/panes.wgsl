@@ -40,6 +40,11 @@ fn seen_through(in: Pane) -> Drawn {
 }
 
 @fragment
+fn copied(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
+    return textureLoad(picture, vec2<i32>(clip.xy), 0);
+}
+
+@fragment
 fn far_away() -> Drawn {
     return drawn_at(vec4(0.0), 0.0);
 }
