@@ -4,7 +4,7 @@ use enfilade_geom::{DMat3, DVec3, Similarity};
 use enfilade_world::{Space, SpecialImage};
 use glam::{Mat4, Quat, Vec3};
 
-use crate::props::{Prop, PropMesh};
+use crate::prop::{Prop, PropMesh};
 use crate::scene::{Corner, Instance, Span};
 
 /// A prop, or its image beyond a special portal.

@@ -122,6 +122,19 @@ fn clipped(polygon: &[DVec3], height: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
     out
 }
 
+/// Chooses pixels of a region.
+const CHOOSES: Stencil = Stencil {
+    writes: CHOSEN,
+    ..Stencil::IN_REGION
+};
+
+/// Gives chosen pixels to a region. The reference is without the bit: pixels that differ are chosen.
+const TAKES: Stencil = Stencil {
+    compare: wgpu::CompareFunction::NotEqual,
+    reads: CHOSEN,
+    writes: REGION | CHOSEN,
+};
+
 /// Pipelines for pictures of one format.
 pub(crate) struct PanePipelines {
     /// Depth of polygons, where nothing hides them.
@@ -156,18 +169,8 @@ pub(crate) struct PanePipelines {
 
 impl PanePipelines {
     pub(crate) fn new(gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) -> Self {
-        use wgpu::CompareFunction::{Always, Equal, GreaterEqual, NotEqual};
+        use wgpu::CompareFunction::{Always, Equal, GreaterEqual};
         let module = shader(gpu, "panes", &[SKY, include_str!("shaders/panes.wgsl")]);
-        let in_region = |writes| Stencil {
-            writes,
-            ..Stencil::IN_REGION
-        };
-        // The reference is without the bit: pixels that differ are chosen.
-        let chosen = Stencil {
-            compare: NotEqual,
-            reads: CHOSEN,
-            writes: REGION | CHOSEN,
-        };
         let polygon = Kind {
             label: "pane",
             module: &module,
@@ -205,14 +208,14 @@ impl PanePipelines {
             }),
             choose: make(Kind {
                 depth: Some((false, Equal)),
-                stencil: Some(in_region(CHOSEN)),
+                stencil: Some(CHOOSES),
                 writes_color: false,
                 ..polygon
             }),
             open: make(Kind {
                 fragment: Some("far_away"),
                 depth: Some((true, Always)),
-                stencil: Some(chosen),
+                stencil: Some(TAKES),
                 writes_color: false,
                 ..screen
             }),
@@ -226,14 +229,14 @@ impl PanePipelines {
             choose_region: make(Kind {
                 fragment: Some("far_away"),
                 depth: Some((false, Always)),
-                stencil: Some(in_region(CHOSEN)),
+                stencil: Some(CHOOSES),
                 writes_color: false,
                 ..screen
             }),
             close: make(Kind {
                 target: Some((format, Some(multiply()))),
                 depth: Some((true, Always)),
-                stencil: Some(chosen),
+                stencil: Some(TAKES),
                 ..polygon
             }),
             tint: make(Kind {

@@ -17,7 +17,7 @@ use crate::light::Light;
 use crate::list::{RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
-use crate::props::{Prop, PropMesh};
+use crate::prop::{Prop, PropMesh};
 use crate::renderer::read_picture;
 use crate::scene::GpuWorld;
 use crate::shown::Shown;

@@ -7,7 +7,7 @@ use crate::context_targets::ContextTarget;
 use crate::formats::{BLENDED, COLOR};
 use crate::frame::Paint;
 use crate::gpu::{Gpu, RenderError};
-use crate::panes::PanePipelines;
+use crate::panes::{PanePicture, PanePipelines};
 use crate::pipelines::CHOSEN;
 use crate::props::PropDraw;
 use crate::renderer::Renderer;
@@ -135,15 +135,8 @@ impl Renderer {
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("contexts"),
-            color_attachments: &[Some(color_attachment(
-                if in_two { &targets.color } else { output },
-                Some(wgpu::Color::TRANSPARENT),
-            ))],
-            depth_stencil_attachment: Some(depth_stencil_attachment(&targets.depth, true)),
-            ..wgpu::RenderPassDescriptor::default()
-        });
+        let surfaces = if in_two { &targets.color } else { output };
+        let mut pass = begin_pass(&mut encoder, surfaces, &targets.depth, true);
         for k in 0..shadings.len() {
             self.draw_context(&mut pass, &drawing, k, !is_count);
         }
@@ -155,23 +148,11 @@ impl Renderer {
                 &second.post
             };
             self.finish_surfaces(&mut encoder, targets, pipeline, output);
-            pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("context glass"),
-                color_attachments: &[Some(color_attachment(output, None))],
-                depth_stencil_attachment: Some(depth_stencil_attachment(&targets.depth, false)),
-                ..wgpu::RenderPassDescriptor::default()
-            });
+            pass = begin_pass(&mut encoder, output, &targets.depth, false);
         }
         drawing.panes = second;
         if !is_count {
-            let closes = closing(tree, &nodes);
-            // Children before parents.
-            for (k, node) in nodes.iter().enumerate().rev() {
-                self.draw_context_glass(&mut pass, &drawing, k);
-                if closes[k] {
-                    self.close_context(&mut pass, &drawing, node.0);
-                }
-            }
+            self.draw_glass_of_all(&mut pass, &drawing, &nodes);
         }
         if let Some(marks) = marks {
             self.draw_marks(
@@ -182,22 +163,49 @@ impl Renderer {
             );
         }
         drop(pass);
-        if let (Some(kept), Some(whole)) = (kept, whole) {
-            kept.copy(&mut encoder, whole, own.kept);
-        }
-        if let (None, Some(whole), Some(panes)) = (kept, whole, self.contexts.panes(self.format()))
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("rounded"),
-                color_attachments: &[Some(color_attachment(result, Some(wgpu::Color::BLACK)))],
-                ..wgpu::RenderPassDescriptor::default()
-            });
-            pass.set_pipeline(&panes.copy);
-            pass.set_bind_group(0, &self.camera.group, &[]);
-            pass.set_bind_group(1, &whole.group, &[]);
-            pass.draw(0..3, 0..1);
+        match (kept, whole) {
+            (Some(kept), Some(whole)) => kept.copy(&mut encoder, whole, own.kept),
+            (None, Some(whole)) => self.round_picture(&mut encoder, whole, result),
+            _ => {}
         }
         gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Copies a picture of finer colors to `output`.
+    fn round_picture(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        whole: &PanePicture,
+        output: &wgpu::TextureView,
+    ) {
+        let Some(panes) = self.contexts.panes(self.format()) else {
+            return;
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("rounded"),
+            color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_pipeline(&panes.copy);
+        pass.set_bind_group(0, &self.camera.group, &[]);
+        pass.set_bind_group(1, &whole.group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+
+    /// Draws the transparent surfaces of all contexts of a picture, and gives regions back, children before parents.
+    fn draw_glass_of_all(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        drawing: &Drawing<'_>,
+        nodes: &[(usize, &Node)],
+    ) {
+        let closes = closing(drawing.tree, nodes);
+        for (k, node) in nodes.iter().enumerate().rev() {
+            self.draw_context_glass(pass, drawing, k);
+            if closes[k] {
+                self.close_context(pass, drawing, node.0);
+            }
+        }
     }
 
     /// Writes the parameters of all nodes of a picture, and prepares their pipelines.
@@ -466,6 +474,28 @@ fn closing(tree: &Tree, nodes: &[(usize, &Node)]) -> Vec<bool> {
 fn props_of(props: &[(PartId, Vec<PropDraw>)], part: PartId) -> &[PropDraw] {
     let own = props.iter().find(|p| p.0 == part);
     own.map_or(&[], |p| &p.1)
+}
+
+/// Begins the pass of the surfaces of a picture, which clears it, or that of what is transparent.
+fn begin_pass<'e>(
+    encoder: &'e mut wgpu::CommandEncoder,
+    color: &wgpu::TextureView,
+    depth: &wgpu::TextureView,
+    is_first: bool,
+) -> wgpu::RenderPass<'e> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(if is_first {
+            "contexts"
+        } else {
+            "context glass"
+        }),
+        color_attachments: &[Some(color_attachment(
+            color,
+            is_first.then_some(wgpu::Color::TRANSPARENT),
+        ))],
+        depth_stencil_attachment: Some(depth_stencil_attachment(depth, is_first)),
+        ..wgpu::RenderPassDescriptor::default()
+    })
 }
 
 fn depth_stencil_attachment(

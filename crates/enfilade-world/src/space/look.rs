@@ -15,7 +15,7 @@
 
 use std::collections::BinaryHeap;
 
-use enfilade_cpg::Way;
+use enfilade_cpg::{MonitorCamera, Way};
 use enfilade_geom::Similarity;
 use enfilade_runtime::{SeeOptions, SpecialView, View, Window};
 
@@ -267,6 +267,21 @@ impl SpaceViewer {
         self.buffers.found = found;
     }
 
+    /// Opens the context of a monitor's picture. A camera without direction shows nothing.
+    fn open_monitor(&mut self, space: &Space, via: SeenVia, share: f64, camera: &MonitorCamera) {
+        let layout = &space.parts[via.part.idx()].layout;
+        let [_, right, up] = layout.special_rectangle(via.special);
+        let aspect = (right.length() / up.length()) as f32;
+        let view = View::perspective(camera.eye, camera.toward, camera.up, camera.fov_y, aspect);
+        if let Ok(view) = view {
+            let context = self.add_context(via.part, view, Similarity::IDENTITY);
+            let own = &mut self.contexts[context];
+            (own.via, own.share) = (Some(via), share);
+            own.begin_face();
+            self.open.push(Open { share, context });
+        }
+    }
+
     /// Opens the context of one pass, or adds to the one that an earlier face has opened.
     fn open_special(
         &mut self,
@@ -303,18 +318,9 @@ impl SpaceViewer {
             }
         }
         if let Way::Monitor(camera) = way {
-            let [_, right, up] = own.layout.special_rectangle(special);
-            let aspect = (right.length() / up.length()) as f32;
-            let view =
-                View::perspective(camera.eye, camera.toward, camera.up, camera.fov_y, aspect);
-            // A camera without direction shows nothing.
-            if let (None, Ok(view)) = (known, view) {
-                let context = self.add_context(part, view, Similarity::IDENTITY);
-                let own = &mut self.contexts[context];
-                (own.via, own.share) = (Some(via), share);
+            if known.is_none() {
                 self.apart = apart;
-                own.begin_face();
-                self.open.push(Open { share, context });
+                self.open_monitor(space, via, share, camera);
             }
             return;
         }
