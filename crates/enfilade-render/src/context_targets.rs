@@ -82,10 +82,10 @@ impl ContextTargets {
 
     /// Makes the whole picture of the last size, unless it exists.
     pub(crate) fn add_whole(&mut self, gpu: &Gpu, layouts: &Layouts, format: wgpu::TextureFormat) {
-        if let Some(target) = self.targets.last_mut() {
-            if target.whole.as_ref().is_none_or(|w| w.format != format) {
-                target.whole = Some(PanePicture::new(gpu, layouts, format, target.size));
-            }
+        let target = self.targets.last_mut();
+        if let Some(target) = target.filter(|t| t.whole.as_ref().is_none_or(|w| w.format != format))
+        {
+            target.whole = Some(PanePicture::new(gpu, layouts, format, target.size));
         }
     }
 
