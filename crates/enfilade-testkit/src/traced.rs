@@ -187,10 +187,14 @@ impl Traced {
     ) -> Option<[f64; 3]> {
         ray.t_max = f64::INFINITY;
         let wall = self.structure.closest_hit(&ray, |_| false);
-        // A little on: a special portal may lie in a wall.
+        // On: a special portal may lie in a wall.
         ray.t_max = wall.map_or(f64::INFINITY, |hit| hit.t * (1.0 + IN_WALL));
+        let wall_before = |i: usize, t: f64| {
+            let along = self.specials[i].normal.dot(ray.direction);
+            wall.is_some_and(|hit| (hit.t - t) * along < IN_PLANE[1] || hit.t < t * (1.0 + IN_WALL))
+        };
         if let Some((t, i)) = self.special(&ray, None) {
-            if wall.is_some_and(|hit| hit.t < t * (1.0 + IN_WALL)) {
+            if wall_before(i, t) {
                 return None;
             }
             ray.t_max = t * (1.0 + COINCIDENT);
@@ -202,6 +206,19 @@ impl Traced {
         let Some(hit) = wall else {
             return Some([0.0; 3]);
         };
+        // A special portal in the wall, from the wall on.
+        let on = Ray {
+            origin: ray.origin + ray.direction * hit.t,
+            direction: ray.direction,
+            t_max: f64::INFINITY,
+        };
+        let is_in_wall = |(t, i): (f64, usize)| {
+            let along = self.specials[i].normal.dot(ray.direction);
+            t * along < IN_PLANE[1]
+        };
+        if self.special(&on, None).is_some_and(is_in_wall) {
+            return None;
+        }
         let color = self.colors[hit.triangle as usize];
         // Behind it, nothing of another color is as near.
         ray.t_max = hit.t * (1.0 + COINCIDENT);

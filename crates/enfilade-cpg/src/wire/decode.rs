@@ -1,7 +1,7 @@
 //! GLB → world, from untrusted bytes.
 //!
 //! Every count is checked against the available bytes before anything is allocated for it, and a file cannot have the
-//! same bytes decoded again and again ([`Reader::spend`]), so memory and time stay within a small factor of the
+//! same bytes decoded again and again ([`Arrays::spend`]), so memory and time stay within a small factor of the
 //! file's size. The result satisfies [`World::validate`].
 
 use std::collections::BTreeMap;
@@ -11,11 +11,12 @@ use enfilade_geom::{Aabb, DVec3};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
+use super::arrays::Arrays;
 use super::boxes;
 use super::fitting;
-use super::json::{self, FLOAT, LINE_STRIP, TEXTURE_EXTENSIONS, U8, U16, U32};
+use super::json::{self, LINE_STRIP, TEXTURE_EXTENSIONS};
 use super::origin;
-use super::rows::{Row, eight, four, pairs, take_polygon};
+use super::rows::{eight, four, pairs, take_polygon};
 use super::special;
 use super::visible::read_pvs;
 use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, WireError, broken};
@@ -39,8 +40,7 @@ pub fn decode_glb(bytes: &[u8]) -> Result<World, WireError> {
     let root: json::Root = serde_json::from_str(text).map_err(json_error)?;
     let mut reader = Reader {
         root: &root,
-        bin,
-        budget: 4 * bin.len() as u64,
+        arrays: Arrays::new(&root.accessors, &root.buffer_views, bin),
     };
     let world = reader.world()?;
     world.validate().map_err(WireError::Invalid)?;
@@ -48,12 +48,12 @@ pub fn decode_glb(bytes: &[u8]) -> Result<World, WireError> {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "for map_err")]
-fn json_error(error: serde_json::Error) -> WireError {
+pub(super) fn json_error(error: serde_json::Error) -> WireError {
     WireError::Json(error.to_string())
 }
 
 /// Splits a GLB into the text of its JSON chunk and the bytes of its binary chunk.
-fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), WireError> {
+pub(super) fn chunks(bytes: &[u8]) -> Result<(&str, &[u8]), WireError> {
     if !bytes.starts_with(&GLB_MAGIC) {
         return Err(WireError::NotGlb("it does not begin with `glTF`"));
     }
@@ -118,9 +118,7 @@ fn check_version(text: &str) -> Result<(), WireError> {
 
 struct Reader<'a> {
     root: &'a json::Root,
-    bin: &'a [u8],
-    /// Number of bytes that may still be decoded.
-    budget: u64,
+    arrays: Arrays<'a>,
 }
 
 impl<'a> Reader<'a> {
@@ -134,8 +132,8 @@ impl<'a> Reader<'a> {
                 "is in another file; a world is a single GLB",
             ));
         }
-        let runs = self.optional_view(graph.source_runs, "sourceRuns")?;
-        self.spend(runs.len() as u64)?;
+        let runs = self.arrays.optional_view(graph.source_runs, "sourceRuns")?;
+        self.arrays.spend(runs.len() as u64)?;
         let runs =
             pairs(runs).ok_or_else(|| broken("sourceRuns", "their buffer view is cut off"))?;
         let mut runs = &runs[..];
@@ -176,8 +174,10 @@ impl<'a> Reader<'a> {
             .map(|(i, t)| self.texture(i, t));
         let textures = textures.collect::<Result<_, _>>()?;
         let images = self.root.images.iter().enumerate().map(|(i, image)| {
-            let bytes = self.view(image.buffer_view, || format!("image {i}"))?;
-            self.spend(bytes.len() as u64)?;
+            let bytes = self
+                .arrays
+                .view(image.buffer_view, || format!("image {i}"))?;
+            self.arrays.spend(bytes.len() as u64)?;
             let (name, mime) = (image.name.clone(), image.mime_type.clone());
             Ok(Image {
                 name,
@@ -217,7 +217,7 @@ impl<'a> Reader<'a> {
             .filter(|p| p.mode == Some(LINE_STRIP) && p.indices.is_none())
             .and_then(|p| p.attributes.get("POSITION"));
         let line = line.ok_or_else(|| broken("the leak path", "its node is not a polyline"))?;
-        self.rows(*line)
+        self.arrays.rows(*line)
     }
 
     fn pvs(&mut self) -> Result<Option<Pvs>, WireError> {
@@ -226,8 +226,8 @@ impl<'a> Reader<'a> {
         };
         let of = "the potentially visible set";
         let view = |view| {
-            let bytes = self.optional_view(view, of)?;
-            self.spend(bytes.len() as u64)?;
+            let bytes = self.arrays.optional_view(view, of)?;
+            self.arrays.spend(bytes.len() as u64)?;
             Ok(bytes)
         };
         read_pvs(pvs, view, &|| broken(of, "a buffer view is cut off")).map(Some)
@@ -279,7 +279,9 @@ impl<'a> Reader<'a> {
 
     fn portals(&mut self) -> Result<Vec<Portal>, WireError> {
         let graph = &self.root.extensions.graph;
-        let bytes = self.optional_view(graph.portal_corners, "the portals' vertices")?;
+        let bytes = self
+            .arrays
+            .optional_view(graph.portal_corners, "the portals' vertices")?;
         let (mut corners, rest) = bytes.as_chunks::<12>();
         if !rest.is_empty() {
             return Err(broken(
@@ -287,7 +289,7 @@ impl<'a> Reader<'a> {
                 "their buffer view is cut off",
             ));
         }
-        self.spend(bytes.len() as u64)?;
+        self.arrays.spend(bytes.len() as u64)?;
         let mut portals = Vec::with_capacity(graph.portals.len());
         for (i, p) in graph.portals.iter().enumerate() {
             let mut take = |n| take_polygon(&mut corners, n, || format!("portal {i}"));
@@ -319,16 +321,21 @@ impl<'a> Reader<'a> {
 
     fn specials(&mut self) -> Result<Vec<SpecialPortal>, WireError> {
         let graph = &self.root.extensions.graph;
-        let bytes = self.optional_view(graph.special_corners, special::CORNERS)?;
-        self.spend(bytes.len() as u64)?;
+        let bytes = self
+            .arrays
+            .optional_view(graph.special_corners, special::CORNERS)?;
+        self.arrays.spend(bytes.len() as u64)?;
         special::read_all(graph, bytes)
     }
 
     fn locator(&mut self) -> Result<Locator, WireError> {
         let l = &self.root.extensions.graph.locator;
-        let planes = self.optional_view(l.planes, "the locator's planes")?;
-        let nodes = self.optional_view(l.nodes, "the locator's nodes")?;
-        self.spend(planes.len() as u64 + nodes.len() as u64)?;
+        let planes = self
+            .arrays
+            .optional_view(l.planes, "the locator's planes")?;
+        let nodes = self.arrays.optional_view(l.nodes, "the locator's nodes")?;
+        self.arrays
+            .spend(planes.len() as u64 + nodes.len() as u64)?;
         let (planes, planes_rest) = planes.as_chunks::<32>();
         let (nodes, nodes_rest) = nodes.as_chunks::<12>();
         if !planes_rest.is_empty() || !nodes_rest.is_empty() {
@@ -377,7 +384,7 @@ impl<'a> Reader<'a> {
                         format!("no primitive {primitive} in mesh {mesh}"),
                     )
                 })?;
-                self.primitive(found)?
+                self.arrays.primitive(found)?
             }
             _ => {
                 return Err(broken(
@@ -397,7 +404,7 @@ impl<'a> Reader<'a> {
     fn mesh(&mut self, mesh: u32) -> Result<Mesh, WireError> {
         let found = self.root.meshes.get(mesh as usize);
         let found = found.ok_or_else(|| broken("detailMeshes", format!("no mesh {mesh}")))?;
-        let primitives = found.primitives.iter().map(|p| self.primitive(p));
+        let primitives = found.primitives.iter().map(|p| self.arrays.primitive(p));
         Ok(Mesh {
             name: found.name.clone(),
             primitives: primitives.collect::<Result<_, _>>()?,
@@ -453,139 +460,5 @@ impl<'a> Reader<'a> {
             .source
             .or_else(|| extended.filter_map(|e| e.source).next());
         Ok(Texture { image, sampler })
-    }
-
-    fn primitive(&mut self, p: &json::Primitive) -> Result<Primitive, WireError> {
-        let named = |name: &str| p.attributes.get(name).copied();
-        let position =
-            named("POSITION").ok_or_else(|| broken("a primitive", "has no positions"))?;
-        let mut uvs = Vec::new();
-        while let Some(accessor) = named(&format!("TEXCOORD_{}", uvs.len())) {
-            uvs.push(self.rows(accessor)?);
-        }
-        let indices = p
-            .indices
-            .ok_or_else(|| broken("a primitive", "has no indices"))?;
-        Ok(Primitive {
-            positions: self.rows(position)?,
-            normals: self.optional_rows(named("NORMAL"))?,
-            tangents: self.optional_rows(named("TANGENT"))?,
-            uvs,
-            colors: self.optional_rows(named("COLOR_0"))?,
-            indices: self.indices(indices)?,
-            material: p.material,
-        })
-    }
-
-    fn optional_rows<R: Row>(&mut self, accessor: Option<u32>) -> Result<Vec<R>, WireError> {
-        accessor.map_or(Ok(Vec::new()), |a| self.rows(a))
-    }
-
-    fn rows<R: Row>(&mut self, accessor: u32) -> Result<Vec<R>, WireError> {
-        let (bytes, stride, component_type, kind) = self.accessor(accessor, |_| R::SIZE)?;
-        if component_type != FLOAT || kind != R::KIND {
-            let want = R::KIND;
-            return Err(broken(
-                format!("accessor {accessor}"),
-                format!("is not a {want} of floats"),
-            ));
-        }
-        Ok(bytes.chunks(stride).map(|row| R::of_bytes(row)).collect())
-    }
-
-    fn indices(&mut self, accessor: u32) -> Result<Vec<u32>, WireError> {
-        let size = |component_type| match component_type {
-            U8 => 1,
-            U16 => 2,
-            _ => 4,
-        };
-        let (bytes, stride, component_type, kind) = self.accessor(accessor, size)?;
-        if !matches!(component_type, U8 | U16 | U32) || kind != "SCALAR" {
-            return Err(broken(format!("accessor {accessor}"), "holds no indices"));
-        }
-        let rows = bytes.chunks(stride);
-        Ok(match component_type {
-            U8 => rows.map(|b| b[0].into()).collect(),
-            U16 => rows
-                .map(|b| u16::from_le_bytes([b[0], b[1]]).into())
-                .collect(),
-            _ => rows.map(|b| u32::from_le_bytes(four(b, 0))).collect(),
-        })
-    }
-
-    /// Returns bytes, stride, component type and kind of an accessor whose rows take `size` bytes, by component type.
-    /// The bytes end with the last row, so their chunks of `stride` bytes are the rows.
-    fn accessor(
-        &mut self,
-        accessor: u32,
-        size: impl Fn(u32) -> usize,
-    ) -> Result<(&'a [u8], usize, u32, &'a str), WireError> {
-        let at = || format!("accessor {accessor}");
-        let root = self.root;
-        let a = root
-            .accessors
-            .get(accessor as usize)
-            .ok_or_else(|| broken(at(), "is missing"))?;
-        let view = a
-            .buffer_view
-            .ok_or_else(|| broken(at(), "has no buffer view"))?;
-        let bytes = self.view(view, at)?;
-        let size = size(a.component_type);
-        let stride = match root.buffer_views[view as usize].byte_stride {
-            None => size,
-            Some(stride) if stride >= size as u64 && stride <= 252 => stride as usize,
-            Some(stride) => return Err(broken(at(), format!("invalid stride {stride}"))),
-        };
-        let beyond = || broken(at(), "extends beyond its buffer view");
-        let start = usize::try_from(a.byte_offset).map_err(|_| beyond())?;
-        let bytes = bytes.get(start..).ok_or_else(beyond)?;
-        let end = match a.count.checked_sub(1) {
-            None => Some(0),
-            Some(last) => last
-                .checked_mul(stride as u64)
-                .and_then(|n| n.checked_add(size as u64)),
-        };
-        let end = end
-            .and_then(|end| usize::try_from(end).ok())
-            .ok_or_else(beyond)?;
-        let bytes = bytes.get(..end).ok_or_else(beyond)?;
-        // Memory that decoding allocates: rows of their own size, indices as four bytes.
-        self.spend(a.count * size.max(4) as u64)?;
-        Ok((bytes, stride, a.component_type, &a.kind))
-    }
-
-    fn optional_view(&self, view: Option<u32>, of: &str) -> Result<&'a [u8], WireError> {
-        view.map_or(Ok(&[]), |view| self.view(view, || of.to_owned()))
-    }
-
-    fn view(&self, view: u32, of: impl Fn() -> String) -> Result<&'a [u8], WireError> {
-        let missing = || broken(of(), format!("no buffer view {view}"));
-        let v = self
-            .root
-            .buffer_views
-            .get(view as usize)
-            .ok_or_else(missing)?;
-        let beyond = || broken(of(), format!("buffer view {view} extends beyond the file"));
-        if v.buffer != 0 {
-            return Err(broken(
-                of(),
-                "its buffer is in another file; a world is a single GLB",
-            ));
-        }
-        let start = usize::try_from(v.byte_offset).map_err(|_| beyond())?;
-        let len = usize::try_from(v.byte_length).map_err(|_| beyond())?;
-        self.bin
-            .get(start..)
-            .and_then(|rest| rest.get(..len))
-            .ok_or_else(beyond)
-    }
-
-    /// Counts decoded bytes. Our files use every byte once (indices may grow from one byte to four); a file that has
-    /// megabytes decoded a thousand times is an attack.
-    fn spend(&mut self, bytes: u64) -> Result<(), WireError> {
-        let left = self.budget.checked_sub(bytes);
-        self.budget =
-            left.ok_or_else(|| broken("the file", "decodes to far more than it holds"))?;
-        Ok(())
     }
 }

@@ -30,6 +30,7 @@
 //!   its mesh, counted as `flattened_details`.
 //! - an image without bytes (its file was missing) becomes one white pixel.
 
+mod arrays;
 mod boxes;
 mod buffer;
 mod decode;
@@ -37,6 +38,7 @@ mod encode;
 mod fitting;
 mod json;
 mod origin;
+mod pieces;
 mod rows;
 mod special;
 mod transform;
@@ -44,6 +46,7 @@ mod visible;
 
 pub use decode::decode_glb;
 pub use encode::encode_glb;
+pub use pieces::{PieceContent, SplitFile, join_file, read_piece, split_file};
 
 use crate::GraphError;
 use enfilade_geom::shown;
