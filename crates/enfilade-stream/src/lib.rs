@@ -5,7 +5,17 @@
 //! the cells that need them. A [`Source`] fetches pieces from wherever they are; it never blocks. After Dirkse (2002), §4.
 
 mod catalog;
+mod deadlines;
+mod link;
+mod of_world;
 mod source;
+mod streamer;
 
 pub use catalog::{Catalog, Piece, PieceId};
+pub use link::{LinkOptions, SimulatedLink};
+pub use of_world::WorldPieces;
 pub use source::{FetchError, Reply, Source};
+pub use streamer::{
+    Cause, Changes, Eye, Failed, Frame, InView, Loaded, PinError, Policy, StandIn, StreamCounts,
+    StreamOptions, Streamer,
+};
