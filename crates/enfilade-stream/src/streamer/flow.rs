@@ -6,7 +6,7 @@ use super::frame::{Changes, Eye, Failed, InView, Loaded};
 use super::options::Policy;
 use super::slots::State;
 use super::{COST_OF_PIECE, MANY_FAILURES, Streamer, WORK_OF_FRAME};
-use crate::deadlines::Planned;
+use crate::deadlines::{Planned, Search};
 use crate::{FetchError, PieceId, Source};
 
 /// The outcome of an attempt to fetch a piece ahead.
@@ -162,7 +162,7 @@ impl Streamer {
         if self.options.policy != Policy::Minimal {
             return;
         }
-        for piece in self.slots.from_last(true) {
+        for piece in self.slots.last_first(true) {
             if self.may_go(piece) {
                 self.victims.push(piece);
             }
@@ -246,7 +246,7 @@ impl Streamer {
     fn choose_victims(&mut self, size: u64) -> bool {
         let mut room = self.slots.max_kept - self.slots.n_kept;
         for is_visible in [false, true] {
-            for victim in self.slots.from_last(true) {
+            for victim in self.slots.last_first(true) {
                 if room >= size {
                     break;
                 }
@@ -277,10 +277,10 @@ impl Streamer {
     }
 
     /// Returns `true` if a kept piece may go for one that is wanted now: it is neither in view, nor pinned, nor on its way for a
-    /// view.
+    /// view. What was asked for by a view is shown once, or else two views in turns might keep each other from it for ever.
     fn may_go(&self, piece: PieceId) -> bool {
         let slot = self.slots.of(piece);
-        let is_coming = slot.state == State::InFlight && slot.for_view;
+        let is_coming = slot.state != State::Resident && slot.for_view;
         slot.n_pins == 0 && !is_coming && !self.wanted.has(piece)
     }
 
@@ -362,19 +362,7 @@ impl Streamer {
             Policy::Prefetch { horizon } => horizon.as_secs_f32() * speed.max(0.0),
         };
         self.sweep.is_waiting = false;
-        while let Some(&piece) = self.sweep.again.last() {
-            let due = self.search.due_of(piece.idx());
-            let is_due = due.is_some_and(|due| due <= limit);
-            if is_due && self.slots.state(piece) == State::Absent {
-                let due = due.unwrap_or(0.0);
-                match self.fetch_ahead(source, piece, due, true, changes) {
-                    Attempt::Later => break,
-                    Attempt::Asked if due == 0.0 => self.sweep.pending.push(piece),
-                    Attempt::Asked | Attempt::NoRoom => {}
-                }
-            }
-            self.sweep.again.pop();
-        }
+        self.fetch_again(source, limit, changes);
         let mut work = WORK_OF_FRAME;
         while work > 0 && !self.sweep.is_over && !self.sweep.is_waiting {
             if let Some(&planned) = self.search.order.get(self.sweep.cell) {
@@ -386,6 +374,30 @@ impl Streamer {
             }
         }
         self.sweep.trim(&self.slots);
+    }
+
+    /// Asks for pieces that the sweep has met and that failed or were canceled, the first due first.
+    fn fetch_again<S: Source + ?Sized>(
+        &mut self,
+        source: &mut S,
+        limit: f32,
+        changes: &mut Changes,
+    ) {
+        let due = |search: &Search, p: PieceId| search.due_of(p.idx()).unwrap_or(f32::INFINITY);
+        let first = |again: &[PieceId], search: &Search| {
+            let pieces = (0..).zip(again).map(|(i, &p)| (due(search, p), p, i));
+            pieces.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+        };
+        while let Some((due, piece, i)) = first(&self.sweep.again, &self.search) {
+            if due <= limit && self.slots.state(piece) == State::Absent {
+                match self.fetch_ahead(source, piece, due, true, changes) {
+                    Attempt::Later => return,
+                    Attempt::Asked if due == 0.0 => self.sweep.pending.push(piece),
+                    Attempt::Asked | Attempt::NoRoom => {}
+                }
+            }
+            self.sweep.again.swap_remove(i);
+        }
     }
 
     /// Meets the pieces of a cell.
@@ -442,15 +454,15 @@ impl Streamer {
         }
         let mut room = self.slots.max_kept - self.slots.n_kept;
         let mut soon = 0;
-        for victim in self.slots.from_last(is_passed) {
+        for victim in self.slots.last_first(is_passed) {
             if room >= size {
                 break;
             }
             let is_later = self.search.due_of(victim.idx()).is_none_or(|d| d > due);
             let slot = self.slots.of(victim);
             if is_later && slot.n_pins == 0 && !self.wanted.has(victim) {
-                if slot.state == State::InFlight {
-                    soon += slot.n_resident; // it may go once it has arrived
+                if slot.state == State::InFlight || !self.may_go(victim) {
+                    soon += slot.n_resident; // it may go once it is there
                 } else {
                     room += slot.n_resident;
                     self.victims.push(victim);

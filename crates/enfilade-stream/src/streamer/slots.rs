@@ -123,7 +123,7 @@ impl Slots {
     }
 
     /// Returns the kept pieces, last first; with `all`, to the head of the list, otherwise to the mark.
-    pub(crate) fn from_last(&self, all: bool) -> impl Iterator<Item = PieceId> + '_ {
+    pub(crate) fn last_first(&self, all: bool) -> impl Iterator<Item = PieceId> + '_ {
         let stop = if all { self.head() } else { self.mark };
         let mut at = self.slots[self.head() as usize].before;
         std::iter::from_fn(move || {

@@ -179,6 +179,17 @@ impl Program {
         panic!("not settled after ten minutes: {:?}", self.streamer);
     }
 
+    /// Runs until all in view is settled.
+    pub(crate) fn settle_view(&mut self) {
+        for _ in 0..36_000 {
+            self.frame();
+            if self.streamer.view_settled() {
+                return;
+            }
+        }
+        panic!("not settled after ten minutes: {:?}", self.streamer);
+    }
+
     pub(crate) fn has_cell(&self, cell: u32) -> bool {
         let pieces = self.source.catalog.pieces_of(CellId(cell));
         pieces.iter().all(|p| self.source.resident.contains(p))
