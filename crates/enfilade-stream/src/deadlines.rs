@@ -5,7 +5,8 @@
 //! potentially visible set due ([`Search`]).
 //!
 //! **Errs to early.** A way is at least as long as the straight lines from portal to portal, and these at least as long as
-//! those between the portals' boxes ([`Ways`]); walls and furniture in between are not known here. In a graph without a
+//! those between the portals' boxes ([`Ways`]); walls and furniture in between are not known here. Windows are not walked
+//! through, unless the eye flies. In a graph without a
 //! potentially visible set, everything within reach counts as visible, nearest first.
 
 mod search;

@@ -134,11 +134,14 @@ impl Streamer {
         pvs: Option<Pvs>,
         options: StreamOptions,
     ) -> Self {
+        let pvs = pvs.filter(|pvs| pvs.n_cells() == graph.cells.len());
+        // All within reach may be seen through windows, too.
+        let ways = Ways::of(graph, options.flies || pvs.is_none());
         let sizes = catalog.pieces().iter().map(|p| p.n_resident);
         Self {
             slots: Slots::new(&catalog, options.max_resident),
             wanted: Wanted::new(&catalog),
-            search: Search::new(Ways::of(graph), pvs, &catalog),
+            search: Search::new(ways, pvs, &catalog),
             sweep: Sweep {
                 is_over: true,
                 ..Sweep::default()

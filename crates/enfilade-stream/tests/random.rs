@@ -40,6 +40,7 @@ fn draw_program(seed: u64, policy: Policy) -> (World, Pvs, Program, bool, Rng) {
         max_bytes_in_flight: rng.below(60_000) as u64,
         max_bytes_a_frame: rng.below(60_000) as u64,
         min_share: if rng.chance(0.3) { 0.1 } else { 0.0 },
+        flies: rng.chance(0.5),
         step: rng.range(0.0, 2.0) as f32,
         first_retry: Duration::from_millis(rng.below(400) as u64),
         last_retry: Duration::from_secs(2),

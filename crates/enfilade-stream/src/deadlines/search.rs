@@ -84,7 +84,7 @@ impl Search {
         let n_cells = ways.cells.len();
         let words = n_cells.div_ceil(64);
         Self {
-            pvs: pvs.filter(|pvs| pvs.n_cells() == n_cells),
+            pvs,
             eye: None,
             stamp: 0,
             order: Vec::with_capacity(n_cells),
@@ -321,7 +321,7 @@ mod tests {
     fn search_of(world: &World, pvs: Option<Pvs>) -> Search {
         let rows = vec![Vec::new(); world.graph.cells.len()];
         Search::new(
-            Ways::of(&world.graph),
+            Ways::of(&world.graph, true),
             pvs,
             &Catalog::new(Vec::new(), &rows),
         )

@@ -1,6 +1,6 @@
 //! Ways from cell to cell, flat: the boxes of the portals, by the cells that they lead out of.
 
-use enfilade_cpg::{CellId, CellPortalGraph, SpecialShape, Way};
+use enfilade_cpg::{CellId, CellPortalGraph, PortalKind, SpecialShape, Way};
 
 /// Minimum and maximum. [Units: wu]
 pub(crate) type Box3 = [[f32; 3]; 2];
@@ -28,11 +28,13 @@ pub(crate) struct Ways {
 }
 
 impl Ways {
-    /// Collects the ways of a graph. Special portals are ways in addition to the doorways that they replace. O(portals).
-    pub(crate) fn of(graph: &CellPortalGraph) -> Self {
+    /// Collects the ways of a graph: openings and doors, for eyes that fly windows and cracks too. Special portals are ways in
+    /// addition to the doorways that they replace. O(portals).
+    pub(crate) fn of(graph: &CellPortalGraph, flies: bool) -> Self {
         let n_cells = graph.cells.len();
         let mut from_to = Vec::new();
-        for portal in &graph.portals {
+        let is_walked = |kind| flies || matches!(kind, PortalKind::Open | PortalKind::Door);
+        for portal in graph.portals.iter().filter(|p| is_walked(p.kind)) {
             let opening = box_of(&portal.outline);
             for (from, to) in [(0, 1), (1, 0)] {
                 let crossing = Crossing {

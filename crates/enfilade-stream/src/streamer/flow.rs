@@ -343,7 +343,7 @@ impl Streamer {
             self.slots.begin_sweep();
         }
         if self.search.order.is_empty() {
-            // What may be seen now, so that it does not go for what is in view.
+            // So that what may be seen now does not go for what is in view.
             self.search.find(&self.catalog, &mut WORK_OF_FRAME.clone());
         }
     }

@@ -13,11 +13,11 @@ pub enum Policy {
         /// Share of the screen that counts as much. [Limit: 0 to 1]
         first_share: f32,
     },
-    /// What was in view, until room is needed. Then what is due last goes first, by visibility and length of the way, not by age
-    /// (his §4.1.3).
+    /// All that was in view, until room is needed. Then what is due last goes first, by visibility and length of the way, not
+    /// by age (his §4.1.3).
     Cache,
-    /// What may be seen soon, by deadline: all that may be seen from the eye's cell, and then from each cell that the eye can
-    /// be in, before it can be there (his §4.1.3, last part). What was in view stays until room is needed, as in a cache.
+    /// All that may be seen soon, by deadline: from the eye's cell, and then from each cell that the eye can be in, before it
+    /// can be there (his §4.1.3, last part). As in a cache, what was in view stays until room is needed.
     Prefetch {
         /// Time ahead. What is due later is not fetched.
         horizon: Duration,
@@ -48,6 +48,8 @@ pub struct StreamOptions {
     pub max_bytes_a_frame: u64,
     /// Cells that cover less of the screen are not fetched for the view; they are reported as stand-ins. [Limit: 0 to 1]
     pub min_share: f32,
+    /// True if the eye passes windows and cracks too. If it does so unexpectedly, all that it sees there is late.
+    pub flies: bool,
     /// Distance of the eye from the last search at which deadlines are found anew. [Units: wu]
     pub step: f32,
     /// Time until a piece that failed is asked for again; doubles with each failure in a row.
@@ -65,6 +67,7 @@ impl Default for StreamOptions {
             max_bytes_in_flight: 4 << 20,
             max_bytes_a_frame: 1 << 20,
             min_share: 0.0,
+            flies: false,
             step: 1.0,
             first_retry: Duration::from_millis(250),
             last_retry: Duration::from_secs(8),
