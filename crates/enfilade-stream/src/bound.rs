@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use enfilade_cpg::{CellId, Pvs};
+use enfilade_cpg::{CellId, CellPortalGraph, Pvs};
 
-use crate::{Catalog, PieceId};
+use crate::deadlines::{Search, Ways};
+use crate::{Catalog, Eye, PieceId};
 
 /// A piece, and the time at which it has to be in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +15,33 @@ pub struct Due {
     pub at: Duration,
     /// The piece.
     pub piece: PieceId,
+}
+
+/// Returns when each piece is due for an eye that may go anywhere from now on, at its speed: pieces that may be seen now at time 0,
+/// all others when it can first be where they may be seen. Pieces that it cannot get to see are left out. In the order of the
+/// times. On its way, no deadline gets earlier; so a link on which these can be met, the first due first, is never late.
+#[must_use]
+pub fn deadlines(eye: &Eye, catalog: &Catalog, graph: &CellPortalGraph, pvs: &Pvs) -> Vec<Due> {
+    let mut search = Search::new(Ways::of(graph, false), Some(pvs.clone()), catalog);
+    search.follow(eye.cell, eye.position, 0.0, true);
+    while !search.is_over() {
+        search.find(catalog, &mut u32::MAX.clone());
+    }
+    let mut is_due = vec![false; catalog.pieces().len()];
+    let mut out = Vec::new();
+    for planned in &search.order {
+        let seconds = f64::from(planned.due) / f64::from(eye.speed);
+        let Ok(at) = Duration::try_from_secs_f64(if planned.due > 0.0 { seconds } else { 0.0 })
+        else {
+            continue;
+        };
+        for &piece in catalog.pieces_of(planned.cell) {
+            if !std::mem::replace(&mut is_due[piece.idx()], true) {
+                out.push(Due { at, piece });
+            }
+        }
+    }
+    out
 }
 
 /// Returns when each piece is first due on a recorded walk: when the eye enters a cell from which it may be seen. `walk` lists

@@ -12,7 +12,7 @@ mod of_world;
 mod source;
 mod streamer;
 
-pub use bound::{Due, due_times, least_bandwidth};
+pub use bound::{Due, deadlines, due_times, least_bandwidth};
 pub use catalog::{Catalog, Piece, PieceId};
 pub use link::{LinkOptions, SimulatedLink};
 pub use of_world::WorldPieces;

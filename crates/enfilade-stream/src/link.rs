@@ -97,6 +97,11 @@ impl SimulatedLink {
         }
     }
 
+    /// Sets the bandwidth from now on. [Units: bytes/s] [Limit: above 0]
+    pub fn set_bandwidth(&mut self, bandwidth: f64) {
+        self.options.bandwidth = bandwidth;
+    }
+
     /// Returns the bytes that have come over the link so far, those of failed and canceled transfers included.
     #[must_use]
     pub fn n_bytes(&self) -> f64 {

@@ -9,12 +9,15 @@
 //! - **Progress.** The pieces in view are chosen anew in each frame, the largest first, and those in memory count as larger than
 //!   they are; so the choice does not change while the view rests, and what is chosen is asked for before all else. A request made
 //!   for the view is not canceled, even if the view turns away.
+//! - **In time, not early.** What is due later is fetched once it could be late otherwise, at the [`Pace`] that the link has shown, with
+//!   caution. So little is fetched for nothing over a fast link, and as much as possible over a slow one.
 //! - **No thrash.** Nothing in memory goes unless room is needed (but for [`Policy::Minimal`]). For what is fetched ahead, only
 //!   pieces go that are due later than it.
 
 mod flow;
 mod frame;
 mod options;
+mod pace;
 mod slots;
 mod sweep;
 mod wanted;
@@ -27,6 +30,7 @@ use enfilade_cpg::{CellId, CellPortalGraph, Pvs};
 
 use crate::deadlines::{Search, Ways};
 use crate::{Catalog, PieceId, Reply, Source};
+use pace::Pace;
 use slots::{Slots, State};
 use sweep::Sweep;
 use wanted::Wanted;
@@ -35,7 +39,7 @@ pub use frame::{Cause, Changes, Eye, Failed, Frame, InView, Loaded, StandIn};
 pub use options::{Policy, StreamOptions};
 
 /// Work of a frame for searching and sweeping, in units of about a nanosecond.
-const WORK_OF_FRAME: u32 = 8_000;
+const WORK_OF_FRAME: u32 = 6_000;
 /// Cost of a piece met by the sweep, in the same units.
 const COST_OF_PIECE: u32 = 12;
 /// Failures in a row after which the source counts as out of reach: then nothing is fetched ahead for a while.
@@ -98,6 +102,7 @@ pub struct Streamer {
     wanted: Wanted,
     search: Search,
     sweep: Sweep,
+    pace: Pace,
     /// Pins of each cell.
     pins: Vec<u32>,
     /// Pinned pieces that may be absent.
@@ -146,6 +151,7 @@ impl Streamer {
                 is_over: true,
                 ..Sweep::default()
             },
+            pace: Pace::default(),
             pins: vec![0; catalog.n_cells()],
             to_pin: Vec::new(),
             replies: Vec::new(),
@@ -177,7 +183,11 @@ impl Streamer {
         changes: &mut Changes,
     ) {
         changes.clear();
-        self.now = self.now.max(frame.now);
+        let before = self.now;
+        self.now = before.max(frame.now);
+        if !self.slots.in_flight().is_empty() {
+            self.pace.spend(self.now - before);
+        }
         self.receive(source, changes);
         self.retry();
         let is_same = self.wanted.is_same(frame.in_view, &self.slots);
@@ -191,7 +201,7 @@ impl Streamer {
         self.run_sweep(source, frame.eye.speed, changes);
         // After all that frees pieces, so that none comes and goes in one frame.
         self.hand_over(changes);
-        self.report(frame.in_view, changes);
+        self.report(frame.in_view, is_same, changes);
     }
 
     /// Returns `true` if all is in memory that is in view and fits, and with [`Policy::Prefetch`], all that may be seen from the

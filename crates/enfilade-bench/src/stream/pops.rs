@@ -3,19 +3,23 @@
 use std::collections::HashSet;
 use std::time::Duration;
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use enfilade::geom::{Bvh, DVec3, Ray, Triangle};
-use enfilade::stream::{Due, LinkOptions, PieceId, StreamOptions, due_times, least_bandwidth};
+use enfilade::stream::{
+    LinkOptions, PieceId, StreamOptions, deadlines, due_times, least_bandwidth,
+};
 use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 
-use super::replay::{Outcome, replay};
+use super::replay::{Outcome, frame_of, replay};
 use super::site::{Recorder, Site, Walk, offices, route};
 use crate::rows::Figure;
 
 const LATENCY: Duration = Duration::from_millis(50);
 /// Speeds of walking and running. [Units: wu/s]
 const SPEEDS: [f32; 2] = [1.4, 5.0];
+/// Bandwidth of the link on which bytes are counted. [Units: bytes/s]
+const NORMAL: f64 = 1e6;
 /// Stretches of a walk.
 const STRETCHES: usize = 60;
 /// Factor over the least bandwidth.
@@ -23,21 +27,14 @@ const MORE: f64 = 1.25;
 /// Rays from each place of a walk.
 const RAYS: usize = 2000;
 
-/// Returns the least bandwidth of a walk: for what may be seen from the cells entered, and for what is in view.
-fn bandwidths(site: &Site, walk: &Walk) -> [f64; 2] {
+/// Returns the least bandwidth for a walk: for all ways that it could go on, and for the way that it goes.
+fn bandwidths(site: &Site, walk: &Walk) -> anyhow::Result<[f64; 2]> {
+    let first = walk.steps.first().context("no walk")?;
+    let eye = frame_of(walk, first, first.now).eye;
+    let any = deadlines(&eye, site.catalog(), &site.world.graph, &site.pvs);
     let cells: Vec<(Duration, CellId)> = walk.steps.iter().map(|s| (s.now, s.cell)).collect();
-    let may = due_times(&cells, site.catalog(), &site.pvs);
-    let mut known = HashSet::new();
-    let mut is = Vec::new();
-    for step in &walk.steps {
-        for &piece in step.visible.iter().filter(|p| known.insert(**p)) {
-            is.push(Due {
-                at: step.now,
-                piece,
-            });
-        }
-    }
-    [may, is].map(|due| least_bandwidth(&due, site.catalog(), LATENCY))
+    let this = due_times(&cells, site.catalog(), &site.pvs);
+    Ok([any, this].map(|due| least_bandwidth(&due, site.catalog(), LATENCY)))
 }
 
 fn options() -> StreamOptions {
@@ -62,18 +59,20 @@ fn pops_of(site: &Site) -> anyhow::Result<Figure> {
     let (mut value, mut notes) = (0, Vec::new());
     for speed in SPEEDS {
         let walk = recorder.walk(&route(site, 1, STRETCHES)?, speed)?;
-        let [may, is] = bandwidths(site, &walk);
-        ensure!(may.is_finite(), "a piece is due within the latency");
-        // A walk that needs nothing more than its first view.
-        let out = replay_at(site, &walk, MORE * may.max(1.0));
+        let [any, this] = bandwidths(site, &walk)?;
+        ensure!(any.is_finite(), "a piece is due within the latency");
+        // One byte a second if a walk needs no more than what may be seen at its start.
+        let out = replay_at(site, &walk, MORE * any.max(1.0));
+        let known = replay_at(site, &walk, MORE * this.max(1.0));
         value += out.n_absent;
         notes.push(format!(
-            "{speed} m/s: {} frames, {:.0} kB/s (in view alone {:.0}), {} frames with an absent piece, first view after {:.1} s",
-            walk.steps.len(),
-            MORE * may / 1e3,
-            MORE * is / 1e3,
+            "{speed} m/s: {} of {} frames with an absent piece at {:.0} B/s; at {:.0} B/s, 1.25 × the least for who knows \
+             the way, {}",
             out.n_frames,
-            out.start.as_secs_f64(),
+            walk.steps.len(),
+            MORE * any,
+            MORE * this,
+            known.n_frames,
         ));
     }
     Ok(Figure {
@@ -88,8 +87,8 @@ fn pops_of(site: &Site) -> anyhow::Result<Figure> {
 fn radius_of(site: &Site) -> anyhow::Result<Figure> {
     let mut recorder = Recorder::new(site);
     let walk = recorder.walk(&route(site, 1, STRETCHES)?, SPEEDS[0])?;
-    let [may, _] = bandwidths(site, &walk);
-    let out = replay_at(site, &walk, MORE * may.max(1.0));
+    let out = replay_at(site, &walk, NORMAL);
+    ensure!(out.n_absent == 0, "{} absent pieces", out.n_absent);
     let graph = &site.world.graph;
     let mut cells_of = vec![Vec::new(); site.catalog().pieces().len()];
     for cell in graph.cell_ids() {
@@ -133,8 +132,8 @@ fn radius_of(site: &Site) -> anyhow::Result<Figure> {
 fn reached_of(site: &Site) -> anyhow::Result<Figure> {
     let mut recorder = Recorder::new(site);
     let walk = recorder.walk(&route(site, 1, STRETCHES)?, SPEEDS[0])?;
-    let [may, _] = bandwidths(site, &walk);
-    let out = replay_at(site, &walk, MORE * may.max(1.0));
+    let out = replay_at(site, &walk, NORMAL);
+    ensure!(out.n_absent == 0, "{} absent pieces", out.n_absent);
     let world = &site.world;
     let mut triangles: Vec<Triangle> = Vec::new();
     for batch in &world.batches {

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use enfilade::stream::{Changes, Eye, Frame, LinkOptions, SimulatedLink, StreamOptions, Streamer};
+use enfilade::stream::{
+    Changes, Eye, Frame, LinkOptions, PieceId, SimulatedLink, StreamOptions, Streamer,
+};
 
 use super::site::{FRAME, Site, Step, Walk};
 
-/// Longest time to load the first view.
+/// Frames after which the walk begins in any case: ten minutes.
 const MOST_FRAMES: u32 = 600 * 60;
 
 /// The outcome of a replay.
@@ -18,19 +20,23 @@ pub(super) struct Outcome {
     pub(super) n_frames: usize,
     /// Size in transit of all requests. [Units: bytes]
     pub(super) n_bytes: u64,
-    pub(super) n_requests: u64,
-    /// Time until the first view was settled.
-    pub(super) start: Duration,
 }
 
-/// Replays a walk: the walker waits until the first view is settled, and then walks.
+/// Longest time to load the first view. [Units: s]
+const FIRST: f64 = 300.0;
+
+/// Replays a walk: the walker waits until the first view is settled, and then walks. A link that would need more than five minutes
+/// for the world is faster until then.
 pub(super) fn replay(
     site: &Site,
     walk: &Walk,
     options: StreamOptions,
     link: LinkOptions,
 ) -> Outcome {
+    let bandwidth = link.bandwidth;
     let mut link = SimulatedLink::new(site.catalog(), link);
+    let all = (0..site.catalog().pieces().len() as u32).map(PieceId);
+    link.set_bandwidth(bandwidth.max(site.packed(all) as f64 / FIRST));
     let catalog = site.catalog().clone();
     let pvs = Some(site.pvs.clone());
     let mut streamer = Streamer::new(catalog, &site.world.graph, pvs, options);
@@ -40,27 +46,27 @@ pub(super) fn replay(
         return out;
     };
     let mut now = Duration::ZERO;
-    let mut frame = |now, step: &Step, streamer: &mut Streamer| {
+    let mut frame = |now, step: &Step, streamer: &mut Streamer, link: &mut SimulatedLink| {
         link.advance(now);
-        streamer.update(&mut link, &frame_of(walk, step, now), &mut changes);
+        streamer.update(link, &frame_of(walk, step, now), &mut changes);
     };
     for _ in 0..MOST_FRAMES {
-        frame(now, first, &mut streamer);
+        frame(now, first, &mut streamer, &mut link);
         if streamer.settled() {
             break;
         }
         now += FRAME;
     }
-    out.start = now;
+    link.set_bandwidth(bandwidth);
     for step in &walk.steps {
-        frame(out.start + FRAME + step.now, step, &mut streamer);
+        frame(now + FRAME + step.now, step, &mut streamer, &mut link);
         let is_absent = |p: &&_| !streamer.is_resident(**p);
         let n = step.visible.iter().filter(is_absent).count();
         out.n_absent += n;
         out.n_frames += usize::from(n > 0);
     }
     let counts = streamer.counts();
-    (out.n_bytes, out.n_requests) = (counts.bytes_requested, counts.n_requests);
+    out.n_bytes = counts.bytes_requested;
     out
 }
 

@@ -5,9 +5,13 @@ use std::cmp::Reverse;
 use super::frame::{Changes, Eye, Failed, InView, Loaded};
 use super::options::Policy;
 use super::slots::State;
+use super::sweep::Sweep;
 use super::{COST_OF_PIECE, MANY_FAILURES, Streamer, WORK_OF_FRAME};
 use crate::deadlines::{Planned, Search};
 use crate::{FetchError, PieceId, Source};
+
+/// Time to hand pieces over, and for a sweep to pass. [Units: s]
+const MARGIN: f64 = 0.5;
 
 /// The outcome of an attempt to fetch a piece ahead.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -17,6 +21,24 @@ enum Attempt {
     NoRoom,
     /// Not now: something has to end first.
     Later,
+}
+
+/// How far a sweep fetches ahead.
+struct Reach {
+    /// Latest deadline within the horizon. [Units: wu]
+    limit: f32,
+    /// Speed of the eye, if what need not be fetched yet waits. [Units: wu/s]
+    speed: Option<f32>,
+}
+
+impl Reach {
+    /// Returns the latest deadline that is fetched now. [Units: wu]
+    fn of(&self, sweep: &Sweep) -> f32 {
+        match self.speed {
+            Some(_) => self.limit.min(sweep.limit),
+            None => self.limit,
+        }
+    }
 }
 
 /// Replies, failures and hand-over.
@@ -38,6 +60,8 @@ impl Streamer {
             match reply.bytes {
                 Ok(bytes) if bytes.len() as u64 <= most => {
                     self.n_failures_in_row = 0;
+                    let slot = self.slots.of(piece);
+                    self.pace.receive(slot.n_packed, self.now - slot.asked);
                     self.slots.arrive(piece);
                     self.arrived.push(Loaded { piece, bytes });
                 }
@@ -138,11 +162,11 @@ impl Streamer {
     }
 
     /// Counts what is in view and not in memory, and lists the cells.
-    pub(super) fn report(&mut self, in_view: &[InView], changes: &mut Changes) {
-        if self.wanted.is_same(in_view, &self.slots) && self.is_whole {
+    pub(super) fn report(&mut self, in_view: &[InView], is_same: bool, changes: &mut Changes) {
+        if is_same && self.wanted.is_same(in_view, &self.slots) && self.is_whole {
             return;
         }
-        self.wanted.end(in_view, &self.slots);
+        self.wanted.end(&self.slots);
         let out = &mut changes.stand_ins;
         let min_share = self.options.min_share;
         self.wanted
@@ -162,6 +186,7 @@ impl Streamer {
         if self.options.policy != Policy::Minimal {
             return;
         }
+        self.wanted.mark(&self.catalog);
         for piece in self.slots.last_first(true) {
             if self.may_go(piece) {
                 self.victims.push(piece);
@@ -245,6 +270,9 @@ impl Streamer {
     /// else is not enough. Chooses none if there is not enough.
     fn choose_victims(&mut self, size: u64) -> bool {
         let mut room = self.slots.max_kept - self.slots.n_kept;
+        if room < size {
+            self.wanted.mark(&self.catalog);
+        }
         for is_visible in [false, true] {
             for victim in self.slots.last_first(true) {
                 if room >= size {
@@ -293,6 +321,7 @@ impl Streamer {
 
     fn ask<S: Source + ?Sized>(&mut self, source: &mut S, piece: PieceId, for_view: bool) {
         self.slots.reserve(piece, for_view);
+        self.slots.of_mut(piece).asked = self.now;
         self.n_requests += 1;
         self.bytes_requested += self.slots.of(piece).n_packed;
         source.request(piece);
@@ -361,14 +390,19 @@ impl Streamer {
             Policy::Delayed { .. } => f32::INFINITY,
             Policy::Prefetch { horizon } => horizon.as_secs_f32() * speed.max(0.0),
         };
+        let is_paced = matches!(self.options.policy, Policy::Prefetch { .. });
+        let reach = Reach {
+            limit,
+            speed: is_paced.then_some(speed.max(0.0)),
+        };
         self.sweep.is_waiting = false;
-        self.fetch_again(source, limit, changes);
+        self.fetch_again(source, reach.of(&self.sweep), changes);
         let mut work = WORK_OF_FRAME;
         while work > 0 && !self.sweep.is_over && !self.sweep.is_waiting {
             if let Some(&planned) = self.search.order.get(self.sweep.cell) {
-                self.sweep_cell(source, planned, limit, &mut work, changes);
+                self.sweep_cell(source, planned, &reach, &mut work, changes);
             } else if self.search.is_over() {
-                self.sweep.end();
+                self.end_sweep(&reach);
             } else {
                 self.search.find(&self.catalog, &mut work);
             }
@@ -405,30 +439,66 @@ impl Streamer {
         &mut self,
         source: &mut S,
         planned: Planned,
-        limit: f32,
+        reach: &Reach,
         work: &mut u32,
         changes: &mut Changes,
     ) {
         let Planned { cell, due } = planned;
         self.sweep.is_past_visible |= due > 0.0;
+        if due > reach.limit && self.pass_horizon(reach) {
+            return;
+        }
         *work = work.saturating_sub(COST_OF_PIECE);
         while let Some(&piece) = self.catalog.pieces_of(cell).get(self.sweep.piece) {
             *work = work.saturating_sub(COST_OF_PIECE);
             let slot = self.slots.of(piece);
             if slot.swept != self.sweep.stamp {
                 if slot.state == State::Absent
-                    && due <= limit
+                    && due <= reach.of(&self.sweep)
                     && self.fetch_ahead(source, piece, due, false, changes) == Attempt::Later
                 {
                     self.sweep.is_waiting = true;
                     return;
                 }
                 self.sweep.meet(piece, due, &mut self.slots);
+                self.watch(due, reach);
             }
             self.sweep.piece += 1;
         }
         (self.sweep.cell, self.sweep.piece) = (self.sweep.cell + 1, 0);
         if self.slots.max_kept.saturating_sub(self.sweep.n_bytes) < self.smallest {
+            self.end_sweep(reach);
+        }
+    }
+
+    /// Watches whether all that was met so far can come in time if nothing is fetched until the eye has gone a step.
+    fn watch(&mut self, due: f32, reach: &Reach) {
+        let Some(speed) = reach.speed.filter(|_| due > 0.0 && due <= reach.limit) else {
+            return;
+        };
+        let time = self.pace.time_of(self.sweep.n_ahead) + MARGIN;
+        if f64::from(due - self.options.step) <= time * f64::from(speed) {
+            self.sweep.must = due;
+        }
+    }
+
+    /// Ends the part of a sweep that fetches: sets how far the next one does. Returns `true` if it begins anew, because more has to
+    /// be fetched now.
+    fn pass_horizon(&mut self, reach: &Reach) -> bool {
+        if reach.speed.is_none() || std::mem::replace(&mut self.sweep.is_past_horizon, true) {
+            return false;
+        }
+        let is_more = self.sweep.must > self.sweep.limit;
+        self.sweep.limit = self.sweep.must;
+        if is_more {
+            self.sweep.begin();
+            self.slots.begin_sweep();
+        }
+        is_more
+    }
+
+    fn end_sweep(&mut self, reach: &Reach) {
+        if !self.pass_horizon(reach) {
             self.sweep.end();
         }
     }
@@ -454,6 +524,9 @@ impl Streamer {
         }
         let mut room = self.slots.max_kept - self.slots.n_kept;
         let mut soon = 0;
+        if room < size {
+            self.wanted.mark(&self.catalog);
+        }
         for victim in self.slots.last_first(is_passed) {
             if room >= size {
                 break;

@@ -19,7 +19,8 @@ pub enum Policy {
     /// All that may be seen soon, by deadline: from the eye's cell, and then from each cell that the eye can be in, before it
     /// can be there (his §4.1.3, last part). As in a cache, what was in view stays until room is needed.
     Prefetch {
-        /// Time ahead. What is due later is not fetched.
+        /// Longest time ahead. All that is due within it is watched, and fetched as soon as the link, at the pace that it has
+        /// shown, might need the time; what is due later is not fetched.
         horizon: Duration,
     },
 }
@@ -27,7 +28,7 @@ pub enum Policy {
 impl Default for Policy {
     fn default() -> Self {
         Self::Prefetch {
-            horizon: Duration::from_secs(10),
+            horizon: Duration::from_secs(60),
         }
     }
 }

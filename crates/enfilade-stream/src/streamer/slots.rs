@@ -32,6 +32,8 @@ impl State {
 pub(crate) struct Slot {
     pub(crate) n_resident: u64,
     pub(crate) n_packed: u64,
+    /// Time of the last request.
+    pub(crate) asked: Duration,
     /// Neighbors in the list of kept pieces.
     before: u32,
     after: u32,
@@ -59,6 +61,8 @@ pub(crate) struct Slots {
     pub(crate) n_pinned: u64,
     in_flight: Vec<PieceId>,
     pub(crate) bytes_in_flight: u64,
+    /// Goes up when a piece is no longer in memory of the program.
+    pub(crate) n_losses: u64,
     /// Goes up with each change of a state.
     pub(crate) version: u64,
 }
@@ -69,6 +73,7 @@ impl Slots {
         let empty = Slot {
             n_resident: 0,
             n_packed: 0,
+            asked: Duration::ZERO,
             before: n,
             after: n,
             n_pins: 0,
@@ -93,6 +98,7 @@ impl Slots {
             n_pinned: 0,
             in_flight: Vec::new(),
             bytes_in_flight: 0,
+            n_losses: 0,
             version: 0,
         }
     }
@@ -176,6 +182,7 @@ impl Slots {
         if self.state(piece) == State::InFlight {
             self.land(piece);
         }
+        self.n_losses += u64::from(self.state(piece) == State::Resident);
         self.version += 1;
         self.unlink(piece.0);
         let slot = &mut self.slots[piece.idx()];

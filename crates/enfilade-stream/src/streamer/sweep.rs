@@ -24,6 +24,14 @@ pub(crate) struct Sweep {
     pub(crate) pending: Vec<PieceId>,
     /// A deadline and a size for which there was no room: nor is there for larger pieces that are due no earlier.
     pub(crate) no_room: Option<(f32, u64)>,
+    /// Size in transit of what is due later, was met and is not there. [Units: bytes]
+    pub(crate) n_ahead: u64,
+    /// Latest deadline met that needs that fetching goes on now. [Units: wu]
+    pub(crate) must: f32,
+    /// What is due by then is fetched: the result of the last pass. [Units: wu]
+    pub(crate) limit: f32,
+    /// True if all that is due within the horizon was met.
+    pub(crate) is_past_horizon: bool,
     /// Pieces met that failed or were canceled, and may now be asked for again.
     pub(crate) again: Vec<PieceId>,
     /// True if it has to wait for requests to end.
@@ -43,6 +51,11 @@ impl Sweep {
         self.n_bytes = 0;
         self.is_past_visible = false;
         self.pending.clear();
+        if !self.is_past_horizon {
+            // It got no farther: what it found holds.
+            self.limit = self.limit.max(self.must);
+        }
+        (self.n_ahead, self.must, self.is_past_horizon) = (0, 0.0, false);
         self.no_room = None;
         self.again.clear();
         self.is_waiting = false;
@@ -58,7 +71,11 @@ impl Sweep {
     pub(crate) fn meet(&mut self, piece: PieceId, due: f32, slots: &mut Slots) {
         let slot = slots.of_mut(piece);
         slot.swept = self.stamp;
-        let (state, size) = (slot.state, slot.n_resident);
+        let (state, size, n_packed) = (slot.state, slot.n_resident, slot.n_packed);
+        let is_there = matches!(state, State::Arrived | State::Resident | State::Missing);
+        if due > 0.0 && !is_there {
+            self.n_ahead += n_packed;
+        }
         if state.is_kept() {
             self.n_bytes += size;
             slots.move_to_mark(piece);

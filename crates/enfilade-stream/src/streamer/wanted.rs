@@ -29,6 +29,11 @@ pub(crate) struct Wanted {
     pub(crate) absent: Vec<PieceId>,
     /// Number of chosen pieces that are not in memory but may come.
     n_pending: usize,
+    /// For each cell, one more than the losses of memory after which it was complete; so it still is, after no more.
+    complete: Vec<u64>,
+    /// True if all cells in view are complete: then pieces have no marks until they are [needed](Self::mark).
+    is_complete: bool,
+    is_marked: bool,
     last_view: Vec<InView>,
     last_version: u64,
 }
@@ -37,12 +42,13 @@ impl Wanted {
     pub(crate) fn new(catalog: &Catalog) -> Self {
         Self {
             marks: vec![Mark::default(); catalog.pieces().len()],
+            complete: vec![0; catalog.n_cells()],
             last_version: u64::MAX,
             ..Self::default()
         }
     }
 
-    /// Returns `true` if a piece is in view and fits.
+    /// Returns `true` if a piece is in view and fits. For pieces in memory, only after [`Wanted::mark`].
     #[inline]
     pub(crate) fn has(&self, piece: PieceId) -> bool {
         self.marks[piece.idx()].chosen == self.view
@@ -69,8 +75,8 @@ impl Wanted {
         self.n_pending
     }
 
-    /// Looks at a view: which pieces are in it, and which of them fit. Linear in them if all fit and are in memory, otherwise
-    /// with a sort.
+    /// Looks at a view: which pieces are in it, and which of them fit. Linear in the cells if all are complete and were so
+    /// before, otherwise in the pieces, with a sort of those that are absent, or of all if they do not fit.
     pub(crate) fn look(
         &mut self,
         in_view: &[InView],
@@ -81,6 +87,20 @@ impl Wanted {
         self.view = self.view.wrapping_add(1);
         self.pieces.clear();
         self.absent.clear();
+        self.last_view.clear();
+        self.last_view.extend_from_slice(in_view);
+        let complete = slots.n_losses + 1;
+        let is_complete = |seen: &InView| {
+            let of_cell = self.complete.get(seen.cell.idx());
+            of_cell.is_none_or(|c| *c == complete)
+        };
+        // Pinned pieces that are not there yet need their room.
+        let has_room = slots.n_pinned == 0 || slots.n_kept + slots.n_pinned <= slots.max_kept;
+        self.is_complete = has_room && in_view.iter().all(is_complete);
+        self.is_marked = !self.is_complete;
+        if self.is_complete {
+            return;
+        }
         let (mut n_bytes, view) = (0, self.view);
         for seen in in_view {
             let share = clean(seen.share);
@@ -126,6 +146,18 @@ impl Wanted {
         });
     }
 
+    /// Marks the pieces in view if this was not needed yet. Call it before pieces in memory are chosen to go.
+    pub(crate) fn mark(&mut self, catalog: &Catalog) {
+        if std::mem::replace(&mut self.is_marked, true) {
+            return;
+        }
+        for seen in &self.last_view {
+            for piece in catalog.pieces_of(seen.cell) {
+                self.marks[piece.idx()].chosen = self.view;
+            }
+        }
+    }
+
     /// Returns `true` if a chosen piece of at least this share of the screen is on its way or about to be asked for.
     pub(crate) fn is_large_coming(&self, share: f32, slots: &Slots) -> bool {
         let is_coming = |p: &PieceId| {
@@ -141,28 +173,29 @@ impl Wanted {
         !self.absent.is_empty() || slots.in_flight().iter().any(|p| self.has(*p))
     }
 
-    /// Ends a frame: counts the chosen pieces that are not in memory but may come, and remembers the view, so that an equal
+    /// Ends a frame: counts the chosen pieces that are not in memory but may come, and remembers the state, so that an equal
     /// one is told apart. Linear in the pieces in view.
-    pub(crate) fn end(&mut self, in_view: &[InView], slots: &Slots) {
+    pub(crate) fn end(&mut self, slots: &Slots) {
         let is_pending = |p: &&PieceId| {
             let state = slots.state(**p);
             self.has(**p) && !matches!(state, State::Resident | State::Missing)
         };
         self.n_pending = self.pieces.iter().filter(is_pending).count();
         self.last_version = slots.version;
-        self.last_view.clear();
-        self.last_view.extend_from_slice(in_view);
     }
 
     /// Lists the cells in view that are not complete.
     pub(crate) fn stand_ins(
-        &self,
+        &mut self,
         in_view: &[InView],
         min_share: f32,
         catalog: &Catalog,
         slots: &Slots,
         out: &mut Vec<StandIn>,
     ) {
+        if self.is_complete {
+            return;
+        }
         for &InView { cell, share } in in_view {
             let cause = |&piece: &PieceId| match slots.state(piece) {
                 State::Resident => None,
@@ -173,7 +206,14 @@ impl Wanted {
                 State::Absent | State::InFlight | State::Arrived => Some(Cause::Pending),
             };
             let causes = catalog.pieces_of(cell).iter().filter_map(cause);
-            out.extend(causes.max().map(|cause| StandIn { cell, share, cause }));
+            match causes.max() {
+                Some(cause) => out.push(StandIn { cell, share, cause }),
+                None => {
+                    if let Some(complete) = self.complete.get_mut(cell.idx()) {
+                        *complete = slots.n_losses + 1;
+                    }
+                }
+            }
         }
     }
 
