@@ -18,6 +18,7 @@ mod process;
 mod rows;
 mod score;
 mod sight;
+mod stream;
 mod subject;
 mod table;
 mod tampered;
@@ -63,6 +64,8 @@ enum What {
     Living(Chosen),
     /// Special portals, such as mirrors: a row per figure, with the value that it must reach.
     Portals(Chosen),
+    /// Worlds in pieces over a simulated link: a row per figure, with the value that it must reach.
+    Stream(Chosen),
     /// Rooms, doors and windows found, compared with those that architects modeled; fails below the floors.
     Score {
         /// Folders with `scene.glb` and `truth.json`; all real scenes if there are none.
@@ -199,6 +202,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
         What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
+        What::Stream(chosen) => return bench_rows(stream::ROWS, args.json, chosen),
         What::Messy(options) => return bench_messy(options, args.json),
         What::Trust(options) => return bench_trust(options, args.json),
         What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),

@@ -4,8 +4,20 @@
 //! colors), and *pieces*: the triangles of a set of cells, a mesh of objects, a picture. [`Catalog`] lists the pieces and
 //! the cells that need them. A [`Source`] fetches pieces from wherever they are; it never blocks. After Dirkse (2002), §4.
 
+mod bound;
 mod catalog;
+mod deadlines;
+mod link;
+mod of_world;
 mod source;
+mod streamer;
 
+pub use bound::{Due, deadlines, due_times, least_bandwidth};
 pub use catalog::{Catalog, Piece, PieceId};
+pub use link::{LinkOptions, SimulatedLink};
+pub use of_world::WorldPieces;
 pub use source::{FetchError, Reply, Source};
+pub use streamer::{
+    Cause, Changes, Eye, Failed, Frame, InView, Loaded, PinError, Policy, StandIn, StreamCounts,
+    StreamOptions, Streamer,
+};

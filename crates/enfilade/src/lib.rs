@@ -113,6 +113,7 @@
 //! | `vis` | `vis` | visibility from each cell, precomputed |
 //! | `render` | `render` | pictures of a world with wgpu |
 //! | `verify` | `verify` | checks the promises of a world |
+//! | `stream` | `stream` | worlds in pieces, fetched as they come into view and kept within a budget |
 //! | `world` | `world` | queries of a living world: things, paths, sound, contacts, moving rooms |
 //!
 //! None is on by default: a game that only loads and queries worlds links neither importers nor builders.
@@ -141,6 +142,8 @@ pub use enfilade_bake as bake;
 pub use enfilade_import as import;
 #[cfg(feature = "render")]
 pub use enfilade_render as render;
+#[cfg(feature = "stream")]
+pub use enfilade_stream as stream;
 #[cfg(feature = "verify")]
 pub use enfilade_verify as verify;
 #[cfg(feature = "vis")]

@@ -163,7 +163,7 @@ pub(crate) const fn baked(
     }
 }
 
-const fn named(
+pub(crate) const fn named(
     name: &'static str,
     scenes: &'static [&'static str],
     measure: fn(&World, &str) -> anyhow::Result<Figure>,
