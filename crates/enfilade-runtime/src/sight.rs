@@ -90,6 +90,7 @@ impl Sight {
             chunks: drawn.chunks,
             details: drawn.details,
             areas: drawn.areas,
+            sizes: drawn.sizes,
             extent: drawn.extent,
         };
         Ok(Self::assemble(

@@ -139,6 +139,12 @@ fn a_hollow_world_answers_as_the_whole_world_does() {
             );
             assert_same(&a, &b);
         }
+        let sizes = sight.skeleton().sizes();
+        assert_eq!(whole.skeleton().sizes(), sizes);
+        let batches = world.batches.iter().map(|b| &b.primitive);
+        let meshes = world.detail_meshes.iter().flat_map(|m| &m.primitives);
+        let indices = batches.chain(meshes).map(|p| p.indices.len() as u64);
+        assert_eq!(sizes[1], indices.sum::<u64>());
         assert_eq!(whole.chunks(), sight.chunks());
         assert_eq!(whole.n_triangles(), sight.n_triangles());
         assert_eq!(whole.tolerance().to_bits(), sight.tolerance().to_bits());

@@ -27,6 +27,8 @@ pub(super) struct Drawn {
     pub(super) areas: Vec<f32>,
     /// Per batch: its triangles as index triples, sorted so that chunks are ranges.
     pub(super) indices: Vec<Vec<u32>>,
+    /// Number of vertices and of indices of all batches and meshes, each mesh once.
+    pub(super) sizes: [u64; 2],
     /// Chunk of each triangle, over all batches in order.
     chunk_of: Vec<u32>,
     /// Largest absolute coordinate, or 1. [Units: wu]
@@ -40,9 +42,16 @@ impl Drawn {
             details: Vec::new(),
             areas: Vec::new(),
             indices: Vec::new(),
+            sizes: [0; 2],
             chunk_of: Vec::new(),
             extent: 1.0,
         };
+        let batches = world.batches.iter().map(|b| &b.primitive);
+        let meshes = world.detail_meshes.iter().flat_map(|m| &m.primitives);
+        for primitive in batches.chain(meshes) {
+            drawn.sizes[0] += primitive.positions.len() as u64;
+            drawn.sizes[1] += primitive.indices.len() as u64;
+        }
         for (index, batch) in world.batches.iter().enumerate() {
             let index = index as u32;
             drawn

@@ -52,6 +52,8 @@ pub struct SightSkeleton {
     /// Per cell of the eye: the chunks and details (from `chunks.len()` on) that may be seen from it, if the world has that
     /// information.
     pub(crate) seen_from: Option<VisibleParts>,
+    /// Number of vertices and of indices of all batches and meshes, each mesh once.
+    pub(super) sizes: [u64; 2],
     /// Largest absolute coordinate of what is drawn, or 1. [Units: wu]
     pub(super) extent: f64,
 }
@@ -116,6 +118,12 @@ impl SightSkeleton {
     #[must_use]
     pub fn options(&self) -> &SightOptions {
         &self.options
+    }
+
+    /// Returns the number of vertices and of indices of all batches and meshes of the whole world, each mesh once.
+    #[must_use]
+    pub fn sizes(&self) -> [u64; 2] {
+        self.sizes
     }
 
     /// Returns the number of triangles, those of placed details included. O(chunks and details).

@@ -52,6 +52,7 @@ impl SightSkeleton {
         out.words([o.chunk_triangles, o.occluders, o.portal_group].map(word));
         out.floats([o.occluder_area]);
         out.doubles([self.extent]);
+        out.longs(self.sizes);
         let (n_batches, n_details) = (self.areas.len(), self.details.len());
         out.words([self.n_cells, n_batches, n_details].map(word));
         self.write_chunks(&mut out);
@@ -121,17 +122,18 @@ impl SightSkeleton {
             return Err(damaged("its checksum differs"));
         }
         let mut input = Reader(body.get(MARK.len() + 4..).ok_or(damaged(CUT))?);
-        let sizes = [input.word()?, input.word()?, input.word()?].map(|n| n as usize);
+        let numbers = [input.word()?, input.word()?, input.word()?].map(|n| n as usize);
         let options = SightOptions {
-            chunk_triangles: sizes[0],
-            occluders: sizes[1],
-            portal_group: sizes[2],
+            chunk_triangles: numbers[0],
+            occluders: numbers[1],
+            portal_group: numbers[2],
             occluder_area: input.float()?,
         };
         let extent = input.double()?;
         if !extent.is_finite() || extent < 1.0 {
             return Err(damaged("its extent is no length"));
         }
+        let sizes = [input.long()?, input.long()?];
         let [n_cells, n_batches, n_details] =
             [input.word()?, input.word()?, input.word()?].map(|n| n as usize);
         let (areas, chunks) = read_chunks(&mut input, n_batches)?;
@@ -146,6 +148,7 @@ impl SightSkeleton {
             details,
             occluders: read_occluders(&mut input, n_cells)?,
             seen_from: read_seen(&mut input, n_cells, n_items)?,
+            sizes,
             extent,
         };
         input
@@ -303,6 +306,10 @@ impl Writer {
         (self.0).extend(words.into_iter().flat_map(u32::to_le_bytes));
     }
 
+    fn longs(&mut self, longs: impl IntoIterator<Item = u64>) {
+        (self.0).extend(longs.into_iter().flat_map(u64::to_le_bytes));
+    }
+
     fn floats(&mut self, floats: impl IntoIterator<Item = f32>) {
         (self.0).extend(floats.into_iter().flat_map(f32::to_le_bytes));
     }
@@ -343,6 +350,10 @@ impl<'a> Reader<'a> {
 
     fn word(&mut self) -> Result<u32, SkeletonError> {
         Ok(u32::from_le_bytes(self.take(1)?[0]))
+    }
+
+    fn long(&mut self) -> Result<u64, SkeletonError> {
+        Ok(u64::from_le_bytes(self.take(1)?[0]))
     }
 
     fn float(&mut self) -> Result<f32, SkeletonError> {
