@@ -2,39 +2,43 @@
 //!
 //! One buffer holds all triangles: first those of the chunks of [`Sight`], in the same order, then those of
 //! detail meshes, each mesh once. Draws are ranges of it, so that adjacent chunks join to one draw whatever their
-//! room.
+//! room. In a hollow world the same buffer has room for some of them (`streamed.rs`).
 
+mod buffers;
 mod color;
 mod filling;
+mod pieces;
 mod placed;
 mod plug;
+mod room;
+mod streamed;
 mod textures;
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_runtime::{Sight, SightState};
 use glam::Vec3;
-use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
 use crate::marks::{Mark, MarkShape};
-use crate::materials::{Look, looks_of};
-use filling::{Filling, Level};
+use crate::materials::looks_of;
+use buffers::TriangleBuffers;
+use filling::{Dress, Filling, Level};
 use placed::{Moving, Placed, bounds_of, placed};
+use streamed::Streamed;
 use textures::load_textures;
 
 pub use color::cell_color;
 pub(crate) use color::packed_cell_color;
 pub(crate) use filling::{CORNER_LAYOUT, Corner, Finish, Span};
+pub use pieces::{GpuPiece, PieceMaker};
 pub(crate) use placed::{INSTANCE_LAYOUT, Instance};
 pub(crate) use plug::plug;
+pub use streamed::{Put, StreamLimits};
 pub(crate) use textures::texture_layout;
 
 /// A world on the adapter, ready to be drawn.
 pub struct GpuWorld {
-    pub(crate) corners: wgpu::Buffer,
-    pub(crate) indices: wgpu::Buffer,
-    /// Positions of the vertices of all triangles, three each, for adapters whose shaders cannot fetch them.
-    pub(crate) listed: Option<wgpu::Buffer>,
+    pub(crate) triangles: TriangleBuffers,
     /// Instances: structure first, then objects.
     pub(crate) instances: Vec<Instance>,
     /// Base color textures; the first is white.
@@ -62,6 +66,8 @@ pub struct GpuWorld {
     pub(crate) n_triangles: u64,
     n_missing_pictures: u32,
     n_large_pictures: u32,
+    /// What comes and goes, in a hollow world.
+    streamed: Option<Box<Streamed>>,
 }
 
 impl GpuWorld {
@@ -92,83 +98,62 @@ impl GpuWorld {
         sight: &Sight,
         has_levels: bool,
     ) -> Result<Self, RenderError> {
-        let mut looks: Vec<Look> = looks_of(world);
-        looks.push(Look::default());
+        let looks = looks_of(world);
         let textures = load_textures(gpu, world, &looks)?;
-        let mut filling = Filling {
-            world,
+        let dress = Dress {
             looks,
             texture_of: textures.of,
-            corners: Vec::new(),
-            indices: Vec::new(),
         };
-        let batches = filling.add_batches(sight);
-        let meshes = filling.add_meshes(has_levels);
-        let (instances, details, moving) = placed(world, sight);
-        let plugs = filling.add_plugs(sight);
-        let chunks: Vec<Span> = sight
-            .chunks()
-            .iter()
-            .map(|c| Span {
-                first: batches[c.batch as usize].first + c.first_index,
-                n: c.n_indices,
-                ..batches[c.batch as usize]
-            })
-            .collect();
-        let bounds = bounds_of(world, &details);
-        // The id shaders fetch vertices from these buffers.
-        let fetched = if gpu.fetches() {
-            wgpu::BufferUsages::STORAGE
-        } else {
-            wgpu::BufferUsages::empty()
-        };
-        let buffer = |what, bytes: &[u8], usage| make_buffer(gpu, what, bytes, usage);
-        let corners = bytemuck::cast_slice(&filling.corners);
-        let indices = bytemuck::cast_slice(&filling.indices);
+        let mut filling = Filling::new(&dress);
+        let batches = filling.add_batches(world, sight);
+        let meshes = filling.add_meshes(world, has_levels);
+        let plugs = filling.add_plugs(world, sight);
+        let chunks = sight.chunks().iter().map(|c| Span {
+            first: batches[c.batch as usize].first + c.first_index,
+            n: c.n_indices,
+            ..batches[c.batch as usize]
+        });
+        let triangles = TriangleBuffers::filled(gpu, &filling.corners, &filling.indices)?;
         Ok(Self {
-            corners: buffer(
-                "the world's vertices",
-                corners,
-                wgpu::BufferUsages::VERTEX | fetched,
-            )?,
-            indices: buffer(
-                "the world's indices",
-                indices,
-                wgpu::BufferUsages::INDEX | fetched,
-            )?,
-            listed: if gpu.fetches() {
-                None
-            } else {
-                let listed = filling.listed();
-                let listed = bytemuck::cast_slice(&listed);
-                Some(buffer(
-                    "the triangles' vertices",
-                    listed,
-                    wgpu::BufferUsages::VERTEX,
-                )?)
-            },
-            instances,
+            chunks: chunks.collect(),
+            meshes,
             textures: textures.groups,
-            chunks,
+            n_missing_pictures: textures.n_missing,
+            n_large_pictures: textures.n_too_large,
+            ..Self::of_triangles(world, sight, &dress, triangles, plugs)
+        })
+    }
+
+    /// Returns a world of which only the plugs are listed.
+    fn of_triangles(
+        world: &World,
+        sight: &Sight,
+        dress: &Dress,
+        triangles: TriangleBuffers,
+        plugs: Vec<Span>,
+    ) -> Self {
+        let (instances, details, moving) = placed(world, sight);
+        let portals = &world.graph.portals;
+        Self {
+            triangles,
+            instances,
+            textures: Vec::new(),
+            chunks: Vec::new(),
             batch_of: sight.chunks().iter().map(|c| c.batch).collect(),
             batch_cells: world.batches.iter().map(|b| b.cells.clone()).collect(),
-            meshes,
+            meshes: Vec::new(),
+            bounds: bounds_of(sight, &details),
             details,
             moving,
             plugs,
-            portal_cells: world.graph.portals.iter().map(|p| p.cells).collect(),
-            bounds,
-            outlines: world
-                .graph
-                .portals
-                .iter()
-                .map(|p| p.outline.clone())
-                .collect(),
-            cell_looks: filling.cell_looks(),
+            portal_cells: portals.iter().map(|p| p.cells).collect(),
+            outlines: portals.iter().map(|p| p.outline.clone()).collect(),
+            cell_looks: dress.cell_looks(world, sight),
             n_triangles: sight.n_triangles(),
-            n_missing_pictures: textures.n_missing,
-            n_large_pictures: textures.n_too_large,
-        })
+            n_missing_pictures: 0,
+            n_large_pictures: 0,
+            streamed: None,
+        }
     }
 
     /// Moves leaves as `state` has them.
@@ -246,6 +231,9 @@ impl GpuWorld {
     /// Returns the chunk of a structural triangle, given its index in an id picture.
     #[must_use]
     pub fn chunk_of_triangle(&self, triangle: u32) -> Option<u32> {
+        if let Some(streamed) = &self.streamed {
+            return self.streamed_chunk(streamed, triangle);
+        }
         // Chunks are in ascending order of their ranges.
         let at = self
             .chunks
@@ -268,31 +256,4 @@ impl GpuWorld {
     pub fn batch_of_chunk(&self, chunk: u32) -> Option<u32> {
         self.batch_of.get(chunk as usize).copied()
     }
-}
-
-fn make_buffer(
-    gpu: &Gpu,
-    what: &'static str,
-    bytes: &[u8],
-    usage: wgpu::BufferUsages,
-) -> Result<wgpu::Buffer, RenderError> {
-    let limits = gpu.device.limits();
-    Gpu::check(what, bytes.len() as u64, limits.max_buffer_size)?;
-    if usage.contains(wgpu::BufferUsages::STORAGE) {
-        Gpu::check(
-            what,
-            bytes.len() as u64,
-            limits.max_storage_buffer_binding_size,
-        )?;
-    }
-    // A buffer must not be empty; the largest element has 64 bytes.
-    let empty = [0; 64];
-    let contents = if bytes.is_empty() { &empty } else { bytes };
-    Ok(gpu
-        .device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(what),
-            contents,
-            usage,
-        }))
 }
