@@ -74,7 +74,7 @@ pub enum RenderError {
     /// A piece is not one of the world's.
     #[error("{of:?} is not a piece of this world; fetch it again, or pack the world again")]
     OtherPiece {
-        /// What it was to be.
+        /// The piece that it was to be.
         of: PieceOf,
     },
     /// Something needs all triangles of a world at once.
@@ -82,7 +82,7 @@ pub enum RenderError {
         "{what} needs all triangles at once, but those of a hollow world come and go; load the world whole"
     )]
     NeedsWhole {
-        /// What needs them.
+        /// The user of them.
         what: &'static str,
     },
     /// A world that breaks invariants; decoded worlds never do.

@@ -105,7 +105,7 @@ impl Studio {
     /// Makes room for a hollow world, whose pieces are [put](Studio::put) and [taken](Studio::take) as they come into view;
     /// see [`GpuWorld::hollow`]. `sight` is that of [`Sight::build_hollow`].
     ///
-    /// What is lit by the whole world is off: shadows of the sun, and daylight through portals. Lamps shine, and their shadows
+    /// Light that needs the whole world is off: shadows of the sun, and daylight through portals. Lamps shine, and their shadows
     /// are those of what is there.
     ///
     /// # Errors

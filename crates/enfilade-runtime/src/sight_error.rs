@@ -46,7 +46,7 @@ pub enum SightError {
         "the skeleton of sight has {skeleton} {what}, the hollow world {world}; take the skeleton packed with this world"
     )]
     OtherSkeleton {
-        /// What differs.
+        /// The kind of thing that differs in number.
         what: &'static str,
         /// Its number in the skeleton.
         skeleton: usize,

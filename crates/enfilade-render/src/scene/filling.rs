@@ -1,5 +1,7 @@
 //! The triangles of all batches and meshes in one buffer.
 
+use std::ops::Range;
+
 use enfilade_cpg::{PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
@@ -66,6 +68,33 @@ pub(crate) struct Span {
     pub(crate) is_transparent: bool,
 }
 
+impl Span {
+    /// No triangles.
+    pub(super) const NONE: Self = Self {
+        first: 0,
+        n: 0,
+        texture: 0,
+        finish: Finish::Plain,
+        is_smooth: false,
+        is_transparent: false,
+    };
+
+    /// Returns the spans that its triangles become if all indices of its piece are put into `ranges` in order.
+    pub(super) fn put_into(self, ranges: &[Range<u32>]) -> impl Iterator<Item = Self> {
+        let mut before = 0;
+        ranges.iter().filter_map(move |range| {
+            let own = before..before + (range.end - range.start);
+            before = own.end;
+            let (from, to) = (own.start.max(self.first), own.end.min(self.first + self.n));
+            (from < to).then(|| Self {
+                first: range.start + (from - own.start),
+                n: to - from,
+                ..self
+            })
+        })
+    }
+}
+
 /// Shading that a surface needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Finish {
@@ -87,7 +116,7 @@ pub(crate) struct Level {
 /// The looks of a world's surfaces.
 #[derive(Default)]
 pub(super) struct Dress {
-    /// By material.
+    /// For each material.
     pub(super) looks: Vec<Look>,
     /// For each texture of the world, index into [`super::GpuWorld::textures`], 0 for none.
     pub(super) texture_of: Vec<u32>,

@@ -16,12 +16,12 @@ use crate::piece_of::PieceOf;
 /// A piece as it lies on the adapter, to be [put](super::GpuWorld::put) there.
 pub struct GpuPiece {
     pub(super) of: PieceOf,
-    pub(super) content: Content,
+    pub(super) content: PieceContent,
     n_bytes: u64,
 }
 
 /// The contents of a piece.
-pub(super) enum Content {
+pub(super) enum PieceContent {
     Triangles {
         corners: Vec<Corner>,
         indices: Vec<u32>,
@@ -148,7 +148,7 @@ impl PieceMaker {
         Ok(GpuPiece {
             of,
             n_bytes: levels.iter().map(|l| l.as_raw().len() as u64).sum(),
-            content: Content::Picture(levels),
+            content: PieceContent::Picture(levels),
         })
     }
 
@@ -157,7 +157,7 @@ impl PieceMaker {
         GpuPiece {
             of,
             n_bytes: n * PER_CORNER + n_indices * self.0.per_index,
-            content: Content::Triangles {
+            content: PieceContent::Triangles {
                 corners: filling.corners,
                 indices: filling.indices,
                 spans,

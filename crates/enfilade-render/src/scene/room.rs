@@ -5,16 +5,16 @@ use std::ops::Range;
 
 /// Room for a number of elements. Neighboring free ranges are one.
 ///
-/// What is put in may be scattered over several ranges, so room is never short for being in pieces: vertices go anywhere,
+/// Elements may be scattered over several ranges, so room is never short for being in pieces: vertices go anywhere,
 /// since indices name each, and triangles are drawn wherever they are.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Room {
+pub(super) struct FreeRoom {
     /// Length of each free range, by its start.
     free: BTreeMap<u32, u32>,
     n_free: u32,
 }
 
-impl Room {
+impl FreeRoom {
     /// Makes room for `n` elements.
     pub(super) fn new(n: u32) -> Self {
         let free = (n > 0).then_some((0, n)).into_iter().collect();
@@ -39,7 +39,8 @@ impl Room {
         let holding = self.free.iter().filter(|r| *r.1 >= n);
         if let Some((&start, _)) = holding.min_by_key(|r| (*r.1, *r.0)) {
             self.cut(start, n);
-            return Some(vec![start..start + n]);
+            let one = start..start + n;
+            return Some(Vec::from([one]));
         }
         let mut by_size: Vec<(u32, u32)> = self.free.iter().map(|r| (*r.1, *r.0)).collect();
         by_size.sort_unstable_by(|a, b| b.cmp(a));
@@ -121,7 +122,7 @@ mod tests {
         for seed in 0..20 {
             let mut rng = Rng::new(seed);
             let size = 200 + rng.below(200);
-            let mut room = Room::new(size as u32);
+            let mut room = FreeRoom::new(size as u32);
             let mut owners = Owners(vec![None; size]);
             let mut held: Vec<Option<Vec<Range<u32>>>> = Vec::new();
             // Parts of three stay together.
@@ -161,7 +162,7 @@ mod tests {
 
     #[test]
     fn what_fits_in_one_range_is_not_scattered() {
-        let mut room = Room::new(100);
+        let mut room = FreeRoom::new(100);
         let parts: Vec<_> = (0..5)
             .map(|_| room.take(20, 1).unwrap().remove(0))
             .collect();

@@ -1,4 +1,4 @@
-//! What the answers of a sight take from the triangles of a world.
+//! Information about the triangles of a world that answers of a sight need.
 
 use enfilade_cpg::{Batch, FittingPart, SourceRuns, VisibleParts, World};
 use enfilade_geom::scene::{Image, Mesh, Primitive};

@@ -15,12 +15,12 @@ use crate::options::SightOptions;
 const MARK: [u8; 8] = *b"enfsight";
 const VERSION: u32 = 1;
 
-/// Reason why bytes are no skeleton of sight.
+/// Reason why bytes are not a skeleton of sight.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkeletonError {
     /// They start otherwise.
-    #[error("these bytes are no skeleton of sight; pack the world again")]
+    #[error("these bytes are not a skeleton of sight; pack the world again")]
     OtherFormat,
     /// They are of a version that this program does not read.
     #[error(
@@ -33,7 +33,7 @@ pub enum SkeletonError {
     /// They have changed or are cut off, or were not written by this library.
     #[error("the skeleton of sight is damaged: {what}; fetch it again, or pack the world again")]
     Damaged {
-        /// What is wrong.
+        /// The damage.
         what: &'static str,
     },
 }
