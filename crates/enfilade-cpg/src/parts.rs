@@ -72,6 +72,14 @@ impl VisibleParts {
         out
     }
 
+    /// Makes the table from rows of runs as [`VisibleParts::runs_of`] has them; `ends` holds the end of each row in `runs`.
+    /// `None` if a run is empty or touches the one before it in its row, or a part is not below `n_parts`.
+    #[must_use]
+    pub fn of_runs(ends: Vec<u32>, runs: Vec<[u32; 2]>, n_parts: u32) -> Option<Self> {
+        let (n_pairs, out) = (ends.len(), Self { ends, runs });
+        out.problem(n_pairs, n_parts).is_none().then_some(out)
+    }
+
     /// Returns the number of rows.
     #[must_use]
     pub fn n_pairs(&self) -> usize {
@@ -253,6 +261,8 @@ mod tests {
             parts.problem(2, 3).map(|p| p.0)
         };
         assert_eq!(broken(&|_| {}), None);
+        let runs = |n| VisibleParts::of_runs(good.ends.clone(), good.runs.clone(), n);
+        assert_eq!((runs(3), runs(2)), (Some(good.clone()), None));
         assert_eq!(good.problem(3, 3).map(|p| p.0), Some(0));
         assert_eq!(good.problem(2, 2).map(|p| p.0), Some(0));
         assert_eq!(broken(&|p| p.ends[0] = 9), Some(0));

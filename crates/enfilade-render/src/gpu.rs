@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::sync::{Arc, OnceLock};
 
 use crate::formats::{COLOR, DEPTH, ID};
+use crate::piece_of::PieceOf;
 
 /// An error of drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -67,6 +68,23 @@ pub enum RenderError {
     /// A camera without a direction, or with numbers that are not finite.
     #[error(transparent)]
     Camera(#[from] enfilade_runtime::ViewError),
+    /// Pieces were put into a world that was loaded whole.
+    #[error("pieces come and go only in a hollow world; this one was loaded whole")]
+    NotHollow,
+    /// A piece is not one of the world's.
+    #[error("{of:?} is not a piece of this world; fetch it again, or pack the world again")]
+    OtherPiece {
+        /// The piece that it was to be.
+        of: PieceOf,
+    },
+    /// Something needs all triangles of a world at once.
+    #[error(
+        "{what} needs all triangles at once, but those of a hollow world come and go; load the world whole"
+    )]
+    NeedsWhole {
+        /// The user of them.
+        what: &'static str,
+    },
     /// A world that breaks invariants; decoded worlds never do.
     #[error(transparent)]
     World(#[from] enfilade_runtime::SightError),

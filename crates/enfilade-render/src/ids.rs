@@ -124,13 +124,13 @@ impl Renderer {
         stage.write_instances(gpu, world, list);
         let entries = [
             bound(0, &self.camera.buffer),
-            bound(1, &world.corners),
-            bound(2, &world.indices),
+            bound(1, &world.triangles.corners),
+            bound(2, &world.triangles.indices),
         ];
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("ids"),
             layout: &self.layouts.ids,
-            entries: if world.listed.is_some() {
+            entries: if world.triangles.listed.is_some() {
                 &entries[..1]
             } else {
                 &entries
@@ -158,7 +158,7 @@ impl Renderer {
                 pass.set_pipeline(&self.pipelines.id);
                 pass.set_bind_group(0, &group, &[]);
                 pass.set_vertex_buffer(0, stage.first().instances.buffer.slice(..));
-                if let Some(listed) = &world.listed {
+                if let Some(listed) = &world.triangles.listed {
                     pass.set_vertex_buffer(1, listed.slice(..));
                 }
                 for run in runs {

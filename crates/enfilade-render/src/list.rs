@@ -46,11 +46,14 @@ pub(crate) struct Run {
     pub(crate) scissor: Option<Scissor>,
     /// Distance from the eye of a transparent run. [Units: wu]
     pub(crate) distance: f32,
+    /// Rank in the world, wherever its triangles lie: chunks, then meshes, then plugs.
+    pub(crate) order: u32,
 }
 
 impl Run {
-    fn of(span: &Span, instances: Range<u32>, scissor: Option<Scissor>) -> Self {
+    fn of(span: &Span, instances: Range<u32>, scissor: Option<Scissor>, order: usize) -> Self {
         Self {
+            order: order as u32,
             first: span.first,
             n: span.n,
             texture: span.texture,
@@ -139,8 +142,8 @@ impl RenderList {
 
     /// Sorts draws in the order of the world, so that two lists draw their common part in the same order.
     pub(crate) fn sort(&mut self) {
-        self.opaque.sort_by_key(|r| r.first);
-        self.transparent.sort_by_key(|r| r.first);
+        self.opaque.sort_by_key(|r| r.order);
+        self.transparent.sort_by_key(|r| r.order);
     }
 
     /// Returns an empty list with structure as its only instance.
@@ -284,6 +287,9 @@ impl Lister {
         if !sparing.stop_at_nothing {
             self.list.stand_ins.extend_from_slice(seen.stopped());
         }
+        if world.is_hollow() {
+            self.stand_in_for_bare(world, seen);
+        }
         self.cells.clear();
         self.cells.extend_from_slice(seen.cells());
         self.cells.sort_unstable();
@@ -312,6 +318,20 @@ impl Lister {
             .extend(details.map(|d| (world.details[d.0 as usize].mesh, 0, d.0)));
         self.plugs.extend(state.shut_portals());
         self.finish(world, sight, [0.0; 3], None)
+    }
+
+    /// Fills the portals into cells of which nothing is there.
+    fn stand_in_for_bare(&mut self, world: &GpuWorld, seen: &Seen<'_>) {
+        for visit in seen.visits().iter().filter(|v| world.is_bare(v.cell)) {
+            let Some(portal) = visit.via else { continue };
+            let ends = world.portal_cells[portal.0 as usize];
+            let stand_in = (portal, visit.cell);
+            // Between two bare cells nothing could be seen to lie behind it.
+            let is_first = ends.iter().any(|c| *c != visit.cell && !world.is_bare(*c));
+            if is_first && !self.list.stand_ins.contains(&stand_in) {
+                self.list.stand_ins.push(stand_in);
+            }
+        }
     }
 
     fn begin(&mut self, reason: DrawReason) {
@@ -366,7 +386,6 @@ impl Lister {
         self.chunks.sort_unstable();
         let mut batch = (u32::MAX, None);
         for &(_, c) in &self.chunks {
-            let span = world.chunks[c as usize];
             let b = world.batch_of[c as usize];
             if batch.0 != b {
                 let scissor = size.map(|size| self.scissor(&world.batch_cells[b as usize], size));
@@ -377,20 +396,23 @@ impl Lister {
                 Some(Some(s)) => Some(s),
                 Some(None) => continue,
             };
-            self.list.n_triangles += u64::from(span.n / 3);
-            let run = Run::of(&span, 0..1, scissor);
-            if span.is_transparent {
-                let [low, high] = sight.chunks()[c as usize].aabb.map(Vec3::from);
-                let distance = ((low + high) * 0.5).distance(eye);
-                self.far.push(Run { distance, ..run });
-            } else {
-                push_run(&mut self.list.opaque, run);
+            for span in world.spans_of(c) {
+                self.list.n_triangles += u64::from(span.n / 3);
+                let run = Run::of(span, 0..1, scissor, c as usize);
+                if span.is_transparent {
+                    let [low, high] = sight.chunks()[c as usize].aabb.map(Vec3::from);
+                    let distance = ((low + high) * 0.5).distance(eye);
+                    self.far.push(Run { distance, ..run });
+                } else {
+                    push_run(&mut self.list.opaque, run);
+                }
             }
         }
         for &portal in &self.plugs {
             let span = world.plugs[portal.0 as usize];
             self.list.n_triangles += u64::from(span.n / 3);
-            push_run(&mut self.list.opaque, Run::of(&span, 0..1, None));
+            let order = world.chunks.len() + world.meshes.len() + portal.idx();
+            push_run(&mut self.list.opaque, Run::of(&span, 0..1, None, order));
         }
         self.details.sort_unstable();
         for group in (self.details).chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
@@ -402,7 +424,8 @@ impl Lister {
             let level = (world.meshes.get(mesh as usize)).and_then(|m| m.get(level as usize));
             for span in level.into_iter().flat_map(|l| &l.spans) {
                 self.list.n_triangles += u64::from(span.n / 3) * u64::from(last - first);
-                let run = |instances| Run::of(span, instances, None);
+                let order = world.chunks.len() + mesh as usize;
+                let run = |instances| Run::of(span, instances, None, order);
                 if span.is_transparent {
                     for (at, &(.., detail)) in (first..last).zip(group) {
                         let center = world.details[detail as usize].center;
@@ -418,7 +441,7 @@ impl Lister {
         }
         // Equal distances in the order of the world, so that pictures are deterministic.
         self.far
-            .sort_by(|a, b| (b.distance.total_cmp(&a.distance)).then(a.first.cmp(&b.first)));
+            .sort_by(|a, b| (b.distance.total_cmp(&a.distance)).then(a.order.cmp(&b.order)));
         self.list.transparent.append(&mut self.far);
         &self.list
     }

@@ -13,6 +13,7 @@ use crate::lamps::{
     brightness_at, chosen_lamps, face_projection,
 };
 use crate::list::{RenderList, Shot, Sparing};
+use crate::piece_of::PieceOf;
 use crate::renderer::Renderer;
 use crate::resources::depth_attachment;
 use crate::scene::GpuWorld;
@@ -220,6 +221,18 @@ impl Studio {
             let old = std::mem::replace(&mut self.lamps.watched[i], new);
             self.part_changed(id, &old);
         }
+    }
+
+    /// Marks the maps of lamps that reach a piece of the first world.
+    pub(crate) fn piece_changed(&mut self, of: PieceOf) {
+        let cells;
+        let event = if self.lamps.lights.is_empty() {
+            LampEvent::All
+        } else {
+            cells = self.world.cells_of_piece(of);
+            LampEvent::Doors(PartId::ROOT, &cells)
+        };
+        self.renderer.lamps.follow(&event, |_| Pose::IDENTITY);
     }
 
     fn part_changed(&mut self, id: PartId, old: &WatchedPart) {

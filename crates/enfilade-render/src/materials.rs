@@ -9,7 +9,7 @@ use serde_json::Value;
 const MAX_SIDE: u32 = 2048;
 
 /// Largest texture image: 8192 × 8192 pixels of four bytes. [Units: bytes, decoded]
-const MAX_PICTURE: u64 = 1 << 28;
+pub(crate) const MAX_PICTURE: u64 = 1 << 28;
 /// Most bytes of all images of a world, and more per byte of them in the file: ten times the compression of JPEG.
 const MAX_PICTURES: u64 = 1 << 29;
 const MAX_EXPANSION: u64 = 128;
@@ -151,41 +151,46 @@ impl<'w> Decoder<'w> {
         let texture = self.world.textures.get(texture as usize);
         let image = texture.and_then(|t| self.world.images.get(t.image? as usize));
         let bytes = &image.ok_or(NoPicture::Broken)?.bytes;
-        let broken = |_| NoPicture::Broken;
-        let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
-            .with_guessed_format()
-            .map_err(|_| NoPicture::Broken)?;
-        let mut limits = image::Limits::default();
-        // The decoder needs far less beside the image itself.
-        limits.max_alloc = Some(2 * MAX_PICTURE);
-        reader.limits(limits);
-        let decoder = reader.into_decoder().map_err(broken)?;
-        let (w, h) = decoder.dimensions();
-        // Size after conversion: four bytes per pixel, or more.
-        let size = decoder.total_bytes().max(u64::from(w) * u64::from(h) * 4);
-        if size > MAX_PICTURE.min(self.left) {
-            return Err(NoPicture::TooLarge);
-        }
-        self.left -= size;
-        let mut picture = image::DynamicImage::from_decoder(decoder).map_err(broken)?;
-        if w == 0 || h == 0 {
-            return Err(NoPicture::Broken);
-        }
-        if w.max(h) > MAX_SIDE {
-            let scale = |n: u32| (n * MAX_SIDE / w.max(h)).max(1);
-            // In integers: floats take four times as much.
-            picture = picture.thumbnail_exact(scale(w), scale(h));
-        }
-        let mut levels = vec![picture.into_rgba8()];
-        let filter = image::imageops::FilterType::Triangle;
-        while let Some(last) = levels.last()
-            && last.width().max(last.height()) > 1
-        {
-            let (w, h) = ((last.width() / 2).max(1), (last.height() / 2).max(1));
-            levels.push(image::imageops::resize(last, w, h, filter));
-        }
-        Ok(Decoded { levels })
+        decode(bytes, &mut self.left)
     }
+}
+
+/// Decodes an image, which takes from the `left` bytes. Checks its size before decoding.
+pub(crate) fn decode(bytes: &[u8], left: &mut u64) -> Result<Decoded, NoPicture> {
+    let broken = |_| NoPicture::Broken;
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|_| NoPicture::Broken)?;
+    let mut limits = image::Limits::default();
+    // The decoder needs far less beside the image itself.
+    limits.max_alloc = Some(2 * MAX_PICTURE);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(broken)?;
+    let (w, h) = decoder.dimensions();
+    // Size after conversion: four bytes per pixel, or more.
+    let size = decoder.total_bytes().max(u64::from(w) * u64::from(h) * 4);
+    if size > MAX_PICTURE.min(*left) {
+        return Err(NoPicture::TooLarge);
+    }
+    *left -= size;
+    let mut picture = image::DynamicImage::from_decoder(decoder).map_err(broken)?;
+    if w == 0 || h == 0 {
+        return Err(NoPicture::Broken);
+    }
+    if w.max(h) > MAX_SIDE {
+        let scale = |n: u32| (n * MAX_SIDE / w.max(h)).max(1);
+        // In integers: floats take four times as much.
+        picture = picture.thumbnail_exact(scale(w), scale(h));
+    }
+    let mut levels = vec![picture.into_rgba8()];
+    let filter = image::imageops::FilterType::Triangle;
+    while let Some(last) = levels.last()
+        && last.width().max(last.height()) > 1
+    {
+        let (w, h) = ((last.width() / 2).max(1), (last.height() / 2).max(1));
+        levels.push(image::imageops::resize(last, w, h, filter));
+    }
+    Ok(Decoded { levels })
 }
 
 /// Returns the wrap modes of a texture along u and v: repeated, clamped or mirrored.

@@ -18,7 +18,7 @@ use crate::camera::Camera;
 use crate::gpu::RenderError;
 use crate::list::{DrawReason, RenderList};
 use crate::resources::{depth_attachment, map_bytes};
-use crate::scene::Finish;
+use crate::scene::{Finish, Span};
 use crate::shadings::set_buffers;
 use crate::studio::Studio;
 
@@ -123,8 +123,8 @@ impl Studio {
             .iter()
             .map(|c| c.0)
             .filter(|&c| {
-                let span = &self.world.chunks[c as usize];
-                !span.is_transparent && span.finish != Finish::Masked
+                let hides = |s: &Span| !s.is_transparent && s.finish != Finish::Masked;
+                self.world.spans_of(c).first().is_some_and(hides)
             })
             .collect();
         let mut is_drawn = vec![false; self.world.chunks.len()];
@@ -227,8 +227,9 @@ impl Studio {
             pass.set_pipeline(&renderer.pipelines.depth);
             set_buffers(&mut pass, &self.world, &self.stage.first().instances);
             for &c in new {
-                let span = &self.world.chunks[c as usize];
-                pass.draw_indexed(span.first..span.first + span.n, 0, 0..1);
+                for span in self.world.spans_of(c) {
+                    pass.draw_indexed(span.first..span.first + span.n, 0, 0..1);
+                }
             }
             pass.set_pipeline(&renderer.pipelines.outline);
             pass.set_vertex_buffer(0, renderer.marks.buffer.slice(..));

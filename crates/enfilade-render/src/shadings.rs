@@ -9,8 +9,8 @@ use crate::scene::{Finish, GpuWorld};
 use crate::stage::RenderStage;
 
 pub(crate) fn set_buffers(pass: &mut wgpu::RenderPass<'_>, world: &GpuWorld, instances: &Grown) {
-    pass.set_index_buffer(world.indices.slice(..), wgpu::IndexFormat::Uint32);
-    pass.set_vertex_buffer(0, world.corners.slice(..));
+    pass.set_index_buffer(world.triangles.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.set_vertex_buffer(0, world.triangles.corners.slice(..));
     pass.set_vertex_buffer(1, instances.buffer.slice(..));
 }
 

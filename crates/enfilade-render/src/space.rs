@@ -248,7 +248,7 @@ impl Studio {
 
     /// Draws the map of the sun's shadows unless it is current. Parts in rooms cast none.
     fn cast_sun(&mut self, shot: &SpaceShot<'_>) {
-        if !shot.style.shadows {
+        if !self.drawable(shot.style).shadows {
             return;
         }
         let casts = |p: &StudioPart| (p.stage.surroundings >= 1.0).then_some(p.stage.pose);
@@ -321,7 +321,7 @@ impl Studio {
         Ok(Shown {
             projection,
             pose: *shot.space.pose(shot.frame),
-            style: shot.style,
+            style: self.drawable(shot.style),
             marks: shot.marks,
             props,
             lamps,

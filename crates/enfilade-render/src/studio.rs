@@ -14,8 +14,9 @@ use crate::light::{Light, sun_of};
 use crate::list::{Lister, RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
+use crate::piece_of::PieceOf;
 use crate::renderer::Renderer;
-use crate::scene::GpuWorld;
+use crate::scene::{GpuPiece, GpuWorld, Put, StreamLimits};
 use crate::shown::{DrawnPart, Shown};
 use crate::stage::{RenderStage, StagedWorld};
 
@@ -98,6 +99,36 @@ impl Studio {
     ) -> Result<Self, RenderError> {
         let sight = Sight::build(world)?;
         let on_gpu = GpuWorld::load(&gpu, world, &sight)?;
+        Self::of_world(gpu, world, sight, on_gpu, format)
+    }
+
+    /// Makes room for a hollow world, whose pieces are [put](Studio::put) and [taken](Studio::take) as they come into view;
+    /// see [`GpuWorld::hollow`]. `sight` is that of [`Sight::build_hollow`].
+    ///
+    /// Light that needs the whole world is off: shadows of the sun, and daylight through portals. Lamps shine, and their shadows
+    /// are those of what is there.
+    ///
+    /// # Errors
+    ///
+    /// Limits beyond the adapter's buffers.
+    pub fn hollow(
+        gpu: Gpu,
+        world: &World,
+        sight: Sight,
+        limits: &StreamLimits,
+        format: wgpu::TextureFormat,
+    ) -> Result<Self, RenderError> {
+        let on_gpu = GpuWorld::hollow(&gpu, world, &sight, limits)?;
+        Self::of_world(gpu, world, sight, on_gpu, format)
+    }
+
+    fn of_world(
+        gpu: Gpu,
+        world: &World,
+        sight: Sight,
+        on_gpu: GpuWorld,
+        format: wgpu::TextureFormat,
+    ) -> Result<Self, RenderError> {
         let renderer = Renderer::new(&gpu, format, sun_of(world));
         let state = SightState::new(&sight);
         let stage = renderer.stage(&gpu, Light::uniform(&gpu)?);
@@ -120,12 +151,36 @@ impl Studio {
         })
     }
 
+    /// Puts a piece of a hollow world on the adapter: see [`GpuWorld::put`].
+    ///
+    /// # Errors
+    ///
+    /// As [`GpuWorld::put`].
+    pub fn put(&mut self, piece: &GpuPiece) -> Result<Put, RenderError> {
+        let is_new = !self.world.has(piece.of());
+        let put = self.world.put(&self.gpu, piece)?;
+        if is_new && put == Put::Done {
+            self.piece_changed(piece.of());
+        }
+        Ok(put)
+    }
+
+    /// Takes a piece of a hollow world off the adapter. Returns `true` if it was there.
+    pub fn take(&mut self, of: PieceOf) -> bool {
+        let was_there = self.world.take(of);
+        if was_there {
+            self.piece_changed(of);
+        }
+        was_there
+    }
+
     /// Gives objects levels of detail, for [`Sparing::lod`]. `world` is the one from which the studio was made.
     ///
     /// # Errors
     ///
-    /// As [`Studio::new`].
+    /// As [`Studio::new`]; a hollow world.
     pub fn add_levels(&mut self, world: &World) -> Result<(), RenderError> {
+        self.check_whole("the measurement of levels of detail")?;
         self.world = GpuWorld::load_with_levels(&self.gpu, world, &self.sight)?;
         self.world.place(&self.state);
         // Light does not depend on levels.
@@ -140,15 +195,30 @@ impl Studio {
     ///
     /// # Errors
     ///
-    /// A world whose locator or cells exceed the adapter's textures. It is drawn without this light, as before.
+    /// A world whose locator or cells exceed the adapter's textures, or a hollow world. It is drawn without this light, as
+    /// before.
     pub fn add_light(&mut self, world: &World) -> Result<(), RenderError> {
         if self.stage.light.is_known() {
             return Ok(());
         }
+        self.check_whole("daylight through portals")?;
         let toward = self.renderer.sun.toward;
         let light = Light::of_world(&self.gpu, world, &self.sight, toward)?;
         self.stage = self.renderer.stage(&self.gpu, light);
         Ok(())
+    }
+
+    fn check_whole(&self, what: &'static str) -> Result<(), RenderError> {
+        let needs = RenderError::NeedsWhole { what };
+        (!self.world.is_hollow()).then_some(()).ok_or(needs)
+    }
+
+    /// Returns the style as it can be drawn: the sun casts shadows of whole worlds only.
+    pub(crate) fn drawable(&self, style: Style) -> Style {
+        Style {
+            shadows: style.shadows && !self.world.is_hollow(),
+            ..style
+        }
     }
 
     /// Moves leaves as the state has them.
@@ -165,7 +235,7 @@ impl Studio {
     /// Draws the shadow map unless it is current.
     fn follow_sun(&mut self, style: &Style) {
         let alone = vec![Some(Pose::IDENTITY)];
-        if !style.shadows || self.shadows_of.as_ref() == Some(&alone) {
+        if !self.drawable(*style).shadows || self.shadows_of.as_ref() == Some(&alone) {
             return;
         }
         self.shadows_of = Some(alone);
@@ -176,7 +246,7 @@ impl Studio {
 
     /// Returns the frame apart from the world.
     fn shown<'f>(&self, frame: &'f Frame<'_>, lamps: &'f [ActiveLamp]) -> Shown<'f> {
-        let (style, projection) = (frame.style, frame.projection);
+        let (style, projection) = (self.drawable(frame.style), frame.projection);
         // Parallel pictures have one exposure for all rooms.
         let is_eye = !projection.is_parallel && style.daylight;
         Shown {

@@ -33,15 +33,12 @@ impl Draw {
         &world.batches[self.batch as usize]
     }
 
-    /// Returns its triangles as triples of indices into the batch's positions. O(1).
-    ///
-    /// # Panics
-    ///
-    /// If `sight` is not the one that it was listed for.
+    /// Returns its triangles as triples of indices into the batch's positions; none in a hollow world. O(1).
     #[must_use]
     pub fn indices<'a>(&self, sight: &'a Sight) -> &'a [u32] {
         let first = self.first_index as usize;
-        &sight.indices(self.batch)[first..first + self.n_indices as usize]
+        let indices = sight.indices(self.batch);
+        (indices.get(first..first + self.n_indices as usize)).unwrap_or_default()
     }
 }
 
@@ -130,7 +127,7 @@ impl Index<ChunkId> for Sight {
 
     #[inline]
     fn index(&self, chunk: ChunkId) -> &Chunk {
-        &self.chunks[chunk.0 as usize]
+        &self.drawn.chunks[chunk.0 as usize]
     }
 }
 

@@ -91,7 +91,7 @@ pub use pick::{Hit, NotFinite, Target};
 pub use region::Narrowing;
 pub use see::{Crossing, Gate, SeeOptions, SpecialView, StepQuestion, Viewer, Window};
 pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};
-pub use sight::Sight;
+pub use sight::{Sight, SightSkeleton, SkeletonError};
 pub use sight_error::SightError;
 pub use sightline::{SightHit, Sightlines};
 pub use state::{SavedDoors, SavedDoorsError, SightState};

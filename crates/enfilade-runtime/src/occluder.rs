@@ -18,7 +18,7 @@ use crate::options::SightOptions;
 use crate::point::point;
 
 /// Maximum number of vertices of an occluder.
-const MAX_CORNERS: usize = 8;
+pub(crate) const MAX_CORNERS: usize = 8;
 /// Maximum number of shadows used in one visit.
 const MAX_SHADOWS: usize = 4;
 /// Largest distance of a vertex from a triangle's plane at which it still lies in the plane: merged polygons
@@ -30,20 +30,21 @@ const SHRINK: f64 = 1e-3;
 const BEHIND: f64 = 0.5;
 
 #[derive(Clone, Debug)]
-struct Occluder {
-    normal: DVec3,
-    corners: [DVec3; MAX_CORNERS],
-    n_corners: usize,
-    middle: DVec3,
-    area: f64,
-    is_two_sided: bool,
+pub(crate) struct Occluder {
+    pub(crate) normal: DVec3,
+    pub(crate) corners: [DVec3; MAX_CORNERS],
+    pub(crate) n_corners: usize,
+    pub(crate) middle: DVec3,
+    pub(crate) area: f64,
+    pub(crate) is_two_sided: bool,
 }
 
 /// The occluders of all cells, by cell.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Occluders {
-    first: Vec<u32>,
-    all: Vec<Occluder>,
+    /// Those of cell `c` are `all[first[c]..first[c + 1]]`.
+    pub(crate) first: Vec<u32>,
+    pub(crate) all: Vec<Occluder>,
 }
 
 /// Returns `true` if a surface of this material hides everything behind it.

@@ -2,24 +2,32 @@
 
 mod drawn;
 mod portals;
+mod skeleton;
+mod skeleton_bytes;
+mod trees;
 
 use std::sync::Arc;
 
-use enfilade_cpg::{CellId, Locator, PortalId, VisibleParts, World};
-use enfilade_geom::{DVec3, world_tolerance};
+use enfilade_cpg::{CellId, Locator, PortalId, World};
+use enfilade_geom::DVec3;
+use enfilade_geom::scene::Primitive;
 
 use crate::boxes::{BoxTrees, Root};
-use crate::chunks::Chunk;
+use crate::chunks::{Chunk, chunks_of};
 use crate::doors::{Doors, Leaf};
 use crate::exits::{Exit, Group, Runs, group};
-use crate::occluder::{Occluders, occluders_of};
+use crate::occluder::occluders_of;
 use crate::options::SightOptions;
 use crate::point::point;
 use crate::seen::DetailId;
-use drawn::{Boxes, Detail, Drawn};
+use drawn::{Drawn, is_drawable};
 use portals::Portals;
+use trees::Boxes;
 
 use crate::sight_error::SightError;
+
+pub use skeleton::SightSkeleton;
+pub use skeleton_bytes::SkeletonError;
 
 /// A world prepared for visibility queries: contiguous portals, exits by cell, boxes in trees.
 ///
@@ -41,17 +49,13 @@ pub struct Sight {
     pub(crate) unlisted_root: Root,
     /// Over the boxes of cells, each with everything listed in it.
     pub(crate) world_root: Root,
-    pub(crate) chunks: Vec<Chunk>,
-    pub(crate) details: Vec<Detail>,
-    pub(crate) occluders: Occluders,
-    /// Per cell of the eye: the chunks and details that may be seen from it, if the world has that information.
-    pub(crate) seen_from: Option<VisibleParts>,
-    /// Per batch: its triangles as index triples, sorted so that chunks are ranges.
+    pub(crate) drawn: SightSkeleton,
+    /// Per batch: its triangles as index triples, sorted so that chunks are ranges; empty in a hollow world.
     indices: Vec<Vec<u32>>,
     pub(crate) doors: Arc<Doors>,
     pub(crate) n_portals: usize,
     n_specials: usize,
-    pub(crate) n_triangles: u64,
+    n_triangles: u64,
     /// Largest error of a stored outline. [Units: wu]
     pub(crate) tolerance: f64,
     /// Largest absolute coordinate. [Units: wu]
@@ -74,27 +78,65 @@ impl Sight {
     ///
     /// As [`Sight::build`].
     pub fn build_with(world: &World, options: &SightOptions) -> Result<Self, SightError> {
-        let n_cells = world.graph.cells.len();
         let doors = Doors::of(world)?;
-        let drawn = Drawn::of(world, options, &doors)?;
-        let mut portals = Portals::of(&world.graph)?;
+        let drawn = Drawn::of(world, options)?;
+        let portals = Portals::of(&world.graph)?;
+        let tolerance = portals.tolerance(drawn.extent);
+        let skeleton = SightSkeleton {
+            options: *options,
+            n_cells: world.graph.cells.len(),
+            occluders: occluders_of(world, options, tolerance),
+            seen_from: drawn.seen_from(world, &doors),
+            chunks: drawn.chunks,
+            details: drawn.details,
+            areas: drawn.areas,
+            sizes: drawn.sizes,
+            extent: drawn.extent,
+        };
+        Ok(Self::assemble(
+            world,
+            skeleton,
+            drawn.indices,
+            doors,
+            portals,
+        ))
+    }
+
+    /// Prepares a *hollow* world, whose triangles come and go: see [`SightSkeleton`]. Answers exactly as the `Sight` of the
+    /// whole world that `skeleton` is of; only [`Sight::indices`] are empty. O(n log n) in chunks, details and portals.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sight::build`], and if the skeleton does not fit the world.
+    pub fn build_hollow(world: &World, skeleton: SightSkeleton) -> Result<Self, SightError> {
+        let doors = Doors::of(world)?;
+        skeleton.check(world, &doors)?;
+        let portals = Portals::of(&world.graph)?;
+        let indices = vec![Vec::new(); skeleton.areas.len()];
+        Ok(Self::assemble(world, skeleton, indices, doors, portals))
+    }
+
+    fn assemble(
+        world: &World,
+        drawn: SightSkeleton,
+        indices: Vec<Vec<u32>>,
+        doors: Doors,
+        mut portals: Portals,
+    ) -> Self {
+        let n_cells = world.graph.cells.len();
         let extent = drawn.extent.max(portals.extent);
-        // Snapping by a builder plus rounding in a file, for outline and wall each; `enfilade-verify` uses
-        // the same bound.
-        let tolerance = (2.0 * world_tolerance(extent)).max(portals.off_plane);
+        let tolerance = portals.tolerance(drawn.extent);
         let (first_exit, mut exits) = portals.by_cell(n_cells);
         let (mut first_group, mut groups) = (vec![0], Vec::new());
         for c in 0..n_cells {
             let own = &mut exits[first_exit[c] as usize..first_exit[c + 1] as usize];
-            let size = options.portal_group;
+            let size = drawn.options.portal_group;
             group(own, &portals.corners, size, tolerance, &mut groups);
             first_group.push(groups.len() as u32);
         }
         let boxes = Boxes::of(world, &drawn, &doors, tolerance);
-        let occluders = occluders_of(world, options, tolerance);
         let n_triangles = drawn.n_triangles();
-        let seen_from = drawn.seen_from(world, &doors);
-        Ok(Self {
+        Self {
             locator: world.graph.locator.clone(),
             first_exit,
             exits,
@@ -105,18 +147,21 @@ impl Sight {
             cell_roots: boxes.cell_roots,
             unlisted_root: boxes.unlisted_root,
             world_root: boxes.world_root,
-            chunks: drawn.chunks,
-            details: drawn.details,
-            occluders,
-            seen_from,
-            indices: drawn.indices,
+            drawn,
+            indices,
             doors: Arc::new(doors),
             n_portals: world.graph.portals.len(),
             n_specials: world.graph.specials.len(),
             n_triangles,
             tolerance,
             extent: extent.max(boxes.extent),
-        })
+        }
+    }
+
+    /// Returns all that this took from the world's triangles, to be stored beside a hollow world.
+    #[must_use]
+    pub fn skeleton(&self) -> &SightSkeleton {
+        &self.drawn
     }
 
     /// Returns the number of cells.
@@ -152,12 +197,56 @@ impl Sight {
     /// Returns the chunks of the structural batches, indexed by [`ChunkId`](crate::ChunkId).
     #[must_use]
     pub fn chunks(&self) -> &[Chunk] {
-        &self.chunks
+        &self.drawn.chunks
+    }
+
+    /// Returns the chunks of a batch as a range of [`Sight::chunks`]; empty for a batch that does not exist. O(log n).
+    #[must_use]
+    pub fn chunks_of(&self, batch: u32) -> std::ops::Range<u32> {
+        let chunks = &self.drawn.chunks;
+        let first = chunks.partition_point(|c| c.batch < batch);
+        let n = chunks[first..].partition_point(|c| c.batch == batch);
+        first as u32..(first + n) as u32
+    }
+
+    /// Returns the area of a batch's triangles; 0 for a batch that does not exist. [Units: wu²]
+    #[must_use]
+    pub fn batch_area(&self, batch: u32) -> f32 {
+        self.drawn.areas.get(batch as usize).copied().unwrap_or(0.0)
+    }
+
+    /// Returns minimum and maximum of a detail object in the model's pose; `None` without vertices, or if it does not exist.
+    /// [Units: wu]
+    #[must_use]
+    pub fn detail_box(&self, detail: DetailId) -> Option<[DVec3; 2]> {
+        let bounds = self.drawn.details.get(detail.0 as usize)?.bounds;
+        (!bounds.is_empty()).then_some([bounds.min, bounds.max])
+    }
+
+    /// Returns the triangles of a batch that has arrived, as [`Sight::indices`] of the whole world has them.
+    /// O(n log n) in them; independent of what else is there, so that it may run beside a frame.
+    ///
+    /// # Errors
+    ///
+    /// If `primitive` is not the batch's.
+    pub fn chunk_order(&self, batch: u32, primitive: &Primitive) -> Result<Vec<u32>, SightError> {
+        let own = self.chunks_of(batch);
+        let own = &self.drawn.chunks[own.start as usize..own.end as usize];
+        let mut found = Vec::new();
+        let mut order = Vec::new();
+        if is_drawable(primitive) {
+            let size = self.drawn.options.chunk_triangles.max(1);
+            order = chunks_of(batch, primitive, size, &mut found).indices;
+        }
+        let is_same = (batch as usize) < self.n_batches() && found == own;
+        is_same
+            .then_some(order)
+            .ok_or(SightError::OtherBatch { batch })
     }
 
     /// Returns the triangles of a batch as triples of indices into its positions, ordered so that every
     /// [`Chunk`] is a range. Draw these instead of the batch's own indices. Empty for a batch that does not
-    /// exist.
+    /// exist, and in a hollow world: see [`Sight::chunk_order`].
     #[must_use]
     pub fn indices(&self, batch: u32) -> &[u32] {
         self.indices.get(batch as usize).map_or(&[], Vec::as_slice)
@@ -166,9 +255,8 @@ impl Sight {
     /// Returns the number of triangles of a detail object; 0 for one that does not exist.
     #[must_use]
     pub fn detail_triangles(&self, detail: u32) -> u32 {
-        self.details
-            .get(detail as usize)
-            .map_or(0, |d| d.n_triangles)
+        let details = &self.drawn.details;
+        details.get(detail as usize).map_or(0, |d| d.n_triangles)
     }
 
     /// Returns the leaves of a portal: the objects that shut it, and their motions. Empty if the world records none.

@@ -41,4 +41,24 @@ pub enum SightError {
         /// Its index.
         index: u32,
     },
+    /// A skeleton is not that of the hollow world.
+    #[error(
+        "the skeleton of sight has {skeleton} {what}, the hollow world {world}; take the skeleton packed with this world"
+    )]
+    OtherSkeleton {
+        /// The kind of thing that differs in number.
+        what: &'static str,
+        /// Its number in the skeleton.
+        skeleton: usize,
+        /// Its number in the world.
+        world: usize,
+    },
+    /// Triangles are not those of the batch for which they came.
+    #[error(
+        "the triangles of batch {batch} are not those that the world was packed with; fetch the piece again, or pack the world again"
+    )]
+    OtherBatch {
+        /// The batch.
+        batch: u32,
+    },
 }

@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Aabb, DVec3};
-use enfilade_runtime::{Sight, SightError, SightState};
+use enfilade_runtime::{DetailId, Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
@@ -161,6 +161,15 @@ impl Space {
     ///
     /// If [`Sight::build`] rejects the world.
     pub fn new(world: impl Into<Arc<World>>) -> Result<Self, SpaceError> {
+        let world = world.into();
+        let sight = sight_of(&world, 0)?;
+        Ok(Self::with_sight(world, sight))
+    }
+
+    /// As [`Space::new`], given the sight of this world: for hollow worlds, that of [`Sight::build_hollow`]. Their walls and objects
+    /// stop bodies and casts as far as they are there; see [`SightSkeleton`](enfilade_runtime::SightSkeleton).
+    #[must_use]
+    pub fn with_sight(world: impl Into<Arc<World>>, sight: Sight) -> Self {
         let mut space = Self {
             parts: Vec::new(),
             n_cells: 0,
@@ -169,8 +178,8 @@ impl Space {
             changes: Changes::default(),
             buffers: Buffers::default(),
         };
-        space.push(world.into(), PartId::ROOT, Pose::IDENTITY)?;
-        Ok(space)
+        space.push(world.into(), sight, PartId::ROOT, Pose::IDENTITY);
+        space
     }
 
     /// Adds a world that stands in another, at a pose in the host's frame. Its outdoors stands for its surroundings; a world
@@ -190,15 +199,16 @@ impl Space {
         if !pose.is_rigid() {
             return Err(SpaceError::NotRigid { part });
         }
-        self.push(world.into(), host, pose)?;
+        let world = world.into();
+        let sight = sight_of(&world, part)?;
+        self.push(world, sight, host, pose);
         self.parts[host.idx()].children.push(PartId(part));
         self.set_pose(PartId(part), pose)?;
         Ok(PartId(part))
     }
 
-    fn push(&mut self, world: Arc<World>, host: PartId, local: Pose) -> Result<(), SpaceError> {
+    fn push(&mut self, world: Arc<World>, sight: Sight, host: PartId, local: Pose) {
         let part = self.parts.len() as u32;
-        let sight = Sight::build(&world).map_err(|source| SpaceError::Sight { part, source })?;
         let layout = Layout::new(&world);
         let n_cells = layout.n_cells();
         let border = layout.outdoors().filter(|_| part > 0);
@@ -213,7 +223,7 @@ impl Space {
             })
             .collect();
         self.parts.push(Part {
-            hull: hull_of(&world, &layout),
+            hull: hull_of(&world, &sight, &layout),
             state: SightState::new(&sight),
             sight,
             border,
@@ -232,7 +242,6 @@ impl Space {
         });
         self.n_cells += n_cells;
         self.neighbors.push(Aabb::EMPTY);
-        Ok(())
     }
 
     /// Moves a part, and everything that stands in it, to a pose in its host's frame. O(parts that stand in it, cells that they
@@ -488,24 +497,23 @@ impl Space {
     }
 }
 
-/// Returns the box around all cells but the outdoors, and all triangles.
-fn hull_of(world: &World, layout: &Layout) -> Aabb {
-    let point = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
+fn sight_of(world: &World, part: u32) -> Result<Sight, SpaceError> {
+    Sight::build(world).map_err(|source| SpaceError::Sight { part, source })
+}
+
+/// Returns the box around all cells but the outdoors, and all that is drawn.
+fn hull_of(world: &World, sight: &Sight, layout: &Layout) -> Aabb {
     let mut hull = Aabb::EMPTY;
     for (cell, _) in world.graph.indoor_cells() {
         hull = hull.union(layout.cell(cell).bounds);
     }
-    for batch in &world.batches {
-        let corners = batch.primitive.positions.iter();
-        hull = corners.fold(hull, |hull, p| hull.including(point(p)));
+    for chunk in sight.chunks() {
+        let [low, high] = (chunk.aabb).map(|p| DVec3::from_array(p.map(f64::from)));
+        hull = hull.union(Aabb::new(low, high));
     }
-    for object in &world.details {
-        let placement = object.placement();
-        for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-            let corners = primitive.positions.iter();
-            hull = corners.fold(hull, |hull, p| {
-                hull.including(placement.transform_point3(point(p)))
-            });
+    for detail in (0..world.details.len() as u32).map(DetailId) {
+        if let Some([low, high]) = sight.detail_box(detail) {
+            hull = hull.union(Aabb::new(low, high));
         }
     }
     hull

@@ -1,9 +1,10 @@
 //! The triangles of all batches and meshes in one buffer.
 
+use std::ops::Range;
+
 use enfilade_cpg::{PortalId, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_runtime::Sight;
-use glam::Vec3;
 
 use super::color::color_of;
 use super::plug::plug;
@@ -83,6 +84,33 @@ pub(crate) struct Span {
     pub(crate) is_transparent: bool,
 }
 
+impl Span {
+    /// No triangles.
+    pub(super) const NONE: Self = Self {
+        first: 0,
+        n: 0,
+        texture: 0,
+        finish: Finish::Plain,
+        is_smooth: false,
+        is_transparent: false,
+    };
+
+    /// Returns the spans that its triangles become if all indices of its piece are put into `ranges` in order.
+    pub(super) fn put_into(self, ranges: &[Range<u32>]) -> impl Iterator<Item = Self> {
+        let mut before = 0;
+        ranges.iter().filter_map(move |range| {
+            let own = before..before + (range.end - range.start);
+            before = own.end;
+            let (from, to) = (own.start.max(self.first), own.end.min(self.first + self.n));
+            (from < to).then(|| Self {
+                first: range.start + (from - own.start),
+                n: to - from,
+                ..self
+            })
+        })
+    }
+}
+
 /// Shading that a surface needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Finish {
@@ -101,27 +129,72 @@ pub(crate) struct Level {
     pub(crate) spans: Vec<Span>,
 }
 
-/// Collects the contents of the buffers for upload.
-pub(super) struct Filling<'w> {
-    pub(super) world: &'w World,
+/// The looks of a world's surfaces.
+#[derive(Default)]
+pub(super) struct Dress {
+    /// For each material.
     pub(super) looks: Vec<Look>,
-    /// For each texture of the world, index into the uploaded textures, 0 for none.
+    /// For each texture of the world, index into [`super::GpuWorld::textures`], 0 for none.
     pub(super) texture_of: Vec<u32>,
+}
+
+impl Dress {
+    fn look(&self, primitive: &Primitive) -> Look {
+        let look = primitive.material.and_then(|m| self.looks.get(m as usize));
+        look.copied().unwrap_or_default()
+    }
+
+    /// Returns the mean color of the surfaces of each cell, by area, in the light of the sky.
+    pub(super) fn cell_looks(&self, world: &World, sight: &Sight) -> Vec<[f32; 3]> {
+        const SKY: f32 = 0.55;
+        let mut sums = vec![[0.0; 4]; world.graph.cells.len()];
+        for (i, batch) in (0..).zip(&world.batches) {
+            let color = self.look(&batch.primitive).base_color;
+            let area = sight.batch_area(i);
+            for cell in &batch.cells {
+                if let Some(sum) = sums.get_mut(cell.0 as usize) {
+                    for k in 0..3 {
+                        sum[k] += color[k] * area;
+                    }
+                    sum[3] += area;
+                }
+            }
+        }
+        let mean =
+            |s: [f32; 4]| [0, 1, 2].map(|k| SKY * if s[3] > 0.0 { s[k] / s[3] } else { 0.8 });
+        sums.into_iter().map(mean).collect()
+    }
+}
+
+/// Collects the contents of the buffers for upload.
+pub(super) struct Filling<'d> {
+    dress: &'d Dress,
     pub(super) corners: Vec<Corner>,
     pub(super) indices: Vec<u32>,
 }
 
-impl Filling<'_> {
-    fn look(&self, primitive: &Primitive) -> Look {
-        // The last look stands for no material.
-        let none = self.looks.len() - 1;
-        let at = primitive.material.map_or(none, |m| m as usize).min(none);
-        self.looks[at]
+impl<'d> Filling<'d> {
+    pub(super) fn new(dress: &'d Dress) -> Self {
+        Self {
+            dress,
+            corners: Vec::new(),
+            indices: Vec::new(),
+        }
     }
 
     /// Adds a primitive's triangles by `order`, indices of its positions; returns their span.
-    fn add(&mut self, primitive: &Primitive, order: &[u32], cell: u32) -> Span {
-        let look = self.look(primitive);
+    pub(super) fn add(&mut self, primitive: &Primitive, order: &[u32], cell: u32) -> Span {
+        let look = self.dress.look(primitive);
+        self.add_dressed(primitive, order, cell, &look)
+    }
+
+    fn add_dressed(
+        &mut self,
+        primitive: &Primitive,
+        order: &[u32],
+        cell: u32,
+        look: &Look,
+    ) -> Span {
         let [r, g, b] = look.emissive;
         let emissive = [r, g, b, look.cutoff].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
         let uvs = primitive.uvs.get(look.uv_set);
@@ -146,7 +219,7 @@ impl Filling<'_> {
         self.indices.extend(order.iter().map(|&i| base + i));
         let texture = look
             .texture
-            .and_then(|t| self.texture_of.get(t as usize))
+            .and_then(|t| self.dress.texture_of.get(t as usize))
             .copied()
             .filter(|_| uvs.is_some());
         let texture = texture.unwrap_or(0);
@@ -166,16 +239,8 @@ impl Filling<'_> {
         }
     }
 
-    /// Returns the positions of the vertices of all triangles, three each.
-    pub(super) fn listed(&self) -> Vec<[f32; 3]> {
-        let position = |&i: &u32| self.corners[i as usize].position;
-        self.indices.iter().map(position).collect()
-    }
-
-    pub(super) fn add_batches(&mut self, sight: &Sight) -> Vec<Span> {
-        let batches = &self.world.batches;
-        batches
-            .iter()
+    pub(super) fn add_batches(&mut self, world: &World, sight: &Sight) -> Vec<Span> {
+        (world.batches.iter())
             .enumerate()
             .map(|(i, batch)| {
                 let order = sight.indices(i as u32);
@@ -185,71 +250,41 @@ impl Filling<'_> {
     }
 
     /// Adds the plugs; returns their spans by portal.
-    pub(super) fn add_plugs(&mut self, sight: &Sight) -> Vec<Span> {
+    pub(super) fn add_plugs(&mut self, world: &World, sight: &Sight) -> Vec<Span> {
         let look = Look {
             base_color: super::plug::COLOR,
             ..Look::default()
         };
-        let own = self.looks.len() - 1;
-        // Plugs have no material, so the look of none is theirs for now.
-        let none = std::mem::replace(&mut self.looks[own], look);
-        let world = self.world;
-        let plugs = (0..world.graph.portals.len() as u32)
+        (0..world.graph.portals.len() as u32)
             .map(|p| {
                 let plug = plug(world, sight, PortalId(p));
-                self.add(&plug, &plug.indices, color_of(&[]))
+                self.add_dressed(&plug, &plug.indices, color_of(&[]), &look)
             })
-            .collect();
-        self.looks[own] = none;
-        plugs
+            .collect()
     }
 
-    /// Returns the mean color of the surfaces of each cell, by area, in the light of the sky.
-    pub(super) fn cell_looks(&self) -> Vec<[f32; 3]> {
-        const SKY: f32 = 0.55;
-        let mut sums = vec![[0.0; 4]; self.world.graph.cells.len()];
-        for batch in &self.world.batches {
-            let color = self.look(&batch.primitive).base_color;
-            let corner = |i: u32| Vec3::from(batch.primitive.positions[i as usize]);
-            let area: f32 = (batch.primitive.triples().iter())
-                .map(|t| {
-                    let [a, b, c] = t.map(corner);
-                    (b - a).cross(c - a).length() * 0.5
-                })
-                .sum();
-            for cell in &batch.cells {
-                if let Some(sum) = sums.get_mut(cell.0 as usize) {
-                    for k in 0..3 {
-                        sum[k] += color[k] * area;
-                    }
-                    sum[3] += area;
-                }
-            }
-        }
-        let mean =
-            |s: [f32; 4]| [0, 1, 2].map(|k| SKY * if s[3] > 0.0 { s[k] / s[3] } else { 0.8 });
-        sums.into_iter().map(mean).collect()
+    /// Adds the parts of a mesh that have triangles; returns their spans.
+    pub(super) fn add_mesh<'p>(&mut self, parts: impl Iterator<Item = &'p Primitive>) -> Vec<Span> {
+        let parts = parts.filter(|p| !p.indices.is_empty());
+        parts.map(|p| self.add(p, &p.indices, 0)).collect()
     }
 
-    pub(super) fn add_meshes(&mut self, has_levels: bool) -> Vec<Vec<Level>> {
-        let meshes = &self.world.detail_meshes;
-        meshes
-            .iter()
+    pub(super) fn add_meshes(&mut self, world: &World, has_levels: bool) -> Vec<Vec<Level>> {
+        (world.detail_meshes.iter())
             .map(|mesh| {
                 let parts: Vec<&Primitive> = mesh
                     .primitives
                     .iter()
                     .filter(|p| !p.indices.is_empty())
                     .collect();
+                let mut next = self.corners.len() as u32;
+                let spans = self.add_mesh(parts.iter().copied());
                 // First vertex of each primitive.
-                let mut bases = Vec::new();
-                let spans = parts
-                    .iter()
-                    .map(|p| {
-                        bases.push(self.corners.len() as u32);
-                        self.add(p, &p.indices, 0)
-                    })
-                    .collect();
+                let bases = parts.iter().map(|p| {
+                    next += p.positions.len() as u32;
+                    next - p.positions.len() as u32
+                });
+                let bases: Vec<u32> = bases.collect();
                 let mut levels = vec![Level { error: 0.0, spans }];
                 let coarser = if has_levels {
                     coarser(&parts)
@@ -278,4 +313,10 @@ impl Filling<'_> {
             })
             .collect()
     }
+}
+
+/// Returns the positions of the vertices of triangles, three each.
+pub(super) fn listed(corners: &[Corner], indices: &[u32]) -> Vec<[f32; 3]> {
+    let position = |&i: &u32| corners[i as usize].position;
+    indices.iter().map(position).collect()
 }

@@ -100,29 +100,14 @@ pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed
             key: 0,
             color: color_of(&detail.cells),
         });
-        let mut low = Vec3::INFINITY;
-        let mut high = Vec3::NEG_INFINITY;
-        let mesh = world.detail_meshes.get(detail.mesh as usize);
-        for p in mesh.iter().flat_map(|m| &m.primitives) {
-            for &q in &p.positions {
-                let q = m.transform_point3(q.into());
-                (low, high) = (low.min(q), high.max(q));
-            }
-        }
-        let is_empty = low.x > high.x;
+        let bounds = sight.detail_box(id);
         details.push(Placed {
             mesh: detail.mesh,
             cells: sight.cells_of_detail(world, id),
-            center: if is_empty {
-                m.w_axis.truncate()
-            } else {
-                (low + high) * 0.5
-            },
-            radius: if is_empty {
-                0.0
-            } else {
-                (high - low).length() * 0.5
-            },
+            center: bounds.map_or(m.w_axis.truncate(), |[low, high]| {
+                ((low + high) * 0.5).as_vec3()
+            }),
+            radius: bounds.map_or(0.0, |[low, high]| ((high - low).length() * 0.5) as f32),
             stretch: stretch(&m),
         });
         if sight.portals_of(id).next().is_some() {
@@ -144,11 +129,12 @@ fn stretch(m: &Mat4) -> f32 {
     rows.into_iter().fold(0.0, f32::max).sqrt()
 }
 
-pub(super) fn bounds_of(world: &World, details: &[Placed]) -> [Vec3; 2] {
+pub(super) fn bounds_of(sight: &Sight, details: &[Placed]) -> [Vec3; 2] {
     let mut low = Vec3::INFINITY;
     let mut high = Vec3::NEG_INFINITY;
-    for p in world.batches.iter().flat_map(|b| &b.primitive.positions) {
-        (low, high) = (low.min((*p).into()), high.max((*p).into()));
+    for chunk in sight.chunks() {
+        let [from, to] = chunk.aabb.map(Vec3::from);
+        (low, high) = (low.min(from), high.max(to));
     }
     for d in details {
         (low, high) = (low.min(d.center - d.radius), high.max(d.center + d.radius));

@@ -51,9 +51,7 @@ pub(super) fn load_textures(
     looks: &[Look],
 ) -> Result<Textures, RenderError> {
     let layout = texture_layout(gpu);
-    let white = image::RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
-    let repeat = [wgpu::AddressMode::Repeat; 2];
-    let mut groups = vec![texture_group(gpu, &layout, &[white], repeat)?];
+    let mut groups = vec![white_group(gpu, &layout)?];
     let mut texture_of = vec![0; world.textures.len()];
     let (mut n_missing, mut n_too_large) = (0, 0);
     let mut decoder = Decoder::new(world);
@@ -69,7 +67,8 @@ pub(super) fn load_textures(
             Ok(picture) => {
                 texture_of[t as usize] = groups.len() as u32;
                 let wrap = wrapping(world, t);
-                groups.push(texture_group(gpu, &layout, &picture.levels, wrap)?);
+                let view = upload(gpu, &picture.levels)?;
+                groups.push(texture_group(gpu, &layout, &view, wrap));
             }
             Err(why) => {
                 is_without[t as usize] = true;
@@ -88,12 +87,21 @@ pub(super) fn load_textures(
     })
 }
 
-fn texture_group(
+/// Returns the bind group of surfaces without a texture.
+pub(super) fn white_group(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
-    levels: &[image::RgbaImage],
-    wrap: [wgpu::AddressMode; 2],
 ) -> Result<wgpu::BindGroup, RenderError> {
+    let white = image::RgbaImage::from_pixel(1, 1, image::Rgba([255; 4]));
+    let repeat = [wgpu::AddressMode::Repeat; 2];
+    Ok(texture_group(gpu, layout, &upload(gpu, &[white])?, repeat))
+}
+
+/// Uploads a picture with its mipmaps.
+pub(super) fn upload(
+    gpu: &Gpu,
+    levels: &[image::RgbaImage],
+) -> Result<wgpu::TextureView, RenderError> {
     let (width, height) = levels[0].dimensions();
     Gpu::check(
         "a texture's side",
@@ -124,6 +132,15 @@ fn texture_group(
         wgpu::util::TextureDataOrder::MipMajor,
         &texels,
     );
+    Ok(texture.create_view(&wgpu::TextureViewDescriptor::default()))
+}
+
+pub(super) fn texture_group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    view: &wgpu::TextureView,
+    wrap: [wgpu::AddressMode; 2],
+) -> wgpu::BindGroup {
     let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
         address_mode_u: wrap[0],
         address_mode_v: wrap[1],
@@ -132,19 +149,18 @@ fn texture_group(
         mipmap_filter: wgpu::MipmapFilterMode::Linear,
         ..wgpu::SamplerDescriptor::default()
     });
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("base color"),
         layout,
         entries: &[
             wgpu::BindGroupEntry {
                 binding: 0,
-                resource: wgpu::BindingResource::TextureView(&view),
+                resource: wgpu::BindingResource::TextureView(view),
             },
             wgpu::BindGroupEntry {
                 binding: 1,
                 resource: wgpu::BindingResource::Sampler(&sampler),
             },
         ],
-    }))
+    })
 }

@@ -103,7 +103,7 @@ impl Traversal<'_, '_> {
     /// Adds the items of a tree that are inside the planes and not in a shadow.
     pub(super) fn cull(&mut self, root: Root) {
         let sight = self.sight;
-        let n_chunks = sight.chunks.len() as u32;
+        let n_chunks = sight.drawn.chunks.len() as u32;
         let viewer = &mut *self.viewer;
         let (out, stamps, shadows) = (&mut viewer.out, &mut viewer.item_stamps, &viewer.shadows);
         let frame = viewer.frame_stamp;
@@ -123,11 +123,11 @@ impl Traversal<'_, '_> {
                 }
                 *stamp = frame;
                 if item < n_chunks {
-                    out.n_triangles += u64::from(sight.chunks[item as usize].n_triangles());
+                    out.n_triangles += u64::from(sight.drawn.chunks[item as usize].n_triangles());
                     out.chunks.push(ChunkId(item));
                 } else {
                     let detail = item - n_chunks;
-                    out.n_triangles += u64::from(sight.details[detail as usize].n_triangles);
+                    out.n_triangles += u64::from(sight.drawn.details[detail as usize].n_triangles);
                     out.details.push(DetailId(detail));
                 }
             });

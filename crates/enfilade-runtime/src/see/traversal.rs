@@ -216,7 +216,7 @@ impl Traversal<'_, '_> {
         self.viewer.shadows.clear();
         if self.viewer.options.occlusion {
             let margin = self.planes.margin();
-            let occluders = &sight.occluders;
+            let occluders = &sight.drawn.occluders;
             // Beside its plane, a ray may run along a special portal for long before it passes.
             let gate = self.viewer.stepping.gate.is_some();
             if !gate || entry.is_some() {

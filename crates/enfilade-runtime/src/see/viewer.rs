@@ -117,7 +117,7 @@ impl Viewer {
             portal_stamps: vec![0; sight.n_portals()],
             stop_stamps: vec![0; sight.n_portals()],
             special_stamps: vec![0; sight.n_specials()],
-            item_stamps: vec![0; sight.chunks.len() + sight.details.len()],
+            item_stamps: vec![0; sight.drawn.chunks.len() + sight.drawn.details.len()],
             allowed: Vec::new(),
             is_bounded: false,
             face_stamp: 0,
@@ -139,6 +139,7 @@ impl Viewer {
     /// Loads the precomputed visibility of the eye's cell, if the world has it.
     pub(super) fn bound_by(&mut self, sight: &Sight, cell: u32) {
         let Some(seen) = sight
+            .drawn
             .seen_from
             .as_ref()
             .filter(|_| self.options.precomputed)

@@ -1,9 +1,10 @@
-//! The drawn parts of a world, in pieces small enough to be culled one by one, and the trees over their boxes.
+//! The drawn parts of a world, in pieces small enough to be culled one by one.
 
 use enfilade_cpg::{Batch, CellId, DetailObject, VisibleParts, World};
 use enfilade_geom::Aabb;
+use enfilade_geom::scene::Primitive;
+use glam::Vec3;
 
-use crate::boxes::{BoxTrees, Boxed, Root};
 use crate::chunks::{Chunk, chunks_of};
 use crate::doors::Doors;
 use crate::options::SightOptions;
@@ -13,6 +14,7 @@ use crate::sight_error::SightError;
 /// A placed detail object.
 #[derive(Clone, Debug)]
 pub(crate) struct Detail {
+    /// In the model's pose. [Units: wu]
     pub(crate) bounds: Aabb,
     pub(crate) n_triangles: u32,
 }
@@ -21,8 +23,12 @@ pub(crate) struct Detail {
 pub(super) struct Drawn {
     pub(super) chunks: Vec<Chunk>,
     pub(super) details: Vec<Detail>,
+    /// Per batch: the area of its triangles. [Units: wu²]
+    pub(super) areas: Vec<f32>,
     /// Per batch: its triangles as index triples, sorted so that chunks are ranges.
     pub(super) indices: Vec<Vec<u32>>,
+    /// Number of vertices and of indices of all batches and meshes, each mesh once.
+    pub(super) sizes: [u64; 2],
     /// Chunk of each triangle, over all batches in order.
     chunk_of: Vec<u32>,
     /// Largest absolute coordinate, or 1. [Units: wu]
@@ -30,18 +36,22 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    pub(super) fn of(
-        world: &World,
-        options: &SightOptions,
-        doors: &Doors,
-    ) -> Result<Self, SightError> {
+    pub(super) fn of(world: &World, options: &SightOptions) -> Result<Self, SightError> {
         let mut drawn = Self {
             chunks: Vec::new(),
             details: Vec::new(),
+            areas: Vec::new(),
             indices: Vec::new(),
+            sizes: [0; 2],
             chunk_of: Vec::new(),
             extent: 1.0,
         };
+        let batches = world.batches.iter().map(|b| &b.primitive);
+        let meshes = world.detail_meshes.iter().flat_map(|m| &m.primitives);
+        for primitive in batches.chain(meshes) {
+            drawn.sizes[0] += primitive.positions.len() as u64;
+            drawn.sizes[1] += primitive.indices.len() as u64;
+        }
         for (index, batch) in world.batches.iter().enumerate() {
             let index = index as u32;
             drawn
@@ -60,11 +70,6 @@ impl Drawn {
                     index,
                 })?;
         }
-        for (i, detail) in (0..).zip(&mut drawn.details) {
-            if let Some((swept, _)) = doors.way(i) {
-                detail.bounds = detail.bounds.union(swept);
-            }
-        }
         Ok(drawn)
     }
 
@@ -77,11 +82,7 @@ impl Drawn {
         options: &SightOptions,
     ) -> Option<()> {
         let positions = &batch.primitive.positions;
-        let used = &batch.primitive.indices;
-        let is_good = exist(world, &batch.cells)
-            && used.iter().all(|&i| (i as usize) < positions.len())
-            && positions.iter().flatten().all(|x| x.is_finite());
-        if !is_good {
+        if !exist(world, &batch.cells) || !is_drawable(&batch.primitive) {
             return None;
         }
         for p in positions {
@@ -98,6 +99,7 @@ impl Drawn {
                 self.chunk_of[base + number as usize] = item;
             }
         }
+        self.areas.push(area_of(&batch.primitive));
         self.indices.push(sorted.indices);
         Some(())
     }
@@ -162,12 +164,6 @@ impl Drawn {
         }
         Some(VisibleParts::of_ascending(rows))
     }
-
-    pub(super) fn n_triangles(&self) -> u64 {
-        let chunks = self.chunks.iter().map(|c| u64::from(c.n_triangles()));
-        let details = self.details.iter().map(|d| u64::from(d.n_triangles));
-        chunks.sum::<u64>() + details.sum::<u64>()
-    }
 }
 
 fn exist(world: &World, cells: &[CellId]) -> bool {
@@ -175,78 +171,18 @@ fn exist(world: &World, cells: &[CellId]) -> bool {
     cells.iter().all(|c| (c.0 as usize) < n_cells)
 }
 
-/// Trees over the boxes of what is drawn, by cell, and of the cells.
-pub(super) struct Boxes {
-    pub(super) trees: BoxTrees,
-    pub(super) cell_roots: Vec<Root>,
-    pub(super) unlisted_root: Root,
-    pub(super) world_root: Root,
-    /// Largest absolute coordinate of a cell's box. [Units: wu]
-    pub(super) extent: f64,
+/// Returns `true` if all indices exist and all positions are finite.
+pub(crate) fn is_drawable(primitive: &Primitive) -> bool {
+    let n = primitive.positions.len();
+    primitive.indices.iter().all(|&i| (i as usize) < n)
+        && primitive.positions.iter().flatten().all(|x| x.is_finite())
 }
 
-impl Boxes {
-    pub(super) fn of(world: &World, drawn: &Drawn, doors: &Doors, tolerance: f64) -> Self {
-        let (mut listed, mut unlisted) = listed(world, drawn, doors);
-        let mut trees = BoxTrees::default();
-        let mut boxes = Vec::new();
-        let mut cell_roots = Vec::new();
-        let mut extent = 0.0_f64;
-        for (c, items) in listed.iter_mut().enumerate() {
-            let [low, high] = world.graph.cells[c].aabb.map(point);
-            let mut bounds = Aabb::EMPTY;
-            if low.is_finite() && high.is_finite() {
-                bounds = bounds.union(Aabb::new(low, high));
-            }
-            let bounds = items.iter().fold(bounds, |b, i| b.union(i.bounds));
-            if !bounds.is_empty() {
-                extent = extent.max(bounds.min.abs().max(bounds.max.abs()).max_element());
-                boxes.push(Boxed {
-                    bounds,
-                    item: c as u32,
-                });
-            }
-            cell_roots.push(trees.add(items, tolerance));
-        }
-        let world_root = trees.add(&mut boxes, tolerance);
-        let unlisted_root = trees.add(&mut unlisted, tolerance);
-        Self {
-            trees,
-            cell_roots,
-            unlisted_root,
-            world_root,
-            extent,
-        }
-    }
-}
-
-/// Per cell, the chunks and details that it sees; and those that no cell sees.
-fn listed(world: &World, drawn: &Drawn, doors: &Doors) -> (Vec<Vec<Boxed>>, Vec<Boxed>) {
-    let mut listed: Vec<Vec<Boxed>> = world.graph.cells.iter().map(|_| Vec::new()).collect();
-    let mut unlisted = Vec::new();
-    let mut list = |cells: &[CellId], bounds: Aabb, item: u32| {
-        if cells.is_empty() {
-            unlisted.push(Boxed { bounds, item });
-        }
-        for c in cells {
-            listed[c.0 as usize].push(Boxed { bounds, item });
-        }
-    };
-    let n_chunks = drawn.chunks.len() as u32;
-    for (item, chunk) in (0..).zip(&drawn.chunks) {
-        let batch = &world.batches[chunk.batch as usize];
-        list(&batch.cells, chunk.bounds(), item);
-    }
-    for (item, (placed, detail)) in (n_chunks..).zip(world.details.iter().zip(&drawn.details)) {
-        match doors.way(item - n_chunks) {
-            None => list(&placed.cells, detail.bounds, item),
-            Some((_, way)) => {
-                let mut cells = [&placed.cells, way].concat();
-                cells.sort_unstable();
-                cells.dedup();
-                list(&cells, detail.bounds, item);
-            }
-        }
-    }
-    (listed, unlisted)
+fn area_of(primitive: &Primitive) -> f32 {
+    let corner = |i: u32| Vec3::from(primitive.positions[i as usize]);
+    let areas = primitive.triples().iter().map(|t| {
+        let [a, b, c] = t.map(corner);
+        (b - a).cross(c - a).length() * 0.5
+    });
+    areas.sum()
 }

@@ -1,7 +1,7 @@
 //! Portals of a world as exits of its cells, with convex outlines of few vertices.
 
 use enfilade_cpg::{CellPortalGraph, PortalId, SpecialId};
-use enfilade_geom::{DVec2, DVec3, Plane, Winding};
+use enfilade_geom::{DVec2, DVec3, Plane, Winding, world_tolerance};
 
 use crate::exits::{Exit, NO_PORTAL, SPECIAL};
 use crate::point::point;
@@ -34,6 +34,13 @@ impl Portals {
             portals.add_special(id, graph)?;
         }
         Ok(portals)
+    }
+
+    /// Returns the tolerance of answers, given the largest absolute coordinate of what is drawn.
+    pub(super) fn tolerance(&self, extent: f64) -> f64 {
+        // Snapping by a builder plus rounding in a file, for outline and wall each; `enfilade-verify` uses
+        // the same bound.
+        (2.0 * world_tolerance(extent.max(self.extent))).max(self.off_plane)
     }
 
     /// Adds a special portal as an exit of its cell.
