@@ -7,15 +7,21 @@
 mod bound;
 mod catalog;
 mod deadlines;
+mod files;
+mod head;
 mod link;
 mod of_world;
+mod pack;
 mod source;
 mod streamer;
 
 pub use bound::{Due, deadlines, due_times, least_bandwidth};
 pub use catalog::{Catalog, Piece, PieceId};
+pub use files::{Fetch, FileFetch, PackedFiles, ThreadSource};
+pub use head::{PackError, PackedHead, PieceAt};
 pub use link::{LinkOptions, SimulatedLink};
 pub use of_world::WorldPieces;
+pub use pack::PackedWorld;
 pub use source::{FetchError, Reply, Source};
 pub use streamer::{
     Cause, Changes, Eye, Failed, Frame, InView, Loaded, PinError, Policy, StandIn, StreamCounts,

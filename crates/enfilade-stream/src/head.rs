@@ -1,0 +1,266 @@
+//! The head of a packed world: all that is always in memory.
+
+use enfilade_cpg::World;
+use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+use enfilade_runtime::{Sight, SightError, SightSkeleton};
+use serde::{Deserialize, Serialize};
+
+use crate::{Catalog, Piece, PieceId};
+
+/// First bytes of a head.
+const MAGIC: [u8; 8] = *b"enfpack\0";
+
+/// Version of packed worlds that this program writes and reads.
+const VERSION: u32 = 1;
+
+/// Bytes before the compressed body: magic, version, sizes and hash of the body.
+const FRONT: usize = 8 + 4 + 8 + 8 + 16;
+
+/// Largest head, unpacked. [Units: bytes]
+const MOST: u64 = 4 << 30;
+
+/// The reasons why a world cannot be packed, or bytes are no packed world.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PackError {
+    /// The world, or a piece of it.
+    #[error(transparent)]
+    Wire(#[from] WireError),
+    /// The world cannot be prepared for queries.
+    #[error(transparent)]
+    Sight(#[from] SightError),
+    /// Bytes that are no packed world.
+    #[error("this is not a packed world; make one with `enfilade pack IN.glb -o OUT.enf`")]
+    NotPacked,
+    /// A packed world of another version.
+    #[error(
+        "this packed world has version {0}, but this program reads version {VERSION}; pack the world again"
+    )]
+    Version(u32),
+    /// Damage.
+    #[error("the packed world is damaged: {0}; pack the world again, or fetch it again")]
+    Damaged(String),
+    /// A file or folder.
+    #[error("{path}: {problem}")]
+    File {
+        /// The path.
+        path: String,
+        /// The problem.
+        problem: String,
+    },
+}
+
+pub(crate) fn damaged(problem: impl Into<String>) -> PackError {
+    PackError::Damaged(problem.into())
+}
+
+/// Returns the hash that guards bytes against damage: XXH3 with 128 bits. It is no proof against forgery.
+pub(crate) fn hash_of(bytes: &[u8]) -> [u8; 16] {
+    twox_hash::XxHash3_128::oneshot(bytes).to_le_bytes()
+}
+
+/// Place of a piece among all packed pieces, and its hash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PieceAt {
+    /// Offset of its first byte among the packed pieces. [Units: bytes]
+    pub offset: u64,
+    /// Hash of its packed bytes.
+    pub hash: [u8; 16],
+}
+
+/// The head of a packed world: graph, locator, potentially visible set, placed objects, boxes of what is drawn, and the list of
+/// pieces.
+#[derive(Clone, Debug)]
+pub struct PackedHead {
+    /// The world without triangles and pictures.
+    pub world: World,
+    /// Boxes of chunks and objects, for [`Sight::build_hollow`].
+    pub skeleton: SightSkeleton,
+    /// Pieces and the cells that need them.
+    pub catalog: Catalog,
+    /// For each piece, its place.
+    pub places: Vec<PieceAt>,
+    /// The part of the file that is in no piece; only for putting it together again.
+    pub(crate) rest: PieceAt,
+    pub(crate) rest_packed: u64,
+    /// Size and hash of the file that was packed.
+    pub(crate) file: (u64, [u8; 16]),
+}
+
+/// The list of pieces as written.
+#[derive(Serialize, Deserialize)]
+struct Listed {
+    /// Of each piece: offset, packed size, size in memory.
+    pieces: Vec<[u64; 3]>,
+    hashes: Vec<[u8; 16]>,
+    /// For each cell, its pieces.
+    cells: Vec<Vec<u32>>,
+    /// For each batch, its material: the hollow world has no triangles to say so.
+    materials: Vec<Option<u32>>,
+    rest: ([u64; 2], [u8; 16]),
+    file: (u64, [u8; 16]),
+}
+
+impl PackedHead {
+    /// Prepares the world for queries: answers are those of the whole world.
+    ///
+    /// # Errors
+    ///
+    /// A head that was put together from different worlds.
+    pub fn sight(&self) -> Result<Sight, SightError> {
+        Sight::build_hollow(&self.world, self.skeleton.clone())
+    }
+
+    /// Encodes the head.
+    ///
+    /// # Errors
+    ///
+    /// A world that breaks invariants.
+    pub fn encode(&self) -> Result<Vec<u8>, PackError> {
+        let pieces = self.catalog.pieces().iter().zip(&self.places);
+        let of_cell = |c: u32| {
+            let pieces = self.catalog.pieces_of(enfilade_cpg::CellId(c));
+            pieces.iter().map(|p| p.0).collect()
+        };
+        let batches = self.world.batches.iter();
+        let listed = Listed {
+            pieces: pieces
+                .map(|(piece, at)| [at.offset, piece.n_packed, piece.n_resident])
+                .collect(),
+            hashes: self.places.iter().map(|at| at.hash).collect(),
+            cells: (0..self.catalog.n_cells() as u32).map(of_cell).collect(),
+            materials: batches.map(|b| b.primitive.material).collect(),
+            rest: ([self.rest.offset, self.rest_packed], self.rest.hash),
+            file: self.file,
+        };
+        let listed = serde_json::to_vec(&listed).map_err(|e| damaged(e.to_string()))?;
+        let sections = [listed, encode_glb(&self.world)?, self.skeleton.encode()];
+        let mut body = Vec::new();
+        for section in &sections {
+            body.extend((section.len() as u64).to_le_bytes());
+            body.extend(section);
+        }
+        let packed = compressed(&body)?;
+        let mut out = MAGIC.to_vec();
+        out.extend(VERSION.to_le_bytes());
+        out.extend((packed.len() as u64).to_le_bytes());
+        out.extend((body.len() as u64).to_le_bytes());
+        out.extend(hash_of(&packed));
+        out.extend(packed);
+        Ok(out)
+    }
+
+    /// Returns the size of the head that begins with `bytes`, of which 44 are enough. [Units: bytes]
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no packed world, or one of another version.
+    pub fn size(bytes: &[u8]) -> Result<u64, PackError> {
+        let front = bytes.get(..FRONT).ok_or(PackError::NotPacked)?;
+        if front[..8] != MAGIC {
+            return Err(PackError::NotPacked);
+        }
+        let version = u32::from_le_bytes([front[8], front[9], front[10], front[11]]);
+        if version != VERSION {
+            return Err(PackError::Version(version));
+        }
+        let n = word(front, 12).saturating_add(FRONT as u64);
+        (n <= MOST)
+            .then_some(n)
+            .ok_or_else(|| damaged("its head is larger than 4 GiB"))
+    }
+
+    /// Decodes a head; bytes after it are ignored. Safe on hostile bytes: no panic, memory bounded by the sizes that the head
+    /// states, at most 4 GiB.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no packed world, one of another version, damage.
+    pub fn decode(bytes: &[u8]) -> Result<Self, PackError> {
+        let n = Self::size(bytes)?;
+        let packed = usize::try_from(n).ok().and_then(|n| bytes.get(FRONT..n));
+        let packed = packed.ok_or_else(|| damaged("its head is cut off"))?;
+        if bytes[FRONT - 16..FRONT] != hash_of(packed) {
+            return Err(damaged("its head has another hash than was packed"));
+        }
+        let body = expanded(packed, word(bytes, 20))?;
+        let mut rest = &body[..];
+        let mut section = || {
+            let (n, after) = rest.split_first_chunk::<8>()?;
+            let n = usize::try_from(u64::from_le_bytes(*n)).ok()?;
+            let (own, after) = after.split_at_checked(n)?;
+            rest = after;
+            Some(own)
+        };
+        let cut = || damaged("a section of its head is cut off");
+        let listed: Listed = serde_json::from_slice(section().ok_or_else(cut)?)
+            .map_err(|e| damaged(e.to_string()))?;
+        let mut world = decode_glb(section().ok_or_else(cut)?)?;
+        let skeleton = SightSkeleton::decode(section().ok_or_else(cut)?)
+            .map_err(|e| damaged(e.to_string()))?;
+        let n_materials = world.materials.len() as u32;
+        let is_whole = listed.hashes.len() == listed.pieces.len()
+            && listed.cells.len() == world.graph.cells.len()
+            && listed.materials.len() == world.batches.len()
+            && listed.materials.iter().flatten().all(|m| *m < n_materials);
+        if !is_whole {
+            return Err(damaged("its list of pieces is of another world"));
+        }
+        for (batch, material) in world.batches.iter_mut().zip(&listed.materials) {
+            batch.primitive.material = *material;
+        }
+        let pieces = listed.pieces.iter().map(|[_, n_packed, n_resident]| Piece {
+            n_packed: *n_packed,
+            n_resident: *n_resident,
+        });
+        let rows: Vec<Vec<PieceId>> = (listed.cells.iter())
+            .map(|row| row.iter().copied().map(PieceId).collect())
+            .collect();
+        let places = listed.pieces.iter().zip(&listed.hashes);
+        Ok(Self {
+            world,
+            skeleton,
+            catalog: Catalog::new(pieces.collect(), &rows),
+            places: places
+                .map(|([offset, ..], hash)| PieceAt {
+                    offset: *offset,
+                    hash: *hash,
+                })
+                .collect(),
+            rest: PieceAt {
+                offset: listed.rest.0[0],
+                hash: listed.rest.1,
+            },
+            rest_packed: listed.rest.0[1],
+            file: listed.file,
+        })
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> u64 {
+    let mut word = [0; 8];
+    word.copy_from_slice(&bytes[at..at + 8]);
+    u64::from_le_bytes(word)
+}
+
+/// Packs bytes.
+pub(crate) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, PackError> {
+    const LEVEL: i32 = 9;
+    zstd::bulk::compress(bytes, LEVEL).map_err(|e| damaged(e.to_string()))
+}
+
+/// Unpacks bytes of a known size.
+pub(crate) fn expanded(packed: &[u8], n: u64) -> Result<Vec<u8>, PackError> {
+    if n > MOST {
+        return Err(damaged("a part of it is larger than 4 GiB"));
+    }
+    // Read bit by bit: a false size allocates no more than the bytes hold.
+    let mut out = Vec::new();
+    let reader = zstd::stream::read::Decoder::new(packed).map_err(|e| damaged(e.to_string()))?;
+    let mut limited = std::io::Read::take(reader, n.saturating_add(1));
+    std::io::Read::read_to_end(&mut limited, &mut out).map_err(|e| damaged(e.to_string()))?;
+    if out.len() as u64 != n {
+        return Err(damaged("a part of it has another size than was packed"));
+    }
+    Ok(out)
+}

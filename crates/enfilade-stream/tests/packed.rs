@@ -1,0 +1,231 @@
+//! Packed worlds: the same world, and the same file.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use enfilade_cpg::wire::{PieceContent, decode_glb, encode_glb, read_piece};
+use enfilade_cpg::{CellId, World};
+use enfilade_runtime::{Sight, SightState, View, Viewer};
+use enfilade_stream::{
+    Fetch, FetchError, PackedFiles, PackedHead, PackedWorld, PieceId, Reply, Source, ThreadSource,
+};
+use enfilade_testkit::{GridParams, Rng, room_grid};
+
+fn world() -> World {
+    room_grid(&GridParams {
+        furniture: 4,
+        outdoors: true,
+        ..GridParams::offices(12, 3)
+    })
+}
+
+fn folder(name: &str) -> std::path::PathBuf {
+    let dir = std::env::temp_dir().join(format!("enfilade-{}-{name}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&dir);
+    std::fs::create_dir_all(&dir).unwrap();
+    dir
+}
+
+/// Waits for `n` replies.
+fn replies(source: &mut ThreadSource, n: usize) -> Vec<Reply> {
+    let start = Instant::now();
+    let mut out = Vec::new();
+    while out.len() < n {
+        assert!(start.elapsed() < Duration::from_secs(60), "it hangs");
+        source.poll(&mut out);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    out
+}
+
+// Covers W1.
+#[test]
+fn a_packed_world_unpacks_to_the_same_file_from_a_folder_and_from_one_file() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    assert_eq!(packed.unpack().unwrap(), file);
+    let dir = folder("round");
+    for in_one in [false, true] {
+        let path = dir.join("world.enf");
+        PackedFiles::write(&packed, &path, in_one).unwrap();
+        assert!(PackedFiles::is_packed(&path));
+        assert_eq!(
+            PackedFiles::read_all(&path).unwrap().unpack().unwrap(),
+            file
+        );
+    }
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn a_folder_of_something_else_is_not_overwritten() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    let dir = folder("other");
+    std::fs::write(dir.join("notes.txt"), "mine").unwrap();
+    let error = PackedFiles::write(&packed, &dir, false)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("holds no packed world"), "{error}");
+    assert_eq!(
+        std::fs::read_to_string(dir.join("notes.txt")).unwrap(),
+        "mine"
+    );
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
+fn the_head_answers_as_the_whole_world() {
+    let file = encode_glb(&world()).unwrap();
+    let world = decode_glb(&file).unwrap();
+    let head = PackedWorld::pack(&file).unwrap().head.encode().unwrap();
+    let head = PackedHead::decode(&head).unwrap();
+    let sights = [Sight::build(&world).unwrap(), head.sight().unwrap()];
+    let mut viewers = [Viewer::new(&sights[0]), Viewer::new(&sights[1])];
+    let mut rng = Rng::new(5);
+    for _ in 0..200 {
+        let cell = world.graph.cells[1 + rng.below(world.graph.cells.len() - 1)].aabb;
+        let eye =
+            [0, 1, 2].map(|k| cell[0][k] + (cell[1][k] - cell[0][k]) * rng.range(0.2, 0.8) as f32);
+        let toward = [0, 1, 2].map(|_| rng.range(-1.0, 1.0) as f32);
+        let view = View::perspective(eye, toward, [0.0, 1.0, 0.0], 1.2, 1.5).unwrap();
+        let mut answers = Vec::new();
+        for (sight, viewer) in sights.iter().zip(&mut viewers) {
+            let seen = viewer.see(sight, &SightState::new(sight), &view);
+            answers.push((
+                seen.cells().to_vec(),
+                seen.chunks().to_vec(),
+                seen.details().to_vec(),
+            ));
+        }
+        assert_eq!(answers[0], answers[1]);
+    }
+}
+
+#[test]
+fn a_cell_needs_its_triangles_its_objects_and_nothing_else() {
+    let file = encode_glb(&world()).unwrap();
+    let world = decode_glb(&file).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    for cell in (0..world.graph.cells.len() as u32).map(CellId) {
+        let mut batches = Vec::new();
+        let mut meshes = Vec::new();
+        for &piece in packed.head.catalog.pieces_of(cell) {
+            let bytes = packed.head.expand(piece, packed.packed(piece).unwrap());
+            match read_piece(&bytes.unwrap()).unwrap() {
+                PieceContent::Batches(own) => batches.extend(own.into_iter().map(|b| b.0)),
+                PieceContent::Mesh { mesh, .. } => meshes.push(mesh),
+                PieceContent::Image { .. } => {}
+            }
+        }
+        batches.sort_unstable();
+        let expected: Vec<u32> = (0..)
+            .zip(&world.batches)
+            .filter(|(_, b)| b.cells.contains(&cell) && !b.primitive.indices.is_empty())
+            .map(|(i, _)| i)
+            .collect();
+        assert_eq!(batches, expected, "{cell}");
+        let touching = world.details.iter().filter(|d| d.cells.contains(&cell));
+        assert!(touching.map(|d| d.mesh).all(|m| meshes.contains(&m)));
+    }
+}
+
+#[test]
+fn damaged_heads_and_bodies_are_told() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    let head = packed.head.encode().unwrap();
+    let mut rng = Rng::new(8);
+    for i in 0..300 {
+        let mut other = head.clone();
+        if i % 2 == 0 {
+            other.truncate(rng.below(head.len()));
+        } else {
+            other[rng.below(head.len())] ^= 1 << rng.below(8);
+        }
+        assert!(PackedHead::decode(&other).is_err());
+    }
+    for _ in 0..100 {
+        let piece = PieceId(rng.below(packed.head.places.len()) as u32);
+        let mut other = packed.packed(piece).unwrap().to_vec();
+        let at = rng.below(other.len());
+        other[at] ^= 1 << rng.below(8);
+        assert!(packed.head.expand(piece, &other).is_err());
+    }
+}
+
+#[test]
+fn pieces_come_from_disk_and_canceled_ones_do_not() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    let dir = folder("disk");
+    let path = dir.join("world.enf");
+    PackedFiles::write(&packed, &path, true).unwrap();
+    let (head, files) = PackedFiles::open(&path).unwrap();
+    let n = head.places.len() as u32;
+    let head = Arc::new(head);
+    let mut source = files.source(Arc::clone(&head));
+    for piece in (0..n).map(PieceId) {
+        source.request(piece);
+    }
+    for reply in replies(&mut source, n as usize) {
+        let expected = head.expand(reply.piece, packed.packed(reply.piece).unwrap());
+        assert_eq!(reply.bytes.unwrap(), expected.unwrap());
+    }
+    source.request(PieceId(n));
+    let missing = replies(&mut source, 1).remove(0).bytes.unwrap_err();
+    assert!(matches!(missing, FetchError::Missing { .. }), "{missing}");
+    drop(source);
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+/// Fails, falls short and damages, each one time in ten.
+struct Unreliable {
+    body: Arc<Vec<u8>>,
+    rng: Rng,
+}
+
+impl Fetch for Unreliable {
+    fn fetch(&mut self, offset: u64, n: u64) -> Result<Vec<u8>, String> {
+        let mut out = self.body[offset as usize..(offset + n) as usize].to_vec();
+        match self.rng.below(10) {
+            0 => return Err("the line is dead".into()),
+            1 => out.truncate(out.len() / 2),
+            2 => out[0] ^= 1,
+            _ => {}
+        }
+        Ok(out)
+    }
+}
+
+#[test]
+fn faults_on_the_way_are_survived_or_told() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    let body = Arc::new(packed.body().to_vec());
+    let head = Arc::new(packed.head.clone());
+    let fetches = (0..4).map(|seed| Unreliable {
+        body: Arc::clone(&body),
+        rng: Rng::new(seed),
+    });
+    let mut source = ThreadSource::new(Arc::clone(&head), "here".into(), fetches.collect());
+    let n = head.places.len();
+    for piece in (0..n as u32).map(PieceId) {
+        source.request(piece);
+    }
+    let mut n_failed = 0;
+    for reply in replies(&mut source, n) {
+        match reply.bytes {
+            Ok(bytes) => {
+                let expected = head.expand(reply.piece, packed.packed(reply.piece).unwrap());
+                assert_eq!(bytes, expected.unwrap());
+            }
+            Err(why) => {
+                assert!(why.to_string().contains("here"), "{why}");
+                n_failed += 1;
+            }
+        }
+    }
+    // 0.3 to the fourth: one in 120.
+    assert!(n_failed * 10 < n, "{n_failed} of {n}");
+}
