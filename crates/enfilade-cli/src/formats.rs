@@ -24,6 +24,7 @@ pub(crate) enum Format {
     Sound,
     Living,
     Walk,
+    Packed,
 }
 
 struct Row {
@@ -41,13 +42,13 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
         format,
         name,
         extensions,
-        // Both are read again.
-        is_streamed: !matches!(format, Format::Search | Format::Walk),
+        // These are read again.
+        is_streamed: !matches!(format, Format::Search | Format::Walk | Format::Packed),
     }
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 17] = [
+const TABLE: [Row; 18] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(
@@ -72,6 +73,7 @@ const TABLE: [Row; 17] = [
     row(Format::Evidence, "evidence", &["ev", "evidence"]),
     row(Format::Search, "a saved search", &["search", "checkpoint"]),
     row(Format::Walk, "a map of floors", &["walk"]),
+    row(Format::Packed, "a packed world", &["enf"]),
     row(Format::Manual, "a manual page", &["1"]),
 ];
 

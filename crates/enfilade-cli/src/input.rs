@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
+use enfilade::stream::PackedFiles;
 
 /// Returns `true` if a path stands for standard input or output. A file of that name is `./-`.
 #[must_use]
@@ -42,12 +43,16 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
     read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
 }
 
-/// Like [`read`], for a GLB only: for any other input, only the head is read.
+/// Like [`read`], for a GLB only: for any other input, only the head is read. A packed world is put together.
 ///
 /// # Errors
 ///
 /// As [`read`]; not if the input is not a GLB, which a decoder reports in more detail.
 pub fn read_glb(path: &Path) -> anyhow::Result<Vec<u8>> {
+    if PackedFiles::is_packed(path) {
+        let unpack = || PackedFiles::read_all(path)?.unpack();
+        return unpack().with_context(|| cannot_read(path));
+    }
     let length = |head: &[u8]| glb_length(head).unwrap_or(0);
     read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
 }

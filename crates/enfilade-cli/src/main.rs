@@ -18,6 +18,7 @@ mod living;
 mod locate;
 mod manual;
 mod output;
+mod pack;
 mod path;
 mod plan;
 mod progress;
@@ -65,6 +66,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Man(manual::Man),
+    Pack(pack::Pack),
     Path(path::WalkedPath),
     Plan(plan::Plan),
     Pvs(pvs::Pvs),
@@ -73,6 +75,7 @@ enum Command {
     See(see::See),
     Simplify(simplify::Simplify),
     Sound(sound::Sound),
+    Unpack(pack::Unpack),
     Verify(verify::Verify),
     #[cfg(feature = "view")]
     View(view::View),
@@ -91,6 +94,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),
+        Command::Pack(args) => pack::pack(&args),
         Command::Path(args) => path::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Pvs(args) => pvs::run(&args),
@@ -99,6 +103,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::See(args) => see::run(&args),
         Command::Simplify(args) => simplify::run(&args),
         Command::Sound(args) => sound::run(&args),
+        Command::Unpack(args) => pack::unpack_world(&args),
         Command::Verify(args) => verify::run(&args),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),

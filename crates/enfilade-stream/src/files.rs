@@ -1,7 +1,7 @@
 //! Packed worlds on disk, and sources that read on threads of their own.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -12,15 +12,37 @@ use std::time::Duration;
 use crate::head::{PackError, PackedHead};
 use crate::{FetchError, PackedWorld, PieceId, Reply, Source};
 
-/// Name of the head in a folder.
-const HEAD: &str = "head.enfp";
-/// Name of the pieces in a folder.
+/// Name of the head in the folder of a packed world.
+pub const HEAD: &str = "head.enfp";
+/// Name of the pieces in the folder of a packed world.
 const PIECES: &str = "pieces.enfp";
 
 /// Tries of a fetch before it is given up.
 const TRIES: u32 = 4;
 /// Wait before the second try; doubled before each further one.
 const FIRST_WAIT: Duration = Duration::from_millis(50);
+
+impl PackedWorld {
+    /// Returns the files of its folder, by name.
+    ///
+    /// # Errors
+    ///
+    /// A world that breaks invariants.
+    pub fn files(&self) -> Result<[(&'static str, Vec<u8>); 2], PackError> {
+        Ok([(HEAD, self.head.encode()?), (PIECES, self.body.clone())])
+    }
+
+    /// Returns it as one file.
+    ///
+    /// # Errors
+    ///
+    /// As [`PackedWorld::files`].
+    pub fn one_file(&self) -> Result<Vec<u8>, PackError> {
+        let mut out = self.head.encode()?;
+        out.extend_from_slice(&self.body);
+        Ok(out)
+    }
+}
 
 /// Place of a packed world on disk: a folder with a head and pieces, or one file with both.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,37 +54,6 @@ pub struct PackedFiles {
 }
 
 impl PackedFiles {
-    /// Writes a packed world: to a folder, or, if `in_one`, to a single file. It appears whole or not at all.
-    ///
-    /// # Errors
-    ///
-    /// If files cannot be written, or a folder of this name exists that is no packed world.
-    pub fn write(packed: &PackedWorld, path: &Path, in_one: bool) -> Result<(), PackError> {
-        let head = packed.head.encode()?;
-        let draft = path.with_extension("enf-part");
-        remove(&draft)?;
-        if in_one {
-            let mut all = head;
-            all.extend_from_slice(packed.body());
-            fs::write(&draft, all).map_err(|e| at(&draft, &e))?;
-        } else {
-            fs::create_dir_all(&draft).map_err(|e| at(&draft, &e))?;
-            for (name, bytes) in [(HEAD, head.as_slice()), (PIECES, packed.body())] {
-                let file = draft.join(name);
-                fs::write(&file, bytes).map_err(|e| at(&file, &e))?;
-            }
-        }
-        if path.is_dir() && !path.join(HEAD).is_file() {
-            remove(&draft)?;
-            return Err(PackError::File {
-                path: path.display().to_string(),
-                problem: "is a folder that holds no packed world; give another name".into(),
-            });
-        }
-        remove(path)?;
-        fs::rename(&draft, path).map_err(|e| at(path, &e))
-    }
-
     /// Opens a packed world: reads its head, and finds its pieces. Takes the memory of the head.
     ///
     /// # Errors
@@ -145,17 +136,6 @@ fn at(path: &Path, error: &std::io::Error) -> PackError {
         path: path.display().to_string(),
         problem: error.to_string(),
     }
-}
-
-fn remove(path: &Path) -> Result<(), PackError> {
-    let removed = if path.is_dir() {
-        fs::remove_dir_all(path)
-    } else if path.exists() {
-        fs::remove_file(path)
-    } else {
-        Ok(())
-    };
-    removed.map_err(|e| at(path, &e))
 }
 
 /// Fetches ranges of the packed pieces; may block, on a thread of its own.

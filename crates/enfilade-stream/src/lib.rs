@@ -17,7 +17,7 @@ mod streamer;
 
 pub use bound::{Due, deadlines, due_times, least_bandwidth};
 pub use catalog::{Catalog, Piece, PieceId};
-pub use files::{Fetch, FileFetch, PackedFiles, ThreadSource};
+pub use files::{Fetch, FileFetch, HEAD, PackedFiles, ThreadSource};
 pub use head::{PackError, PackedHead, PieceAt};
 pub use link::{LinkOptions, SimulatedLink};
 pub use of_world::WorldPieces;

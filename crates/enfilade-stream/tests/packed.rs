@@ -26,6 +26,17 @@ fn folder(name: &str) -> std::path::PathBuf {
     dir
 }
 
+fn write(packed: &PackedWorld, path: &std::path::Path, in_one: bool) {
+    if in_one {
+        std::fs::write(path, packed.one_file().unwrap()).unwrap();
+        return;
+    }
+    std::fs::create_dir(path).unwrap();
+    for (name, bytes) in packed.files().unwrap() {
+        std::fs::write(path.join(name), bytes).unwrap();
+    }
+}
+
 /// Waits for `n` replies.
 fn replies(source: &mut ThreadSource, n: usize) -> Vec<Reply> {
     let start = Instant::now();
@@ -46,31 +57,14 @@ fn a_packed_world_unpacks_to_the_same_file_from_a_folder_and_from_one_file() {
     assert_eq!(packed.unpack().unwrap(), file);
     let dir = folder("round");
     for in_one in [false, true] {
-        let path = dir.join("world.enf");
-        PackedFiles::write(&packed, &path, in_one).unwrap();
+        let path = dir.join(if in_one { "one.enf" } else { "world.enf" });
+        write(&packed, &path, in_one);
         assert!(PackedFiles::is_packed(&path));
         assert_eq!(
             PackedFiles::read_all(&path).unwrap().unpack().unwrap(),
             file
         );
     }
-    std::fs::remove_dir_all(dir).unwrap();
-}
-
-#[test]
-fn a_folder_of_something_else_is_not_overwritten() {
-    let file = encode_glb(&world()).unwrap();
-    let packed = PackedWorld::pack(&file).unwrap();
-    let dir = folder("other");
-    std::fs::write(dir.join("notes.txt"), "mine").unwrap();
-    let error = PackedFiles::write(&packed, &dir, false)
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("holds no packed world"), "{error}");
-    assert_eq!(
-        std::fs::read_to_string(dir.join("notes.txt")).unwrap(),
-        "mine"
-    );
     std::fs::remove_dir_all(dir).unwrap();
 }
 
@@ -160,7 +154,7 @@ fn pieces_come_from_disk_and_canceled_ones_do_not() {
     let packed = PackedWorld::pack(&file).unwrap();
     let dir = folder("disk");
     let path = dir.join("world.enf");
-    PackedFiles::write(&packed, &path, true).unwrap();
+    write(&packed, &path, true);
     let (head, files) = PackedFiles::open(&path).unwrap();
     let n = head.places.len() as u32;
     let head = Arc::new(head);

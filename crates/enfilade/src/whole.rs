@@ -52,6 +52,52 @@ pub fn write_with<E: From<io::Error>>(
     written
 }
 
+/// Writes files, by their paths in it, to a folder beside `path` and renames that, so that a reader sees the old folder or the
+/// new one and never a part; between the two there is none for a moment. Replaces what is at `path`. A killed run leaves a folder
+/// `.NAME.PROCESS-TIME.tmp`.
+///
+/// # Errors
+///
+/// If a file cannot be written; the earlier folder then stays as it was.
+pub fn write_folder<P: AsRef<Path>, B: AsRef<[u8]>>(
+    path: impl AsRef<Path>,
+    files: impl IntoIterator<Item = (P, B)>,
+) -> io::Result<()> {
+    let path = followed(path);
+    let new = aside(&path)?;
+    fs::create_dir(&new)?;
+    let fill = || {
+        for (name, bytes) in files {
+            let name = new.join(name);
+            fs::create_dir_all(folder_of(&name))?;
+            let mut file = File::create(name)?;
+            file.write_all(bytes.as_ref())?;
+            file.sync_all()?;
+        }
+        replace(&new, &path)
+    };
+    let written = fill();
+    if written.is_err() {
+        // The first error is the one to report.
+        let _ = fs::remove_dir_all(&new);
+    }
+    written
+}
+
+/// Puts a folder in the place of another, which goes.
+fn replace(new: &Path, path: &Path) -> io::Result<()> {
+    if !path.is_dir() {
+        return fs::rename(new, path);
+    }
+    let old = aside(path)?;
+    fs::rename(path, &old)?;
+    if let Err(error) = fs::rename(new, path) {
+        fs::rename(&old, path)?;
+        return Err(error);
+    }
+    fs::remove_dir_all(old)
+}
+
 /// Tests if [`write()`] to `path` could create its file: makes the file beside it and removes it again. Leaves `path`
 /// alone.
 ///
@@ -199,6 +245,21 @@ mod tests {
         write(&path, b"new").unwrap();
         try_write(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_is_replaced_whole_or_stays() {
+        let folder = fresh_folder("folder");
+        let path = folder.join("w.enf");
+        write_folder(&path, [("a/b", "old"), ("c", "gone")]).unwrap();
+        write_folder(&path, [("a/b", "new")]).unwrap();
+        assert_eq!(fs::read(path.join("a/b")).unwrap(), b"new");
+        assert!(!path.join("c").exists());
+        // A file cannot be a folder, too.
+        assert!(write_folder(&path, [("a", "no"), ("a/b", "no")]).is_err());
+        assert_eq!(fs::read(path.join("a/b")).unwrap(), b"new");
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
         fs::remove_dir_all(&folder).unwrap();
     }

@@ -1,0 +1,135 @@
+//! `enfilade pack` and `enfilade unpack`: a world in pieces, for loading what comes into view.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use enfilade::geom::shown;
+use enfilade::stream::{HEAD, PackedFiles, PackedWorld};
+use enfilade::whole;
+
+use crate::formats::Format;
+use crate::output::{Outputs, Written, write_whole};
+use crate::screen::print_json;
+use enfilade_cli::input::{name_of, read};
+
+/// Cuts a world into pieces, so that a program loads only what comes into view: a small head, one piece per set of cells, per
+/// mesh and per picture, compressed without loss.
+#[derive(clap::Args)]
+pub(crate) struct Pack {
+    /// World written by `enfilade bake`; `-` for standard input.
+    input: PathBuf,
+    /// Folder for the packed world, or its file with --one-file. A packed world that is there is replaced.
+    #[arg(short, long, value_name = "OUT.enf")]
+    output: PathBuf,
+    /// Write one file instead of a folder, for servers of ranges.
+    #[arg(long)]
+    one_file: bool,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Puts the world file together again from a packed world, byte for byte.
+#[derive(clap::Args)]
+pub(crate) struct Unpack {
+    /// Packed world, a folder or one file.
+    input: PathBuf,
+    /// World file to write; `-` for standard output.
+    #[arg(short, long, value_name = "OUT.glb")]
+    output: PathBuf,
+}
+
+#[derive(serde::Serialize)]
+struct PackReport {
+    file: String,
+    /// Sizes in bytes.
+    original: u64,
+    packed: u64,
+    head: u64,
+    pieces: usize,
+    largest_piece: u64,
+}
+
+pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
+    let mut outputs = Outputs::reading([&args.input])?;
+    if args.one_file {
+        outputs.write("-o", Format::Packed, &args.output)?;
+    } else {
+        Format::Packed.check("-o", &args.output)?;
+        check_folder(&args.output)?;
+    }
+    let glb = read(&args.input)?;
+    let packed = PackedWorld::pack(&glb).with_context(|| name_of(&args.input))?;
+    if args.one_file {
+        write_whole(&args.output, &packed.one_file()?)?;
+    } else {
+        whole::write_folder(&args.output, packed.files()?).with_context(|| {
+            format!(
+                "cannot write {}; choose another place, or free space there",
+                args.output.display()
+            )
+        })?;
+    }
+    let head = packed.head.encode()?.len() as u64;
+    let sizes = packed.head.catalog.pieces();
+    let report = PackReport {
+        file: args.output.display().to_string(),
+        original: glb.len() as u64,
+        packed: head + packed.body().len() as u64,
+        head,
+        pieces: sizes.len(),
+        largest_piece: sizes.iter().map(|p| p.n_packed).max().unwrap_or(0),
+    };
+    if args.json {
+        return print_json(outputs.printed(), &report);
+    }
+    let mb = |n: u64| n as f64 / 1e6;
+    let mut out = outputs.printed();
+    writeln!(
+        out,
+        "packed {:.2} MB into {:.2} MB ({:.0} %); the head takes {:.2} MB",
+        mb(report.original),
+        mb(report.packed),
+        100.0 * report.packed as f64 / report.original.max(1) as f64,
+        mb(report.head)
+    )?;
+    writeln!(
+        out,
+        "{} pieces; the largest takes {:.2} MB",
+        report.pieces,
+        mb(report.largest_piece)
+    )?;
+    writeln!(out, "wrote {}", shown(&report.file))?;
+    Ok(())
+}
+
+/// Refuses to replace what is no packed world.
+fn check_folder(path: &Path) -> anyhow::Result<()> {
+    if path.is_file() {
+        bail!(
+            "{} is a file; give -o a folder, or use --one-file",
+            path.display()
+        );
+    }
+    let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    if path.exists() && !path.join(HEAD).is_file() && !is_empty() {
+        bail!(
+            "{} is a folder with other contents; choose another name with -o",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+pub(crate) fn unpack_world(args: &Unpack) -> anyhow::Result<()> {
+    let mut outputs = Outputs::reading([&args.input])?;
+    outputs.write("-o", Format::World, &args.output)?;
+    let packed = PackedFiles::read_all(&args.input)?;
+    let glb = packed.unpack().with_context(|| name_of(&args.input))?;
+    write_whole(&args.output, &glb)?;
+    let written = Written::new(&args.output, &glb);
+    writeln!(outputs.printed(), "{written}")?;
+    Ok(())
+}
