@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::io::Cursor;
+use std::time::Instant;
 
 use enfilade_cpg::{CellId, World, wire};
 use enfilade_geom::scene::{Image, Material, Primitive, Texture};
@@ -604,5 +605,23 @@ fn real_buildings_settle() {
             assert!(a == b, "{}: {camera:?}", file.display());
         }
         eprintln!("{}: {n_there} of {n_pieces} pieces", file.display());
+        for of in pair.pieces.clone() {
+            pair.hollow.take(of);
+        }
+        let mut times = [Vec::new(), Vec::new()];
+        for of in pair.pieces.clone() {
+            let start = Instant::now();
+            let piece = pair.piece(of);
+            times[0].push(start.elapsed());
+            let start = Instant::now();
+            assert_eq!(pair.hollow.put(&piece).unwrap(), Put::Done);
+            times[1].push(start.elapsed());
+        }
+        for (times, what) in times.iter_mut().zip(["made ready", "put"]) {
+            times.sort_unstable();
+            let at = |share: usize| times[(times.len() - 1) * share / 100];
+            let [middle, most] = [50, 100].map(at);
+            eprintln!("  {what} in {middle:?}, {most:?} at most");
+        }
     }
 }

@@ -36,7 +36,7 @@ pub struct StreamLimits {
 pub enum Put {
     /// It is there.
     Done,
-    /// There is no room: take other pieces away and try again.
+    /// There is no room for its vertices, its indices or its texels: take other pieces away and try again.
     Full,
 }
 
@@ -237,11 +237,10 @@ impl GpuWorld {
             .write_scattered(gpu, [&at, &ranges], corners, indices);
         match of {
             PieceOf::Batch(batch) => {
-                furnish(
-                    &mut streamed.cells,
-                    &self.batch_cells[batch as usize],
-                    |n| n[1] += 1,
-                );
+                if !own_chunks.is_empty() {
+                    let seen_by = &self.batch_cells[batch as usize];
+                    furnish(&mut streamed.cells, seen_by, |n| n[1] += 1);
+                }
                 streamed
                     .batch_at
                     .extend(ranges.iter().map(|r| (r.start, batch)));
@@ -299,11 +298,10 @@ impl GpuWorld {
         };
         match of {
             PieceOf::Batch(batch) => {
-                furnish(
-                    &mut streamed.cells,
-                    &self.batch_cells[batch as usize],
-                    |n| n[1] -= 1,
-                );
+                if !own_chunks.is_empty() {
+                    let seen_by = &self.batch_cells[batch as usize];
+                    furnish(&mut streamed.cells, seen_by, |n| n[1] -= 1);
+                }
                 for range in &held.indices {
                     streamed.batch_at.remove(&range.start);
                 }
