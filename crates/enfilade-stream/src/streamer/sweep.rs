@@ -69,9 +69,9 @@ impl Sweep {
 
     /// Meets a piece: if it is kept, it goes on where it belongs in the list.
     pub(crate) fn meet(&mut self, piece: PieceId, due: f32, slots: &mut Slots) {
-        let slot = slots.of_mut(piece);
-        slot.swept = self.stamp;
-        let (state, size, n_packed) = (slot.state, slot.n_resident, slot.n_packed);
+        slots.rest_mut(piece).swept = self.stamp;
+        let (slot, n_packed) = (slots.of(piece), slots.rest(piece).n_packed);
+        let (state, size) = (slot.state, slot.n_resident);
         let is_there = matches!(state, State::Arrived | State::Resident | State::Missing);
         if due > 0.0 && !is_there {
             self.n_ahead += n_packed;
