@@ -60,7 +60,7 @@ impl Streamer {
             match reply.bytes {
                 Ok(bytes) if bytes.len() as u64 <= most => {
                     self.n_failures_in_row = 0;
-                    // What was not fetched ahead before the first reply is looked at again.
+                    // All that was not fetched ahead before the first reply is looked at again.
                     self.sweep.may_regain |= self.pace.is_unknown();
                     let request = self.slots.rest(piece);
                     self.pace

@@ -28,7 +28,7 @@ pub(crate) struct Sweep {
     pub(crate) n_ahead: u64,
     /// Latest deadline met that needs that fetching goes on now. [Units: wu]
     pub(crate) must: f32,
-    /// What is due by then is fetched: the result of the last pass. [Units: wu]
+    /// All that is due by then is fetched: the result of the last pass. [Units: wu]
     pub(crate) limit: f32,
     /// True if all that is due within the horizon was met.
     pub(crate) is_past_horizon: bool,
