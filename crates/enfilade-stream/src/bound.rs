@@ -159,7 +159,7 @@ mod tests {
                 was_late |= now > d.at + Duration::from_micros(100 * 20);
             }
             assert!(!was_late, "{now:?}");
-            // By definition: at some time, the link has had time for no more than what is due.
+            // At some time, the link has had time for no more than what is due.
             let is_tight = |d: &Due| {
                 let by = due.iter().filter(|e| e.at <= d.at);
                 let bytes: u64 = by.map(|e| sizes[e.piece.idx()]).sum();

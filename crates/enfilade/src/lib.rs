@@ -170,3 +170,8 @@ struct Readme;
 #[cfg(all(doctest, feature = "world"))]
 #[doc = include_str!("../../../docs/living.md")]
 struct Living;
+
+/// The page about worlds in pieces, compiled with the tests.
+#[cfg(all(doctest, feature = "stream"))]
+#[doc = include_str!("../../../docs/streaming.md")]
+struct Streaming;

@@ -58,6 +58,16 @@ fn draw_catalog(rng: &mut Rng, n_cells: usize) -> Catalog {
     Catalog::new(pieces.collect(), &rows)
 }
 
+/// Adds one of five cells.
+fn draw_view(rng: &mut Rng, n_cells: usize, in_view: &mut Vec<InView>) {
+    for cell in (0..n_cells as u32).map(CellId) {
+        if rng.chance(0.2) {
+            let share = rng.unit() as f32;
+            in_view.push(InView { cell, share });
+        }
+    }
+}
+
 /// Counts frames with more memory on its way and resident than the budget, or more requests than the limit, and requests that
 /// do not end once the view rests.
 pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
@@ -113,12 +123,7 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
                     speed: rng.range(0.0, 6.0) as f32,
                 };
                 in_view.clear();
-                for c in (0..n_cells as u32).map(CellId) {
-                    if rng.chance(0.2) {
-                        let share = rng.unit() as f32;
-                        in_view.push(InView { cell: c, share });
-                    }
-                }
+                draw_view(&mut rng, n_cells, &mut in_view);
             }
             let now = FRAME * (i as u32 + 1);
             source.link.advance(now);

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use enfilade::stream::{Changes, LinkOptions, SimulatedLink, StreamOptions, Streamer};
 
 use super::replay::frame_of;
-use super::site::{FRAME, Recorder, Site, Walk, near_sets, offices, route};
+use super::site::{FRAME, Recorder, Recording, Streamed, near_sets, offices, route};
 use crate::measure::quantile;
 use crate::rows::Figure;
 
@@ -15,8 +15,8 @@ const STRETCHES: usize = 200;
 
 /// A walk, its streamer after the walk, and the times of its frames. [Units: µs]
 struct Timed {
-    site: Site,
-    walk: Walk,
+    site: Streamed,
+    walk: Recording,
     streamer: Streamer,
     link: SimulatedLink,
     times: Vec<f64>,
@@ -27,7 +27,7 @@ struct Timed {
 fn walk(scene: &str) -> anyhow::Result<Timed> {
     let world = offices(scene)?;
     let pvs = near_sets(&world);
-    let site = Site::with_pvs(&world, pvs.clone())?;
+    let site = Streamed::with_pvs(&world, pvs.clone())?;
     let walk = Recorder::new(&site).walk(&route(&site, 3, STRETCHES)?, 1.4)?;
     let link = LinkOptions {
         bandwidth: 1e7,
@@ -56,7 +56,7 @@ fn walk(scene: &str) -> anyhow::Result<Timed> {
     })
 }
 
-fn figure(times: &mut [f64], site: &Site) -> Figure {
+fn figure(times: &mut [f64], site: &Streamed) -> Figure {
     let at = [0.5, 0.99, 1.0].map(|share| quantile(times, share));
     Figure {
         value: at[1],

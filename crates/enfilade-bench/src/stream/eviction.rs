@@ -11,7 +11,7 @@ use quick_cache::Weighter;
 use quick_cache::unsync::Cache;
 
 use super::replay::frame_of;
-use super::site::{FRAME, Recorder, Site, Step, Walk, offices, route};
+use super::site::{FRAME, Recorder, Recording, Step, Streamed, offices, route};
 use crate::rows::Figure;
 
 const STRETCHES: usize = 200;
@@ -27,7 +27,7 @@ struct Misses {
     all: u64,
 }
 
-fn misses(site: &Site) -> anyhow::Result<Misses> {
+fn misses(site: &Streamed) -> anyhow::Result<Misses> {
     let walk = Recorder::new(site).walk(&route(site, 2, STRETCHES)?, SPEED)?;
     // The pieces of the cells in view, frame by frame, as all caches get them.
     let wanted = |step: &Step| {
@@ -56,7 +56,7 @@ fn misses(site: &Site) -> anyhow::Result<Misses> {
 }
 
 /// The streamer's cache over a link that takes no time.
-fn ours(site: &Site, walk: &Walk, capacity: u64) -> u64 {
+fn ours(site: &Streamed, walk: &Recording, capacity: u64) -> u64 {
     let options = StreamOptions {
         policy: Policy::Cache,
         max_resident: capacity,
@@ -94,7 +94,7 @@ enum Order {
     Lru,
 }
 
-fn evicting(site: &Site, frames: &[BTreeSet<PieceId>], capacity: u64, order: &Order) -> u64 {
+fn evicting(site: &Streamed, frames: &[BTreeSet<PieceId>], capacity: u64, order: &Order) -> u64 {
     let mut uses: HashMap<PieceId, Vec<usize>> = HashMap::new();
     for (i, frame) in frames.iter().enumerate() {
         for &piece in frame {
@@ -143,7 +143,7 @@ impl Weighter<PieceId, ()> for Sizes {
 }
 
 /// `quick_cache`, asked for each piece in view whenever the view changes.
-fn quick(site: &Site, frames: &[BTreeSet<PieceId>], capacity: u64) -> u64 {
+fn quick(site: &Streamed, frames: &[BTreeSet<PieceId>], capacity: u64) -> u64 {
     let sizes: Vec<u64> = site
         .catalog()
         .pieces()
@@ -183,7 +183,7 @@ fn note(m: &Misses) -> String {
 
 /// Misses divided by Belady's.
 pub(super) fn belady(world: &World) -> anyhow::Result<Figure> {
-    let m = misses(&Site::of(world)?)?;
+    let m = misses(&Streamed::of(world)?)?;
     Ok(Figure {
         value: m.ours as f64 / m.belady as f64,
         most: 1.15,
@@ -197,7 +197,7 @@ pub(super) fn belady_in(scene: &str) -> anyhow::Result<Figure> {
 
 /// Misses less the fewer of those of LRU and `quick_cache`: fewer than both.
 pub(super) fn peers(world: &World) -> anyhow::Result<Figure> {
-    let m = misses(&Site::of(world)?)?;
+    let m = misses(&Streamed::of(world)?)?;
     Ok(Figure {
         value: m.ours as f64 - m.lru.min(m.quick) as f64,
         most: -1.0,

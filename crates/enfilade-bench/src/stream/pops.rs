@@ -12,7 +12,7 @@ use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 
 use super::replay::{Outcome, frame_of, replay};
-use super::site::{Recorder, Site, Walk, offices, route};
+use super::site::{Recorder, Recording, Streamed, offices, route};
 use crate::rows::Figure;
 
 const LATENCY: Duration = Duration::from_millis(50);
@@ -28,7 +28,7 @@ const MORE: f64 = 1.25;
 const RAYS: usize = 2000;
 
 /// Returns the least bandwidth for a walk: for all ways that it could go on, and for the way that it goes.
-fn bandwidths(site: &Site, walk: &Walk) -> anyhow::Result<[f64; 2]> {
+fn bandwidths(site: &Streamed, walk: &Recording) -> anyhow::Result<[f64; 2]> {
     let first = walk.steps.first().context("no walk")?;
     let eye = frame_of(walk, first, first.now).eye;
     let any = deadlines(&eye, site.catalog(), &site.world.graph, &site.pvs);
@@ -44,7 +44,7 @@ fn options() -> StreamOptions {
     }
 }
 
-fn replay_at(site: &Site, walk: &Walk, bandwidth: f64) -> Outcome {
+fn replay_at(site: &Streamed, walk: &Recording, bandwidth: f64) -> Outcome {
     let link = LinkOptions {
         latency: LATENCY,
         bandwidth,
@@ -54,7 +54,7 @@ fn replay_at(site: &Site, walk: &Walk, bandwidth: f64) -> Outcome {
 }
 
 /// Counts frame × piece in view and absent.
-fn pops_of(site: &Site) -> anyhow::Result<Figure> {
+fn pops_of(site: &Streamed) -> anyhow::Result<Figure> {
     let mut recorder = Recorder::new(site);
     let (mut value, mut notes) = (0, Vec::new());
     for speed in SPEEDS {
@@ -84,7 +84,7 @@ fn pops_of(site: &Site) -> anyhow::Result<Figure> {
 
 /// Returns the bytes of a walk without pops, divided by those of loading by radius: all pieces of cells within the least radius
 /// that holds all that is ever in view, at infinite bandwidth.
-fn radius_of(site: &Site) -> anyhow::Result<Figure> {
+fn radius_of(site: &Streamed) -> anyhow::Result<Figure> {
     let mut recorder = Recorder::new(site);
     let walk = recorder.walk(&route(site, 1, STRETCHES)?, SPEEDS[0])?;
     let out = replay_at(site, &walk, NORMAL);
@@ -129,7 +129,7 @@ fn radius_of(site: &Site) -> anyhow::Result<Figure> {
 }
 
 /// Returns the bytes of a walk without pops, divided by those of the pieces of the cells that rays from places on it reach.
-fn reached_of(site: &Site) -> anyhow::Result<Figure> {
+fn reached_of(site: &Streamed) -> anyhow::Result<Figure> {
     let mut recorder = Recorder::new(site);
     let walk = recorder.walk(&route(site, 1, STRETCHES)?, SPEEDS[0])?;
     let out = replay_at(site, &walk, NORMAL);
@@ -185,7 +185,7 @@ fn reached_of(site: &Site) -> anyhow::Result<Figure> {
 }
 
 pub(super) fn pops(world: &World) -> anyhow::Result<Figure> {
-    pops_of(&Site::of(world)?)
+    pops_of(&Streamed::of(world)?)
 }
 
 pub(super) fn pops_in(scene: &str) -> anyhow::Result<Figure> {
@@ -193,7 +193,7 @@ pub(super) fn pops_in(scene: &str) -> anyhow::Result<Figure> {
 }
 
 pub(super) fn radius(world: &World) -> anyhow::Result<Figure> {
-    radius_of(&Site::of(world)?)
+    radius_of(&Streamed::of(world)?)
 }
 
 pub(super) fn radius_in(scene: &str) -> anyhow::Result<Figure> {
@@ -201,7 +201,7 @@ pub(super) fn radius_in(scene: &str) -> anyhow::Result<Figure> {
 }
 
 pub(super) fn reached(world: &World) -> anyhow::Result<Figure> {
-    reached_of(&Site::of(world)?)
+    reached_of(&Streamed::of(world)?)
 }
 
 pub(super) fn reached_in(scene: &str) -> anyhow::Result<Figure> {

@@ -6,7 +6,7 @@ use enfilade::stream::{
     Changes, Eye, Frame, LinkOptions, PieceId, SimulatedLink, StreamOptions, Streamer,
 };
 
-use super::site::{FRAME, Site, Step, Walk};
+use super::site::{FRAME, Recording, Step, Streamed};
 
 /// Frames after which the walk begins in any case: ten minutes.
 const MOST_FRAMES: u32 = 600 * 60;
@@ -28,8 +28,8 @@ const FIRST: f64 = 300.0;
 /// Replays a walk: the walker waits until the first view is settled, and then walks. A link that would need more than five minutes
 /// for the world is faster until then.
 pub(super) fn replay(
-    site: &Site,
-    walk: &Walk,
+    site: &Streamed,
+    walk: &Recording,
     options: StreamOptions,
     link: LinkOptions,
 ) -> Outcome {
@@ -71,7 +71,7 @@ pub(super) fn replay(
 }
 
 /// Returns the input of a frame.
-pub(super) fn frame_of<'a>(walk: &Walk, step: &'a Step, now: Duration) -> Frame<'a> {
+pub(super) fn frame_of<'a>(walk: &Recording, step: &'a Step, now: Duration) -> Frame<'a> {
     Frame {
         now,
         eye: Eye {

@@ -12,7 +12,7 @@ use enfilade::stream::{
 };
 use enfilade_testkit::Rng;
 
-use super::site::{FRAME, Recorder, Site, offices};
+use super::site::{FRAME, Recorder, Streamed, offices};
 use crate::rows::Figure;
 
 const VIEWS: usize = 1000;
@@ -27,7 +27,7 @@ struct Stand {
     visible: Vec<PieceId>,
 }
 
-fn draw_stands(site: &Site, n: usize) -> anyhow::Result<Vec<Stand>> {
+fn draw_stands(site: &Streamed, n: usize) -> anyhow::Result<Vec<Stand>> {
     let mut rng = Rng::new(5);
     let mut recorder = Recorder::new(site);
     let rooms: Vec<_> = site.world.graph.indoor_cells().collect();
@@ -63,7 +63,7 @@ fn draw_stands(site: &Site, n: usize) -> anyhow::Result<Vec<Stand>> {
 /// Counts pieces in view that are absent in settled views, from a memory that holds no more than one and a half of the largest
 /// view.
 pub(super) fn settled(world: &World) -> anyhow::Result<Figure> {
-    let site = Site::of(world)?;
+    let site = Streamed::of(world)?;
     let stands = draw_stands(&site, VIEWS)?;
     let of_view = |stand: &Stand| {
         let cells = stand.in_view.iter();
@@ -100,6 +100,12 @@ pub(super) fn settled(world: &World) -> anyhow::Result<Figure> {
     })
 }
 
+/// Returns the number of cells in view of which a piece has failed.
+fn n_failing_in(changes: &Changes) -> usize {
+    let causes = changes.stand_ins.iter().map(|s| s.cause);
+    causes.filter(|c| *c == Cause::Failing).count()
+}
+
 /// Rests in a view until it is settled. Returns `false` if it is not after five minutes.
 fn rest(
     streamer: &mut Streamer,
@@ -129,7 +135,7 @@ fn rest(
 /// Counts views whose settled pieces differ from those without faults, that do not settle, or whose faults are not told. Faults
 /// are errors of 10 % of the requests, 30 % short reads, and a link that is cut for two seconds in each view.
 pub(super) fn faults(world: &World) -> anyhow::Result<Figure> {
-    let site = Site::of(world)?;
+    let site = Streamed::of(world)?;
     let stands = draw_stands(&site, VIEWS_WITH_FAULTS)?;
     let all: u64 = site.resident((0..site.catalog().pieces().len() as u32).map(PieceId));
     // A horizon of nothing: what is settled does not depend on how long it took.
@@ -171,16 +177,7 @@ pub(super) fn faults(world: &World) -> anyhow::Result<Figure> {
                     };
                     streamer.update(&mut link, &frame, &mut changes);
                     told += changes.failed.len();
-                    let failing = |s: &&_| {
-                        matches!(
-                            s,
-                            &&enfilade::stream::StandIn {
-                                cause: Cause::Failing,
-                                ..
-                            }
-                        )
-                    };
-                    n_failing += changes.stand_ins.iter().filter(failing).count();
+                    n_failing += n_failing_in(&changes);
                 }
                 n_untold += usize::from(told == 0 || n_failing == 0);
             }

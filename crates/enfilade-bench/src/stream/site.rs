@@ -16,14 +16,14 @@ use serde_json::Value;
 pub(super) const FRAME: Duration = Duration::from_micros(16_667);
 
 /// A world, its visible sets and its pieces.
-pub(super) struct Site {
+pub(super) struct Streamed {
     pub(super) world: World,
     pub(super) sight: Sight,
     pub(super) pvs: Pvs,
     pub(super) pieces: WorldPieces,
 }
 
-impl Site {
+impl Streamed {
     /// Prepares a world; finds what may be seen from each cell.
     pub(super) fn of(world: &World) -> anyhow::Result<Self> {
         let mut context = VisContext {
@@ -119,14 +119,14 @@ pub(super) struct Step {
 }
 
 /// A walk, frame by frame.
-pub(super) struct Walk {
+pub(super) struct Recording {
     pub(super) speed: f32,
     pub(super) steps: Vec<Step>,
 }
 
 /// Records walks through a world.
 pub(super) struct Recorder<'a> {
-    site: &'a Site,
+    site: &'a Streamed,
     state: SightState,
     viewer: Viewer,
     marks: Vec<u32>,
@@ -134,7 +134,7 @@ pub(super) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    pub(super) fn new(site: &'a Site) -> Self {
+    pub(super) fn new(site: &'a Streamed) -> Self {
         Self {
             state: SightState::new(&site.sight),
             viewer: Viewer::new(&site.sight),
@@ -146,7 +146,7 @@ impl<'a> Recorder<'a> {
 
     /// Walks a route at a speed. Where it bends, the walker stops and turns by 180 degrees a second; every eight stretches it
     /// looks all around.
-    pub(super) fn walk(&mut self, route: &[DVec3], speed: f32) -> anyhow::Result<Walk> {
+    pub(super) fn walk(&mut self, route: &[DVec3], speed: f32) -> anyhow::Result<Recording> {
         let seconds = FRAME.as_secs_f64();
         let (step, turn) = (f64::from(speed) * seconds, std::f64::consts::PI * seconds);
         let (mut steps, mut heading) = (Vec::new(), 0.0_f64);
@@ -173,7 +173,7 @@ impl<'a> Recorder<'a> {
                 self.look(pair[0] + along * (f64::from(k) / n), heading, &mut steps)?;
             }
         }
-        Ok(Walk { speed, steps })
+        Ok(Recording { speed, steps })
     }
 
     /// Records a frame; nothing if the eye is in no cell.
@@ -235,7 +235,7 @@ impl<'a> Recorder<'a> {
 
 /// Draws a route through a world: from room to room through doorways, the least visited next, in straight stretches that stay
 /// in the air.
-pub(super) fn route(site: &Site, seed: u64, n_stretches: usize) -> anyhow::Result<Vec<DVec3>> {
+pub(super) fn route(site: &Streamed, seed: u64, n_stretches: usize) -> anyhow::Result<Vec<DVec3>> {
     let mut rng = Rng::new(seed);
     let graph = &site.world.graph;
     let mut been = vec![0_u32; graph.cells.len()];

@@ -60,8 +60,11 @@ impl Streamer {
             match reply.bytes {
                 Ok(bytes) if bytes.len() as u64 <= most => {
                     self.n_failures_in_row = 0;
-                    let slot = self.slots.of(piece);
-                    self.pace.receive(slot.n_packed, self.now - slot.asked);
+                    // All that was not fetched ahead before the first reply is looked at again.
+                    self.sweep.may_regain |= self.pace.is_unknown();
+                    let request = self.slots.rest(piece);
+                    self.pace
+                        .receive(request.n_packed, self.now - request.asked);
                     self.slots.arrive(piece);
                     self.arrived.push(Loaded { piece, bytes });
                 }
@@ -116,7 +119,7 @@ impl Streamer {
                 if self.slots.of(piece).n_pins > 0 {
                     self.to_pin.push(piece);
                 }
-                if self.slots.of(piece).swept == self.sweep.stamp {
+                if self.slots.rest(piece).swept == self.sweep.stamp {
                     self.sweep.again.push(piece);
                 }
             }
@@ -125,9 +128,9 @@ impl Streamer {
 
     /// Chooses among the pieces in view.
     pub(super) fn look(&mut self, in_view: &[InView]) {
-        let min_share = self.options.min_share;
+        let (min_share, n_first) = (self.options.min_share, self.options.max_in_flight.max(1));
         self.wanted
-            .look(in_view, min_share, &self.catalog, &self.slots);
+            .look(in_view, min_share, n_first, &self.catalog, &self.slots);
         for &piece in self.slots.in_flight() {
             if self.wanted.has(piece) {
                 self.taken_over.push(piece);
@@ -247,7 +250,7 @@ impl Streamer {
         changes: &mut Changes,
     ) -> bool {
         let slot = self.slots.of(piece);
-        let (size, n_packed) = (slot.n_resident, slot.n_packed);
+        let (size, n_packed) = (slot.n_resident, self.slots.rest(piece).n_packed);
         if !self.choose_victims(size) {
             return false;
         }
@@ -321,9 +324,9 @@ impl Streamer {
 
     fn ask<S: Source + ?Sized>(&mut self, source: &mut S, piece: PieceId, for_view: bool) {
         self.slots.reserve(piece, for_view);
-        self.slots.of_mut(piece).asked = self.now;
+        self.slots.rest_mut(piece).asked = self.now;
         self.n_requests += 1;
-        self.bytes_requested += self.slots.of(piece).n_packed;
+        self.bytes_requested += self.slots.rest(piece).n_packed;
         source.request(piece);
     }
 
@@ -332,7 +335,7 @@ impl Streamer {
             match self.slots.state(piece) {
                 State::InFlight => {
                     source.cancel(piece);
-                    if self.slots.of(piece).swept == self.sweep.stamp {
+                    if self.slots.rest(piece).swept == self.sweep.stamp {
                         self.sweep.again.push(piece);
                     }
                 }
@@ -346,7 +349,7 @@ impl Streamer {
     /// Frees the memory of a piece.
     fn lose(&mut self, piece: PieceId, state: State) {
         let slot = self.slots.of(piece);
-        if slot.swept == self.sweep.stamp {
+        if self.slots.rest(piece).swept == self.sweep.stamp {
             self.sweep.n_bytes = self.sweep.n_bytes.saturating_sub(slot.n_resident);
             self.sweep.has_lost |= state == State::Absent;
         }
@@ -452,7 +455,7 @@ impl Streamer {
         while let Some(&piece) = self.catalog.pieces_of(cell).get(self.sweep.piece) {
             *work = work.saturating_sub(COST_OF_PIECE);
             let slot = self.slots.of(piece);
-            if slot.swept != self.sweep.stamp {
+            if self.slots.rest(piece).swept != self.sweep.stamp {
                 if slot.state == State::Absent
                     && due <= reach.of(&self.sweep)
                     && self.fetch_ahead(source, piece, due, false, changes) == Attempt::Later
@@ -476,6 +479,9 @@ impl Streamer {
         let Some(speed) = reach.speed.filter(|_| due > 0.0 && due <= reach.limit) else {
             return;
         };
+        if self.pace.is_unknown() && !self.slots.in_flight().is_empty() {
+            return; // a reply will tell
+        }
         let time = self.pace.time_of(self.sweep.n_ahead) + MARGIN;
         if f64::from(due - self.options.step) <= time * f64::from(speed) {
             self.sweep.must = due;
@@ -514,7 +520,7 @@ impl Streamer {
         changes: &mut Changes,
     ) -> Attempt {
         let slot = self.slots.of(piece);
-        let (size, n_packed) = (slot.n_resident, slot.n_packed);
+        let (size, n_packed) = (slot.n_resident, self.slots.rest(piece).n_packed);
         if self.sweep.knows_no_room(due, size) {
             self.sweep.has_lost = true;
             return Attempt::NoRoom;

@@ -64,7 +64,7 @@ impl Default for StreamOptions {
         Self {
             policy: Policy::default(),
             max_resident: 256 << 20,
-            max_in_flight: 8,
+            max_in_flight: 16,
             max_bytes_in_flight: 4 << 20,
             max_bytes_a_frame: 1 << 20,
             min_share: 0.0,

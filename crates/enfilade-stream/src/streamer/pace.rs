@@ -35,6 +35,11 @@ impl Pace {
         self.bytes += n_bytes as f64;
     }
 
+    /// Returns `true` before the first reply.
+    pub(crate) fn is_unknown(&self) -> bool {
+        self.bytes == 0.0
+    }
+
     /// Returns the time that bytes are expected to take at worst, with caution; infinite before the first reply. [Units: s]
     pub(crate) fn time_of(&self, n_bytes: u64) -> f64 {
         if self.bytes == 0.0 {

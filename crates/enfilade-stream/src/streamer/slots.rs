@@ -28,23 +28,29 @@ impl State {
     }
 }
 
+/// The part of a piece's state that is read for all pieces in view, frame by frame: small.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slot {
     pub(crate) n_resident: u64,
+    /// Number of pinned cells that need it.
+    pub(crate) n_pins: u32,
+    pub(crate) state: State,
+    /// Its request was made, or is now wanted, for the view: it is not canceled.
+    pub(crate) for_view: bool,
+}
+
+/// The other part.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rest {
     pub(crate) n_packed: u64,
     /// Time of the last request.
     pub(crate) asked: Duration,
     /// Neighbors in the list of kept pieces.
     before: u32,
     after: u32,
-    /// Number of pinned cells that need it.
-    pub(crate) n_pins: u32,
     /// The sweep that last met it.
     pub(crate) swept: u32,
-    pub(crate) n_failures: u8,
-    pub(crate) state: State,
-    /// Its request was made, or is now wanted, for the view: it is not canceled.
-    pub(crate) for_view: bool,
+    n_failures: u8,
 }
 
 /// States of all pieces, and the kept ones in a list: those met by the current sweep in its order, up to the mark, and then the
@@ -52,6 +58,8 @@ pub(crate) struct Slot {
 #[derive(Debug)]
 pub(crate) struct Slots {
     slots: Vec<Slot>,
+    /// One more than pieces: the last is the head of the list.
+    rest: Vec<Rest>,
     /// The piece after which the sweep goes on; the number of pieces for the head of the list.
     mark: u32,
     /// Memory of kept pieces. [Units: bytes]
@@ -70,28 +78,26 @@ pub(crate) struct Slots {
 impl Slots {
     pub(crate) fn new(catalog: &Catalog, max_kept: u64) -> Self {
         let n = catalog.pieces().len() as u32;
-        let empty = Slot {
-            n_resident: 0,
-            n_packed: 0,
+        let pieces = catalog.pieces().iter();
+        let slots = pieces.clone().map(|piece| Slot {
+            n_resident: piece.n_resident,
+            n_pins: 0,
+            state: State::Absent,
+            for_view: false,
+        });
+        let sizes = pieces.map(|piece| piece.n_packed).chain([0]);
+        let rest = sizes.map(|n_packed| Rest {
+            n_packed,
             asked: Duration::ZERO,
             before: n,
             after: n,
-            n_pins: 0,
             swept: 0,
             n_failures: 0,
-            state: State::Absent,
-            for_view: false,
-        };
-        let pieces = catalog.pieces().iter().map(|piece| Slot {
-            n_resident: piece.n_resident,
-            n_packed: piece.n_packed,
-            ..empty
         });
-        let mut slots = Vec::with_capacity(n as usize + 1);
-        slots.extend(pieces);
-        slots.push(empty); // the head of the list
+        let (slots, rest) = (slots.collect(), rest.collect());
         Self {
             slots,
+            rest,
             mark: n,
             n_kept: 0,
             max_kept,
@@ -114,6 +120,16 @@ impl Slots {
     }
 
     #[inline]
+    pub(crate) fn rest(&self, piece: PieceId) -> &Rest {
+        &self.rest[piece.idx()]
+    }
+
+    #[inline]
+    pub(crate) fn rest_mut(&mut self, piece: PieceId) -> &mut Rest {
+        &mut self.rest[piece.idx()]
+    }
+
+    #[inline]
     pub(crate) fn state(&self, piece: PieceId) -> State {
         self.slots[piece.idx()].state
     }
@@ -125,16 +141,16 @@ impl Slots {
     }
 
     fn head(&self) -> u32 {
-        self.slots.len() as u32 - 1
+        self.slots.len() as u32
     }
 
     /// Returns the kept pieces, last first; with `all`, to the head of the list, otherwise to the mark.
     pub(crate) fn last_first(&self, all: bool) -> impl Iterator<Item = PieceId> + '_ {
         let stop = if all { self.head() } else { self.mark };
-        let mut at = self.slots[self.head() as usize].before;
+        let mut at = self.rest[self.head() as usize].before;
         std::iter::from_fn(move || {
             let piece = (at != stop && at != self.head()).then_some(PieceId(at))?;
-            at = self.slots[at as usize].before;
+            at = self.rest[at as usize].before;
             Some(piece)
         })
     }
@@ -158,7 +174,7 @@ impl Slots {
         (slot.state, slot.for_view) = (State::InFlight, for_view);
         self.n_kept += slot.n_resident;
         self.in_flight.push(piece);
-        self.bytes_in_flight += slot.n_packed;
+        self.bytes_in_flight += self.rest[piece.idx()].n_packed;
         self.version += 1;
         debug_assert!(self.n_kept <= self.max_kept, "no room was made");
         self.link(piece.0, self.mark);
@@ -167,8 +183,8 @@ impl Slots {
     /// Ends the request of a piece: it arrived.
     pub(crate) fn arrive(&mut self, piece: PieceId) {
         self.land(piece);
-        let slot = &mut self.slots[piece.idx()];
-        (slot.state, slot.n_failures) = (State::Arrived, 0);
+        self.slots[piece.idx()].state = State::Arrived;
+        self.rest[piece.idx()].n_failures = 0;
     }
 
     /// Hands a piece over.
@@ -199,32 +215,32 @@ impl Slots {
 
     /// Counts a failure. Returns the time until the next request.
     pub(crate) fn back_off(&mut self, piece: PieceId, first: Duration, last: Duration) -> Duration {
-        let slot = &mut self.slots[piece.idx()];
-        let wait = first.saturating_mul(1 << u32::from(slot.n_failures).min(30));
-        slot.n_failures = slot.n_failures.saturating_add(1);
+        let n_failures = &mut self.rest[piece.idx()].n_failures;
+        let wait = first.saturating_mul(1 << u32::from(*n_failures).min(30));
+        *n_failures = n_failures.saturating_add(1);
         wait.min(last)
     }
 
     fn land(&mut self, piece: PieceId) {
         self.version += 1;
         self.in_flight.retain(|p| *p != piece);
-        self.bytes_in_flight -= self.slots[piece.idx()].n_packed;
+        self.bytes_in_flight -= self.rest[piece.idx()].n_packed;
     }
 
     fn link(&mut self, piece: u32, after: u32) {
-        let next = self.slots[after as usize].after;
-        let slot = &mut self.slots[piece as usize];
+        let next = self.rest[after as usize].after;
+        let slot = &mut self.rest[piece as usize];
         (slot.before, slot.after) = (after, next);
-        self.slots[after as usize].after = piece;
-        self.slots[next as usize].before = piece;
+        self.rest[after as usize].after = piece;
+        self.rest[next as usize].before = piece;
     }
 
     fn unlink(&mut self, piece: u32) {
-        let Slot { before, after, .. } = self.slots[piece as usize];
+        let Rest { before, after, .. } = self.rest[piece as usize];
         if self.mark == piece {
             self.mark = before;
         }
-        self.slots[before as usize].after = after;
-        self.slots[after as usize].before = before;
+        self.rest[before as usize].after = after;
+        self.rest[after as usize].before = before;
     }
 }

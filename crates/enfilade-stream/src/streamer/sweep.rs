@@ -28,7 +28,7 @@ pub(crate) struct Sweep {
     pub(crate) n_ahead: u64,
     /// Latest deadline met that needs that fetching goes on now. [Units: wu]
     pub(crate) must: f32,
-    /// What is due by then is fetched: the result of the last pass. [Units: wu]
+    /// All that is due by then is fetched: the result of the last pass. [Units: wu]
     pub(crate) limit: f32,
     /// True if all that is due within the horizon was met.
     pub(crate) is_past_horizon: bool,
@@ -69,9 +69,9 @@ impl Sweep {
 
     /// Meets a piece: if it is kept, it goes on where it belongs in the list.
     pub(crate) fn meet(&mut self, piece: PieceId, due: f32, slots: &mut Slots) {
-        let slot = slots.of_mut(piece);
-        slot.swept = self.stamp;
-        let (state, size, n_packed) = (slot.state, slot.n_resident, slot.n_packed);
+        slots.rest_mut(piece).swept = self.stamp;
+        let (slot, n_packed) = (slots.of(piece), slots.rest(piece).n_packed);
+        let (state, size) = (slot.state, slot.n_resident);
         let is_there = matches!(state, State::Arrived | State::Resident | State::Missing);
         if due > 0.0 && !is_there {
             self.n_ahead += n_packed;

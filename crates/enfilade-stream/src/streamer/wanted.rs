@@ -25,8 +25,10 @@ pub(crate) struct Wanted {
     view: u32,
     marks: Vec<Mark>,
     pieces: Vec<PieceId>,
-    /// Chosen pieces that are absent, largest share first.
+    /// Chosen pieces that are absent; the first of them, as many as may be asked for at once, by share, the largest first.
     pub(crate) absent: Vec<PieceId>,
+    /// Chosen pieces that were not in memory when the view was looked at.
+    lacking: Vec<PieceId>,
     /// Number of chosen pieces that are not in memory but may come.
     n_pending: usize,
     /// For each cell, one more than the losses of memory after which it was complete; so it still is, after no more.
@@ -76,17 +78,20 @@ impl Wanted {
     }
 
     /// Looks at a view: which pieces are in it, and which of them fit. Linear in the cells if all are complete and were so
-    /// before, otherwise in the pieces, with a sort of those that are absent, or of all if they do not fit.
+    /// before, otherwise in the pieces, with a sort of the `n_first` absent ones that are asked for first, or of all if they do
+    /// not fit.
     pub(crate) fn look(
         &mut self,
         in_view: &[InView],
         min_share: f32,
+        n_first: usize,
         catalog: &Catalog,
         slots: &Slots,
     ) {
         self.view = self.view.wrapping_add(1);
         self.pieces.clear();
         self.absent.clear();
+        self.lacking.clear();
         self.last_view.clear();
         self.last_view.extend_from_slice(in_view);
         let complete = slots.n_losses + 1;
@@ -135,15 +140,23 @@ impl Wanted {
                 room -= slot.n_resident;
             }
             self.marks[piece.idx()].chosen = view;
+            if slot.state != State::Resident {
+                self.lacking.push(piece);
+            }
             if slot.state == State::Absent {
                 self.absent.push(piece);
             }
         }
         let marks = &self.marks;
-        self.absent.sort_unstable_by(|a, b| {
+        let larger = |a: &PieceId, b: &PieceId| {
             let share = |p: &PieceId| marks[p.idx()].share;
             share(b).total_cmp(&share(a)).then(a.cmp(b))
-        });
+        };
+        let n = self.absent.len().min(n_first);
+        if n > 0 {
+            self.absent.select_nth_unstable_by(n - 1, larger);
+            self.absent[..n].sort_unstable_by(larger);
+        }
     }
 
     /// Marks the pieces in view if this was not needed yet. Call it before pieces in memory are chosen to go.
@@ -176,11 +189,9 @@ impl Wanted {
     /// Ends a frame: counts the chosen pieces that are not in memory but may come, and remembers the state, so that an equal
     /// one is told apart. Linear in the pieces in view.
     pub(crate) fn end(&mut self, slots: &Slots) {
-        let is_pending = |p: &&PieceId| {
-            let state = slots.state(**p);
-            self.has(**p) && !matches!(state, State::Resident | State::Missing)
-        };
-        self.n_pending = self.pieces.iter().filter(is_pending).count();
+        let is_pending =
+            |p: &&PieceId| !matches!(slots.state(**p), State::Resident | State::Missing);
+        self.n_pending = self.lacking.iter().filter(is_pending).count();
         self.last_version = slots.version;
     }
 
