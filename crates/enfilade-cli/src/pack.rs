@@ -105,7 +105,7 @@ pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses to replace what is no packed world.
+/// Refuses to replace a folder of something else.
 fn check_folder(path: &Path) -> anyhow::Result<()> {
     if path.is_file() {
         bail!(

@@ -71,7 +71,7 @@ fn what_is_no_packed_world_is_neither_replaced_nor_read() {
     fs::create_dir_all(dir.join("other")).unwrap();
     fs::write(dir.join("other/thing"), "mine").unwrap();
     for (line, message) in [
-        ("pack w.glb -o w.glb", "extension"),
+        ("pack w.glb -o w.glb", "writes a packed world"),
         ("pack w.glb -o other", "is a folder with other contents"),
         ("pack other/thing -o x.enf", "this is not a GLB file"),
         ("unpack w.glb -o x.glb", "this is not a packed world"),

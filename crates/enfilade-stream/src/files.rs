@@ -58,7 +58,7 @@ impl PackedFiles {
     ///
     /// # Errors
     ///
-    /// A path that is no packed world, damage.
+    /// A path without a packed world, damage.
     pub fn open(path: &Path) -> Result<(PackedHead, Self), PackError> {
         let in_one = !path.is_dir();
         let of_head = if in_one {

@@ -19,7 +19,7 @@ const FRONT: usize = 8 + 4 + 8 + 8 + 16;
 /// Largest head, unpacked. [Units: bytes]
 const MOST: u64 = 4 << 30;
 
-/// The reasons why a world cannot be packed, or bytes are no packed world.
+/// The reasons why a world cannot be packed, or bytes are not a packed world.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PackError {
@@ -29,7 +29,7 @@ pub enum PackError {
     /// The world cannot be prepared for queries.
     #[error(transparent)]
     Sight(#[from] SightError),
-    /// Bytes that are no packed world.
+    /// Bytes of something else.
     #[error("this is not a packed world; make one with `enfilade pack IN.glb -o OUT.enf`")]
     NotPacked,
     /// A packed world of another version.
@@ -54,7 +54,7 @@ pub(crate) fn damaged(problem: impl Into<String>) -> PackError {
     PackError::Damaged(problem.into())
 }
 
-/// Returns the hash that guards bytes against damage: XXH3 with 128 bits. It is no proof against forgery.
+/// Returns the hash that guards bytes against damage: XXH3 with 128 bits. It does not detect forgery.
 pub(crate) fn hash_of(bytes: &[u8]) -> [u8; 16] {
     twox_hash::XxHash3_128::oneshot(bytes).to_le_bytes()
 }
@@ -90,7 +90,7 @@ pub struct PackedHead {
 /// The list of pieces as written.
 #[derive(Serialize, Deserialize)]
 struct Listed {
-    /// Of each piece: offset, packed size, size in memory.
+    /// For each piece: offset, packed size, size in memory.
     pieces: Vec<[u64; 3]>,
     hashes: Vec<[u8; 16]>,
     /// For each cell, its pieces.
@@ -154,7 +154,7 @@ impl PackedHead {
     ///
     /// # Errors
     ///
-    /// Bytes that are no packed world, or one of another version.
+    /// Bytes of something else, or of another version.
     pub fn size(bytes: &[u8]) -> Result<u64, PackError> {
         let front = bytes.get(..FRONT).ok_or(PackError::NotPacked)?;
         if front[..8] != MAGIC {
@@ -175,7 +175,7 @@ impl PackedHead {
     ///
     /// # Errors
     ///
-    /// Bytes that are no packed world, one of another version, damage.
+    /// Bytes of something else, another version, damage.
     pub fn decode(bytes: &[u8]) -> Result<Self, PackError> {
         let n = Self::size(bytes)?;
         let packed = usize::try_from(n).ok().and_then(|n| bytes.get(FRONT..n));

@@ -23,7 +23,7 @@ impl PackedWorld {
     ///
     /// # Errors
     ///
-    /// A file that is no world.
+    /// A file of something else.
     pub fn pack(file: &[u8]) -> Result<Self, PackError> {
         let SplitFile {
             world,
