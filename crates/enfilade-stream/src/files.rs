@@ -118,12 +118,12 @@ impl PackedFiles {
 
     /// Returns a source of its pieces, which reads on a thread.
     #[must_use]
-    pub fn source(&self, head: Arc<PackedHead>) -> ThreadSource {
+    pub fn source(&self, head: &Arc<PackedHead>) -> ThreadSource {
         let fetch = FileFetch {
             files: self.clone(),
             file: None,
         };
-        ThreadSource::new(head, self.pieces.display().to_string(), vec![fetch])
+        ThreadSource::new(head, &self.pieces.display().to_string(), vec![fetch])
     }
 }
 
@@ -193,15 +193,15 @@ pub struct ThreadSource {
 impl ThreadSource {
     /// Starts a thread for each of `fetches`. `place` names where the pieces are, for people.
     #[must_use]
-    pub fn new<F: Fetch>(head: Arc<PackedHead>, place: String, fetches: Vec<F>) -> Self {
+    pub fn new<F: Fetch>(head: &Arc<PackedHead>, place: &str, fetches: Vec<F>) -> Self {
         let waiting = Arc::new(Mutex::new(Waiting::default()));
         let (wake, woken) = channel();
         let (reply, replies) = channel();
         let woken = Arc::new(Mutex::new(woken));
         let threads = fetches.into_iter().map(|fetch| {
             let mut worker = Worker {
-                head: Arc::clone(&head),
-                place: place.clone(),
+                head: Arc::clone(head),
+                place: place.to_owned(),
                 waiting: Arc::clone(&waiting),
                 woken: Arc::clone(&woken),
                 reply: reply.clone(),

@@ -158,7 +158,7 @@ fn pieces_come_from_disk_and_canceled_ones_do_not() {
     let (head, files) = PackedFiles::open(&path).unwrap();
     let n = head.places.len() as u32;
     let head = Arc::new(head);
-    let mut source = files.source(Arc::clone(&head));
+    let mut source = files.source(&head);
     for piece in (0..n).map(PieceId) {
         source.request(piece);
     }
@@ -202,7 +202,7 @@ fn faults_on_the_way_are_survived_or_told() {
         body: Arc::clone(&body),
         rng: Rng::new(seed),
     });
-    let mut source = ThreadSource::new(Arc::clone(&head), "here".into(), fetches.collect());
+    let mut source = ThreadSource::new(&head, "here", fetches.collect());
     let n = head.places.len();
     for piece in (0..n as u32).map(PieceId) {
         source.request(piece);

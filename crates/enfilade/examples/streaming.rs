@@ -5,6 +5,7 @@
 use std::error::Error;
 use std::time::Duration;
 
+use enfilade::cpg::Portal;
 use enfilade::stream::{
     Changes, Eye, Frame, InView, LinkOptions, SimulatedLink, StreamOptions, Streamer, WorldPieces,
 };
@@ -37,7 +38,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let sight = Sight::build(&world)?;
     let (state, mut viewer) = (SightState::new(&sight), Viewer::new(&sight));
     let mut changes = Changes::default();
-    let doorways: Vec<[f32; 3]> = world.graph.portals.iter().map(|p| p.center()).collect();
+    let doorways: Vec<[f32; 3]> = world.graph.portals.iter().map(Portal::center).collect();
     let (mut now, mut n_late) = (Duration::ZERO, 0);
     for pair in doorways.windows(2) {
         let d = [0, 1, 2].map(|k| pair[1][k] - pair[0][k]);

@@ -246,8 +246,8 @@ impl Splitter<'_> {
     fn rest(&mut self) -> Vec<u8> {
         self.taken.sort_unstable_by_key(|r| (r.start, r.end));
         let (mut ranges, mut body, mut end) = (Vec::new(), Vec::new(), 0);
-        let ends = [self.bytes.len()..self.bytes.len()];
-        for range in self.taken.iter().chain(&ends) {
+        let n = self.bytes.len();
+        for range in self.taken.iter().chain(std::iter::once(&(n..n))) {
             if range.start > end {
                 ranges.push([end as u64, (range.start - end) as u64]);
                 body.extend_from_slice(&self.bytes[end..range.start]);
