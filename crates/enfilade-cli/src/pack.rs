@@ -39,6 +39,9 @@ pub(crate) struct Unpack {
     /// World file to write; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
     output: PathBuf,
+    /// Print JSON for machines.
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(serde::Serialize)]
@@ -130,6 +133,9 @@ pub(crate) fn unpack_world(args: &Unpack) -> anyhow::Result<()> {
     let glb = packed.unpack().with_context(|| name_of(&args.input))?;
     write_whole(&args.output, &glb)?;
     let written = Written::new(&args.output, &glb);
+    if args.json {
+        return print_json(outputs.printed(), &written);
+    }
     writeln!(outputs.printed(), "{written}")?;
     Ok(())
 }

@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 18] = [
+const COMMANDS: [(&str, &[&str]); 20] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -29,6 +29,8 @@ const COMMANDS: [(&str, &[&str]); 18] = [
     ),
     ("inspect world.glb", &["cells", "portals", "stats"]),
     ("locate world.glb", &["cells"]),
+    ("pack world.glb -o w.enf", &["file", "packed", "pieces"]),
+    ("unpack w.enf -o u.glb", &["file", "bytes"]),
     ("plan world.glb -o p.svg", &["file", "bytes"]),
     ("pvs world.glb -o p.pvs", &["cells", "pairs", "complete"]),
     (
