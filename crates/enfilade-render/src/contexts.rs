@@ -321,7 +321,6 @@ impl Studio {
         children: &HashMap<ViaKey, usize>,
         answer: SpaceSeen<'_>,
     ) {
-        let back = back_of(space, context);
         for (id, seen) in context.parts() {
             let graph = &space.world(id).graph;
             let part = tree.nodes[node].parts.iter().position(|p| p.id == id);
@@ -336,7 +335,7 @@ impl Studio {
             };
             for special in graph.special_ids().filter(is_seen) {
                 let key = (index, id, special);
-                if back != Some((id, special)) {
+                if !context.never_meets(space, id, special) {
                     self.add_face(tree, space, context, (node, part), key, children, answer);
                 }
             }
@@ -440,18 +439,6 @@ impl Studio {
             later,
         });
     }
-}
-
-/// Returns the special portal by which a context would look back to where its view comes from.
-fn back_of(space: &Space, context: &SeenContext<'_>) -> Option<(PartId, SpecialId)> {
-    let via = context.via()?;
-    let side = &space.world(via.part).graph.specials[via.special.idx()];
-    let back = match &side.passes[via.pass].way {
-        Way::Lead { back, .. } => *back,
-        Way::Monitor(_) => None,
-        _ => Some(via.special),
-    };
-    Some((via.part, back?))
 }
 
 /// Returns `true` if a pass of a special portal is in view, and too small or one too many.

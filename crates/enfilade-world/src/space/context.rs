@@ -29,6 +29,10 @@ pub(super) struct Context {
     pub(super) map: Similarity,
     pub(super) via: Option<SeenVia>,
     pub(super) back: Option<(PartId, SpecialId)>,
+    /// The opening by which the view comes in: normal, and height of its plane, in `frame`. `None` if it begins at the eye.
+    pub(super) plane: Option<(DVec3, f64)>,
+    /// Where the eye is, if the view begins there.
+    pub(super) at: Option<Place>,
     /// The plane beyond which the view begins, relative to the eye in `frame`.
     pub(super) gate: Option<(DVec3, f64)>,
     /// Share of the query's screen that the whole screen of this context takes.
@@ -75,6 +79,33 @@ impl Context {
     pub(super) fn answer(&self, part: PartId) -> Seen<'_> {
         let viewer = self.parts[part.idx()].viewer.as_ref();
         viewer.expect("a seen part has a viewer").answer()
+    }
+
+    /// Returns `true` if no line of sight of this context meets a special portal, which tolerances alone would show: it lies in the
+    /// plane of the opening by which the view comes in, or before it; or it is the other side of the doorway in which the eye
+    /// is. Without this, views that come out at a doorway with panes would be handed to and fro there.
+    pub(super) fn never_meets(&self, space: &Space, part: PartId, special: SpecialId) -> bool {
+        if self.back == Some((part, special)) {
+            return true;
+        }
+        let layout = space.layout(part);
+        let opening = layout.special_opening(special);
+        let near = 4.0 * layout.tolerance();
+        if let Some((normal, height)) = self.plane {
+            let to_frame = space.between(part, self.frame);
+            let mut vertices = opening.pieces().flatten();
+            return vertices.all(|p| normal.dot(to_frame.point(*p)) <= height + near);
+        }
+        let (Some(at), Some(eye)) = (self.at, self.view.as_ref().map(View::exact_eye)) else {
+            return false;
+        };
+        let eye = space.between(self.frame, part).point(eye);
+        let own = &space.parts[part.idx()].world.graph;
+        let is_beyond = layout.portal_of_special(special).is_some_and(|portal| {
+            let cell = own.specials[special.idx()].cell;
+            at.cell != cell && own[portal].cells.contains(&at.cell)
+        });
+        at.part == part && is_beyond && opening.height_of(eye).abs() <= near
     }
 
     pub(super) fn begin_face(&mut self) {

@@ -177,6 +177,8 @@ impl SpaceViewer {
                 map,
                 via: None,
                 back: None,
+                plane: None,
+                at: None,
                 gate: None,
                 share: 1.0,
                 is_direct: true,
@@ -191,6 +193,7 @@ impl SpaceViewer {
         context.view = Some(view);
         (context.frame, context.map) = (frame, map);
         (context.via, context.back, context.gate) = (None, None, None);
+        (context.plane, context.at) = (None, None);
         context.share = 1.0;
         context.is_direct = true;
         context.starts.clear();
@@ -205,6 +208,7 @@ impl SpaceViewer {
             return;
         };
         let at = space.locate(own.frame, eye);
+        own.at = at;
         // An eye in no cell sees everything in view, of all parts.
         let start = at.map_or(PartId::ROOT, |place| place.part);
         own.add_eye(
@@ -247,6 +251,9 @@ impl SpaceViewer {
         found.sort_by_key(|(part, view)| (*part, view.special));
         for views in found.chunk_by(|a, b| a.0 == b.0 && a.1.special == b.1.special) {
             let (part, special) = (views[0].0, views[0].1.special);
+            if self.contexts[parent].never_meets(space, part, special) {
+                continue;
+            }
             let graph = &space.parts[part.idx()].world.graph;
             let share = views.iter().map(|v| v.1.window.share()).sum::<f64>();
             let share = share.min(1.0) * self.contexts[parent].share;
@@ -324,7 +331,8 @@ impl SpaceViewer {
             }
             return;
         }
-        let Some(map) = own.layout.map_of_pass(special, pass) else {
+        let layout = &own.layout;
+        let Some(map) = layout.map_of_pass(special, pass) else {
             return;
         };
         let to = side
@@ -351,10 +359,14 @@ impl SpaceViewer {
                 let to_frame = space.between(part, of_parent.frame).into();
                 let whole = of_parent.map.after(&to_frame).after(&appears);
                 let screen = of_parent.share;
+                let opening = layout.special_opening(special);
+                let normal = map.direction(opening.normal());
+                let plane = (normal, normal.dot(map.point(opening.center())));
                 let context = self.add_context(part, view, whole);
                 let own = &mut self.contexts[context];
                 (own.via, own.share) = (Some(via), screen);
                 own.back = back.map(|back| (part, back));
+                own.plane = Some(plane);
                 own.is_direct = false;
                 own.rectangle = NOTHING;
                 self.apart = apart;

@@ -1,10 +1,11 @@
 //! Answers to views.
 
+use enfilade_cpg::SpecialId;
 use enfilade_geom::{DVec3, Similarity};
 use enfilade_runtime::{Seen, View};
 
-use super::PartId;
 use super::context::{Context, SeenVia, StoppedSpecial};
+use super::{PartId, Space};
 
 /// The answer to a view, context by context and part by part.
 #[derive(Clone, Copy)]
@@ -95,6 +96,13 @@ impl<'a> SeenContext<'a> {
     #[must_use]
     pub fn plane(&self) -> Option<(DVec3, f64)> {
         self.context.gate
+    }
+
+    /// Returns `true` if no line of sight meets a special portal in the cells that it sees: what is
+    /// [in view](Seen::specials) errs to more.
+    #[must_use]
+    pub fn never_meets(&self, space: &Space, part: PartId, special: SpecialId) -> bool {
+        self.context.never_meets(space, part, special)
     }
 
     /// Returns the rectangle of the screen around it: `[left, bottom, right, top]`, -1 to 1.
