@@ -87,6 +87,10 @@ impl PackedFiles {
         } else {
             path.to_owned()
         };
+        if !file.is_file() {
+            // Reading from a pipe would take away its beginning.
+            return false;
+        }
         let mut first = [0; 64];
         let n = File::open(file).and_then(|mut f| f.read(&mut first));
         n.is_ok_and(|n| PackedHead::size(&first[..n]).is_ok())

@@ -153,6 +153,9 @@ impl From<ureq::Error> for Failure {
     fn from(error: ureq::Error) -> Self {
         use std::io::ErrorKind::ConnectionRefused;
         Self::Other(match error {
+            ureq::Error::BadUri(_) | ureq::Error::Http(_) => {
+                "this is not an address; write it as http://HOST/PATH".into()
+            }
             ureq::Error::HostNotFound => {
                 "no server of this name was found; check the address and the network".into()
             }

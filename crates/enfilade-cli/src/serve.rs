@@ -1,0 +1,166 @@
+//! `enfilade serve`: a folder over HTTP, for programs that stream packed worlds.
+
+use std::io::{self, ErrorKind, Write};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::pin::Pin;
+
+use anyhow::{Context, bail};
+use enfilade::geom::shown;
+use enfilade::stream::PackedFiles;
+use hyper::Method;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+use tokio::net::TcpListener;
+use tower_http::compression::Compression;
+use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate};
+use tower_http::cors::{Any, Cors};
+use tower_http::services::ServeDir;
+use tower_http::services::fs::{Backend, TokioBackend};
+
+use crate::screen::printed;
+
+/// Serves a folder over HTTP until Ctrl-C: files, ranges of them, and whole files compressed. Prints the addresses of the
+/// packed worlds in it, which all commands take in place of files. Any page of a browser may read it.
+#[derive(clap::Args)]
+pub(crate) struct Serve {
+    /// Folder with packed worlds, or a packed world. Links that lead out of it are not followed.
+    dir: PathBuf,
+    /// Address and port: 0.0.0.0 serves other machines, too; port 0 takes one that is free.
+    #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:8000")]
+    address: SocketAddr,
+}
+
+pub(crate) fn run(args: &Serve) -> anyhow::Result<()> {
+    let cannot = || format!("cannot serve {}", args.dir.display());
+    let root = args.dir.canonicalize().with_context(cannot)?;
+    if !root.is_dir() {
+        bail!(
+            "{} is not a folder; give the one around it",
+            args.dir.display()
+        );
+    }
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    runtime.with_context(cannot)?.block_on(async {
+        let listener = TcpListener::bind(args.address).await.with_context(|| {
+            format!(
+                "cannot listen at {}; choose another one with --address",
+                args.address
+            )
+        })?;
+        tell(args, listener.local_addr()?)?;
+        tokio::spawn(serve(listener, root));
+        Ok(tokio::signal::ctrl_c().await?)
+    })
+}
+
+/// Prints addresses: of the folder, and of the packed worlds directly in it.
+fn tell(args: &Serve, address: SocketAddr) -> anyhow::Result<()> {
+    let mut worlds = Vec::new();
+    if PackedFiles::is_packed(&args.dir) {
+        worlds.push(String::new());
+    }
+    for entry in args.dir.read_dir()? {
+        let path = entry?.path();
+        if PackedFiles::is_packed(&path)
+            && let Some(name) = path.file_name().and_then(|name| name.to_str())
+            && !worlds.contains(&String::new())
+        {
+            const KEPT: &percent_encoding::AsciiSet = &NON_ALPHANUMERIC
+                .remove(b'.')
+                .remove(b'-')
+                .remove(b'_')
+                .remove(b'~');
+            let slash = if path.is_dir() { "/" } else { "" };
+            worlds.push(format!("{}{slash}", utf8_percent_encode(name, KEPT)));
+        }
+    }
+    worlds.sort_unstable();
+    let mut out = printed();
+    let dir = args.dir.display().to_string();
+    writeln!(
+        out,
+        "serving {} at http://{address}/ until Ctrl-C",
+        shown(&dir)
+    )?;
+    if worlds.is_empty() {
+        writeln!(
+            out,
+            "no packed world is directly in it; `enfilade pack W.glb -o W.enf` makes one"
+        )?;
+    }
+    for world in &worlds {
+        writeln!(out, "http://{address}/{world}")?;
+    }
+    Ok(())
+}
+
+/// Answers requests for ever.
+async fn serve(listener: TcpListener, root: PathBuf) {
+    let files = ServeDir::with_backend(root.clone(), Inside(root));
+    // Packed worlds are compressed already.
+    let is_loose = NotForContentType::const_new("application/octet-stream");
+    let files = Compression::new(files).compress_when(DefaultPredicate::new().and(is_loose));
+    let files = Cors::new(files)
+        .allow_origin(Any)
+        .allow_methods([Method::GET, Method::HEAD])
+        .allow_headers(Any)
+        .expose_headers(Any);
+    let service = TowerToHyperService::new(files);
+    loop {
+        let (stream, _) = match listener.accept().await {
+            Ok(accepted) => accepted,
+            // A caller that left again, or too many of them: others may have more luck.
+            Err(_) => {
+                tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+                continue;
+            }
+        };
+        let service = service.clone();
+        tokio::spawn(async move {
+            let mut http = hyper::server::conn::http1::Builder::new();
+            let http = http.timer(TokioTimer::new());
+            // A connection that breaks concerns nobody else.
+            let _ = http.serve_connection(TokioIo::new(stream), service).await;
+        });
+    }
+}
+
+/// The files of a folder, without those that links in it lead to outside.
+#[derive(Clone)]
+struct Inside(PathBuf);
+
+impl Inside {
+    fn check(&self, path: &Path) -> io::Result<()> {
+        if path.canonicalize()?.starts_with(&self.0) {
+            return Ok(());
+        }
+        Err(ErrorKind::NotFound.into())
+    }
+}
+
+type Later<T> = Pin<Box<dyn Future<Output = io::Result<T>> + Send>>;
+
+impl Backend for Inside {
+    type File = <TokioBackend as Backend>::File;
+    type Metadata = std::fs::Metadata;
+    type OpenFuture = Later<Self::File>;
+    type MetadataFuture = Later<Self::Metadata>;
+
+    fn open(&self, path: PathBuf) -> Self::OpenFuture {
+        match self.check(&path) {
+            Ok(()) => TokioBackend.open(path),
+            Err(e) => Box::pin(async { Err(e) }),
+        }
+    }
+
+    fn metadata(&self, path: PathBuf) -> Self::MetadataFuture {
+        match self.check(&path) {
+            Ok(()) => TokioBackend.metadata(path),
+            Err(e) => Box::pin(async { Err(e) }),
+        }
+    }
+}
