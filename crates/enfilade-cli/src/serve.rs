@@ -51,9 +51,12 @@ pub(crate) fn run(args: &Serve) -> anyhow::Result<()> {
                 args.address
             )
         })?;
+        let end = tokio::spawn(tokio::signal::ctrl_c());
+        // It listens for Ctrl-C before anybody is told that it is there.
+        tokio::task::yield_now().await;
         tell(args, listener.local_addr()?)?;
         tokio::spawn(serve(listener, root));
-        Ok(tokio::signal::ctrl_c().await?)
+        Ok(end.await??)
     })
 }
 
