@@ -4,6 +4,7 @@ use std::io::{self, ErrorKind, Write};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use enfilade::geom::shown;
@@ -11,7 +12,7 @@ use enfilade::stream::PackedFiles;
 use hyper::Method;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use tokio::net::TcpListener;
 use tower_http::compression::Compression;
 use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate};
@@ -60,28 +61,34 @@ pub(crate) fn run(args: &Serve) -> anyhow::Result<()> {
     })
 }
 
-/// Prints addresses: of the folder, and of the packed worlds directly in it.
-fn tell(args: &Serve, address: SocketAddr) -> anyhow::Result<()> {
-    let mut worlds = Vec::new();
-    if PackedFiles::is_packed(&args.dir) {
-        worlds.push(String::new());
+/// Letters of names that stand for themselves in addresses.
+const PLAIN: &AsciiSet = &NON_ALPHANUMERIC
+    .remove(b'.')
+    .remove(b'-')
+    .remove(b'_')
+    .remove(b'~');
+
+/// Returns the packed worlds of a folder as parts of addresses: itself, or what is directly in it.
+fn worlds_in(dir: &Path) -> io::Result<Vec<String>> {
+    if PackedFiles::is_packed(dir) {
+        return Ok(vec![String::new()]);
     }
-    for entry in args.dir.read_dir()? {
+    let mut worlds = Vec::new();
+    for entry in dir.read_dir()? {
         let path = entry?.path();
-        if PackedFiles::is_packed(&path)
-            && let Some(name) = path.file_name().and_then(|name| name.to_str())
-            && !worlds.contains(&String::new())
-        {
-            const KEPT: &percent_encoding::AsciiSet = &NON_ALPHANUMERIC
-                .remove(b'.')
-                .remove(b'-')
-                .remove(b'_')
-                .remove(b'~');
+        let name = path.file_name().and_then(|name| name.to_str());
+        if let Some(name) = name.filter(|_| PackedFiles::is_packed(&path)) {
             let slash = if path.is_dir() { "/" } else { "" };
-            worlds.push(format!("{}{slash}", utf8_percent_encode(name, KEPT)));
+            worlds.push(format!("{}{slash}", utf8_percent_encode(name, PLAIN)));
         }
     }
     worlds.sort_unstable();
+    Ok(worlds)
+}
+
+/// Prints the addresses of the folder and of its packed worlds.
+fn tell(args: &Serve, address: SocketAddr) -> anyhow::Result<()> {
+    let worlds = worlds_in(&args.dir)?;
     let mut out = printed();
     let dir = args.dir.display().to_string();
     writeln!(
@@ -114,13 +121,10 @@ async fn serve(listener: TcpListener, root: PathBuf) {
         .expose_headers(Any);
     let service = TowerToHyperService::new(files);
     loop {
-        let (stream, _) = match listener.accept().await {
-            Ok(accepted) => accepted,
+        let Ok((stream, _)) = listener.accept().await else {
             // A caller that left again, or too many of them: others may have more luck.
-            Err(_) => {
-                tokio::time::sleep(std::time::Duration::from_millis(50)).await;
-                continue;
-            }
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            continue;
         };
         let service = service.clone();
         tokio::spawn(async move {
