@@ -15,10 +15,8 @@ use crate::{Fetch, PackedWorld, ThreadSource};
 
 /// Threads of a source, each with a connection of its own.
 const CONNECTIONS: usize = 3;
-/// Longest wait for a connection.
-const MOST_CONNECT: Duration = Duration::from_secs(10);
-/// Longest wait for the next bytes, and for an answer of no length.
-const MOST_WAIT: Duration = Duration::from_secs(30);
+/// Longest wait for a connection, for the next bytes, and for a whole answer of no length.
+const MOST_WAIT: Duration = Duration::from_secs(10);
 /// Slowest pace at which an answer may come, beyond [`MOST_WAIT`]. [Units: bytes per second]
 const LEAST_PACE: u64 = 16 << 10;
 /// Most bytes that are read from the beginning of a file to the end of a range, if a server ignores ranges. [Units: bytes]
@@ -124,9 +122,9 @@ impl PackedHttp {
     }
 }
 
-/// Fetches over HTTP by requests for ranges. An answer is given up if no connection comes within 10 s, no bytes come for 30 s,
-/// or it takes longer than 30 s and 1 s for every 16 KiB. If the server ignores ranges, the part is taken out of its answer, up
-/// to 64 MiB into the file.
+/// Fetches over HTTP by requests for ranges. An answer is given up if no connection or no bytes come for 10 s, or it takes longer
+/// than 10 s and 1 s for every 16 KiB. If the server ignores ranges, the part is taken out of its answer, up to 64 MiB into the
+/// file.
 #[derive(Debug)]
 pub struct HttpFetch {
     place: PackedHttp,
@@ -162,6 +160,7 @@ impl From<ureq::Error> for Failure {
             ureq::Error::Io(e) if e.kind() == ConnectionRefused => {
                 "no server answers there; check the address, and start the server".into()
             }
+            ureq::Error::Io(e) => format!("{e}; check the address and the network"),
             ureq::Error::Timeout(_) => "the server takes too long; try again later".into(),
             other => other.to_string(),
         })
@@ -178,7 +177,7 @@ fn agent() -> Agent {
     let config = Agent::config_builder()
         .http_status_as_error(false)
         .max_idle_connections(1)
-        .timeout_connect(Some(MOST_CONNECT))
+        .timeout_connect(Some(MOST_WAIT))
         .timeout_per_read(Some(MOST_WAIT))
         .user_agent(concat!("enfilade/", env!("CARGO_PKG_VERSION")));
     config.build().into()
