@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
-use enfilade::stream::PackedFiles;
+use enfilade::stream::{PackedFiles, PackedPlace};
 
 /// Returns `true` if a path stands for standard input or output. A file of that name is `./-`.
 #[must_use]
@@ -28,7 +28,7 @@ pub fn name_of(path: &Path) -> String {
 /// ([`Limits::max_file_bytes`]).
 ///
 /// A GLB states its length in its head: beyond that, at most one byte is read. An input in none of the three formats
-/// is read only at its beginning.
+/// is read only at its beginning. A packed world is put together, from disk or from a server.
 ///
 /// # Errors
 ///
@@ -40,21 +40,16 @@ pub fn read(path: &Path) -> anyhow::Result<Vec<u8>> {
             || head.starts_with(b"ENFEVID");
         glb_length(head).unwrap_or(if is_known { u64::MAX } else { BEGINNING })
     };
-    read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
+    read_world_like(path, length)
 }
 
-/// Like [`read`], for a GLB only: for any other input, only the head is read. A packed world is put together.
+/// Like [`read`], for a GLB only: for any other input, only the head is read.
 ///
 /// # Errors
 ///
 /// As [`read`]; not if the input is not a GLB, which a decoder reports in more detail.
 pub fn read_glb(path: &Path) -> anyhow::Result<Vec<u8>> {
-    if PackedFiles::is_packed(path) {
-        let unpack = || PackedFiles::read_all(path)?.unpack();
-        return unpack().with_context(|| cannot_read(path));
-    }
-    let length = |head: &[u8]| glb_length(head).unwrap_or(0);
-    read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
+    read_world_like(path, |head| glb_length(head).unwrap_or(0))
 }
 
 /// Reads a short text written by a person. `what` names it in errors, as in "cannot read settings a.toml".
@@ -103,6 +98,14 @@ const HEAD: u64 = 12;
 const BEGINNING: u64 = 4096;
 /// Settings and paths of cameras are never longer. [Units: bytes]
 const MAX_TEXT: u64 = 64 << 20;
+
+fn read_world_like(path: &Path, length: impl Fn(&[u8]) -> u64) -> anyhow::Result<Vec<u8>> {
+    if PackedPlace::is_url(path) || PackedFiles::is_packed(path) {
+        let unpack = || PackedPlace::read_all(path)?.unpack();
+        return unpack().with_context(|| cannot_read(path));
+    }
+    read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
+}
 
 /// The length that a GLB states.
 fn glb_length(head: &[u8]) -> Option<u64> {

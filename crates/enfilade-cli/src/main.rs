@@ -28,6 +28,7 @@ mod render;
 mod report;
 mod screen;
 mod see;
+mod serve;
 mod simplify;
 mod sound;
 mod specials;
@@ -73,6 +74,7 @@ enum Command {
     Render(render::Render),
     Report(report::Report),
     See(see::See),
+    Serve(serve::Serve),
     Simplify(simplify::Simplify),
     Sound(sound::Sound),
     Unpack(pack::Unpack),
@@ -101,6 +103,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Render(args) => render::run(&args),
         Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Simplify(args) => simplify::run(&args),
         Command::Sound(args) => sound::run(&args),
         Command::Unpack(args) => pack::unpack_world(&args),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::geom::shown;
-use enfilade::stream::{HEAD, PackedFiles, PackedWorld};
+use enfilade::stream::{HEAD, PackedPlace, PackedWorld};
 use enfilade::whole;
 
 use crate::formats::Format;
@@ -34,7 +34,7 @@ pub(crate) struct Pack {
 /// Puts the world file together again from a packed world, byte for byte.
 #[derive(clap::Args)]
 pub(crate) struct Unpack {
-    /// Packed world, a folder or one file.
+    /// Packed world: a folder, one file, or the address of one on a server.
     input: PathBuf,
     /// World file to write; `-` for standard output.
     #[arg(short, long, value_name = "OUT.glb")]
@@ -129,7 +129,7 @@ fn check_folder(path: &Path) -> anyhow::Result<()> {
 pub(crate) fn unpack_world(args: &Unpack) -> anyhow::Result<()> {
     let mut outputs = Outputs::reading([&args.input])?;
     outputs.write("-o", Format::World, &args.output)?;
-    let packed = PackedFiles::read_all(&args.input)?;
+    let packed = PackedPlace::read_all(&args.input)?;
     let glb = packed.unpack().with_context(|| name_of(&args.input))?;
     write_whole(&args.output, &glb)?;
     let written = Written::new(&args.output, &glb);

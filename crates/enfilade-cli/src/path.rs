@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
+use enfilade::stream::PackedPlace;
 use enfilade::world::{Agent, NoPath, PartId, Path, PathSearch, Space};
 
 use crate::formats::Format;
@@ -78,8 +79,8 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         bail!("--step {}: a length of at least 0 is needed", args.step);
     }
     if args.keep {
-        if is_stream(&args.world) {
-            bail!("--keep writes a file beside the world; give it a file, not '-'");
+        if is_stream(&args.world) || PackedPlace::is_url(&args.world) {
+            bail!("--keep writes a file beside the world; give it a file, not '-' or an address");
         }
         let mut outputs = Outputs::reading([&args.world])?;
         outputs.write("--keep", Format::Walk, &walk::beside(&args.world))?;

@@ -10,6 +10,7 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{self, CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
+use enfilade::stream::PackedPlace;
 use enfilade::vis::{
     VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, WorldVis, see_all, see_parts_through,
     see_world,
@@ -283,6 +284,9 @@ fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
     let path = match &args.output {
         Some(path) => path.clone(),
         None if is_stream(&args.input) => args.input.clone(),
+        None if PackedPlace::is_url(&args.input) => {
+            bail!("an address has no folder for the answer; name a file with -o")
+        }
         None => args.input.with_extension("pvs"),
     };
     let mut outputs = Outputs::reading([&args.input])?;

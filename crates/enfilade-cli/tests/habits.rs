@@ -64,8 +64,8 @@ const COMMANDS: [(&str, &[&str]); 20] = [
     ),
 ];
 
-/// Commands without output for machines: a script for a shell, files, a window.
-const OTHERS: [&str; 4] = ["completions", "help", "man", "view"];
+/// Commands without output for machines: a script for a shell, files, a server, a window.
+const OTHERS: [&str; 5] = ["completions", "help", "man", "serve", "view"];
 
 /// A folder of this test alone.
 fn folder(name: &str) -> PathBuf {

@@ -9,21 +9,29 @@ mod catalog;
 mod deadlines;
 mod files;
 mod head;
+#[cfg(feature = "http")]
+mod http;
 mod link;
 mod of_world;
 mod pack;
+mod place;
 mod source;
 mod streamer;
+mod threads;
 
 pub use bound::{Due, deadlines, due_times, least_bandwidth};
 pub use catalog::{Catalog, Piece, PieceId};
-pub use files::{Fetch, FileFetch, HEAD, PackedFiles, ThreadSource};
+pub use files::{FileFetch, HEAD, PackedFiles};
 pub use head::{PackError, PackedHead, PieceAt};
+#[cfg(feature = "http")]
+pub use http::{HttpFetch, PackedHttp};
 pub use link::{LinkOptions, SimulatedLink};
 pub use of_world::WorldPieces;
 pub use pack::PackedWorld;
+pub use place::PackedPlace;
 pub use source::{FetchError, Reply, Source};
 pub use streamer::{
     Cause, Changes, Eye, Failed, Frame, InView, Loaded, PinError, Policy, StandIn, StreamCounts,
     StreamOptions, Streamer,
 };
+pub use threads::{Fetch, ThreadSource};

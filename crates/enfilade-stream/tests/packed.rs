@@ -1,6 +1,7 @@
 //! Packed worlds: the same world, and the same file.
 
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
 use enfilade_cpg::wire::{PieceContent, decode_glb, encode_glb, read_piece};
@@ -222,4 +223,67 @@ fn faults_on_the_way_are_survived_or_told() {
     }
     // 0.3 to the fourth: one in 120.
     assert!(n_failed * 10 < n, "{n_failed} of {n}");
+}
+
+/// Fetches once it is let through.
+struct Gate {
+    body: Arc<Vec<u8>>,
+    begun: Sender<()>,
+    let_through: Receiver<()>,
+}
+
+impl Fetch for Gate {
+    fn fetch(&mut self, offset: u64, n: u64) -> Result<Vec<u8>, String> {
+        self.begun.send(()).map_err(|e| e.to_string())?;
+        self.let_through.recv().map_err(|e| e.to_string())?;
+        Ok(self.body[offset as usize..(offset + n) as usize].to_vec())
+    }
+}
+
+#[test]
+fn a_request_ends_in_one_reply_even_if_an_earlier_one_was_canceled() {
+    let packed = PackedWorld::pack(&encode_glb(&world()).unwrap()).unwrap();
+    let (begun, has_begun) = channel();
+    let (let_through, gate) = channel();
+    let fetch = Gate {
+        body: Arc::new(packed.body().to_vec()),
+        begun,
+        let_through: gate,
+    };
+    let mut source = ThreadSource::new(&Arc::new(packed.head), "here", vec![fetch]);
+    let replies_of = |source: &mut ThreadSource, pieces: &[u32]| {
+        // The thread takes the next request only after its last reply.
+        source.request(PieceId(9));
+        let _ = let_through.send(());
+        let _ = let_through.send(());
+        let mut ids: Vec<u32> = (replies(source, pieces.len() + 1).iter())
+            .map(|r| r.piece.0)
+            .collect();
+        assert_eq!(ids.pop(), Some(9));
+        assert_eq!(ids, pieces);
+        while has_begun.try_recv().is_ok() {}
+    };
+    let begin = |source: &mut ThreadSource| {
+        source.request(PieceId(0));
+        has_begun.recv().unwrap();
+    };
+    // Canceled under way, and asked for again.
+    begin(&mut source);
+    source.cancel(PieceId(0));
+    source.request(PieceId(0));
+    replies_of(&mut source, &[0]);
+    // Canceled for good.
+    begin(&mut source);
+    source.cancel(PieceId(0));
+    replies_of(&mut source, &[]);
+    // Canceled when its reply is there.
+    begin(&mut source);
+    let _ = let_through.send(());
+    std::thread::sleep(Duration::from_millis(50));
+    source.cancel(PieceId(0));
+    source.request(PieceId(0));
+    replies_of(&mut source, &[0]);
+    // Dropping it does not wait for what is under way.
+    begin(&mut source);
+    drop(source);
 }
