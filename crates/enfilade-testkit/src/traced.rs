@@ -27,6 +27,9 @@ const IN_WALL: f64 = 5e-5;
 /// behind it: rounding decides between. [Units: wu]
 const IN_PLANE: [f64; 2] = [5e-5, 3e-4];
 
+/// Distance up to which an eye may be on either side of a surface: a few roundings of single precision. [Units: wu]
+const AT_SURFACE: f64 = 1e-5;
+
 /// Share of a monitor's picture within which its colors must agree.
 const BLUR: f64 = 0.04;
 
@@ -297,6 +300,12 @@ impl Traced {
             }
         }
         Some(out)
+    }
+
+    /// Returns `true` if a surface is so near to a point that rounding decides which side of it is seen from there.
+    #[must_use]
+    pub fn is_in_surface(&self, p: DVec3) -> bool {
+        self.structure.nearest(p, AT_SURFACE).is_some()
     }
 
     /// Returns a ray that begins in a plane, from behind the surfaces in it on; `None` if one is neither in it nor behind it.

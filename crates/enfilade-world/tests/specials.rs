@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use enfilade_cpg::{SpecialId, Way, World};
+use enfilade_cpg::{Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World};
 use enfilade_geom::{Bvh, DMat3, DVec3, Ray, Triangle};
 use enfilade_runtime::{Seen, Sight, View};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_specials};
@@ -312,4 +312,65 @@ fn an_eye_in_an_opening_is_on_both_sides_and_looks_back_by_neither() {
             assert_ne!(*back, Some(SpecialId(pair[1].0)), "there and straight back");
         }
     }
+}
+
+/// W8: an eye in a doorway with panes on both sides meets that of its cell alone, and what comes out there meets none of them.
+#[test]
+fn an_eye_in_a_doorway_with_two_panes_meets_one_of_them() {
+    let mut world = room_grid(&GridParams::offices(6, 3));
+    let rooms = |portal: &PortalId| {
+        let cells = world.graph[*portal].cells;
+        cells.into_iter().all(|cell| !world.graph[cell].outdoor)
+    };
+    let doorways: Vec<PortalId> = world.graph.portal_ids().filter(rooms).collect();
+    for &portal in &doorways {
+        for cell in world.graph[portal].cells {
+            world.graph.specials.push(SpecialPortal {
+                name: String::new(),
+                cell,
+                shape: SpecialShape::Portal(portal),
+                passes: vec![Pass::new(Way::Through), Pass::new(Way::Mirror)],
+            });
+        }
+    }
+    let space = Space::new(world.clone()).unwrap();
+    let mut viewer = SpaceViewer::new(&space);
+    let near = 0.25 * space.sight(PartId::ROOT).tolerance();
+    let mut n = 0;
+    for id in world.graph.special_ids() {
+        let (normal, pieces) = world.graph.special_opening(id);
+        let eye = (pieces[0].mean() - normal * near).as_vec3();
+        let at = space.locate(PartId::ROOT, eye.as_dvec3());
+        let is_in_room = at.is_some_and(|at| at.cell == world.graph.specials[id.idx()].cell);
+        // Rounding may move it past the plane.
+        if !is_in_room {
+            continue;
+        }
+        n += 1;
+        let toward = normal.as_vec3().to_array();
+        let view = View::perspective(eye.to_array(), toward, [0.0, 1.0, 0.0], 1.0, 1.0).unwrap();
+        let seen = viewer.see(&space, PartId::ROOT, &view);
+        let of = |index: usize| -> Vec<SpecialId> {
+            let vias = seen.contexts().filter_map(|c| c.via());
+            let own = vias.filter(|via| via.parent == index);
+            own.map(|via| via.special).collect()
+        };
+        let portal = |s: SpecialId| match world.graph.specials[s.idx()].shape {
+            SpecialShape::Portal(portal) => Some(portal),
+            SpecialShape::Surface { .. } => None,
+        };
+        let in_doorway = |s: &SpecialId| portal(*s) == portal(id);
+        assert_eq!(
+            of(0).into_iter().filter(in_doorway).collect::<Vec<_>>(),
+            [id]
+        );
+        for index in 1..seen.contexts().len() {
+            let via = seen.context(index).via().map(|via| via.special);
+            let again = of(index)
+                .into_iter()
+                .filter(|s| portal(*s) == via.and_then(portal));
+            assert_eq!(again.count(), 0, "{id}: context {index}");
+        }
+    }
+    assert!(n > 4, "{n} eyes");
 }

@@ -256,6 +256,9 @@ fn compared(world: World, n_views: usize) -> anyhow::Result<Figure> {
         let Some(camera) = camera(&world, &space, &mut rng) else {
             continue;
         };
+        if traced.is_in_surface(point(camera.eye)) {
+            continue;
+        }
         n += 1;
         let view = camera.view(SIZE[0] as f32 / SIZE[1] as f32)?;
         let start = Instant::now();

@@ -83,7 +83,7 @@ impl Context {
 
     /// Returns `true` if no line of sight of this context meets a special portal, which tolerances alone would show: it lies in the
     /// plane of the opening by which the view comes in, or before it; or it is the other side of the doorway in which the eye
-    /// is. Without this, views that come out at a doorway with panes would be handed to and fro there.
+    /// is, of which the eye's cell sees a special side, too. Without this, views that come out at a doorway with panes would be handed to and fro there.
     pub(super) fn never_meets(&self, space: &Space, part: PartId, special: SpecialId) -> bool {
         if self.back == Some((part, special)) {
             return true;
@@ -100,12 +100,13 @@ impl Context {
             return false;
         };
         let eye = space.between(self.frame, part).point(eye);
-        let own = &space.parts[part.idx()].world.graph;
-        let is_beyond = layout.portal_of_special(special).is_some_and(|portal| {
-            let cell = own.specials[special.idx()].cell;
-            at.cell != cell && own[portal].cells.contains(&at.cell)
-        });
-        at.part == part && is_beyond && opening.height_of(eye).abs() <= near
+        let graph = &space.parts[part.idx()].world.graph;
+        let is_other_side = || {
+            let own = layout.portal_of_special(special);
+            let of_eye = own.and_then(|portal| graph.special_side(portal, at.cell));
+            of_eye.is_some_and(|side| side != special)
+        };
+        at.part == part && opening.height_of(eye).abs() <= near && is_other_side()
     }
 
     pub(super) fn begin_face(&mut self) {
