@@ -156,7 +156,7 @@ fn two_portals_of_a_name_lead_to_each_other() {
     let (to, map) = west.leads_to().unwrap();
     assert_eq!(to, east.cell);
     assert_ne!(west.cell, east.cell);
-    // By hand: who walks in along -x comes out along +z; left stays left.
+    // Worked out by hand: who walks in along -x comes out along +z; left stays left.
     let point = |x, y, z| DVec3::new(x, y, z);
     for (from, into) in [
         (point(0.0, 0.0, 2.0), point(7.0, 0.0, 0.0)),
