@@ -54,6 +54,8 @@ pub struct Traced<H> {
     pub end: TraceEnd<H>,
     /// The part in whose frame the end is: that of the last special portal passed, otherwise that of the ray.
     pub frame: PartId,
+    /// The start of the last stretch, beyond the plane of the last special portal. [Units: wu]
+    pub since: DVec3,
     /// The end. [Units: wu]
     pub at: DVec3,
     /// The map from the frame of the ray to that of the end. Its inverse moves what is hit to where it seems to be.
@@ -97,7 +99,7 @@ impl Space {
     /// Follows a ray through special portals to the first surface: it is reflected by mirrors, moved by links, goes on through panes,
     /// and ends at monitors. A shut doorway has no sides.
     ///
-    /// Of several passes, the ray takes the one that is seen most: the last that covers at least half of those before it. `surfaces`
+    /// The ray takes the pass that is seen most: the last that covers at least half of those before it. `surfaces`
     /// returns the first surface on a segment in the frame of a part, and the share of the segment before it; it may be asked once
     /// for each special portal passed and once more. Those passed are written to `passed`, in order. A ray that is not finite
     /// meets nothing.
@@ -111,6 +113,7 @@ impl Space {
         let mut traced = Traced {
             end: TraceEnd::Open,
             frame: ray.frame,
+            since: ray.from,
             at: ray.from,
             map: Similarity::IDENTITY,
             length: 0.0,
@@ -125,9 +128,9 @@ impl Space {
             let crossed = self.first_crossing(traced.frame, traced.at, left, |part, special| {
                 self.shown_pass(part, special).is_some()
             });
-            let begin = traced.at + left * skipped;
+            traced.since = traced.at + left * skipped;
             let met = if skipped < 1.0 {
-                surfaces(traced.frame, begin, traced.at + left)
+                surfaces(traced.frame, traced.since, traced.at + left)
             } else {
                 None
             };
@@ -201,9 +204,8 @@ impl Space {
     /// Returns the pass of a special portal that a ray takes; `None` for one through which it goes on straight.
     fn shown_pass(&self, part: PartId, special: SpecialId) -> Option<usize> {
         let side = &self.parts[part.idx()].world.graph.specials[special.idx()];
-        let most = (side.passes.iter().enumerate())
-            .filter(|(i, pass)| *i == 0 || pass.tint[3] >= 0.5)
-            .last();
+        let most =
+            (side.passes.iter().enumerate()).rfind(|(i, pass)| *i == 0 || pass.tint[3] >= 0.5);
         most.filter(|(_, pass)| pass.way != Way::Through)
             .map(|(i, _)| i)
     }
