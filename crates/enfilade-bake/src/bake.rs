@@ -8,6 +8,7 @@ use enfilade_geom::scene::Scene;
 use crate::bound::keep_costs;
 use crate::budget::n_structural;
 use crate::delaunay::Session;
+use crate::marked::make_marked;
 use crate::realize::realize;
 use crate::structure::Structure;
 use crate::vessel::is_vessel;
@@ -50,6 +51,7 @@ pub fn bake(
         baked.notes.push(note.to_owned());
     }
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
+    make_marked(&mut baked.world, &mut baked.notes, scene);
     Ok(baked)
 }
 
@@ -70,6 +72,7 @@ pub fn bake_session(
     let proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
     let mut baked = realize(structure, method, proposal, config, context)?;
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
+    make_marked(&mut baked.world, &mut baked.notes, scene);
     Ok(baked)
 }
 

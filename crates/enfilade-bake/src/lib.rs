@@ -26,6 +26,7 @@ mod error;
 mod join;
 mod layout;
 pub mod leak;
+mod marked;
 mod method;
 mod output;
 mod proposal;

@@ -20,6 +20,7 @@ use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
+use enfilade::geom::shown;
 use enfilade::world::{Space, WalkMapKey};
 use serde::Serialize;
 
@@ -28,6 +29,7 @@ use crate::inspect::{write_holes, write_seals};
 use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
+use crate::specials::described;
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
@@ -263,6 +265,15 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
         }
     }
     cracks::write_cracks(&mut Warned, baked)?;
+    let graph = &baked.world.graph;
+    for special in graph.special_ids() {
+        let name = shown(&graph.specials[special.idx()].name);
+        writeln!(
+            err,
+            "'{name}' becomes {special}: {}",
+            described(graph, special)
+        )?;
+    }
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
     doorless::write_roomless(&mut Warned, &baked.world.graph)?;
@@ -281,6 +292,7 @@ pub(crate) struct Summary {
     open: usize,
     cracks: usize,
     detail_objects: usize,
+    special_portals: usize,
 }
 
 impl Summary {
@@ -297,6 +309,7 @@ impl Summary {
             open: count(PortalKind::Open),
             cracks: count(PortalKind::Crack),
             detail_objects: world.details.len(),
+            special_portals: graph.specials.len(),
         }
     }
 }
@@ -315,6 +328,14 @@ pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<(
         ("detail objects", summary.detail_objects),
     ] {
         writeln!(out, "{name:<16} {n:>9}")?;
+    }
+    // Few worlds have any.
+    if summary.special_portals > 0 {
+        writeln!(
+            out,
+            "{:<16} {:>9}",
+            "special portals", summary.special_portals
+        )?;
     }
     Ok(())
 }

@@ -28,6 +28,28 @@ pub struct Scene {
     pub fixtures: Vec<Fixture>,
     /// The input's metadata as a whole.
     pub about: About,
+    /// Objects that are to become mirrors or linked portals.
+    pub marks: Vec<Mark>,
+}
+
+/// An object, or one of its parts, that the input marks as a special portal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Index into [`Scene::objects`].
+    pub object: u32,
+    /// Index into [`Mesh::primitives`]; all of them if absent.
+    pub primitive: Option<u32>,
+    /// Kind of the special portal.
+    pub kind: MarkKind,
+}
+
+/// Kind of a [`Mark`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MarkKind {
+    /// A mirror.
+    Mirror,
+    /// One of two portals of this name, each of which leads to the other.
+    Portal(String),
 }
 
 /// Metadata of an input as a whole.

@@ -28,6 +28,7 @@ mod foreign;
 mod gltf;
 mod ifc;
 mod map;
+mod marks;
 mod mesh;
 mod mtl;
 mod obj;
@@ -291,6 +292,9 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     }
     if let Some(wanted) = &options.repair {
         report.repair = Some(repair(&mut scene, wanted)?);
+    }
+    if !options.ignores_marks {
+        scene.marks = marks::of_scene(&scene);
     }
     Ok(Imported { scene, report })
 }

@@ -36,6 +36,9 @@ pub struct ImportOptions {
     pub allow_outside: bool,
     /// Converter for IFC; without one such files are rejected.
     pub ifc: Option<IfcConverter>,
+    /// Leaves objects called `mirror` or `portal:NAME` as they are, so that [`Scene::marks`](enfilade_geom::scene::Scene::marks)
+    /// stays empty.
+    pub ignores_marks: bool,
     /// Repairs of structural triangles; `None` repairs nothing.
     pub repair: Option<RepairOptions>,
 }

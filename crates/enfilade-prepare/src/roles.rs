@@ -319,7 +319,8 @@ fn has_word(list: &[&str], word: &str) -> bool {
 }
 
 /// Returns lower-case words, split at characters other than letters and between a small letter and a capital.
-fn words(name: &str) -> Vec<String> {
+#[must_use]
+pub fn words(name: &str) -> Vec<String> {
     let mut words = Vec::new();
     let mut word = String::new();
     let mut was_lower = false;

@@ -43,7 +43,7 @@ pub use sound::{
     Listener, OCTAVES, Reverb, SPEED_OF_SOUND, TautString, Transmission, at_ears, test_sound,
 };
 pub use space::{
-    Docking, Followed, PartId, Passing, Place, SeenContext, SeenVia, Space, SpaceError, SpaceSeen,
-    SpaceViewer, SpecialImage, SpecialOptions, StoppedSpecial,
+    Docking, Followed, PartId, Passing, Place, SeenContext, SeenVia, SightRay, Space, SpaceError,
+    SpaceSeen, SpaceViewer, SpecialImage, SpecialOptions, StoppedSpecial, TraceEnd, Traced,
 };
 pub use things::{Flood, Moved, Posted, ThingError, ThingId, Things, Tie};

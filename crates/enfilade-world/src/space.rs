@@ -32,6 +32,7 @@ pub use look::{SpaceViewer, SpecialOptions};
 pub use meet::Docking;
 pub use seen::{SeenContext, SpaceSeen};
 pub use sweep::Passing;
+pub use trace::{SightRay, TraceEnd, Traced};
 
 mod changes;
 mod context;
@@ -45,6 +46,7 @@ mod meet;
 mod neighbors;
 mod seen;
 mod sweep;
+mod trace;
 pub(crate) mod walls;
 
 /// Reason why a part cannot be added or moved.

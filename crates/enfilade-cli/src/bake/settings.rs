@@ -32,6 +32,9 @@ pub(crate) struct SceneOptions {
     /// Make small free-standing objects detail if no other rule gives them a role [default: on].
     #[arg(long, value_enum)]
     auto_roles: Option<Switch>,
+    /// Make mirrors and links of flat objects called `mirror` or `portal:NAME` [default: on].
+    #[arg(long, value_enum)]
+    marks: Option<Switch>,
     /// The input's unit: m, cm, mm, in, ft, or a number of meters.
     #[arg(long, visible_alias = "scale", value_name = "UNIT", value_parser = parse_unit)]
     unit: Option<f64>,
@@ -158,6 +161,7 @@ struct ConfigFile {
     up: Option<UpAxis>,
     origin: Option<[f64; 3]>,
     auto_roles: Option<bool>,
+    marks: Option<bool>,
     repair: Option<Weld>,
     repair_holes: Option<Hole>,
     #[serde(default)]
@@ -471,6 +475,9 @@ impl SceneOptions {
                 ..RoleRules::default()
             },
             allow_outside: self.allow_outside,
+            ignores_marks: !(self.marks.map(|s| s == Switch::On))
+                .or(file.marks)
+                .unwrap_or(true),
             ifc: self.ifc_converter(),
             repair: self.repair_with(file),
             ..ImportOptions::default()

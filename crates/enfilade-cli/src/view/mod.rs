@@ -4,6 +4,7 @@ mod map;
 mod mode;
 mod open;
 mod panel;
+mod pointed;
 mod walker;
 
 use std::collections::{BTreeSet, VecDeque};
@@ -31,6 +32,7 @@ use winit::window::{Window, WindowId};
 use self::mode::Mode;
 use self::open::{Open, name_ahead};
 use self::panel::{Panel, Shown};
+use self::pointed::{FAR, Pointed};
 use self::walker::Walker;
 use crate::formats::Format;
 use crate::limits::Limits;
@@ -420,14 +422,14 @@ impl App<'_> {
             toward: (forward + right * x + up * y).to_array(),
             ..camera
         };
-        // The leaf at the pointer, or else the opening.
-        let end = [0, 1, 2].map(|k| ray.eye[k] + ray.toward[k] * CLICK);
-        let hit = self.lines.pick(&open.studio.state, ray.eye, end);
-        let leaf_of = match hit.ok().flatten().map(|h| h.target) {
+        // The leaf at the pointer, or else the opening; in a mirror, what it shows there.
+        let pointed = Pointed::at(&open.lived.space, &self.lines, &ray, CLICK);
+        let leaf_of = match pointed.hit.map(|h| h.target) {
             Some(Target::Detail { detail, .. }) => open.studio.sight.portals_of(detail).next(),
             _ => None,
         };
-        let portal = leaf_of.or_else(|| Some(portal_looked_at(&self.world, &self.lines, &ray)?.0));
+        let opening = || Some(portal_looked_at(&self.world, &self.lines, &pointed.ray)?.0);
+        let portal = leaf_of.or_else(opening);
         match portal {
             Some(portal) => open.toggle(portal),
             None => open.say("no portal there".into()),
@@ -462,7 +464,8 @@ impl App<'_> {
         if let Some(recorded) = &mut open.recorded {
             recorded.push(outside);
         }
-        open.shown.ahead = name_ahead(&self.world, &self.lines, &outside);
+        let pointed = Pointed::at(&open.lived.space, &self.lines, &outside, FAR);
+        open.shown.ahead = name_ahead(&self.world, &self.lines, &pointed.ray);
         open.draw(&self.world, &camera, seconds)
     }
 

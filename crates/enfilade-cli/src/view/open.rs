@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::pointed::FAR;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
@@ -63,7 +64,6 @@ pub(super) struct Open {
 
 /// The name of the cell in the middle of the picture: of the air before the surface there.
 pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> String {
-    const FAR: f32 = 1000.0;
     let [.., forward] = camera.axes();
     let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * FAR);
     let t = lines.first_hit(camera.eye, end).map_or(1.0, |h| h.t as f32);

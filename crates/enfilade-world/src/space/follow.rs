@@ -48,7 +48,12 @@ impl Space {
             is_capped: false,
         };
         let mut left = by;
-        while let Some((t, part, special)) = self.first_passage(step.frame, step.at, left) {
+        let is_way = |part: PartId, special| {
+            let layout = &self.parts[part.idx()].layout;
+            layout.passage(special).is_some()
+        };
+        while let Some((t, part, special)) = self.first_crossing(step.frame, step.at, left, is_way)
+        {
             if step.n_passed == MAX_PASSED {
                 step.is_capped = true;
                 left = DVec3::ZERO;
@@ -70,12 +75,13 @@ impl Space {
         step
     }
 
-    /// Returns the first open special portal that leads somewhere and that a step passes: the share of the step before it.
-    fn first_passage(
+    /// Returns the first open special portal, of those that count, that a step passes: the share of the step before it.
+    pub(super) fn first_crossing(
         &self,
         frame: PartId,
         from: DVec3,
         by: DVec3,
+        counts: impl Fn(PartId, SpecialId) -> bool,
     ) -> Option<(f64, PartId, SpecialId)> {
         let mut first: Option<(f64, PartId, SpecialId)> = None;
         for (id, part) in (0..).map(PartId).zip(&self.parts) {
@@ -90,6 +96,9 @@ impl Space {
                 (map.point(from), map.point(from + by))
             };
             for special in (0..n as u32).map(SpecialId) {
+                if !counts(id, special) {
+                    continue;
+                }
                 let crossed = self.crossing(id, special, [a, b]);
                 if let Some(t) = crossed.filter(|t| first.is_none_or(|f| *t < f.0)) {
                     first = Some((t, id, special));
@@ -102,7 +111,6 @@ impl Space {
     /// Returns the share of a segment, in the frame of a part, before it passes a special portal.
     fn crossing(&self, part: PartId, special: SpecialId, [a, b]: [DVec3; 2]) -> Option<f64> {
         let own = &self.parts[part.idx()];
-        own.layout.passage(special)?;
         let opening = own.layout.special_opening(special);
         let (before, after) = (opening.height_of(a), opening.height_of(b));
         if before > 0.0 || after <= 0.0 {
