@@ -340,7 +340,7 @@ fn thread_seconds() -> f64 {
 }
 
 /// Equal objects, one per room.
-struct Rings {
+pub(crate) struct Rings {
     places: Vec<[f32; 3]>,
     ring: Primitive,
 }
@@ -350,7 +350,7 @@ const RADIUS: f32 = 0.42;
 
 impl Rings {
     /// Makes as many as rooms have space for, so that the world has about `total` triangles.
-    fn of(world: &World, total: u64) -> anyhow::Result<Self> {
+    pub(crate) fn of(world: &World, total: u64) -> anyhow::Result<Self> {
         let sight = Sight::build(world)?;
         let mut places = Vec::new();
         for (i, cell) in (0..).zip(&world.graph.cells) {
@@ -388,7 +388,7 @@ impl Rings {
     }
 
     /// Places them in a world: the one they were made for, or another of the same scene.
-    fn place(&self, world: &mut World) {
+    pub(crate) fn place(&self, world: &mut World) {
         let mesh = world.detail_meshes.len() as u32;
         world.detail_meshes.push(Mesh {
             name: "ring".into(),

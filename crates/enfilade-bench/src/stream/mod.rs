@@ -5,6 +5,7 @@
 mod budget;
 mod cost;
 mod eviction;
+mod first;
 mod pops;
 mod replay;
 mod settled;
@@ -40,6 +41,11 @@ pub(crate) const ROWS: &[Row] = &[
     made("budget", &["random"], budget::budget),
     made("faults", TOWNS, settled::faults_in),
     baked("faults", BUILDINGS, settled::faults),
+    baked(
+        "first picture",
+        &["institute", "clinic"],
+        first::first_picture,
+    ),
     made("cost of a frame: idle", &["offices-10000"], cost::idle),
     made("cost of a frame: moving", &["offices-10000"], cost::moving),
 ];

@@ -21,13 +21,13 @@ const MOST_FRAMES: u32 = 18_000;
 const VIEWS_WITH_FAULTS: usize = 100;
 
 /// A view at rest.
-struct Stand {
-    eye: Eye,
-    in_view: Vec<InView>,
-    visible: Vec<PieceId>,
+pub(super) struct Stand {
+    pub(super) eye: Eye,
+    pub(super) in_view: Vec<InView>,
+    pub(super) visible: Vec<PieceId>,
 }
 
-fn draw_stands(site: &Streamed, n: usize) -> anyhow::Result<Vec<Stand>> {
+pub(super) fn draw_stands(site: &Streamed, n: usize) -> anyhow::Result<Vec<Stand>> {
     let mut rng = Rng::new(5);
     let mut recorder = Recorder::new(site);
     let rooms: Vec<_> = site.world.graph.indoor_cells().collect();
