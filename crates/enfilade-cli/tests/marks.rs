@@ -81,9 +81,9 @@ fn a_bake_makes_mirrors_and_links_and_lists_them() {
     let (done, world, output) = bake(&input, &[]);
     let text = said(&done);
     for line in [
-        "'Mirror_hall' becomes special-0: mirror of a wall in cell-0, at 1.00 1.20 0.00",
-        "'portal:a' becomes special-1: to cell-0, back by special-2 of a wall in cell-0, at 2.50 1.20 0.00",
-        "'portal:a.001' becomes special-2: to cell-0, back by special-1 of a wall",
+        "'Mirror_hall' becomes special-0: mirror of a wall in cell-1, at 1.00 1.20 0.00",
+        "'portal:a' becomes special-1: to cell-1, back by special-2 of a wall in cell-1, at 2.50 1.20 0.00",
+        "'portal:a.001' becomes special-2: to cell-1, back by special-1 of a wall",
     ] {
         assert!(text.contains(line), "{line}: {text}");
     }

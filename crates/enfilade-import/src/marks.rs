@@ -6,7 +6,7 @@
 //! `portal:NAME`, or any other for a plain object.
 
 use enfilade_geom::scene::{Mark, MarkKind, Object, Scene};
-use enfilade_prepare::words;
+use enfilade_prepare::{marked_portal, words};
 use serde_json::Value;
 
 /// Key of the mark in `extras`.
@@ -63,26 +63,18 @@ fn of_extras(extras: &str) -> Option<Option<MarkKind>> {
     if asked.eq_ignore_ascii_case("mirror") {
         return Some(Some(MarkKind::Mirror));
     }
-    Some(portal(asked).map(|name| MarkKind::Portal(name.to_owned())))
+    Some(marked_portal(asked).map(|name| MarkKind::Portal(name.to_owned())))
 }
 
 /// Returns the mark that a name makes.
 fn of_name(name: &str) -> Option<MarkKind> {
-    if let Some(name) = portal(name) {
+    if let Some(name) = marked_portal(name) {
         return Some(MarkKind::Portal(without_number(name).to_owned()));
     }
     let words = words(name);
     let is_mirror =
         words.first().is_some_and(|w| w == "mirror") && words.iter().all(|w| w != "frame");
     is_mirror.then_some(MarkKind::Mirror)
-}
-
-/// Returns NAME of `portal:NAME`.
-fn portal(name: &str) -> Option<&str> {
-    let (kind, name) = name.split_once(':')?;
-    kind.trim()
-        .eq_ignore_ascii_case("portal")
-        .then_some(name.trim())
 }
 
 /// Returns a name without the `.001` that modelers append.

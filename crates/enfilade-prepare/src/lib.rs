@@ -18,4 +18,6 @@ pub use error::BadOption;
 pub use finding::{Example, Finding};
 pub use glob::{Glob, GlobState, is_match};
 pub use repair::{GridSteps, RepairOptions, RepairReport, repair, weld_quantized};
-pub use roles::{RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, words};
+pub use roles::{
+    RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal, words,
+};

@@ -212,6 +212,9 @@ impl RoleRules {
         if let Some(why) = facts.moves {
             return detail(format!("moves: {why}"));
         }
+        if let Some(name) = facts.names.iter().find(|n| marked_portal(n).is_some()) {
+            return detail(format!("name: '{name}'"));
+        }
         for name in facts.names {
             match judge_words(name) {
                 Some((Role::Structural, word)) => return structural(format!("name: '{word}'")),
@@ -226,6 +229,15 @@ impl RoleRules {
         }
         structural(DEFAULT.into())
     }
+}
+
+/// Returns NAME of `portal:NAME`, the name of an end of a link.
+#[must_use]
+pub fn marked_portal(name: &str) -> Option<&str> {
+    let (kind, name) = name.split_once(':')?;
+    kind.trim()
+        .eq_ignore_ascii_case("portal")
+        .then_some(name.trim())
 }
 
 fn judge_ifc(name: &str) -> Option<RoleVerdict> {
@@ -379,6 +391,16 @@ mod tests {
         };
         change(&mut facts);
         rules.judge(&facts)
+    }
+
+    #[test]
+    fn ends_of_links_stand_in_rooms_whatever_they_are_called() {
+        for name in ["portal:a", "Portal: hall wall.001"] {
+            assert_eq!(role(name), Some(Role::Detail), "{name}");
+        }
+        assert_eq!(role("portal"), Some(Role::Structural));
+        assert_eq!(marked_portal("portal: a b"), Some("a b"));
+        assert_eq!(marked_portal("portals:a"), None);
     }
 
     fn role(name: &str) -> Option<Role> {

@@ -531,7 +531,7 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 39);
+        assert_eq!(n, 40);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: ConfigFile = toml::from_str(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));
