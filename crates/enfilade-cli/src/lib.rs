@@ -8,5 +8,6 @@ pub mod cameras;
 pub mod doors;
 pub mod input;
 pub mod memory;
+pub mod streamed;
 pub mod values;
 pub mod world;

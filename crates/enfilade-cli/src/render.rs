@@ -4,213 +4,30 @@ use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
-use clap::ValueEnum;
-use enfilade::cpg::{PortalId, World};
+use enfilade::cpg::World;
 use enfilade::world::PartId;
-use enfilade_render::{
-    AdapterChoice, Camera, Culling, FOV, Mark, MarkShape, Paint, Picture, Sparing, Studio, Style,
-    good_camera, lamp_lights, walk_cameras,
-};
+use enfilade_render::{Camera, Mark, MarkShape, Paint, Picture, Sparing, Studio, Style};
 use serde_json::json;
 
 mod above;
+mod options;
 mod special;
+mod streaming;
+mod whole;
 
 use crate::formats::Format;
-use crate::limits::Limits;
 use crate::living::{Lived, Player, STEP};
 use crate::output::{Outputs, refuse_stream, write_whole};
-use crate::screen::{Warned, print_json};
+use crate::screen::print_json;
 use crate::walk::WorldFile;
 use enfilade_cli::cameras::{path_text, read_path};
-use enfilade_cli::input::name_of;
-use enfilade_cli::values::{door, point, size};
-use enfilade_cli::world::read_world;
 
 pub(crate) use above::above;
+use options::Colors;
+pub(crate) use options::Render;
 use special::Mirrored;
-
-/// Draws a picture of a world, or one for each camera of a path, to PNG files; does not need a display.
-#[derive(clap::Args)]
-pub(crate) struct Render {
-    /// World written by `enfilade bake`; `-` for standard input.
-    world: PathBuf,
-    /// File for the picture, `-` for standard output; for a path, `walk.png` becomes `walk-0001.png` and so on.
-    #[arg(short, long, value_name = "PNG")]
-    output: PathBuf,
-    /// Position of the eye, in meters; a place with much to see if not given.
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "look")]
-    eye: Option<[f32; 3]>,
-    /// The point looked at, in meters; not a direction.
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, requires = "eye")]
-    look: Option<[f32; 3]>,
-    /// Draw a picture for each line of this file: eye and point looked at, `x y z x y z`.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "walk"])]
-    path: Option<PathBuf>,
-    /// Draw this many pictures on a walk through the doorways, 10,000 at most.
-    #[arg(long, value_name = "N", conflicts_with = "eye", value_parser = clap::value_parser!(u32).range(0..=10_000))]
-    walk: Option<u32>,
-    /// Write the cameras of the pictures to this file, for use with --path.
-    #[arg(long, value_name = "FILE")]
-    record: Option<PathBuf>,
-    /// Angle from the lower to the upper edge of the picture, in degrees.
-    #[arg(long, value_name = "DEG", default_value_t = FOV.to_degrees(), value_parser = angle)]
-    fov: f32,
-    /// Width and height of the picture.
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
-    size: [u32; 2],
-    /// Set of things to draw: everything, all in the view, or all visible through portals.
-    #[arg(long, value_enum, default_value_t = RenderMode::Portals)]
-    mode: RenderMode,
-    /// Colors of surfaces: lit materials, one color per cell, or how often pixels are drawn.
-    #[arg(long, value_enum, default_value_t = Colors::Lit)]
-    paint: Colors,
-    /// Outline the portals in view, and the view as each one narrows it.
-    #[arg(long)]
-    portals: bool,
-    /// Show the world from above, with the view and what is culled: dark is out of view, red behind
-    /// walls, orange hidden by a large polygon.
-    #[arg(long)]
-    above: bool,
-    /// Remove everything higher than this, in meters, and light the rest evenly; with --above, 0.5 above the eye by
-    /// default.
-    #[arg(long, value_name = "METERS", allow_hyphen_values = true)]
-    cut: Option<f32>,
-    /// Portals to close, by number: their leaves are shut, and a panel fills those without leaves.
-    #[arg(long, value_name = "ID", value_delimiter = ',')]
-    close: Vec<u32>,
-    /// Lifts, people, lamps and sounds in the world, as `demo --living` writes them; pictures of a path are a 30th of a
-    /// second apart.
-    #[arg(long, value_name = "JSON", conflicts_with_all = ["above", "portals", "close", "door", "stop", "objects", "lod", "mode"])]
-    living: Option<PathBuf>,
-    /// Time of the first picture of --living, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, requires = "living", value_parser = time)]
-    time: f64,
-    /// How far the leaves of a portal are open, from shut (0) to open (1); as in the model if not given.
-    #[arg(long, value_name = "ID=SHARE", value_delimiter = ',', value_parser = door)]
-    door: Vec<(u32, f32)>,
-    /// Do not look through portals that cover fewer pixels: the mean color of the cell behind replaces the view.
-    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
-    stop: f32,
-    /// Leave the portals of --stop empty.
-    #[arg(long, requires = "stop")]
-    stop_at_nothing: bool,
-    /// Do not draw objects in cells that are seen through fewer pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
-    objects: f32,
-    /// Draw objects with fewer triangles if that moves their surface by at most this many pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
-    lod: f32,
-    /// No shadows, no ambient occlusion, no lamps, the same daylight everywhere: faster.
-    #[arg(long)]
-    plain: bool,
-    /// Leave the lamps of the world dark: its point and spot lights.
-    #[arg(long)]
-    no_lamps: bool,
-    /// Share of the daylight that is left, from night (0) to day (1).
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
-    daylight: f32,
-    /// Adapter to draw with: `best`, `gpu`, `software`, or part of a name.
-    #[arg(long, default_value = "best", value_name = "NAME")]
-    adapter: AdapterChoice,
-    /// Print a report on the pictures as JSON for machines; for a path, as a list.
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    limits: Limits,
-}
-
-/// The set of things to draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum RenderMode {
-    Everything,
-    Frustum,
-    Portals,
-}
-
-impl RenderMode {
-    pub(crate) fn culling(self) -> Culling {
-        match self {
-            Self::Everything => Culling::Everything,
-            Self::Frustum => Culling::Frustum,
-            Self::Portals => Culling::Portals,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Colors {
-    Lit,
-    Cells,
-    Overdraw,
-}
-
-fn time(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if (0.0..=3600.0).contains(&x) => Ok(x),
-        _ => Err("a time between 0 and 3600 seconds is needed".into()),
-    }
-}
-
-fn angle(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(x) if (1.0..=165.0).contains(&x) => Ok(x),
-        _ => Err("an angle between 1 and 165 degrees is needed".into()),
-    }
-}
-
-fn share(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
-        _ => Err("a number from 0 to 1 is needed".into()),
-    }
-}
-
-/// Reads a world and loads it on an adapter.
-pub(crate) fn open(path: &Path, adapter: &AdapterChoice) -> anyhow::Result<(World, Studio)> {
-    let world = read_world(path)?;
-    let studio = Studio::new(enfilade_cli::adapter::open(adapter)?, &world)
-        .with_context(|| name_of(path))?;
-    tell_of_pictures(&studio)?;
-    Ok((world, studio))
-}
-
-/// Warns about texture pictures that are not drawn.
-pub(crate) fn tell_of_pictures(studio: &Studio) -> anyhow::Result<()> {
-    for (n, why) in [
-        (studio.world.n_missing_pictures(), "missing or damaged"),
-        (
-            studio.world.n_large_pictures(),
-            "larger than 8192x8192, or in total than 512 MiB and 128 times their files",
-        ),
-    ] {
-        if n > 0 {
-            writeln!(
-                Warned,
-                "enfilade: {n} texture pictures are {why}; drawn without them"
-            )?;
-        }
-    }
-    Ok(())
-}
-
-/// Computes the light of each place; if the adapter cannot hold it, warns, and all places are lit alike.
-pub(crate) fn light(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
-    if let Err(error) = studio.add_light(world) {
-        writeln!(Warned, "enfilade: all rooms are lit alike: {error}")?;
-    }
-    Ok(())
-}
-
-/// Lights the lamps of a world; if the adapter cannot hold their maps, warns, and they stay dark.
-pub(crate) fn light_lamps(studio: &mut Studio, world: &World) -> anyhow::Result<()> {
-    let lamps = lamp_lights(world, PartId::ROOT);
-    if let Err(error) = studio.set_lamps(lamps) {
-        writeln!(Warned, "enfilade: the lamps stay dark: {error}")?;
-    }
-    Ok(())
-}
+use streaming::{Pieces, Setting};
+pub(crate) use whole::{light, light_lamps, tell_of_pictures};
 
 /// Draws a picture at twice the size and halves it: smooth edges.
 pub(crate) fn smooth(
@@ -245,15 +62,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         .as_deref()
         .map(|p| read_path(p, fov))
         .transpose()?;
-    let (world, mut studio) = open(&args.world, &args.adapter)?;
-    set_doors(args, &mut studio)?;
-    let cameras = match given {
-        Some(path) => path,
-        None => cameras(args, &mut studio, &world)?,
-    };
-    if cameras.is_empty() {
-        bail!("{}: no room to walk in", name_of(&args.world));
-    }
+    let Setting {
+        world,
+        mut studio,
+        cameras,
+        mut mirrored,
+        mut pieces,
+    } = Setting::open(args, given)?;
     if is_path {
         let pictures: Vec<_> = (1..=cameras.len())
             .map(|n| numbered(&args.output, n))
@@ -278,7 +93,6 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         None => None,
     };
-    let mut mirrored = Mirrored::new(&world, &args.door, &args.close)?;
     let mut out = outputs.printed();
     let mut all = Vec::new();
     for (i, camera) in cameras.iter().enumerate() {
@@ -286,6 +100,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         if let Some(lived) = &mut lived {
             let seconds = if i == 0 { args.time } else { STEP };
             lived.play(&Player::at(camera.eye), seconds);
+        }
+        if let Some(pieces) = &mut pieces {
+            pieces.settle(&mut studio, i)?;
         }
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
@@ -301,13 +118,15 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             picture.add_overdraw_scale();
         }
         write_whole(&to, &picture.to_png()?)?;
-        let drawn = Drawn::new(args, &mut studio, &world, camera, (to, drawn_size))?;
+        let mut drawn = Drawn::new(args, &mut studio, &world, camera, (to, drawn_size))?;
+        drawn.loaded_bytes = pieces.as_ref().map(|p| p.counts().loaded);
         if args.json {
             all.push(drawn);
         } else {
             writeln!(out, "{drawn}")?;
         }
     }
+    pieces.as_ref().map_or(Ok(()), Pieces::tell_of_pictures)?;
     if let Some(record) = &args.record {
         write_whole(record, path_text(&cameras).as_bytes())?;
     }
@@ -353,27 +172,6 @@ fn draw(
     Ok(studio.picture(camera, culling, style, &marks, size)?)
 }
 
-/// Closes portals and moves leaves.
-fn set_doors(args: &Render, studio: &mut Studio) -> anyhow::Result<()> {
-    let n = studio.sight.n_portals();
-    let asked = args.door.iter().map(|(p, _)| p).chain(&args.close);
-    if let Some(p) = asked.into_iter().find(|p| **p as usize >= n) {
-        bail!("there is no portal {p}; `enfilade inspect` lists them");
-    }
-    for &(p, share) in &args.door {
-        if studio.sight.leaves(PortalId(p)).is_empty() {
-            bail!(
-                "--door: portal {p} has no leaf that moves; `enfilade inspect` lists those with leaves; --close fills any"
-            );
-        }
-        studio.state.set_leaves(PortalId(p), share);
-    }
-    for &p in &args.close {
-        studio.state.close(PortalId(p));
-    }
-    Ok(())
-}
-
 /// The look of pictures.
 fn style_of(args: &Render) -> Style {
     Style {
@@ -388,19 +186,6 @@ fn style_of(args: &Render) -> Style {
         daylight: !args.plain && args.cut.is_none(),
         cut_above: args.cut.unwrap_or(f32::INFINITY),
     }
-}
-
-/// The cameras to draw from, if no path gives them.
-fn cameras(args: &Render, studio: &mut Studio, world: &World) -> anyhow::Result<Vec<Camera>> {
-    let fov_y = args.fov.to_radians();
-    if let Some(n) = args.walk {
-        return Ok(walk_cameras(world, &studio.sight, n as usize, fov_y));
-    }
-    let camera = match args.eye.zip(args.look) {
-        Some((eye, look)) => Camera::looking_at(eye, look),
-        None => good_camera(studio, world)?,
-    };
-    Ok(vec![Camera { fov_y, ..camera }])
 }
 
 fn numbered(path: &Path, n: usize) -> PathBuf {
@@ -422,6 +207,9 @@ struct Drawn {
     of_triangles: u64,
     draws: usize,
     adapter: String,
+    /// Size of the pieces loaded so far and of all, as packed; of packed worlds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loaded_bytes: Option<[u64; 2]>,
 }
 
 impl Drawn {
@@ -447,6 +235,7 @@ impl Drawn {
             of_triangles: studio.world.n_triangles(),
             draws,
             adapter: studio.gpu.name(),
+            loaded_bytes: None,
         })
     }
 }
@@ -465,7 +254,12 @@ impl fmt::Display for Drawn {
             self.of_triangles,
             self.draws,
             self.adapter
-        )
+        )?;
+        if let Some([loaded, all]) = self.loaded_bytes {
+            let [loaded, all] = [loaded, all].map(|n| n as f64 / 1e6);
+            write!(f, ", {loaded:.2} of {all:.2} MB loaded")?;
+        }
+        Ok(())
     }
 }
 

@@ -1,8 +1,13 @@
 //! Pictures of worlds with special portals, such as mirrors.
 
-use enfilade::cpg::{PortalId, World};
+use std::collections::BTreeMap;
+
+use enfilade::cpg::{CellId, PortalId, World};
+use enfilade::runtime::{Sight, View};
 use enfilade::world::{PartId, Space, SpaceViewer};
 use enfilade_render::{Camera, Culling, Mark, Picture, SpaceShot, Studio, Style};
+
+use enfilade_cli::streamed::cells_in_view;
 
 /// A world whose special portals are looked into.
 pub(crate) struct Mirrored {
@@ -11,20 +16,17 @@ pub(crate) struct Mirrored {
 }
 
 impl Mirrored {
-    /// Prepares a world, its leaves and shut portals; `None` if it has no special portals.
-    ///
-    /// # Errors
-    ///
-    /// If it cannot be prepared.
+    /// Prepares a world, its leaves and shut portals; `None` if it has no special portals. `sight` is that of the world.
     pub(crate) fn new(
         world: &World,
+        sight: &Sight,
         leaves: &[(u32, f32)],
         shut: &[u32],
-    ) -> anyhow::Result<Option<Self>> {
+    ) -> Option<Self> {
         if world.graph.specials.is_empty() {
-            return Ok(None);
+            return None;
         }
-        let mut space = Space::new(world.clone())?;
+        let mut space = Space::with_sight(world.clone(), sight.clone());
         for &(portal, share) in leaves {
             space.set_leaves(PartId::ROOT, PortalId(portal), share);
         }
@@ -32,7 +34,18 @@ impl Mirrored {
             space.close(PartId::ROOT, PortalId(portal));
         }
         let viewer = SpaceViewer::new(&space);
-        Ok(Some(Self { space, viewer }))
+        Some(Self { space, viewer })
+    }
+
+    /// Lists the cells in view, those that special portals show included.
+    pub(crate) fn cells(&mut self, view: &View, out: &mut BTreeMap<CellId, f32>) {
+        let seen = self.viewer.see(&self.space, PartId::ROOT, view);
+        let n_cells = self.space.sight(PartId::ROOT).n_cells();
+        for context in seen.contexts() {
+            if let Some(seen) = context.of_part(PartId::ROOT) {
+                cells_in_view(&seen, n_cells, out);
+            }
+        }
     }
 
     /// Draws a picture.
