@@ -105,7 +105,7 @@ fn furnished(world: &World) -> anyhow::Result<World> {
         let mut own = ring.clone();
         let vertices = own.primitives.iter_mut().flat_map(|p| &mut p.positions);
         for x in vertices.flatten() {
-            // By up to a millimeter, so that no two are equal.
+            // No two are equal: vertices are moved by up to a millimeter.
             *x += rng.range(-1e-3, 1e-3) as f32;
         }
         object.mesh = world.detail_meshes.len() as u32;
