@@ -30,7 +30,7 @@ pub(super) struct Context {
     pub(super) via: Option<SeenVia>,
     pub(super) back: Option<(PartId, SpecialId)>,
     /// The opening by which the view comes in: normal, and height of its plane, in `frame`. `None` if it begins at the eye.
-    pub(super) plane: Option<(DVec3, f64)>,
+    pub(super) opening: Option<(DVec3, f64)>,
     /// Where the eye is, if the view begins there.
     pub(super) at: Option<Place>,
     /// The plane beyond which the view begins, relative to the eye in `frame`.
@@ -91,7 +91,7 @@ impl Context {
         let layout = space.layout(part);
         let opening = layout.special_opening(special);
         let near = 4.0 * layout.tolerance();
-        if let Some((normal, height)) = self.plane {
+        if let Some((normal, height)) = self.opening {
             let to_frame = space.between(part, self.frame);
             let mut vertices = opening.pieces().flatten();
             return vertices.all(|p| normal.dot(to_frame.point(*p)) <= height + near);

@@ -177,7 +177,7 @@ impl SpaceViewer {
                 map,
                 via: None,
                 back: None,
-                plane: None,
+                opening: None,
                 at: None,
                 gate: None,
                 share: 1.0,
@@ -193,7 +193,7 @@ impl SpaceViewer {
         context.view = Some(view);
         (context.frame, context.map) = (frame, map);
         (context.via, context.back, context.gate) = (None, None, None);
-        (context.plane, context.at) = (None, None);
+        (context.opening, context.at) = (None, None);
         context.share = 1.0;
         context.is_direct = true;
         context.starts.clear();
@@ -359,14 +359,13 @@ impl SpaceViewer {
                 let to_frame = space.between(part, of_parent.frame).into();
                 let whole = of_parent.map.after(&to_frame).after(&appears);
                 let screen = of_parent.share;
-                let opening = layout.special_opening(special);
-                let normal = map.direction(opening.normal());
-                let plane = (normal, normal.dot(map.point(opening.center())));
+                let polygon = layout.special_opening(special);
+                let normal = map.direction(polygon.normal());
                 let context = self.add_context(part, view, whole);
                 let own = &mut self.contexts[context];
                 (own.via, own.share) = (Some(via), screen);
                 own.back = back.map(|back| (part, back));
-                own.plane = Some(plane);
+                own.opening = Some((normal, normal.dot(map.point(polygon.center()))));
                 own.is_direct = false;
                 own.rectangle = NOTHING;
                 self.apart = apart;
