@@ -56,6 +56,7 @@ impl Walker {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use enfilade::bake::edit::special::{LinkOptions, Spot, link};
     use enfilade::cpg::{DetailObject, PortalId, World};
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
     use enfilade::geom::Aabb;
@@ -181,6 +182,37 @@ mod tests {
             highest = highest.max(walker.eye.y);
         }
         assert!((highest - floor - 0.76).abs() < 0.03, "{}", highest - floor);
+    }
+
+    #[test]
+    fn who_walks_into_a_link_passes_the_panels_that_it_was_made_of() {
+        let mut world = rooms(1);
+        let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
+        let middle = |k: usize| (low[k] + high[k]) * 0.5;
+        // Panels of 1 x 2 m in the wall at larger x and in that at smaller z, a little behind the plane of the link.
+        let (x, z) = (high[0] - 1e-3, low[2] + 1e-3);
+        let [bottom, top] = [low[1], low[1] + 2.0];
+        let [z0, z1] = [middle(2) - 0.5, middle(2) + 0.5];
+        let [x0, x1] = [middle(0) - 0.5, middle(0) + 0.5];
+        let corners = |points: [[f64; 3]; 4]| Spot::Wall(points.map(DVec3::from).to_vec());
+        let from = corners([[x, bottom, z0], [x, bottom, z1], [x, top, z1], [x, top, z0]]);
+        let into = corners([[x0, bottom, z], [x1, bottom, z], [x1, top, z], [x0, top, z]]);
+        add_block(&mut world, [x, bottom, z0], [x + 0.005, top, z1]);
+        add_block(&mut world, [x0, bottom, z - 0.005], [x1, top, z]);
+        let (mut straight, plain) = walker(&world);
+        walk(&mut straight, &plain, DVec3::X * 3.0);
+        assert!(straight.eye.x > x - 1.0, "{}", straight.eye);
+        link(&mut world, &from, &into, &LinkOptions::default()).unwrap();
+        let (mut walker, space) = walker(&world);
+        let start = walker.eye;
+        for _ in 0..100 {
+            walker.step(DVec3::X * 3.0, 0.02, &space);
+            if walker.eye.x < x - 1.0 && (walker.eye - start).length() > 1.0 {
+                break;
+            }
+        }
+        // Out of the other wall, and on along it.
+        assert!(walker.eye.z < middle(2) - 0.5, "{}", walker.eye);
     }
 
     #[test]
