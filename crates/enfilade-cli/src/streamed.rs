@@ -4,6 +4,8 @@
 //! each frame puts some of them there. Pictures settle in all that they show ([`Streamed::settle`]); a window draws what is there.
 
 mod packed;
+#[cfg(test)]
+mod tests;
 mod workshop;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
