@@ -1,5 +1,7 @@
 //! A walk through a packed world that does not fit in memory: what is shown, once it is there, and the memory that it takes.
 
+mod pictured;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,9 +11,10 @@ use enfilade::runtime::SightState;
 use enfilade::stream::{Eye, PackedWorld};
 use enfilade_cli::streamed::{Packed, Streamed, cells_in_view, view_of};
 use enfilade_cpg::World;
-use enfilade_cpg::wire::encode_glb;
+use enfilade_cpg::wire::{decode_glb, encode_glb};
 use enfilade_render::{AdapterChoice, Camera, Culling, FOV, Gpu, Studio, Style, walk_cameras};
 use enfilade_testkit::{GridParams, room_grid, with_doors};
+use pictured::pictured;
 
 const SIZE: [u32; 2] = [96, 64];
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -42,7 +45,9 @@ fn rooms(n: usize) -> World {
         windows: 0.0,
         ..GridParams::offices(n, 4)
     });
-    with_doors(grid, |p| p % 3 == 0)
+    let world = pictured(with_doors(grid, |p| p % 3 == 0));
+    // As it is after a file.
+    decode_glb(&encode_glb(&world).unwrap()).unwrap()
 }
 
 /// A walker with a window's share of memory.
@@ -117,7 +122,8 @@ fn settled_frames_of_a_walk_are_those_of_the_whole_world_and_memory_keeps_to_its
     let path = packed("walk.enf", &world);
     let mut whole = Studio::new(gpu(), &world).unwrap();
     let sizes = whole.sight.skeleton().sizes();
-    let memory = sizes[0] * 40 + sizes[1] * 4;
+    let pictures: usize = world.images.iter().map(|i| 32 * i.bytes.len()).sum();
+    let memory = sizes[0] * 40 + sizes[1] * 4 + pictures as u64;
     let mut walk = Walk::open(&path, memory);
     let cameras = walk_cameras(&world, &whole.sight, 120, FOV);
     let mut n_absent = 0;

@@ -144,6 +144,12 @@ fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
             let world = packed.head.world.clone();
             let space = Space::with_sight(world.clone(), packed.head.sight()?);
             let lived = Lived::in_space(space, LivingFile::default(), Vec::new(), None)?;
+            let name = args.world.display();
+            let memory = args.memory;
+            writeln!(
+                Told,
+                "enfilade: {name} is streamed into {memory} MiB, without daylight and shadows of the sun"
+            )?;
             return Ok((world, lived, Some(packed)));
         };
         let name = args.world.display();

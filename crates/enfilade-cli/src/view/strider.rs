@@ -17,15 +17,23 @@ const LIFT: f64 = 3.0;
 /// Farthest floor that is fallen to. [Units: wu]
 const DEEP: f64 = 100.0;
 
-/// Finds a first camera: in the middle of the largest room that has one, toward its first doorway.
+/// Finds a first camera: in the middle of the largest room that leads to another, or else of the largest, toward its first doorway.
 pub(super) fn start_in(world: &World, sight: &Sight) -> Camera {
     let middle = |aabb: [[f32; 3]; 2]| [0, 1, 2].map(|k| (aabb[0][k] + aabb[1][k]) * 0.5);
     let rooms = world.graph.indoor_cells();
     let rooms = rooms.filter(|(id, cell)| sight.locate(middle(cell.aabb)) == Some(*id));
-    let largest = rooms.max_by(|a, b| a.1.volume.total_cmp(&b.1.volume));
+    let door = |room: CellId| {
+        let mut exits = world.graph.exits(room);
+        exits.find(|e| is_walked(e.portal.kind) && !world.graph[e.to].outdoor)
+    };
+    let largest = rooms.max_by(|(a, x), (b, y)| {
+        let leads = door(*a).is_some().cmp(&door(*b).is_some());
+        leads.then(x.volume.total_cmp(&y.volume))
+    });
     let eye = largest.map_or([0.0; 3], |(_, cell)| middle(cell.aabb));
-    let exit = largest.and_then(|(id, _)| world.graph.exits(id).next());
-    let ahead = exit.map(|e| e.portal.center());
+    let ahead = largest
+        .and_then(|(id, _)| door(id))
+        .map(|e| e.portal.center());
     let toward = ahead.map_or([1.0, 0.0, 0.0], |p| [p[0] - eye[0], 0.0, p[2] - eye[2]]);
     Camera {
         eye,
@@ -87,10 +95,13 @@ fn is_way(at: DVec3, by: DVec3, space: &Space) -> bool {
     let (graph, state) = (&space.world(PartId::ROOT).graph, space.state(PartId::ROOT));
     to == from
         || graph.exits(from).any(|exit| {
-            let is_walked = matches!(exit.portal.kind, PortalKind::Open | PortalKind::Door);
             let is_shut = || state.shut_portals().any(|p| p == exit.id);
-            exit.to == to && is_walked && !is_shut()
+            exit.to == to && is_walked(exit.portal.kind) && !is_shut()
         })
+}
+
+fn is_walked(kind: PortalKind) -> bool {
+    matches!(kind, PortalKind::Open | PortalKind::Door)
 }
 
 #[cfg(test)]
