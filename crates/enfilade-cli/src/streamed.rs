@@ -222,7 +222,10 @@ impl Streamed {
 
     /// Sets the cells in view.
     pub fn look(&mut self, in_view: Vec<InView>) {
-        if self.in_view == in_view {
+        let cells = |view: &[InView]| view.iter().map(|v| v.cell).collect::<Vec<_>>();
+        if cells(&self.in_view) == cells(&in_view) {
+            // Only shares of the screen have changed.
+            self.in_view = in_view;
             return;
         }
         let catalog = self.streamer.catalog();
