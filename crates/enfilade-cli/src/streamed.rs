@@ -3,22 +3,26 @@
 //! [`Streamed::frame`] is the main flow: the [`Streamer`] says what comes and goes, a thread makes pieces ready for the adapter, and
 //! each frame puts some of them there. Pictures settle in all that they show ([`Streamed::settle`]); a window draws what is there.
 
+mod packed;
+#[cfg(test)]
+mod tests;
+mod workshop;
+
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::path::Path;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::fmt;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::cpg::CellId;
-use enfilade::cpg::wire::{PieceContent, read_piece};
-use enfilade::runtime::{Seen, Sight};
+use enfilade::runtime::{Sight, SightState};
 use enfilade::stream::{
-    Changes, Eye, FetchError, Frame, InView, PackedFiles, PackedHead, PackedPlace, PieceId,
-    StreamOptions, Streamer, ThreadSource,
+    Catalog, Changes, Eye, FetchError, Frame, InView, PackedPlace, PieceId, Policy, StreamOptions,
+    Streamer, ThreadSource,
 };
-use enfilade_render::{GpuPiece, PieceMaker, PieceOf, Put, StreamLimits, Studio};
+use enfilade_render::{Gpu, PieceOf, Put, RenderError, Studio};
+
+pub use self::packed::{Packed, cells_in_view, view_of};
+use self::workshop::{ReadyPiece, Workshop};
 
 /// Time without a new piece after which a view counts as out of reach, besides the time that its largest piece may take.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -26,101 +30,13 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const SLOWEST: u64 = 16 << 10;
 /// Time between two looks for what has come.
 const PAUSE: Duration = Duration::from_millis(1);
-/// Most vertices and indices that a byte of a piece decodes to, as [`read_piece`] checks: four times one of a byte.
-const DECODED: u64 = 4;
-
-/// A packed world whose head was read.
-pub struct Packed {
-    /// The head.
-    pub head: Arc<PackedHead>,
-    place: PackedPlace,
-    name: String,
-}
-
-impl Packed {
-    /// Returns `true` for addresses, and for what looks like a packed world on disk.
-    #[must_use]
-    pub fn is_at(path: &Path) -> bool {
-        PackedPlace::is_url(path) || PackedFiles::is_packed(path)
-    }
-
-    /// Reads the head of a packed world.
-    ///
-    /// # Errors
-    ///
-    /// A place without a packed world, damage; the error names it.
-    pub fn open(path: &Path) -> anyhow::Result<Self> {
-        let name = path.display().to_string();
-        let opened = PackedPlace::open(path).with_context(|| format!("cannot read {name}"))?;
-        Ok(Self {
-            head: Arc::new(opened.0),
-            place: opened.1,
-            name,
-        })
-    }
-
-    /// Returns the unpacked size of all pieces that cells need together. [Units: bytes]
-    #[must_use]
-    pub fn size_of(&self, cells: &[InView]) -> u64 {
-        let catalog = &self.head.catalog;
-        let pieces = cells.iter().flat_map(|c| catalog.pieces_of(c.cell));
-        let pieces: BTreeSet<PieceId> = pieces.copied().collect();
-        let sizes = pieces.iter().map(|p| catalog.pieces()[p.idx()].n_resident);
-        sizes.sum()
-    }
-
-    /// Returns limits under which pieces of `n` bytes, unpacked, always find room.
-    #[must_use]
-    pub fn limits_for(&self, n: u64) -> StreamLimits {
-        let [n_corners, n_indices] = self.head.skeleton.sizes();
-        // As much of the whole as these bytes can be of its vertices, of 12 bytes, or of its indices.
-        let most = |whole: u64, size: u64| DECODED as f64 * (n / size) as f64 / whole.max(1) as f64;
-        let share = most(n_corners, 12).max(most(n_indices, 1)).min(1.0);
-        // 40 bytes a vertex, and up to 16 an index.
-        let whole = n_corners as f64 * 40.0 + n_indices as f64 * 16.0;
-        StreamLimits {
-            triangle_bytes: if share < 1.0 {
-                (whole * share).ceil() as u64
-            } else {
-                u64::MAX
-            },
-            picture_bytes: 1 << 40,
-        }
-    }
-}
-
-/// Lists the cells that a query has seen, each with its share of the screen; all cells if the eye is lost, or the query gave up.
-pub fn cells_in_view(seen: &Seen<'_>, n_cells: usize, out: &mut BTreeMap<CellId, f32>) {
-    let counts = seen.counts();
-    if counts.is_eye_lost || counts.is_capped {
-        for cell in (0..n_cells as u32).map(CellId) {
-            out.entry(cell).or_insert(0.0);
-        }
-    }
-    for &cell in seen.cells() {
-        out.entry(cell).or_insert(0.0);
-    }
-    for visit in seen.visits() {
-        let [left, low, right, high] = visit.rectangle;
-        if let Some(share) = out.get_mut(&visit.cell) {
-            *share = (*share + (right - left) * (high - low) * 0.25).clamp(0.0, 1.0);
-        }
-    }
-}
-
-/// Turns listed cells into those of a view.
-#[must_use]
-pub fn view_of(cells: &BTreeMap<CellId, f32>) -> Vec<InView> {
-    let view = cells.iter();
-    view.map(|(&cell, &share)| InView { cell, share }).collect()
-}
 
 /// Numbers for people.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StreamedCounts {
     /// Pieces on the adapter, and all pieces.
     pub n_there: [usize; 2],
-    /// Unpacked size of pieces in memory or on their way, and the most it may be. [Units: bytes]
+    /// Size of pieces in memory or on their way, and the most it may be; on the adapter, in walks, and otherwise unpacked. [Units: bytes]
     pub kept: [u64; 2],
     /// Size as packed of what has come since the start, and of all pieces. [Units: bytes]
     pub loaded: [u64; 2],
@@ -130,14 +46,34 @@ pub struct StreamedCounts {
     pub bytes_in_flight: u64,
     /// Pieces of the view.
     pub n_wanted: usize,
-    /// Their unpacked size. [Units: bytes]
+    /// Their size, as of those kept. [Units: bytes]
     pub bytes_wanted: u64,
-    /// Pieces of the view that are not there yet, and fit.
+    /// Pieces of the view that are not there.
     pub n_late: usize,
-    /// Their unpacked size. [Units: bytes]
+    /// Their size, as of those kept. [Units: bytes]
     pub bytes_late: u64,
     /// Pictures that came damaged or too large, and are drawn as a color.
     pub n_bare_pictures: usize,
+}
+
+impl fmt::Display for StreamedCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mib = |n: u64| n as f64 / f64::from(1 << 20);
+        let [there, all] = self.n_there;
+        write!(
+            f,
+            "{there} of {all} pieces resident, {:.1} of {:.0} MiB\n\
+             wanted {} ({:.1} MiB), in flight {} ({:.1} MiB), late {} ({:.1} MiB)",
+            mib(self.kept[0]),
+            mib(self.kept[1]),
+            self.n_wanted,
+            mib(self.bytes_wanted),
+            self.n_in_flight,
+            mib(self.bytes_in_flight),
+            self.n_late,
+            mib(self.bytes_late)
+        )
+    }
 }
 
 /// A piece that was handed over.
@@ -156,12 +92,21 @@ pub struct Streamed {
     source: ThreadSource,
     changes: Changes,
     in_view: Vec<InView>,
+    /// Pieces of the cells in view.
+    wanted: BTreeSet<PieceId>,
     workshop: Workshop,
     held: BTreeMap<PieceId, Held>,
-    /// ReadyPiece ready, not on the adapter.
+    /// Made ready, not on the adapter.
     ready: VecDeque<ReadyPiece>,
+    /// Made ready, and without room on the adapter.
+    waiting: Vec<ReadyPiece>,
+    /// `true` if waiting pieces may find room, or are needed more than before.
+    may_fit: bool,
     /// Handed over, and neither ready nor given up.
     n_making: usize,
+    /// Memory of pieces handed over that are not on the adapter, and the most before others are taken. [Units: bytes]
+    backlog: u64,
+    max_backlog: u64,
     failures: BTreeMap<PieceId, FetchError>,
     /// Pieces that arrived whole and cannot be drawn.
     broken: BTreeMap<PieceId, String>,
@@ -169,66 +114,164 @@ pub struct Streamed {
     n_arrivals: u64,
     n_there: usize,
     bytes_loaded: u64,
+    bytes_packed: u64,
     n_bare_pictures: usize,
 }
 
 impl Streamed {
-    /// Starts to stream a world into a studio made for it by [`Studio::hollow`].
+    /// Makes a studio for pictures of given views, and streams into it: there is room for the largest of them.
     ///
     /// # Errors
     ///
-    /// A studio of a whole world.
-    pub fn new(packed: Packed, studio: &Studio, options: StreamOptions) -> anyhow::Result<Self> {
+    /// A view larger than the adapter's buffers.
+    pub fn for_views(
+        packed: Packed,
+        gpu: Gpu,
+        (sight, state): (Sight, SightState),
+        views: &[Vec<InView>],
+    ) -> anyhow::Result<(Studio, Self)> {
+        let largest = views.iter().map(|v| packed.size_of(v)).max().unwrap_or(0);
+        let limits = packed.limits_for(largest);
+        let format = wgpu::TextureFormat::Rgba8UnormSrgb;
+        let mut studio = Studio::hollow(gpu, &packed.head.world, sight, &limits, format)?;
+        studio.state = state;
+        let options = StreamOptions {
+            policy: Policy::Cache,
+            max_resident: largest,
+            max_bytes_a_frame: u64::MAX,
+            ..StreamOptions::default()
+        };
+        let catalog = packed.head.catalog.clone();
+        let streamed = Self::new(packed, catalog, &studio, (options, u64::MAX))?;
+        Ok((studio, streamed))
+    }
+
+    /// Makes a studio for a walk, and streams into it: pieces take at most `memory`, a half of it for triangles, an eighth for
+    /// those on their way to the adapter. [Units: bytes]
+    ///
+    /// # Errors
+    ///
+    /// Memory beyond the adapter's buffers.
+    pub fn for_walk(
+        packed: Packed,
+        gpu: Gpu,
+        sight: Sight,
+        memory: u64,
+        format: wgpu::TextureFormat,
+    ) -> anyhow::Result<(Studio, Self)> {
+        let (limits, transit) = packed.limits_within(memory);
+        let studio = Studio::hollow(gpu, &packed.head.world, sight, &limits, format)?;
+        let options = StreamOptions {
+            policy: Policy::default(),
+            max_resident: limits.triangle_bytes + limits.picture_bytes,
+            ..StreamOptions::default()
+        };
+        let catalog = packed.on_adapter();
+        let streamed = Self::new(packed, catalog, &studio, (options, transit))?;
+        Ok((studio, streamed))
+    }
+
+    fn new(
+        packed: Packed,
+        catalog: Catalog,
+        studio: &Studio,
+        (options, max_backlog): (StreamOptions, u64),
+    ) -> anyhow::Result<Self> {
         let maker = studio.world.piece_maker();
         let maker = maker.context("a packed world is streamed into a hollow one")?;
         let head = &packed.head;
+        let bytes_packed = catalog.pieces().iter().map(|p| p.n_packed).sum();
         let pvs = head.world.pvs.clone();
-        let streamer = Streamer::new(head.catalog.clone(), &head.world.graph, pvs, options);
         Ok(Self {
             source: packed.place.source(head),
-            streamer,
+            streamer: Streamer::new(catalog, &head.world.graph, pvs, options),
             changes: Changes::default(),
             in_view: Vec::new(),
+            wanted: BTreeSet::new(),
             workshop: Workshop::open(maker, studio.sight.clone()),
             held: BTreeMap::new(),
             ready: VecDeque::new(),
+            waiting: Vec::new(),
+            may_fit: false,
             n_making: 0,
+            backlog: 0,
+            max_backlog,
             failures: BTreeMap::new(),
             broken: BTreeMap::new(),
             start: Instant::now(),
             n_arrivals: 0,
             n_there: 0,
             bytes_loaded: 0,
+            bytes_packed,
             n_bare_pictures: 0,
             packed,
         })
     }
 
+    /// Returns the packed world.
+    #[must_use]
+    pub fn packed(&self) -> &Packed {
+        &self.packed
+    }
+
+    /// Returns the cells in view.
+    #[must_use]
+    pub fn in_view(&self) -> &[InView] {
+        &self.in_view
+    }
+
     /// Sets the cells in view.
     pub fn look(&mut self, in_view: Vec<InView>) {
+        let cells = |view: &[InView]| view.iter().map(|v| v.cell).collect::<Vec<_>>();
+        if cells(&self.in_view) == cells(&in_view) {
+            // Only shares of the screen have changed.
+            self.in_view = in_view;
+            return;
+        }
+        let catalog = self.streamer.catalog();
+        let pieces = in_view.iter().flat_map(|v| catalog.pieces_of(v.cell));
+        self.wanted = pieces.copied().collect();
         self.in_view = in_view;
+        self.may_fit = true;
     }
 
     /// Runs a frame: frees what has to go, asks for what comes next, and puts what is ready on the adapter, for as long as `slice`,
-    /// but one piece at least.
-    ///
-    /// # Errors
-    ///
-    /// An adapter without room for a piece.
-    pub fn frame(&mut self, studio: &mut Studio, eye: Eye, slice: Duration) -> anyhow::Result<()> {
-        let frame = Frame {
-            now: self.start.elapsed(),
-            eye,
-            in_view: &self.in_view,
-        };
-        (self.streamer).update(&mut self.source, &frame, &mut self.changes);
-        for piece in &self.changes.removed {
-            if let Some(held) = self.held.remove(piece) {
-                self.n_there -= usize::from(held.is_there);
-                for of in held.parts {
-                    studio.take(of);
-                }
+    /// but one piece at least. Pieces in view that find no room there take that of others.
+    pub fn frame(&mut self, studio: &mut Studio, eye: Eye, slice: Duration) {
+        // Otherwise what has come would pile up.
+        if self.backlog <= self.max_backlog {
+            let frame = Frame {
+                now: self.start.elapsed(),
+                eye,
+                in_view: &self.in_view,
+            };
+            (self.streamer).update(&mut self.source, &frame, &mut self.changes);
+            self.follow(studio);
+        }
+        for made in self.workshop.made.try_iter() {
+            self.n_making -= 1;
+            self.ready.push_back(made);
+        }
+        if std::mem::take(&mut self.may_fit) {
+            for made in self.waiting.drain(..) {
+                self.backlog += size(&self.streamer, made.piece);
+                self.ready.push_back(made);
             }
+        }
+        let begin = Instant::now();
+        while let Some(made) = self.ready.pop_front() {
+            self.backlog -= size(&self.streamer, made.piece);
+            self.put(studio, made);
+            if begin.elapsed() >= slice {
+                break;
+            }
+        }
+    }
+
+    /// Frees what the streamer frees, and takes what it hands over.
+    fn follow(&mut self, studio: &mut Studio) {
+        for piece in std::mem::take(&mut self.changes.removed) {
+            self.free(studio, piece);
         }
         for failed in self.changes.failed.drain(..) {
             self.failures.insert(failed.piece, failed.error);
@@ -239,6 +282,7 @@ impl Streamed {
             self.n_arrivals += 1;
             let sizes = self.streamer.catalog().pieces();
             self.bytes_loaded += sizes[piece.idx()].n_packed;
+            self.backlog += sizes[piece.idx()].n_resident;
             let arrival = self.n_arrivals;
             let held = Held {
                 arrival,
@@ -249,53 +293,95 @@ impl Streamed {
             self.n_making += 1;
             self.workshop.make(piece, arrival, loaded.bytes);
         }
-        for made in self.workshop.made.try_iter() {
-            self.n_making -= 1;
-            self.ready.push_back(made);
-        }
-        self.integrate(studio, slice)
     }
 
-    /// Puts what is ready on the adapter.
-    fn integrate(&mut self, studio: &mut Studio, slice: Duration) -> anyhow::Result<()> {
-        let begin = Instant::now();
-        while let Some(made) = self.ready.pop_front() {
-            let held = self.held.get_mut(&made.piece);
-            let Some(held) = held.filter(|h| h.arrival == made.arrival) else {
-                continue;
-            };
-            let pieces = match made.pieces {
-                Ok(pieces) => pieces,
+    fn free(&mut self, studio: &mut Studio, piece: PieceId) {
+        let Some(held) = self.held.remove(&piece) else {
+            return;
+        };
+        self.n_there -= usize::from(held.is_there);
+        for of in held.parts {
+            studio.take(of);
+        }
+        self.waiting.retain(|made| made.piece != piece);
+        self.may_fit = true;
+    }
+
+    /// Puts a piece on the adapter, or lets it wait.
+    fn put(&mut self, studio: &mut Studio, made: ReadyPiece) {
+        let ReadyPiece { piece, arrival, .. } = made;
+        let is_current = |s: &Self| s.held.get(&piece).is_some_and(|h| h.arrival == arrival);
+        while is_current(self) {
+            let put = match &made.pieces {
+                Ok(pieces) => pieces.iter().try_fold(Put::Done, |so_far, piece| {
+                    Ok(match so_far {
+                        Put::Done => studio.put(piece)?,
+                        Put::Full => Put::Full,
+                    })
+                }),
                 Err(why) => {
-                    self.broken.insert(made.piece, why);
-                    continue;
+                    self.broken.insert(piece, why.clone());
+                    return;
                 }
             };
-            for piece in &pieces {
-                if studio.put(piece)? == Put::Full {
-                    bail!(
-                        "{}: the adapter has no room for piece {}; allow more memory",
-                        self.packed.name,
-                        made.piece.0
-                    );
+            let parts = made.pieces.iter().flatten();
+            if let Ok(Put::Done) = put {
+                let pictures = parts
+                    .clone()
+                    .filter(|p| matches!(p.of(), PieceOf::Image(_)));
+                self.n_bare_pictures += pictures.filter(|p| p.n_bytes() == 0).count();
+                if let Some(held) = self.held.get_mut(&piece) {
+                    held.parts = parts.map(enfilade_render::GpuPiece::of).collect();
+                    held.is_there = true;
                 }
-                let is_picture = matches!(piece.of(), PieceOf::Image(_));
-                self.n_bare_pictures += usize::from(is_picture && piece.n_bytes() == 0);
-                held.parts.push(piece.of());
+                self.n_there += 1;
+                return;
             }
-            held.is_there = true;
-            self.n_there += 1;
-            if begin.elapsed() >= slice {
-                break;
+            for part in parts {
+                studio.take(part.of());
+            }
+            match put {
+                Err(why) => {
+                    let why: RenderError = why;
+                    self.broken.insert(piece, why.to_string());
+                    return;
+                }
+                Ok(_) if self.wanted.contains(&piece) && self.make_room(studio) => {}
+                Ok(_) => {
+                    self.waiting.push(made);
+                    return;
+                }
             }
         }
-        Ok(())
+    }
+
+    /// Frees the piece out of view that came first; returns `false` if there is none.
+    fn make_room(&mut self, studio: &mut Studio) -> bool {
+        let others = self
+            .held
+            .iter()
+            .filter(|(p, h)| h.is_there && !self.wanted.contains(p));
+        let Some((&oldest, _)) = others.min_by_key(|(_, h)| h.arrival) else {
+            return false;
+        };
+        self.free(studio, oldest);
+        self.streamer.forget(oldest);
+        true
     }
 
     /// Returns `true` if all that is in view and fits is on the adapter.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.streamer.view_settled() && self.n_making == 0 && self.ready.is_empty()
+    }
+
+    /// Returns the last problem with a piece in view, for people.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let wanted = || self.wanted.iter();
+        let failed = wanted().find_map(|p| self.failures.get(p));
+        let broken = || wanted().find_map(|p| self.broken.get(p)).cloned();
+        failed.map(ToString::to_string).or_else(broken)
     }
 
     /// Waits until all pieces in view are on the adapter.
@@ -307,12 +393,19 @@ impl Streamed {
     pub fn settle(&mut self, studio: &mut Studio, eye: Eye) -> anyhow::Result<()> {
         let mut last = (Instant::now(), self.n_arrivals);
         loop {
-            self.frame(studio, eye, Duration::MAX)?;
+            self.frame(studio, eye, Duration::MAX);
             if let Some((piece, why)) = self.broken.first_key_value() {
                 bail!(
                     "{}: piece {} cannot be drawn: {why}; pack the world again",
                     self.packed.name,
                     piece.0
+                );
+            }
+            if let Some(made) = self.waiting.iter().find(|m| self.wanted.contains(&m.piece)) {
+                bail!(
+                    "{}: the adapter has no room for piece {}; choose another with --adapter, or a smaller view",
+                    self.packed.name,
+                    made.piece.0
                 );
             }
             let absent = self.absent();
@@ -338,12 +431,8 @@ impl Streamed {
 
     /// Returns the pieces in view that did not arrive.
     fn absent(&self) -> BTreeSet<PieceId> {
-        let catalog = self.streamer.catalog();
-        let pieces = self
-            .in_view
-            .iter()
-            .flat_map(|v| catalog.pieces_of(v.cell).iter().copied());
-        pieces.filter(|p| !self.held.contains_key(p)).collect()
+        let absent = self.wanted.iter().filter(|p| !self.held.contains_key(p));
+        absent.copied().collect()
     }
 
     /// The error of a view that lacks pieces.
@@ -372,23 +461,17 @@ impl Streamed {
     #[must_use]
     pub fn counts(&self) -> StreamedCounts {
         let counts = self.streamer.counts();
-        let catalog = self.streamer.catalog();
-        let sizes = catalog.pieces();
-        let in_view = self.in_view.iter();
-        let wanted: BTreeSet<PieceId> = in_view
-            .flat_map(|v| catalog.pieces_of(v.cell).iter().copied())
-            .collect();
-        let bytes = |p: &PieceId| sizes[p.idx()].n_resident;
         let is_late = |p: &&PieceId| !self.held.get(p).is_some_and(|h| h.is_there);
-        let late = || wanted.iter().filter(is_late);
+        let late = || self.wanted.iter().filter(is_late);
+        let bytes = |p: &PieceId| size(&self.streamer, *p);
         StreamedCounts {
-            n_there: [self.n_there, sizes.len()],
+            n_there: [self.n_there, self.streamer.catalog().pieces().len()],
             kept: [counts.n_kept, counts.max_kept],
-            loaded: [self.bytes_loaded, sizes.iter().map(|p| p.n_packed).sum()],
+            loaded: [self.bytes_loaded, self.bytes_packed],
             n_in_flight: counts.n_in_flight,
             bytes_in_flight: counts.bytes_in_flight,
-            n_wanted: wanted.len(),
-            bytes_wanted: wanted.iter().map(bytes).sum(),
+            n_wanted: self.wanted.len(),
+            bytes_wanted: self.wanted.iter().map(bytes).sum(),
             n_late: late().count(),
             bytes_late: late().map(bytes).sum(),
             n_bare_pictures: self.n_bare_pictures,
@@ -396,55 +479,6 @@ impl Streamed {
     }
 }
 
-/// A piece made ready, or the reason why it cannot be.
-struct ReadyPiece {
-    piece: PieceId,
-    arrival: u64,
-    pieces: Result<Vec<GpuPiece>, String>,
-}
-
-/// A thread that makes pieces ready. It ends when this is dropped, after the piece at hand.
-struct Workshop {
-    orders: Sender<(PieceId, u64, Vec<u8>)>,
-    made: Receiver<ReadyPiece>,
-}
-
-impl Workshop {
-    fn open(maker: PieceMaker, sight: Sight) -> Self {
-        let (orders, ordered) = channel::<(PieceId, u64, Vec<u8>)>();
-        let (out, made) = channel();
-        thread::spawn(move || {
-            for (piece, arrival, bytes) in ordered {
-                let pieces = make(&maker, &sight, &bytes);
-                let made = ReadyPiece {
-                    piece,
-                    arrival,
-                    pieces,
-                };
-                if out.send(made).is_err() {
-                    break;
-                }
-            }
-        });
-        Self { orders, made }
-    }
-
-    fn make(&self, piece: PieceId, arrival: u64, bytes: Vec<u8>) {
-        // The thread is there as long as the receiver of what it makes.
-        let _ = self.orders.send((piece, arrival, bytes));
-    }
-}
-
-/// Makes the bytes of a piece ready for the adapter.
-fn make(maker: &PieceMaker, sight: &Sight, bytes: &[u8]) -> Result<Vec<GpuPiece>, String> {
-    let pieces = match read_piece(bytes).map_err(|why| why.to_string())? {
-        PieceContent::Batches(batches) => (batches.iter())
-            .map(|(batch, primitive)| maker.batch(sight, *batch, primitive))
-            .collect(),
-        PieceContent::Mesh { mesh, primitives } => {
-            maker.mesh(mesh, &primitives).map(|made| vec![made])
-        }
-        PieceContent::Image { image, bytes } => maker.image(image, &bytes).map(|made| vec![made]),
-    };
-    pieces.map_err(|why: enfilade_render::RenderError| why.to_string())
+fn size(streamer: &Streamer, piece: PieceId) -> u64 {
+    streamer.catalog().pieces()[piece.idx()].n_resident
 }

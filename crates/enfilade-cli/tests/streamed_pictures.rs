@@ -1,5 +1,7 @@
 //! Pictures of packed worlds, of which only what is in view is loaded: those of the whole world, byte for byte.
 
+mod pictured;
+
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -7,6 +9,7 @@ use std::process::{Child, Command, Output, Stdio};
 
 use enfilade_cpg::World;
 use enfilade_testkit::{GridParams, room_grid, with_doors, with_specials};
+use pictured::pictured;
 
 fn folder(name: &str, world: &World) -> PathBuf {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("streamed-{name}"));
@@ -90,6 +93,7 @@ fn pictures_from_pieces_are_those_of_the_whole_world() {
     for (name, world) in [
         ("doors", with_doors(grid(40, 3), |p| p % 2 == 0)),
         ("mirrors", with_specials(grid(30, 9), 3, 4)),
+        ("pictures", pictured(grid(30, 5))),
     ] {
         let dir = folder(name, &world);
         for options in ["--plain", "--plain --stop 40 --portals --close 1,3"] {

@@ -9,6 +9,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use enfilade::stream::PackedWorld;
 use enfilade_cpg::World;
 use enfilade_cpg::wire::encode_glb;
 use enfilade_testkit::{GridParams, room_grid};
@@ -76,16 +77,9 @@ struct Viewer {
 }
 
 impl Viewer {
-    fn open(display: &Display, dir: &Path, args: &[&str]) -> Self {
+    fn open(display: &Display, dir: &Path, world: &str, args: &[&str]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_enfilade"))
-            .args([
-                "view",
-                "world.glb",
-                "--size",
-                "320x240",
-                "--adapter",
-                "software",
-            ])
+            .args(["view", world, "--size", "320x240", "--adapter", "software"])
             .args(args)
             .current_dir(dir)
             .env("DISPLAY", &display.name)
@@ -203,7 +197,7 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     fs::create_dir_all(dir.join("walk.txt")).unwrap();
     let display = Display::open();
     let args = ["--eye", &eye, "--record", "walk.txt", "--free-mouse"];
-    let mut viewer = Viewer::open(&display, &dir, &args);
+    let mut viewer = Viewer::open(&display, &dir, "world.glb", &args);
     let window = ["search", "--onlyvisible", "--name", "enfilade"];
     let end = Instant::now() + PATIENCE;
     while !display.tool(&window) {
@@ -285,8 +279,27 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     assert_eq!(viewer.ends().code(), Some(0));
 
     // Repeats the walk, and closes at its end by itself.
-    let again = Viewer::open(&display, &dir, &["--path", "walk.txt"]);
+    let again = Viewer::open(&display, &dir, "world.glb", &["--path", "walk.txt"]);
     assert_eq!(again.ends().code(), Some(0));
+
+    // The same from pieces, and by foot.
+    let packed = PackedWorld::pack(&encode_glb(&world).unwrap()).unwrap();
+    fs::write(dir.join("world.enf"), packed.one_file().unwrap()).unwrap();
+    let args = ["--path", "walk.txt", "--memory", "64"];
+    let again = Viewer::open(&display, &dir, "world.enf", &args);
+    assert_eq!(again.ends().code(), Some(0));
+    let viewer = Viewer::open(&display, &dir, "world.enf", &["--eye", &eye]);
+    viewer.wait_to_hear("the mouse is captured");
+    assert!(display.tool(&[&window[..], &["windowfocus"]].concat()));
+    key("F12");
+    viewer.wait_to_hear("wrote shot-");
+    assert!(
+        fs::read(dir.join("shot-1.png"))
+            .unwrap()
+            .starts_with(b"\x89PNG")
+    );
+    key("Escape");
+    assert_eq!(viewer.ends().code(), Some(0));
 }
 
 #[test]

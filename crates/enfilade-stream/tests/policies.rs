@@ -501,3 +501,31 @@ fn a_cut_link_is_told_and_all_comes_once_it_is_mended() {
     };
     assert_eq!(resident_after(true), resident_after(false));
 }
+
+#[test]
+fn a_forgotten_piece_gives_its_memory_back_and_comes_again() {
+    let (world, mut program) = row_program(6, options(Policy::Cache, 6), LinkOptions::default());
+    for cell in [0, 3] {
+        program.look(&world, cell, &[(cell, 1.0)]);
+        program.settle_view();
+    }
+    let streamer = &mut program.streamer;
+    let before = streamer.counts().n_kept;
+    // Those that are not in memory are none to forget.
+    for piece in [0, 0, 5, 77].map(PieceId) {
+        streamer.forget(piece);
+        program.source.resident.remove(&piece);
+    }
+    assert_eq!(streamer.counts().n_kept, before - SIZE);
+    assert!(!streamer.is_resident(PieceId(0)) && streamer.is_resident(PieceId(3)));
+    program.look(&world, 0, &[(0, 1.0)]);
+    program.settle_view();
+    assert!(program.has_cell(0));
+    assert_eq!(log(&program), [0, 3, 0]);
+    // Even in view.
+    program.streamer.forget(PieceId(0));
+    program.source.resident.clear();
+    program.source.resident.insert(PieceId(3));
+    program.settle_view();
+    assert_eq!(log(&program), [0, 3, 0, 0]);
+}

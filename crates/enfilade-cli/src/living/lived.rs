@@ -117,7 +117,20 @@ impl Lived {
         lift_worlds: Vec<World>,
         world_file: Option<WorldFile<'_>>,
     ) -> anyhow::Result<Self> {
-        let mut space = Space::new(world)?;
+        Self::in_space(Space::new(world)?, file, lift_worlds, world_file)
+    }
+
+    /// As [`Lived::new`], given the space of the world.
+    ///
+    /// # Errors
+    ///
+    /// As [`Lived::new`].
+    pub(crate) fn in_space(
+        mut space: Space,
+        file: LivingFile,
+        lift_worlds: Vec<World>,
+        world_file: Option<WorldFile<'_>>,
+    ) -> anyhow::Result<Self> {
         let mut lifts = Vec::new();
         for (entry, world) in file.lifts.iter().zip(lift_worlds) {
             let at = Pose::from_translation(DVec3::from_array(entry.stops[0]));

@@ -6,7 +6,7 @@ use std::io::Write;
 use anyhow::bail;
 use enfilade::cpg::{PortalId, World};
 use enfilade::runtime::{Sight, SightState, Viewer};
-use enfilade::stream::{Eye, InView, Policy, StreamOptions};
+use enfilade::stream::{Eye, InView};
 use enfilade_render::{Camera, Studio, good_camera, walk_cameras};
 
 use super::options::{Colors, Render, RenderMode};
@@ -88,19 +88,8 @@ impl Setting {
             }
             views.push(view_of(&cells));
         }
-        let largest = views.iter().map(|v| packed.size_of(v)).max().unwrap_or(0);
         let gpu = adapter::open(&args.adapter)?;
-        let limits = packed.limits_for(largest);
-        let format = wgpu::TextureFormat::Rgba8UnormSrgb;
-        let mut studio = Studio::hollow(gpu, &world, sight, &limits, format)?;
-        studio.state = state;
-        let options = StreamOptions {
-            policy: Policy::Cache,
-            max_resident: largest,
-            max_bytes_a_frame: u64::MAX,
-            ..StreamOptions::default()
-        };
-        let streamed = Streamed::new(packed, &studio, options)?;
+        let (studio, streamed) = Streamed::for_views(packed, gpu, (sight, state), &views)?;
         Ok(Self {
             world,
             studio,

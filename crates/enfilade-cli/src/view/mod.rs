@@ -5,9 +5,11 @@ mod mode;
 mod open;
 mod panel;
 mod pointed;
+mod strider;
 mod walker;
 
 use std::collections::{BTreeSet, VecDeque};
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,7 +18,7 @@ use anyhow::{Context, anyhow};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sightlines, Target};
-use enfilade::world::PartId;
+use enfilade::world::{PartId, Space};
 use enfilade_render::{
     AdapterChoice, Camera, FOV, Paint, Sparing, Studio, good_camera, portal_looked_at,
 };
@@ -30,24 +32,28 @@ use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
 
 use self::mode::Mode;
-use self::open::{Open, name_ahead};
+use self::open::{Open, name_ahead, name_here};
 use self::panel::{Panel, Shown};
 use self::pointed::{FAR, Pointed};
+use self::strider::start_in;
 use self::walker::Walker;
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::living::{Lived, LivingFile, STEP};
 use crate::output::{Outputs, refuse_stream, write_whole};
+use crate::screen::Told;
 use crate::walk::WorldFile;
 use enfilade_cli::adapter;
 use enfilade_cli::cameras::{path_text, read_path};
+use enfilade_cli::streamed::{Packed, Streamed};
 use enfilade_cli::values::{point, size};
 use enfilade_cli::world::read_world_hashed;
 
 /// Opens a window to walk through a world: W A S D and the mouse; F1 in the window lists all keys.
 #[derive(clap::Args)]
 pub(crate) struct View {
-    /// World written by `enfilade bake`.
+    /// World written by `enfilade bake`, or packed, on disk or at an address. Of a packed one, pieces are loaded as they come into
+    /// view, or are about to, unless --living or --lod is given.
     world: PathBuf,
     /// Lifts that one rides, people, lamps and sounds in it, as `demo --living` writes them.
     #[arg(long, value_name = "JSON")]
@@ -82,6 +88,9 @@ pub(crate) struct View {
     /// Adapter to draw with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
+    /// Most memory of the pieces of a packed world, in MiB.
+    #[arg(long, value_name = "MIB", default_value_t = 1024, value_parser = clap::value_parser!(u64).range(8..=1 << 20))]
+    memory: u64,
     #[command(flatten)]
     limits: Limits,
 }
@@ -103,15 +112,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         .as_deref()
         .map(|p| read_path(p, FOV))
         .transpose()?;
-    let (world, hash) = read_world_hashed(&args.world)?;
-    let file = WorldFile {
-        path: &args.world,
-        hash,
-    };
-    let lived = match &args.living {
-        Some(path) => Lived::read(path, &world, Some(file))?,
-        None => Lived::new(world.clone(), LivingFile::default(), Vec::new(), None)?,
-    };
+    let (world, lived, packed) = read(args)?;
     let events = EventLoop::new()
         .context("no window can be opened here; `enfilade render` draws without one")?;
     events.set_control_flow(ControlFlow::Poll);
@@ -119,6 +120,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         args,
         lines: Sightlines::build(&world),
         world,
+        packed,
         path: path.map(Into::into),
         lived: Some(lived),
         outputs,
@@ -132,12 +134,52 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     }
 }
 
+/// Reads the world, and what lives in it; of a packed one only the head, if that is enough.
+fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
+    if Packed::is_at(&args.world) {
+        let needs_whole = [
+            (args.living.is_some(), "--living"),
+            (args.lod > 0.0, "--lod"),
+        ];
+        let Some((_, option)) = needs_whole.into_iter().find(|n| n.0) else {
+            let packed = Packed::open(&args.world)?;
+            let world = packed.head.world.clone();
+            let space = Space::with_sight(world.clone(), packed.head.sight()?);
+            let lived = Lived::in_space(space, LivingFile::default(), Vec::new(), None)?;
+            let name = args.world.display();
+            let memory = args.memory;
+            writeln!(
+                Told,
+                "enfilade: {name} is streamed into {memory} MiB, without daylight and shadows of the sun"
+            )?;
+            return Ok((world, lived, Some(packed)));
+        };
+        let name = args.world.display();
+        writeln!(
+            Told,
+            "enfilade: {name} is loaded whole: {option} needs all of it"
+        )?;
+    }
+    let (world, hash) = read_world_hashed(&args.world)?;
+    let file = WorldFile {
+        path: &args.world,
+        hash,
+    };
+    let lived = match &args.living {
+        Some(path) => Lived::read(path, &world, Some(file))?,
+        None => Lived::new(world.clone(), LivingFile::default(), Vec::new(), None)?,
+    };
+    Ok((world, lived, None))
+}
+
 /// Reach of a click, in lengths of the view direction.
 const CLICK: f32 = 30.0;
 
 struct App<'a> {
     args: &'a View,
+    /// Hollow if it is streamed.
     world: World,
+    packed: Option<Packed>,
     lines: Sightlines,
     /// Until the window opens.
     lived: Option<Lived>,
@@ -267,7 +309,15 @@ impl App<'_> {
         }
         surface.configure(&gpu.device, &config);
         let panel = Panel::new(&gpu, &window, config.format, &self.world);
-        let mut studio = Studio::with_format(gpu, &self.world, config.format)?;
+        let (mut studio, streamed) = match &self.packed {
+            Some(packed) => {
+                let sight = lived.space.sight(PartId::ROOT).clone();
+                let memory = self.args.memory << 20;
+                let opened = Streamed::for_walk(packed.clone(), gpu, sight, memory, config.format)?;
+                (opened.0, Some(opened.1))
+            }
+            None => (Studio::with_format(gpu, &self.world, config.format)?, None),
+        };
         if self.args.lod > 0.0 {
             studio.add_levels(&self.world)?;
         }
@@ -276,14 +326,7 @@ impl App<'_> {
         if self.args.living.is_some() || !studio.gpu.is_software() {
             lived.furnish(&mut studio)?;
         }
-        let start = match self.args.eye {
-            Some(eye) => Camera {
-                eye,
-                toward: [1.0, 0.0, 0.0],
-                fov_y: FOV,
-            },
-            None => good_camera(&mut studio, &self.world)?,
-        };
+        let start = self.start(&mut studio)?;
         let [x, y, z] = start.toward;
         let shown = Shown {
             // The software adapter draws the plain picture several times as fast.
@@ -293,7 +336,7 @@ impl App<'_> {
             ..Shown::default()
         };
         Ok(Open {
-            walker: Walker::new(start.eye),
+            walker: Walker::new(start.eye, streamed.is_some()),
             has_company: self.args.living.is_some(),
             is_living: self.args.living.is_some() || !self.world.graph.specials.is_empty(),
             lived,
@@ -311,13 +354,30 @@ impl App<'_> {
             mode: Mode::default(),
             is_captured: false,
             wants_mouse: false,
-            has_asked_for_light: false,
+            // Daylight needs the whole world.
+            has_asked_for_light: streamed.is_some(),
+            streamed,
             turning: Vec::new(),
             recorded: None,
             n_shots: 0,
             last: Instant::now(),
             props: Vec::new(),
         })
+    }
+
+    /// The first camera.
+    fn start(&self, studio: &mut Studio) -> anyhow::Result<Camera> {
+        if let Some(eye) = self.args.eye {
+            return Ok(Camera {
+                eye,
+                toward: [1.0, 0.0, 0.0],
+                fov_y: FOV,
+            });
+        }
+        if self.packed.is_some() {
+            return Ok(start_in(&self.world, &studio.sight));
+        }
+        Ok(good_camera(studio, &self.world)?)
     }
 
     /// Acts once when a key goes down. Synthetic events report keys that were down already when the window got the
@@ -464,8 +524,12 @@ impl App<'_> {
         if let Some(recorded) = &mut open.recorded {
             recorded.push(outside);
         }
-        let pointed = Pointed::at(&open.lived.space, &self.lines, &outside, FAR);
-        open.shown.ahead = name_ahead(&self.world, &self.lines, &pointed.ray);
+        open.shown.ahead = if open.streamed.is_some() {
+            name_here(&self.world, &outside)
+        } else {
+            let pointed = Pointed::at(&open.lived.space, &self.lines, &outside, FAR);
+            name_ahead(&self.world, &self.lines, &pointed.ray)
+        };
         open.draw(&self.world, &camera, seconds)
     }
 

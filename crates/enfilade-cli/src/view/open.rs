@@ -1,16 +1,17 @@
 //! The open window: its contents, and how they are drawn.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::pointed::FAR;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
 use enfilade::runtime::View;
+use enfilade::stream::Eye;
 use enfilade::world::PartId;
 use enfilade_render::{
     AdapterChoice, Camera, Culling, FOV, Frame, Paint, Prop, SpaceShot, Sparing, Studio, Style,
@@ -26,6 +27,12 @@ use crate::formats::Format;
 use crate::living::{Lived, radar_words};
 use crate::output::{Outputs, write_whole};
 use crate::render::{light, portal_marks};
+use enfilade_cli::streamed::{Streamed, cells_in_view, view_of};
+
+/// Greatest speed. [Units: wu/s]
+const RUN: f32 = 5.0;
+/// Time of a frame in which pieces are put on the adapter.
+const SLICE: Duration = Duration::from_millis(1);
 
 /// State that exists once the window is open.
 pub(super) struct Open {
@@ -33,6 +40,8 @@ pub(super) struct Open {
     pub(super) surface: wgpu::Surface<'static>,
     pub(super) config: wgpu::SurfaceConfiguration,
     pub(super) studio: Studio,
+    /// The pieces of a packed world.
+    pub(super) streamed: Option<Streamed>,
     pub(super) panel: Panel,
     pub(super) walker: Walker,
     pub(super) lived: Lived,
@@ -70,6 +79,13 @@ pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> 
     let away = (t * FAR - 0.02).max(0.0);
     let p = [0, 1, 2].map(|k| f64::from(camera.eye[k] + forward[k] * away));
     let cell = world.graph.locator.locate(DVec3::from(p));
+    cell.map_or_else(|| "no cell".into(), |c| world.graph[c].name.clone())
+}
+
+/// The name of the cell of the eye.
+pub(super) fn name_here(world: &World, camera: &Camera) -> String {
+    let eye = DVec3::from(camera.eye.map(f64::from));
+    let cell = world.graph.locator.locate(eye);
     cell.map_or_else(|| "no cell".into(), |c| world.graph[c].name.clone())
 }
 
@@ -165,7 +181,7 @@ impl Open {
             DVec3::new(forward.x, 0.0, forward.z).normalize_or_zero()
         };
         let speed = if self.keys.contains(&KeyCode::ShiftLeft) {
-            5.0
+            f64::from(RUN)
         } else {
             1.8
         };
@@ -183,6 +199,38 @@ impl Open {
                 .extend_from_slice(self.lived.radar(&player));
             let name = |c: CellId| world.graph[c].name.clone();
             self.shown.told = radar_words(&self.shown.blips, name);
+        }
+    }
+
+    /// Fetches the pieces of a packed world that are in view, or may soon be, and puts some of them on the adapter.
+    fn stream(&mut self, view: &View) {
+        let position = self.camera_in_root().eye;
+        let Some(streamed) = &mut self.streamed else {
+            return;
+        };
+        let (sight, mut cells) = (&self.studio.sight, BTreeMap::new());
+        if self.is_living {
+            self.props.clear();
+            let player = self.walker.player();
+            let (_, seen, _) = self.lived.see(&player, view, &mut self.props);
+            for seen in seen.contexts().filter_map(|c| c.of_part(PartId::ROOT)) {
+                cells_in_view(&seen, sight.n_cells(), &mut cells);
+            }
+        } else {
+            let seen = self.studio.viewer.see(sight, &self.studio.state, view);
+            cells_in_view(&seen, sight.n_cells(), &mut cells);
+        }
+        streamed.look(view_of(&cells));
+        let eye = Eye {
+            cell: sight.locate(position),
+            position,
+            speed: RUN,
+        };
+        streamed.frame(&mut self.studio, eye, SLICE);
+        self.shown.streamed = streamed.counts().to_string();
+        if let Some(problem) = streamed.problem() {
+            self.shown.streamed += "\n";
+            self.shown.streamed += &problem;
         }
     }
 
@@ -216,6 +264,7 @@ impl Open {
         };
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
+        self.stream(&view);
         let mut marks = Vec::new();
         if self.shown.portals {
             marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
@@ -398,14 +447,27 @@ impl Open {
         let to = screenshot.with_file_name(format!("{stem}-{}.png", self.n_shots));
         let camera = self.camera();
         // In a separate studio: pictures of a window cannot be read back.
-        let mut studio = Studio::new(enfilade_cli::adapter::open(adapter)?, world)?;
+        let gpu = enfilade_cli::adapter::open(adapter)?;
+        let mut studio = match &self.streamed {
+            Some(streamed) => {
+                let state = (self.studio.sight.clone(), self.studio.state.clone());
+                let (packed, view) = (streamed.packed().clone(), streamed.in_view().to_vec());
+                let opened = Streamed::for_views(packed, gpu, state, std::slice::from_ref(&view))?;
+                let (mut studio, mut streamed) = opened;
+                streamed.look(view);
+                streamed.settle(&mut studio, Eye::default())?;
+                studio
+            }
+            None => Studio::new(gpu, world)?,
+        };
         studio.state = self.studio.state.clone();
         studio.sparing = Sparing {
             // Its levels would have to be rebuilt.
             lod: 0.0,
             ..self.studio.sparing
         };
-        if self.style().daylight || self.shown.paint == Paint::Cells {
+        let has_light = self.style().daylight || self.shown.paint == Paint::Cells;
+        if has_light && self.streamed.is_none() {
             light(&mut studio, world)?;
         }
         let size = [self.config.width, self.config.height];

@@ -38,6 +38,8 @@ pub(super) struct Shown {
     pub(super) is_recording: bool,
     pub(super) flies: bool,
     pub(super) message: String,
+    /// Counters of the pieces of a packed world, in lines.
+    pub(super) streamed: String,
     /// Counters and sounds of what lives there, in lines.
     pub(super) living: String,
     /// The things on the radar, and what it says of them.
@@ -121,7 +123,7 @@ impl Panel {
             self.map.follow(world, camera.eye);
         }
         let map = &mut self.map;
-        let full = self.context.run_ui(input, |ui| paint(ui, map, shown));
+        let mut full = self.context.run_ui(input, |ui| paint(ui, map, shown));
         self.state
             .handle_platform_output(window, full.platform_output);
         let screen = egui_wgpu::ScreenDescriptor {
@@ -164,6 +166,8 @@ impl Panel {
         for id in &full.textures_delta.free {
             self.renderer.free_texture(id);
         }
+        // They are applied; dropped as they are, they would count as forgotten.
+        full.textures_delta.clear();
     }
 }
 
@@ -198,7 +202,7 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
             text += words;
         }
     }
-    for line in [&shown.living, &shown.told, &shown.message] {
+    for line in [&shown.streamed, &shown.living, &shown.told, &shown.message] {
         if !line.is_empty() {
             text += "\n";
             text += line;

@@ -5,6 +5,7 @@ use enfilade::world::{Agent, PartId, Space, Walker as Body};
 
 use enfilade_render::EYE_HEIGHT;
 
+use super::strider::step_in_cells;
 use crate::living::Player;
 
 /// A body in a space or, when it flies, an eye.
@@ -15,10 +16,12 @@ pub(super) struct Walker {
     /// Position of the eye in the frame of its part.
     pub(super) eye: DVec3,
     pub(super) flies: bool,
+    /// `true` in worlds whose walls and furniture may be absent: then cells are the guide.
+    by_cells: bool,
 }
 
 impl Walker {
-    pub(super) fn new(eye: [f32; 3]) -> Self {
+    pub(super) fn new(eye: [f32; 3], by_cells: bool) -> Self {
         let agent = Agent {
             eye: EYE_HEIGHT.into(),
             ..Agent::default()
@@ -29,6 +32,7 @@ impl Walker {
             frame: PartId::ROOT,
             eye,
             flies: false,
+            by_cells,
         }
     }
 
@@ -45,6 +49,10 @@ impl Walker {
             self.eye = space.between(self.frame, PartId::ROOT).point(self.eye);
             self.frame = PartId::ROOT;
             self.eye += wish * seconds.clamp(0.0, 0.1);
+            return;
+        }
+        if self.by_cells {
+            self.eye = step_in_cells(self.eye, wish, seconds, space);
             return;
         }
         (self.body.eye, self.body.frame) = (self.eye, self.frame);
@@ -77,7 +85,7 @@ mod tests {
     fn walker(world: &World) -> (Walker, Space) {
         let [low, high] = world.graph.cells[0].aabb;
         let eye = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
-        (Walker::new(eye), Space::new(world.clone()).unwrap())
+        (Walker::new(eye, false), Space::new(world.clone()).unwrap())
     }
 
     /// A box as an object.

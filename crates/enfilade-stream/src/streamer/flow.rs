@@ -346,6 +346,14 @@ impl Streamer {
         }
     }
 
+    /// Counts a piece in memory as freed: the program needed the room. It is asked for again when it is in view or due soon, so
+    /// leave the view alone. Without effect for other pieces.
+    pub fn forget(&mut self, piece: PieceId) {
+        if self.is_resident(piece) {
+            self.lose(piece, State::Absent);
+        }
+    }
+
     /// Frees the memory of a piece.
     fn lose(&mut self, piece: PieceId, state: State) {
         let slot = self.slots.of(piece);
