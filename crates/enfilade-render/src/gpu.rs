@@ -56,6 +56,9 @@ pub enum RenderError {
         /// The largest of this shape.
         most: [u32; 2],
     },
+    /// Settings of portal textures that cannot be.
+    #[error(transparent)]
+    PortalTextures(#[from] crate::portal_texture_options::PortalTextureError),
     /// The device was lost or ran out of memory while drawing.
     #[error("the adapter failed while drawing: {0}")]
     Lost(String),

@@ -67,6 +67,7 @@
 //! surfaces directly only, and props cast no shadows. Metalness, roughness and normal maps are ignored.
 
 mod camera;
+mod compare;
 mod context_targets;
 mod contexts;
 mod copies;
@@ -87,6 +88,8 @@ mod panes;
 mod picture;
 mod piece_of;
 mod pipelines;
+mod portal_texture_options;
+mod portal_textures;
 mod prop;
 mod props;
 mod queries;
@@ -99,6 +102,8 @@ mod shown;
 mod space;
 mod stage;
 mod studio;
+mod targets;
+mod textured;
 mod viewpoints;
 
 pub use camera::{Camera, Projection};
@@ -111,6 +116,9 @@ pub use marks::{Mark, MarkShape};
 pub use oracle::Oracle;
 pub use picture::Picture;
 pub use piece_of::PieceOf;
+pub use portal_texture_options::{
+    PortalTextureCounts, PortalTextureError, PortalTextureOptions, PortalTexturePaint, Viewpoints,
+};
 pub use prop::{Prop, PropMesh};
 pub use queries::QueryCounts;
 pub use scene::{GpuPiece, GpuWorld, PieceMaker, Put, StreamLimits, cell_color};

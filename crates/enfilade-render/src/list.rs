@@ -104,6 +104,8 @@ pub struct RenderList {
     pub(crate) instances: Vec<u32>,
     /// Polygons drawn in place of cells behind small portals.
     pub(crate) stand_ins: Vec<(PortalId, CellId)>,
+    /// Portals filled by textures of what lies behind them.
+    pub(crate) doorways: Vec<(PortalId, CellId)>,
     n_triangles: u64,
 }
 
@@ -126,6 +128,46 @@ impl RenderList {
         &self.stand_ins
     }
 
+    /// Returns the portals drawn as textures of what lies behind them.
+    #[must_use]
+    pub fn doorways(&self) -> &[(PortalId, CellId)] {
+        &self.doorways
+    }
+
+    /// Leaves out draws from the end, transparent ones first, until there are `most` triangles.
+    pub(crate) fn cut_to(&mut self, most: u64) {
+        for runs in [&mut self.transparent, &mut self.opaque] {
+            while self.n_triangles > most
+                && let Some(last) = runs.last_mut()
+            {
+                let copies = u64::from(last.instances.end - last.instances.start).max(1);
+                let whole = u64::from(last.n / 3) * copies;
+                let rest = most.saturating_sub(self.n_triangles - whole);
+                self.n_triangles -= whole;
+                last.n = (rest / copies) as u32 * 3;
+                self.n_triangles += u64::from(last.n / 3) * copies;
+                if last.n == 0 {
+                    runs.pop();
+                } else {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Leaves out the transparent surfaces that a cell sees, which frames that see the cell draw on their own.
+    pub(crate) fn leave_out_glass_of(&mut self, world: &GpuWorld, cell: CellId) {
+        let instances = &self.instances;
+        self.transparent.retain(|run| {
+            let number = instances[run.instances.start as usize] & INSTANCE_MASK;
+            let cells = match number.checked_sub(1) {
+                Some(detail) => &world.details[detail as usize].cells,
+                None => &world.batch_cells[world.batch_of[run.order as usize] as usize],
+            };
+            !cells.contains(&cell)
+        });
+    }
+
     /// Appends the draws of another list.
     pub fn append(&mut self, other: &Self) {
         let base = self.instances.len() as u32;
@@ -135,6 +177,7 @@ impl RenderList {
             ..run.clone()
         };
         self.stand_ins.extend_from_slice(&other.stand_ins);
+        self.doorways.extend_from_slice(&other.doorways);
         self.opaque.extend(other.opaque.iter().map(moved));
         self.transparent.extend(other.transparent.iter().map(moved));
         self.n_triangles += other.n_triangles;
@@ -159,6 +202,7 @@ impl RenderList {
         self.transparent.clear();
         self.instances.clear();
         self.stand_ins.clear();
+        self.doorways.clear();
         self.n_triangles = 0;
     }
 }
@@ -207,6 +251,14 @@ impl Lister {
     /// Moves out the last list with its buffers; give them back with [`Lister::give`].
     pub(crate) fn take(&mut self) -> RenderList {
         std::mem::take(&mut self.list)
+    }
+
+    pub(crate) fn list(&self) -> &RenderList {
+        &self.list
+    }
+
+    pub(crate) fn list_mut(&mut self) -> &mut RenderList {
+        &mut self.list
     }
 
     pub(crate) fn give(&mut self, list: RenderList) {

@@ -80,6 +80,8 @@ pub(crate) struct Pipelines {
     pub(crate) sky: wgpu::RenderPipeline,
     /// Ambient occlusion.
     pub(crate) post: wgpu::RenderPipeline,
+    /// Ambient occlusion, but for pixels of portal textures, which have it.
+    pub(crate) post_textured: wgpu::RenderPipeline,
     pub(crate) heat_map: wgpu::RenderPipeline,
     /// Marks hidden by surfaces.
     pub(crate) marks: wgpu::RenderPipeline,
@@ -438,9 +440,7 @@ impl Pipelines {
             buffers: &[],
             target: Some((output, None)),
             depth: None,
-            constants: &[],
-            stencil: None,
-            writes_color: true,
+            ..base
         };
         let make = |kind| pipeline(gpu, &kind);
         Self {
@@ -478,6 +478,10 @@ impl Pipelines {
             heat_map: make(Kind {
                 label: "heat map",
                 fragment: Some("heat_map"),
+                ..post
+            }),
+            post_textured: make(Kind {
+                constants: &[("HAS_TEXTURES", 1.0)],
                 ..post
             }),
             post: make(post),

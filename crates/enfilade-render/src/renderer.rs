@@ -23,17 +23,10 @@ use crate::shown::{DrawnPart, PartView, Shown};
 use crate::stage::{
     Exposed, Globals, GlobalsBuffer, RenderStage, StageView, Sunlight, lamp_buffer,
 };
+use crate::targets::Targets;
 
 /// Side of the shadow map. [Units: texels]
 const SHADOW_SIDE: u32 = 4096;
-
-/// Intermediate targets of frames of one size.
-pub(crate) struct Targets {
-    pub(crate) size: [u32; 2],
-    pub(crate) color: wgpu::TextureView,
-    pub(crate) depth: wgpu::TextureView,
-    post: wgpu::BindGroup,
-}
 
 /// Draws worlds; one for each texture format.
 pub(crate) struct Renderer {
@@ -243,36 +236,9 @@ impl Renderer {
 
     /// Makes the targets of a size unless they exist.
     pub(crate) fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<(), RenderError> {
-        if self.targets.as_ref().is_some_and(|t| t.size == size) {
-            return Ok(());
+        if self.targets.as_ref().is_none_or(|t| t.size != size) {
+            self.targets = Some(Targets::new(gpu, &self.layouts, size)?);
         }
-        gpu.check_picture(size)?;
-        let usage = wgpu::TextureUsages::TEXTURE_BINDING;
-        let view = |label, format| {
-            texture(gpu, label, size, format, usage)
-                .create_view(&wgpu::TextureViewDescriptor::default())
-        };
-        let (color, depth) = (view("color", COLOR), view("depth", DEPTH));
-        let post = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("post"),
-            layout: &self.layouts.post,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&color),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(&depth),
-                },
-            ],
-        });
-        self.targets = Some(Targets {
-            size,
-            color,
-            depth,
-            post,
-        });
         Ok(())
     }
 
@@ -339,9 +305,18 @@ impl Renderer {
             self.draw_surfaces(&mut pass, part.as_view(), shadings, size);
             self.draw_props(&mut pass, part.as_view(), shadings, props, size);
         }
+        if let (Some(doorways), Some(part)) = (shown.textures, parts.first()) {
+            pass.set_scissor_rect(0, 0, size[0], size[1]);
+            doorways.draw(&mut pass, &part.stage.first().globals.group);
+        }
         if in_two {
             drop(pass);
-            self.draw_picture(&mut encoder, targets, is_count, output);
+            let post = match shown.textures {
+                _ if is_count => &self.pipelines.heat_map,
+                Some(_) => &self.pipelines.post_textured,
+                None => &self.pipelines.post,
+            };
+            self.draw_picture(&mut encoder, targets, post, output);
             pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("glass"),
                 color_attachments: &[Some(color_attachment(output, None))],
@@ -473,12 +448,12 @@ impl Renderer {
         });
     }
 
-    /// Draws the image of the surfaces to `output`, with ambient occlusion or as counts.
+    /// Draws the image of the surfaces to `output` by a pipeline: with ambient occlusion or as counts.
     fn draw_picture(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         targets: &Targets,
-        is_count: bool,
+        post: &wgpu::RenderPipeline,
         output: &wgpu::TextureView,
     ) {
         let mut picture = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -486,11 +461,7 @@ impl Renderer {
             color_attachments: &[Some(color_attachment(output, Some(wgpu::Color::BLACK)))],
             ..wgpu::RenderPassDescriptor::default()
         });
-        picture.set_pipeline(if is_count {
-            &self.pipelines.heat_map
-        } else {
-            &self.pipelines.post
-        });
+        picture.set_pipeline(post);
         picture.set_bind_group(0, &self.camera.group, &[]);
         picture.set_bind_group(1, &targets.post, &[]);
         picture.draw(0..3, 0..1);

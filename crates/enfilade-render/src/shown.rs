@@ -8,6 +8,7 @@ use crate::frame::Style;
 use crate::lamps::ActiveLamp;
 use crate::list::RenderList;
 use crate::marks::Mark;
+use crate::portal_textures::DoorwayDraw;
 use crate::scene::GpuWorld;
 use crate::stage::{RenderStage, StageView};
 
@@ -51,6 +52,8 @@ pub(crate) struct Shown<'a> {
     pub(crate) exposure: f32,
     /// Share of the daylight that is left, 0 to 1.
     pub(crate) day: f32,
+    /// Portals of the first world that textures fill.
+    pub(crate) textures: Option<DoorwayDraw<'a>>,
 }
 
 impl Shown<'_> {

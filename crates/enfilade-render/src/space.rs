@@ -327,6 +327,7 @@ impl Studio {
             lamps,
             day: self.day,
             exposure,
+            textures: None,
         })
     }
 

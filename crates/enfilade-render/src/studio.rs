@@ -8,13 +8,13 @@ use crate::camera::Camera;
 use crate::explain::Explanation;
 use crate::frame::{Frame, Style};
 use crate::gpu::{Gpu, RenderError};
-use crate::ids::IdPicture;
 use crate::lamps::{ActiveLamp, LampState};
 use crate::light::{Light, sun_of};
 use crate::list::{Lister, RenderList, Shot, Sparing};
 use crate::marks::Mark;
 use crate::picture::Picture;
 use crate::piece_of::PieceOf;
+use crate::portal_textures::PortalTextures;
 use crate::renderer::Renderer;
 use crate::scene::{GpuPiece, GpuWorld, Put, StreamLimits};
 use crate::shown::{DrawnPart, Shown};
@@ -30,6 +30,9 @@ pub enum Culling {
     /// Everything visible through portals.
     #[default]
     Portals,
+    /// Everything visible through near portals, and [textures](Studio::add_portal_textures) of what lies behind far ones, as
+    /// [planned](Studio::plan_portal_textures).
+    PortalTextures,
 }
 
 /// An off-screen target, for benchmarks.
@@ -75,6 +78,7 @@ pub struct Studio {
     pub(crate) shadows_of: Option<Vec<Option<Pose>>>,
     /// For pictures of everything: finds what special portals show.
     pub(crate) special_viewer: Option<SpaceViewer>,
+    pub(crate) portal_textures: Option<Box<PortalTextures>>,
 }
 
 impl Studio {
@@ -148,6 +152,7 @@ impl Studio {
             day: 1.0,
             shadows_of: None,
             special_viewer: None,
+            portal_textures: None,
         })
     }
 
@@ -208,7 +213,7 @@ impl Studio {
         Ok(())
     }
 
-    fn check_whole(&self, what: &'static str) -> Result<(), RenderError> {
+    pub(crate) fn check_whole(&self, what: &'static str) -> Result<(), RenderError> {
         let needs = RenderError::NeedsWhole { what };
         (!self.world.is_hollow()).then_some(()).ok_or(needs)
     }
@@ -233,7 +238,7 @@ impl Studio {
     }
 
     /// Draws the shadow map unless it is current.
-    fn follow_sun(&mut self, style: &Style) {
+    pub(crate) fn follow_sun(&mut self, style: &Style) {
         let alone = vec![Some(Pose::IDENTITY)];
         if !self.drawable(*style).shadows || self.shadows_of.as_ref() == Some(&alone) {
             return;
@@ -256,12 +261,31 @@ impl Studio {
             marks: frame.marks,
             props: &[],
             lamps,
+            textures: None,
             day: self.day,
             exposure: if is_eye {
                 self.stage.light.exposure(projection.origin, 1.0)
             } else {
                 1.0
             },
+        }
+    }
+
+    /// Adds the textures of a list's doorways to a frame.
+    pub(crate) fn with_textures<'f>(
+        &self,
+        shown: Shown<'f>,
+        textures: Option<&'f mut PortalTextures>,
+        list: &RenderList,
+    ) -> Shown<'f> {
+        let Some(own) = textures.filter(|_| !list.doorways.is_empty()) else {
+            return shown;
+        };
+        let seen_by = (&shown.projection_in(&self.stage), shown.exposure);
+        let (layouts, marks) = (&self.renderer.layouts, shown.style.dark_corners);
+        Shown {
+            textures: Some(own.write(&self.gpu, layouts, list, seen_by, marks)),
+            ..shown
         }
     }
 
@@ -290,6 +314,19 @@ impl Studio {
                     ..Sparing::default()
                 };
                 self.lister.seen(world, sight, &seen, &shot, &sparing)
+            }
+            Culling::PortalTextures => {
+                let planned = self.portal_textures.as_ref();
+                if let Some(own) = planned {
+                    self.viewer.stops_mut().clone_from(&own.stops);
+                }
+                let seen = self.viewer.see(sight, &self.state, view);
+                (self.lister).seen(world, sight, &seen, &shot, &self.sparing);
+                self.viewer.stops_mut().clear();
+                if let Some(own) = planned {
+                    own.sort_out(self.lister.list_mut());
+                }
+                self.lister.list()
             }
             Culling::Portals => {
                 let pixels = (size[0] as f32 * size[1] as f32).max(1.0);
@@ -392,14 +429,18 @@ impl Studio {
         self.follow_sun(&frame.style);
         let eye = frame.projection.origin.as_dvec3();
         let lamps = self.active_lamps(None, &frame.style, eye, None);
+        let mut textures = self.portal_textures.take();
         let shown = self.shown(frame, &lamps);
+        let shown = self.with_textures(shown, textures.as_deref_mut(), frame.list);
         let part = DrawnPart {
             id: PartId::ROOT,
             world: &self.world,
             stage: &mut self.stage,
             list: frame.list,
         };
-        (self.renderer).picture(&self.gpu, &mut [part], &shown, size)
+        let picture = (self.renderer).picture(&self.gpu, &mut [part], &shown, size);
+        self.portal_textures = textures;
+        picture
     }
 
     /// Draws a frame to a texture of the studio's format.
@@ -417,76 +458,18 @@ impl Studio {
         self.follow_sun(&frame.style);
         let eye = frame.projection.origin.as_dvec3();
         let lamps = self.active_lamps(None, &frame.style, eye, None);
+        let mut textures = self.portal_textures.take();
         let shown = self.shown(frame, &lamps);
+        let shown = self.with_textures(shown, textures.as_deref_mut(), frame.list);
         let part = DrawnPart {
             id: PartId::ROOT,
             world: &self.world,
             stage: &mut self.stage,
             list: frame.list,
         };
-        (self.renderer).draw(&self.gpu, &mut [part], &shown, output, size)
-    }
-
-    /// Draws the id pictures of a camera: opaque surfaces, and the nearest transparent one.
-    ///
-    /// # Errors
-    ///
-    /// As [`Studio::picture`].
-    pub fn ids(
-        &mut self,
-        camera: &Camera,
-        culling: Culling,
-        size: [u32; 2],
-    ) -> Result<[IdPicture; 2], RenderError> {
-        let aspect = size[0] as f32 / size[1] as f32;
-        let mut list = self
-            .list(&camera.view(aspect)?, camera.eye, culling, size)
-            .clone();
-        list.sort();
-        self.ids_of(camera, &list, size)
-    }
-
-    /// Draws the id pictures of everything, and of what portals leave. The latter is drawn first in both, so that
-    /// both show the same one of two coincident triangles.
-    ///
-    /// # Errors
-    ///
-    /// As [`Studio::picture`].
-    pub fn ids_compared(
-        &mut self,
-        camera: &Camera,
-        size: [u32; 2],
-    ) -> Result<[[IdPicture; 2]; 2], RenderError> {
-        let view = camera.view(size[0] as f32 / size[1] as f32)?;
-        let mut culled = self.list(&view, camera.eye, Culling::Portals, size).clone();
-        culled.sort();
-        let mut all = self
-            .list(&view, camera.eye, Culling::Everything, size)
-            .clone();
-        all.sort();
-        let mut whole = culled.clone();
-        whole.append(&all);
-        Ok([
-            self.ids_of(camera, &whole, size)?,
-            self.ids_of(camera, &culled, size)?,
-        ])
-    }
-
-    fn ids_of(
-        &mut self,
-        camera: &Camera,
-        list: &RenderList,
-        size: [u32; 2],
-    ) -> Result<[IdPicture; 2], RenderError> {
-        let projection = camera.projection(size[0] as f32 / size[1] as f32)?;
-        self.renderer.ids(
-            &self.gpu,
-            &self.world,
-            &mut self.stage,
-            &projection,
-            list,
-            size,
-        )
+        let drawn = (self.renderer).draw(&self.gpu, &mut [part], &shown, output, size);
+        self.portal_textures = textures;
+        drawn
     }
 
     /// Draws everything that `projection` shows, colored by why each point is visible from another camera or not:

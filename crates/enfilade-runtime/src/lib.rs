@@ -89,7 +89,7 @@ pub use follow::{Follower, Step};
 pub use options::SightOptions;
 pub use pick::{Hit, NotFinite, Target};
 pub use region::Narrowing;
-pub use see::{Crossing, Gate, SeeOptions, SpecialView, StepQuestion, Viewer, Window};
+pub use see::{Crossing, Gate, SeeOptions, SpecialView, StepQuestion, Stops, Viewer, Window};
 pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};
 pub use sight::{Sight, SightSkeleton, SkeletonError};
 pub use sight_error::SightError;

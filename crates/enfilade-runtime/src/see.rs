@@ -20,6 +20,7 @@
 mod listing;
 mod queue;
 mod steps;
+mod stops;
 mod traversal;
 mod viewer;
 mod window;
@@ -34,6 +35,7 @@ use crate::view::View;
 use traversal::Traversal;
 
 pub use steps::StepQuestion;
+pub use stops::Stops;
 pub use viewer::{SeeOptions, Viewer};
 pub use window::{Crossing, Gate, SpecialView, Window};
 

@@ -115,8 +115,9 @@ impl<'a> Seen<'a> {
         &self.lists.portals
     }
 
-    /// Returns the portals that cover less than [`SeeOptions::min_share`](crate::SeeOptions::min_share) of the
-    /// screen, each once, with the cell behind, which may still be visible through another portal.
+    /// Returns the portals not passed, each once, with the cell behind, which may still be visible through another portal:
+    /// those that cover less than [`SeeOptions::min_share`](crate::SeeOptions::min_share) of the screen, and
+    /// [stops](crate::Stops).
     #[must_use]
     pub fn stopped(&self) -> &'a [(PortalId, CellId)] {
         &self.lists.stopped

@@ -69,6 +69,9 @@ fn heat_map(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
 // True if the sky is in the picture already.
 override KEEPS_SKY: bool = false;
 
+// True if pixels of alpha 0 come from portal textures, which were finished when they were made.
+override HAS_TEXTURES: bool = false;
+
 @fragment
 fn finish(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     let p = vec2<i32>(clip.xy);
@@ -80,6 +83,11 @@ fn finish(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
             return vec4(drawn.rgb, 1.0);
         }
         return vec4(sky(p), 1.0);
+    }
+    if HAS_TEXTURES {
+        if drawn.a == 0.0 {
+            return vec4(drawn.rgb, 1.0);
+        }
     }
     return vec4(drawn.rgb * open_sky(p, point_at(p, z), z), 1.0);
 }

@@ -332,7 +332,8 @@ impl Traversal<'_, '_> {
             self.add_special(special, window, false);
             return;
         }
-        if narrowed.share() < f64::from(self.viewer.options.min_share) {
+        let is_small = narrowed.share() < f64::from(self.viewer.options.min_share);
+        if is_small || self.viewer.stops.has(exit, to_center.length()) {
             self.add_stop(exit);
             return;
         }

@@ -5,6 +5,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
+use super::stops::Stops;
 use super::window::{NONE, Stepping};
 use crate::occluder::Shadows;
 use crate::region::{Clipper, Narrowing, Region};
@@ -75,6 +76,7 @@ pub(super) struct Mark {
 /// Memory: 16 bytes per cell, 8 bytes per portal, 4 bytes per chunk and detail.
 pub struct Viewer {
     pub(super) options: SeeOptions,
+    pub(super) stops: Stops,
     pub(super) marks: Vec<Mark>,
     pub(super) cell_stamps: Vec<u32>,
     pub(super) portal_stamps: Vec<u32>,
@@ -112,6 +114,7 @@ impl Viewer {
         };
         Self {
             options,
+            stops: Stops::default(),
             marks: vec![mark; sight.n_cells()],
             cell_stamps: vec![0; sight.n_cells()],
             portal_stamps: vec![0; sight.n_portals()],
@@ -134,6 +137,11 @@ impl Viewer {
     /// Returns the options, which may be changed between queries.
     pub fn options_mut(&mut self) -> &mut SeeOptions {
         &mut self.options
+    }
+
+    /// Returns the portals at which views stop, which may be changed between queries.
+    pub fn stops_mut(&mut self) -> &mut Stops {
+        &mut self.stops
     }
 
     /// Loads the precomputed visibility of the eye's cell, if the world has it.

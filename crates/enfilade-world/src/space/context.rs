@@ -3,7 +3,7 @@
 use enfilade_cpg::{CellId, SpecialId};
 use enfilade_geom::{DVec3, Similarity};
 use enfilade_runtime::{
-    Crossing, Gate, SeeOptions, Seen, SpecialView, StepQuestion, View, Viewer, Window,
+    Crossing, Gate, SeeOptions, Seen, SpecialView, StepQuestion, Stops, View, Viewer, Window,
 };
 
 use super::{PartId, Place, Space};
@@ -42,6 +42,8 @@ pub(super) struct Context {
     /// Where the view of the current face begins.
     pub(super) starts: Vec<(CellId, Option<Window>)>,
     pub(super) rectangle: [f64; 4],
+    /// Portals of the root at which the view stops.
+    pub(super) stops: Stops,
 }
 
 pub(super) struct PartView {
@@ -181,6 +183,9 @@ impl Context {
         if own.view.is_none() {
             own.view = Some(of_frame.in_frame(&to_frame));
             viewer.begin_steps();
+            if id == PartId::ROOT {
+                viewer.stops_mut().clone_from(&self.stops);
+            }
             own.is_begun = false;
             self.seen.push(id);
         }

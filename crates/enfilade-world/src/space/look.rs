@@ -17,7 +17,7 @@ use std::collections::BinaryHeap;
 
 use enfilade_cpg::{MonitorCamera, Way};
 use enfilade_geom::Similarity;
-use enfilade_runtime::{SeeOptions, SpecialView, View, Window};
+use enfilade_runtime::{SeeOptions, SpecialView, Stops, View, Window};
 
 use super::context::{Context, SeenVia, StoppedSpecial, ViewBuffers};
 use super::seen::SpaceSeen;
@@ -56,6 +56,8 @@ pub struct SpaceViewer {
     n_contexts: usize,
     options: SeeOptions,
     specials: SpecialOptions,
+    /// Stops of the direct view in the root.
+    stops: Stops,
     /// Contexts to look into in the current face, the largest on the screen first.
     open: BinaryHeap<Open>,
     stopped: Vec<StoppedSpecial>,
@@ -113,6 +115,7 @@ impl SpaceViewer {
             n_contexts: 0,
             options,
             specials: SpecialOptions::default(),
+            stops: Stops::default(),
             open: BinaryHeap::new(),
             stopped: Vec::new(),
             is_capped: false,
@@ -124,6 +127,11 @@ impl SpaceViewer {
     /// Returns the bounds of views through special portals, which may be changed between queries.
     pub fn specials_mut(&mut self) -> &mut SpecialOptions {
         &mut self.specials
+    }
+
+    /// Returns the portals of the root at which the direct view stops, which may be changed between queries.
+    pub fn stops_mut(&mut self) -> &mut Stops {
+        &mut self.stops
     }
 
     /// Returns everything that `view`, in the frame of part `frame`, sees. A view in the frame of the part that the eye is in is
@@ -140,6 +148,7 @@ impl SpaceViewer {
         self.is_capped = false;
         self.apart = 0.0;
         let root = self.add_context(frame, view.clone(), Similarity::IDENTITY);
+        self.contexts[root].stops.clone_from(&self.stops);
         for face in 0..view.n_faces() {
             self.open.clear();
             self.contexts[root].begin_face();
@@ -184,6 +193,7 @@ impl SpaceViewer {
                 is_direct: true,
                 starts: Vec::new(),
                 rectangle: SCREEN,
+                stops: Stops::default(),
             });
         }
         let context = &mut self.contexts[index];
@@ -198,6 +208,7 @@ impl SpaceViewer {
         context.is_direct = true;
         context.starts.clear();
         context.rectangle = SCREEN;
+        context.stops.clear();
         index
     }
 
