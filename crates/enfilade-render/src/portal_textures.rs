@@ -36,9 +36,12 @@ use draw::{DoorwayFrame, add_corners};
 impl PortalTextures {
     /// Moves the doorways that textures fill out of the list of those of one color.
     pub(crate) fn sort_out(&self, list: &mut RenderList) {
-        let shown = &self.shown;
-        list.stand_ins.retain(|id| !shown.contains_key(id));
-        list.doorways.extend(shown.keys());
+        let (shown, doorways) = (&self.shown, &mut list.doorways);
+        list.stand_ins.retain(|id| {
+            let is_textured = shown.contains_key(id);
+            doorways.extend(is_textured.then_some(*id));
+            !is_textured
+        });
         list.cut_to(self.options.max_triangles);
     }
 

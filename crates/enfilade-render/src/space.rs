@@ -124,12 +124,21 @@ impl Studio {
         if let Some(counts) = self.draw_contexts(shot, output, size)? {
             return Ok(counts);
         }
-        let lists = self.space_lists(shot, size)?;
+        let mut lists = self.space_lists(shot, size)?;
         let lamps = self.space_lamps(shot, shot.seen);
         let props = self.prop_copies(shot);
-        let shown = self.space_shown(shot, (&lamps, &props), size)?;
+        let mut shown = self.space_shown(shot, (&lamps, &props), size)?;
+        let mut textures = self.portal_textures.take();
+        if let (Some(own), Some((PartId::ROOT, list))) = (&mut textures, lists.first_mut())
+            && std::mem::take(&mut own.is_planned)
+        {
+            own.sort_out(list);
+            shown = self.with_textures(shown, Some(own), list);
+        }
         let mut parts = drawn_parts(&self.world, &mut self.stage, &mut self.parts, &lists);
-        (self.renderer).draw(&self.gpu, &mut parts, &shown, output, size)?;
+        let drawn = (self.renderer).draw(&self.gpu, &mut parts, &shown, output, size);
+        self.portal_textures = textures;
+        drawn?;
         let missed = |s: SpaceSeen<'_>| s.contexts().len() - 1 + s.stopped_specials().len();
         let is_without = !self.gpu.has_stencil();
         Ok(SpaceCounts {
@@ -213,7 +222,7 @@ impl Studio {
         Ok((read_picture(&self.gpu, &target, size)?, counts))
     }
 
-    fn place_parts(&mut self, space: &Space) {
+    pub(crate) fn place_parts(&mut self, space: &Space) {
         let n = space.n_parts();
         assert!(n <= self.parts.len() + 1, "each part of a space was added");
         if self.placed != space.state(PartId::ROOT).shares() {
@@ -247,7 +256,7 @@ impl Studio {
     }
 
     /// Draws the map of the sun's shadows unless it is current. Parts in rooms cast none.
-    fn cast_sun(&mut self, shot: &SpaceShot<'_>) {
+    pub(crate) fn cast_sun(&mut self, shot: &SpaceShot<'_>) {
         if !self.drawable(shot.style).shadows {
             return;
         }

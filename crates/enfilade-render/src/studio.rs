@@ -403,6 +403,9 @@ impl Studio {
     ) -> Result<Picture, RenderError> {
         let aspect = size[0] as f32 / size[1] as f32;
         let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
+        if culling == Culling::PortalTextures {
+            self.plan_portal_textures(camera, style, size)?;
+        }
         let list = self.list(&view, camera.eye, culling, size).clone();
         self.picture_of(
             &Frame {

@@ -2,7 +2,10 @@
 
 mod plan;
 
+use enfilade_cpg::CellId;
+use enfilade_runtime::Stops;
 use enfilade_world::PartId;
+use glam::Vec3;
 
 use plan::{PlanShot, eye_of};
 
@@ -13,6 +16,7 @@ use crate::portal_texture_options::{
     PortalTextureCounts, PortalTextureOptions, PortalTexturePaint,
 };
 use crate::portal_textures::{PortalTextures, TextureArrays};
+use crate::space::{SpaceShot, view_in};
 use crate::studio::Studio;
 
 impl Studio {
@@ -97,14 +101,86 @@ impl Studio {
                 1.0
             },
         };
-        let counts = if style.paint == Paint::Lit {
-            self.plan_with(&mut own, &shot)
-        } else {
-            own.shown.clear();
-            own.stops.clear();
-            Ok(PortalTextureCounts::default())
-        };
+        let counts = self.plan_styled(&mut own, &shot);
         self.portal_textures = Some(own);
         counts
+    }
+
+    /// As [`Studio::plan_portal_textures`], for a view of a space: before [`SpaceViewer::see`](enfilade_world::SpaceViewer::see), whose
+    /// [stops](enfilade_world::SpaceViewer::stops_mut) must be [those of the plan](Studio::portal_texture_stops), and before
+    /// [`Studio::draw_space`] with its answer. What `shot` has [seen](SpaceShot::seen) is ignored.
+    ///
+    /// Portals of the root become textures, but not those behind which other parts stand, which may move, or special
+    /// portals are seen.
+    ///
+    /// # Errors
+    ///
+    /// As [`Studio::draw_space`].
+    ///
+    /// # Panics
+    ///
+    /// As [`Studio::draw_space`].
+    pub fn plan_space_textures(
+        &mut self,
+        shot: &SpaceShot<'_>,
+        size: [u32; 2],
+    ) -> Result<PortalTextureCounts, RenderError> {
+        let Some(mut own) = self.portal_textures.take() else {
+            return Ok(PortalTextureCounts::default());
+        };
+        let counts = self.plan_in_space(&mut own, shot, size);
+        own.is_planned = counts.is_ok();
+        self.portal_textures = Some(own);
+        counts
+    }
+
+    fn plan_in_space(
+        &mut self,
+        own: &mut PortalTextures,
+        shot: &SpaceShot<'_>,
+        size: [u32; 2],
+    ) -> Result<PortalTextureCounts, RenderError> {
+        self.place_parts(shot.space);
+        self.cast_sun(shot);
+        let view = shot.camera.view(size[0] as f32 / size[1] as f32)?;
+        let eye = Vec3::from(shot.camera.eye).as_dvec3();
+        let planned = PlanShot {
+            space: Some(shot.space),
+            view: &view_in(shot.space, PartId::ROOT, shot.frame, &view),
+            eye: eye_of(Some(shot.space), shot.frame, &shot.camera),
+            fov_y: shot.camera.fov_y,
+            size,
+            style: self.drawable(shot.style),
+            exposure: self.exposure(shot, shot.frame, eye),
+        };
+        self.plan_styled(own, &planned)
+    }
+
+    /// Plans unless surfaces are colored to explain something.
+    fn plan_styled(
+        &mut self,
+        own: &mut PortalTextures,
+        shot: &PlanShot<'_>,
+    ) -> Result<PortalTextureCounts, RenderError> {
+        if shot.style.paint == Paint::Lit {
+            return self.plan_with(own, shot);
+        }
+        own.shown.clear();
+        own.stops.clear();
+        Ok(PortalTextureCounts::default())
+    }
+
+    /// Returns the stops of the last plan, for the viewer whose answer is drawn.
+    #[must_use]
+    pub fn portal_texture_stops(&self) -> Option<&Stops> {
+        self.portal_textures.as_ref().map(|own| &own.stops)
+    }
+
+    /// Returns the cells that the textures of the last plan show, with repetitions: what moves in them is drawn over the textures.
+    pub fn cells_in_portal_textures(&self) -> impl Iterator<Item = CellId> {
+        let own = self.portal_textures.iter();
+        let shown = own.flat_map(|own| own.shown.keys().map(move |id| (own, *id)));
+        let held = shown.flat_map(|(own, id)| own.of_doorway(id));
+        held.flat_map(|held| held.cells.iter().copied())
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::{DVec3, shown};
-use enfilade::runtime::View;
+use enfilade::runtime::{Stops, View};
 use enfilade::world::{
     Acoustics, ActorId, AwakeCells, Lamp, LampId, Lights, Listener, PartId, Pose, Space, SpaceSeen,
     SpaceViewer, Transmission,
@@ -312,6 +312,22 @@ impl Lived {
         view: &View,
         props: &mut Vec<Prop>,
     ) -> (&Space, SpaceSeen<'_>, &[u32]) {
+        self.see_to(
+            player,
+            view,
+            props,
+            None::<(&Stops, std::iter::Empty<CellId>)>,
+        )
+    }
+
+    /// As [`Lived::see`], up to stops, where textures show some cells. A view with special portals in it has no stops.
+    pub(crate) fn see_to(
+        &mut self,
+        player: &Player,
+        view: &View,
+        props: &mut Vec<Prop>,
+        stops: Option<(&Stops, impl Iterator<Item = CellId>)>,
+    ) -> (&Space, SpaceSeen<'_>, &[u32]) {
         let Self {
             space,
             viewer,
@@ -320,9 +336,24 @@ impl Lived {
             awake,
             ..
         } = self;
+        viewer.stops_mut().clear();
+        let mut behind = Vec::new();
+        if let Some((stops, cells)) = stops {
+            viewer.stops_mut().clone_from(stops);
+            let seen = viewer.see(space, player.frame, view);
+            if seen.contexts().len() > 1 || !seen.stopped_specials().is_empty() {
+                viewer.stops_mut().clear();
+            } else {
+                behind.extend(cells);
+                behind.sort_unstable();
+                behind.dedup();
+            }
+        }
         let seen = viewer.see(space, player.frame, view);
-        let cells = seen.of_part(PartId::ROOT);
-        let cells = cells.iter().flat_map(enfilade::Seen::cells).copied();
+        let of_root = seen.of_part(PartId::ROOT);
+        let direct = of_root.iter().flat_map(enfilade::Seen::cells).copied();
+        behind.retain(|cell| !direct.clone().any(|own| own == *cell));
+        let cells = direct.chain(behind);
         awake.update(self.time, cells.clone());
         for cell in cells {
             props.extend(

@@ -20,7 +20,8 @@ use enfilade::geom::DVec3;
 use enfilade::runtime::{Sightlines, Target};
 use enfilade::world::{PartId, Space};
 use enfilade_render::{
-    AdapterChoice, Camera, FOV, Paint, Sparing, Studio, good_camera, portal_looked_at,
+    AdapterChoice, Camera, FOV, Paint, PortalTextureOptions, Sparing, Studio, good_camera,
+    portal_looked_at,
 };
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
@@ -85,6 +86,12 @@ pub(crate) struct View {
     /// Draw objects with fewer triangles if that moves their surface by at most this many pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.0)]
     lod: f32,
+    /// Draw far portals as textures of what lies behind them: M changes that, T tints them.
+    #[arg(long)]
+    portal_textures: bool,
+    /// Triangles drawn in a frame at most: nearer portals become textures, too, until it holds.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    max_triangles: Option<u64>,
     /// Adapter to draw with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
@@ -140,6 +147,8 @@ fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
         let needs_whole = [
             (args.living.is_some(), "--living"),
             (args.lod > 0.0, "--lod"),
+            (args.portal_textures, "--portal-textures"),
+            (args.max_triangles.is_some(), "--max-triangles"),
         ];
         let Some((_, option)) = needs_whole.into_iter().find(|n| n.0) else {
             let packed = Packed::open(&args.world)?;
@@ -351,7 +360,15 @@ impl App<'_> {
             pointer: [0.0; 2],
             pressed_at: None,
             shown,
-            mode: Mode::default(),
+            mode: if self.args.portal_textures || self.args.max_triangles.is_some() {
+                Mode::PortalTextures
+            } else {
+                Mode::default()
+            },
+            texture_options: PortalTextureOptions {
+                max_triangles: self.args.max_triangles.unwrap_or(u64::MAX),
+                ..PortalTextureOptions::default()
+            },
             is_captured: false,
             wants_mouse: false,
             // Daylight needs the whole world.
@@ -436,6 +453,7 @@ impl App<'_> {
             KeyCode::KeyR => shown.radar = !shown.radar,
             KeyCode::KeyO => shown.portals = !shown.portals,
             KeyCode::KeyP => shown.plain = !shown.plain,
+            KeyCode::KeyT => shown.tints = !shown.tints,
             KeyCode::F4 => open.recorded = Some(Vec::new()),
             KeyCode::F5 => {
                 if let Some(path) = open.recorded.take() {

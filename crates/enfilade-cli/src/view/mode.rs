@@ -8,6 +8,8 @@ pub(super) enum Mode {
     /// Portals, clipped by the processor.
     #[default]
     Portals,
+    /// Portals; far ones are textures of what lies behind them.
+    PortalTextures,
     /// Portals, each tested on the adapter by an occlusion query.
     Queries,
     /// The view frustum.
@@ -19,7 +21,8 @@ pub(super) enum Mode {
 impl Mode {
     pub(super) fn next(self) -> Self {
         match self {
-            Self::Portals => Self::Queries,
+            Self::Portals => Self::PortalTextures,
+            Self::PortalTextures => Self::Queries,
             Self::Queries => Self::Frustum,
             Self::Frustum => Self::Everything,
             Self::Everything => Self::Portals,
@@ -29,6 +32,7 @@ impl Mode {
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Portals => "portals",
+            Self::PortalTextures => "portal textures",
             Self::Queries => "portals, occlusion queries",
             Self::Frustum => "frustum culling",
             Self::Everything => "everything",
@@ -39,6 +43,7 @@ impl Mode {
     pub(super) fn culling(self) -> Culling {
         match self {
             Self::Portals | Self::Queries => Culling::Portals,
+            Self::PortalTextures => Culling::PortalTextures,
             Self::Frustum => Culling::Frustum,
             Self::Everything => Culling::Everything,
         }

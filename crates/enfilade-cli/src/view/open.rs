@@ -14,7 +14,8 @@ use enfilade::runtime::View;
 use enfilade::stream::Eye;
 use enfilade::world::PartId;
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, FOV, Frame, Paint, Prop, SpaceShot, Sparing, Studio, Style,
+    AdapterChoice, Camera, Culling, FOV, Frame, Paint, PortalTextureOptions, PortalTexturePaint,
+    Prop, SpaceShot, Sparing, Studio, Style,
 };
 use winit::dpi::PhysicalSize;
 use winit::keyboard::KeyCode;
@@ -57,6 +58,8 @@ pub(super) struct Open {
     pub(super) pressed_at: Option<[f64; 2]>,
     pub(super) shown: Shown,
     pub(super) mode: Mode,
+    /// Settings of portal textures, until they are on.
+    pub(super) texture_options: PortalTextureOptions,
     /// `true` if the pointer is held in the window, and its movements turn the view.
     pub(super) is_captured: bool,
     /// `true` if it should be, while the window has the keyboard.
@@ -234,6 +237,25 @@ impl Open {
         }
     }
 
+    /// Makes room for portal textures if the mode uses them; if they cannot be, another mode follows.
+    fn begin_textures(&mut self) {
+        if self.mode != Mode::PortalTextures {
+            return;
+        }
+        if self.studio.portal_texture_options().is_none()
+            && let Err(why) = (self.studio).add_portal_textures(self.texture_options.clone())
+        {
+            self.mode = Mode::Portals;
+            self.warn(format!("no portal textures: {why}"));
+            return;
+        }
+        self.studio.paint_portal_textures(if self.shown.tints {
+            PortalTexturePaint::Tinted
+        } else {
+            PortalTexturePaint::Plain
+        });
+    }
+
     fn style(&self) -> Style {
         Style {
             paint: self.shown.paint,
@@ -275,6 +297,8 @@ impl Open {
             light(&mut self.studio, world)?;
         }
         self.shown.queries = None;
+        self.shown.textures = None;
+        self.begin_textures();
         self.scan(world);
         if self.is_living {
             return self.draw_living(world, (camera, &view), target, seconds);
@@ -285,6 +309,10 @@ impl Open {
             list
         } else {
             let culling = self.mode.culling();
+            if culling == Culling::PortalTextures {
+                let counts = self.studio.plan_portal_textures(camera, style, size)?;
+                self.shown.textures = Some(counts);
+            }
             self.studio.take_list(&view, camera.eye, culling, size)
         };
         let output = target
@@ -343,7 +371,24 @@ impl Open {
         let player = self.walker.player();
         let (style, outside) = (self.style(), self.camera_in_root());
         self.props.clear();
-        let (space, seen, lamps) = self.lived.see(&player, view, &mut self.props);
+        let is_textured = self.mode == Mode::PortalTextures;
+        if is_textured {
+            let shot = SpaceShot {
+                space: &self.lived.space,
+                frame: player.frame,
+                camera: *camera,
+                seen: None,
+                style,
+                marks: &[],
+                props: &[],
+                lamps: None,
+            };
+            self.shown.textures = Some(self.studio.plan_space_textures(&shot, size)?);
+        }
+        let stops = self.studio.portal_texture_stops().filter(|_| is_textured);
+        let behind = self.studio.cells_in_portal_textures();
+        let (space, seen, lamps) =
+            (self.lived).see_to(&player, view, &mut self.props, stops.map(|s| (s, behind)));
         let cells = seen.of_part(PartId::ROOT);
         self.shown.cells.clear();
         (self.shown.cells).extend(cells.iter().flat_map(enfilade::Seen::cells).map(|c| c.0));
@@ -353,7 +398,10 @@ impl Open {
             .shut_portals()
             .map(|p| p.0)
             .collect();
-        let is_culled = self.mode.culling() == Culling::Portals;
+        let is_culled = matches!(
+            self.mode.culling(),
+            Culling::Portals | Culling::PortalTextures
+        );
         let counts = self.studio.draw_space(
             &SpaceShot {
                 space,

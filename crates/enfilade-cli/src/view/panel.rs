@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use egui::{Align2, Color32, Pos2, Rect, Stroke, Vec2};
 use enfilade::cpg::World;
-use enfilade_render::{Camera, Gpu, Paint};
+use enfilade_render::{Camera, Gpu, Paint, PortalTextureCounts};
 use winit::event::WindowEvent;
 use winit::window::Window;
 
@@ -33,6 +33,10 @@ pub(super) struct Shown {
     pub(super) ahead: String,
     /// `true` if distant rooms and objects are spared.
     pub(super) spares: bool,
+    /// Counters of portal textures, in the mode that uses them.
+    pub(super) textures: Option<PortalTextureCounts>,
+    /// `true` if portals that are textures are tinted.
+    pub(super) tints: bool,
     /// Magnification of the map, relative to the whole.
     pub(super) zoom: f32,
     pub(super) is_recording: bool,
@@ -72,8 +76,9 @@ mouse          look around; Tab: let go of it, then drag
 click          open or close the door or doorway there
 wheel, + -     zoom of the map
 F              fly; Q and E: down and up
-M              drawn: portals, portals by occlusion queries,
-               frustum, everything
+M              drawn: portals, far portals as textures,
+               occlusion queries, frustum, everything
+T              tint the portals that are textures
 L              spare small portals and what is behind them
 R              radar: things around, on the map and in words
 C              paint: lit, cells, overdraw
@@ -171,6 +176,30 @@ impl Panel {
     }
 }
 
+/// Returns a line about portal textures.
+fn textures_told(counts: &PortalTextureCounts) -> String {
+    let PortalTextureCounts {
+        n_textured,
+        n_turning,
+        n_made,
+        n_plain,
+        n_bytes,
+        ..
+    } = *counts;
+    let mib = n_bytes as f64 / f64::from(1 << 20);
+    let mut text = format!("\n{n_textured} portals are textures ({mib:.0} MiB)");
+    for (n, words) in [
+        (n_turning, "turning"),
+        (n_made, "made"),
+        (n_plain, "of one color"),
+    ] {
+        if n > 0 {
+            text += &format!(", {n} {words}");
+        }
+    }
+    text
+}
+
 fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
     let painter = ui.painter();
     let screen = ui.max_rect();
@@ -191,6 +220,9 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
     );
     if let Some([rounds, queries]) = shown.queries {
         text += &format!("\n{queries} occlusion queries in {rounds} rounds");
+    }
+    if let Some(counts) = shown.textures {
+        text += &textures_told(&counts);
     }
     for (is_so, words) in [
         (shown.spares, "small portals spared"),

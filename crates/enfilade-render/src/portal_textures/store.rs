@@ -67,6 +67,8 @@ pub(crate) struct PortalTextures {
     pub(crate) stops: Stops,
     /// The doorways that textures fill in the frame.
     pub(crate) shown: BTreeMap<DoorwayId, Vec<Component>>,
+    /// True from the plan of a space's frame to its draw.
+    pub(crate) is_planned: bool,
     conditions: Option<Conditions>,
     /// Eye of the last frame, in the root. [Units: wu]
     pub(crate) last_eye: Option<glam::DVec3>,
@@ -83,6 +85,7 @@ impl PortalTextures {
             frame: 0,
             stops: Stops::default(),
             shown: BTreeMap::new(),
+            is_planned: false,
             conditions: None,
             last_eye: None,
         }
@@ -186,6 +189,13 @@ impl PortalTextures {
         }
         self.layers[held.layer] = (Some(key), self.frame);
         self.held.insert(key, held);
+    }
+
+    /// Returns the textures of a doorway.
+    pub(crate) fn of_doorway(&self, id: DoorwayId) -> impl Iterator<Item = &HeldTexture> {
+        let own = self.held.range((id, None)..);
+        own.take_while(move |(key, _)| key.0 == id)
+            .map(|(_, held)| held)
     }
 
     /// Returns the memory of the textures held. [Units: byte]

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use enfilade_runtime::{SightState, View};
-use enfilade_world::{PartId, Pose, Space};
+use enfilade_world::{PartId, Place, Pose, Space};
 use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
@@ -132,6 +132,19 @@ impl Studio {
             return Ok(false);
         }
         let is_made = self.compose(own, shot, (id, &doorway, eye), (lacking, counts))?;
+        // What stands behind it may move, and its own view would stop here.
+        let has_guest = |space: &Space, cell| {
+            let part = PartId::ROOT;
+            !space.guests(Place { part, cell }).is_empty()
+        };
+        let is_still = shot.space.is_none_or(|space| {
+            let mut cells = own.of_doorway(id).flat_map(|held| &held.cells);
+            !cells.any(|cell| has_guest(space, *cell))
+        });
+        if !is_still {
+            own.shown.remove(&id);
+            return Ok(false);
+        }
         if is_made && turn > 0 {
             self.turn(own, shot, (id, &doorway, eye), counts)?;
         }
