@@ -116,12 +116,18 @@ pub struct Dwelling {
 /// If rows or storeys of the plan differ in size.
 #[must_use]
 pub fn dwelling(params: &DwellingParams) -> Dwelling {
-    let plan = Plan::new(params);
+    let plan = RoomPlan::new(params);
     let holes = plan.holes();
     let mut world = world_of(&plan.grid, &[], &mut |face| holes.get(&key(face)).copied());
     dress(&mut world);
     let floors = plan.floors();
-    furnish(&mut world, &plan.spots(), &floors, params);
+    furnish(
+        &mut world,
+        &plan.spots(),
+        &floors,
+        params.n_triangles,
+        params.seed,
+    );
     Dwelling {
         route: plan.route(&holes),
         world,
@@ -146,12 +152,12 @@ fn join(groups: &mut BTreeMap<Square, usize>, squares: [Square; 2]) -> bool {
     a != b
 }
 
-struct Plan<'a> {
+struct RoomPlan<'a> {
     params: &'a DwellingParams,
     grid: Grid,
 }
 
-impl<'a> Plan<'a> {
+impl<'a> RoomPlan<'a> {
     fn new(params: &'a DwellingParams) -> Self {
         let plan = &params.plan;
         let size = [plan[0][0].len(), plan.len(), plan[0].len()];

@@ -6,7 +6,6 @@ use enfilade_cpg::{Batch, CellId, DetailObject, World};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
 
-use super::dwelling::DwellingParams;
 use super::turned::Turned;
 use super::world::box_indices;
 use crate::picture::oak_planks;
@@ -130,16 +129,15 @@ pub(super) fn furnish(
     world: &mut World,
     spots: &[Spot],
     floors: &[(u32, [DVec3; 2])],
-    params: &DwellingParams,
+    n_triangles: u64,
+    seed: u64,
 ) {
-    let placings = placings(spots, params.seed);
+    let placings = placings(spots, seed);
     let structure: usize = (world.batches.iter())
         .map(|b| b.primitive.indices.len() / 3)
         .sum();
     let n_floors = 12 * floors.len() as u64;
-    let budget = params
-        .n_triangles
-        .saturating_sub(structure as u64 + n_floors);
+    let budget = n_triangles.saturating_sub(structure as u64 + n_floors);
     let mut counts: BTreeMap<(Turned, usize), u64> = BTreeMap::new();
     for (kind, set, ..) in &placings {
         *counts.entry((*kind, *set)).or_default() += 1;

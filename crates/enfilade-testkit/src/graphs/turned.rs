@@ -93,7 +93,7 @@ impl Turned {
 
 /// The surface of a piece.
 #[derive(Clone, Copy)]
-enum Shape {
+enum TurnedShape {
     /// Radii and heights, turned about the vertical through the piece's place.
     Lathe(&'static [[f64; 2]]),
     /// Half its size; edges are the sharper, the smaller the power. 1 makes an ellipsoid.
@@ -103,7 +103,7 @@ enum Shape {
 /// A surface of one color; its ends may be open.
 #[derive(Clone, Copy)]
 struct Piece {
-    shape: Shape,
+    shape: TurnedShape,
     at: DVec3,
     /// 0 to 2.
     color: usize,
@@ -115,8 +115,8 @@ impl Piece {
     fn divisions(&self, fineness: f64) -> [usize; 2] {
         let n = self.weight * fineness;
         let along = match self.shape {
-            Shape::Lathe(profile) => n.max(profile.len() as f64 - 1.0),
-            Shape::Cushion(..) => n * 0.6,
+            TurnedShape::Lathe(profile) => n.max(profile.len() as f64 - 1.0),
+            TurnedShape::Cushion(..) => n * 0.6,
         };
         [(n.round() as usize).max(5), (along.round() as usize).max(3)]
     }
@@ -126,7 +126,7 @@ impl Piece {
         let (sin, cos) = (around * TAU).sin_cos();
         self.at
             + match self.shape {
-                Shape::Lathe(profile) => {
+                TurnedShape::Lathe(profile) => {
                     let t = along * (profile.len() - 1) as f64;
                     let i = (t as usize).min(profile.len() - 2);
                     let ([r0, y0], [r1, y1]) = (profile[i], profile[i + 1]);
@@ -135,7 +135,7 @@ impl Piece {
                     let r = r0 + (r1 - r0) * t * t * (3.0 - 2.0 * t);
                     DVec3::new(r * cos, y0 + (y1 - y0) * t, -r * sin)
                 }
-                Shape::Cushion(half, power) => {
+                TurnedShape::Cushion(half, power) => {
                     let bent = |x: f64| x.signum() * x.abs().powf(power);
                     // A thousandth short of the poles, where triangles would have no area.
                     let (up, out) = ((along - 0.5) * PI * 0.999).sin_cos();
@@ -174,7 +174,7 @@ impl Piece {
 
 fn lathe(profile: &'static [[f64; 2]], at: [f64; 3], color: usize, weight: f64) -> Piece {
     Piece {
-        shape: Shape::Lathe(profile),
+        shape: TurnedShape::Lathe(profile),
         at: at.into(),
         color,
         weight,
@@ -189,7 +189,7 @@ fn block(low: [f64; 3], high: [f64; 3], color: usize, weight: f64) -> Piece {
 fn cushion(low: [f64; 3], high: [f64; 3], power: f64, color: usize, weight: f64) -> Piece {
     let (low, high) = (DVec3::from(low), DVec3::from(high));
     Piece {
-        shape: Shape::Cushion((high - low) * 0.5, power),
+        shape: TurnedShape::Cushion((high - low) * 0.5, power),
         at: (low + high) * 0.5,
         color,
         weight,
@@ -303,7 +303,7 @@ fn table() -> Vec<Piece> {
 
 fn ball(at: [f64; 3], radius: f64, color: usize, weight: f64) -> Piece {
     Piece {
-        shape: Shape::Cushion(DVec3::splat(radius), 1.0),
+        shape: TurnedShape::Cushion(DVec3::splat(radius), 1.0),
         at: at.into(),
         color,
         weight,
