@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use enfilade_render::{Camera, Culling, Frame, Picture, Studio, Style};
+use enfilade_render::{Camera, Culling, Frame, Picture, Sparing, Studio, Style};
 
 use crate::measure::quantile;
 
@@ -13,6 +13,8 @@ pub(super) enum DrawMode {
     Frustum,
     /// Cells seen through portals.
     Portals,
+    /// The eye's cell alone, as if each doorway were a picture for nothing: the least that pictures can reach.
+    Room,
 }
 
 impl DrawMode {
@@ -20,19 +22,24 @@ impl DrawMode {
         match self {
             Self::Frustum => "frustum culling",
             Self::Portals => "portal culling",
+            Self::Room => "the eye's room alone",
         }
     }
 
     fn culling(self) -> Culling {
         match self {
             Self::Frustum => Culling::Frustum,
-            Self::Portals => Culling::Portals,
+            Self::Portals | Self::Room => Culling::Portals,
         }
     }
 
     /// Readies the studio for a walk. Ways with pictures forget those of the last walk here, or make them.
     pub(super) fn begin(self, studio: &mut Studio) {
-        studio.sparing = enfilade_render::Sparing::default();
+        studio.sparing = Sparing {
+            // No portal has as many pixels.
+            stop_below: if self == Self::Room { 1e9 } else { 0.0 },
+            ..Sparing::default()
+        };
     }
 }
 
