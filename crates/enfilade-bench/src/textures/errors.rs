@@ -65,6 +65,8 @@ pub(super) fn mean_pop(frames: [&Picture; 2], truths: [&Picture; 2], mask: &[boo
 
 #[cfg(test)]
 mod tests {
+    use enfilade_testkit::{GridParams, room_grid};
+
     use super::*;
 
     fn row(reds: &[u8]) -> Picture {
@@ -100,25 +102,25 @@ mod tests {
 
     #[test]
     fn the_mask_is_where_the_portal_is_in_view() {
-        let portal = Portal {
-            outline: vec![
-                [-1.0, -1.0, -4.0],
-                [1.0, -1.0, -4.0],
-                [1.0, 1.0, -4.0],
-                [-1.0, 1.0, -4.0],
-            ],
-            ..Portal::default()
-        };
+        let mut world = room_grid(&GridParams::two_rooms());
+        let portal = &mut world.graph.portals[0];
+        portal.outline = vec![
+            [-1.0, -1.0, -4.0],
+            [1.0, -1.0, -4.0],
+            [1.0, 1.0, -4.0],
+            [-1.0, 1.0, -4.0],
+        ];
+        let portal = &*portal;
         let camera = |z: f32| Camera {
             eye: [0.0; 3],
             toward: [0.0, 0.0, z],
             fov_y: std::f32::consts::FRAC_PI_2,
         };
         // A quarter of the picture's width and height.
-        let mask = portal_mask(&camera(-1.0), [&portal], [16, 16]);
+        let mask = portal_mask(&camera(-1.0), [portal], [16, 16]);
         assert_eq!(mask.iter().filter(|m| **m).count(), 16);
         assert!(mask[6 * 16 + 6] && !mask[5 * 16 + 6] && mask[9 * 16 + 9]);
-        let mask = portal_mask(&camera(1.0), [&portal], [16, 16]);
+        let mask = portal_mask(&camera(1.0), [portal], [16, 16]);
         assert!(!mask.contains(&true), "it is behind the eye");
     }
 }
