@@ -22,6 +22,7 @@ mod stream;
 mod subject;
 mod table;
 mod tampered;
+mod textures;
 mod trust;
 mod walkthrough;
 
@@ -42,6 +43,7 @@ use score::bench_score;
 use sight::{bench_los, bench_maze, bench_see, bench_tight};
 use table::Table;
 use tampered::bench_tampered;
+use textures::{PortalTextures, bench_portal_textures};
 use trust::{Trust, bench_trust};
 use walkthrough::Walkthrough;
 
@@ -64,6 +66,9 @@ enum What {
     Living(Chosen),
     /// Special portals, such as mirrors: a row per figure, with the value that it must reach.
     Portals(Chosen),
+    /// Doorways drawn as pictures: a row per figure, with the value that it must reach. Rows: model, portal culling, error,
+    /// pops, figures.
+    PortalTextures(PortalTextures),
     /// Worlds in pieces over a simulated link: a row per figure, with the value that it must reach.
     Stream(Chosen),
     /// Rooms, doors and windows found, compared with those that architects modeled; fails below the floors.
@@ -202,6 +207,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
         What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
+        What::PortalTextures(options) => return bench_portal_textures(options, args.json),
         What::Stream(chosen) => return bench_rows(stream::ROWS, args.json, chosen),
         What::Messy(options) => return bench_messy(options, args.json),
         What::Trust(options) => return bench_trust(options, args.json),

@@ -174,7 +174,7 @@ pub(crate) fn folder_of(name: &str) -> Option<PathBuf> {
 }
 
 /// Returns the world of a scene; `None` if the scene is missing.
-fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
+pub(crate) fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
     let Some(dir) = folder_of(name) else {
         return Ok(None);
     };

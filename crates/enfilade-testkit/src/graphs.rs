@@ -4,9 +4,12 @@
 //! graph is exact, so any loss at run-time is the run-time's own.
 
 mod doors;
+mod dwelling;
+mod furnished;
 mod grid;
 mod scale;
 mod specials;
+mod turned;
 mod world;
 
 use std::collections::BTreeMap;
@@ -16,6 +19,7 @@ use enfilade_geom::{Aabb, DMat3, DVec3};
 
 use crate::rng::Rng;
 pub use doors::with_doors;
+pub use dwelling::{Dwelling, DwellingParams, dwelling};
 use grid::{Face, Grid};
 pub use scale::scaled_world;
 pub use specials::{endless_room, linked_copies, traced_step, with_specials};

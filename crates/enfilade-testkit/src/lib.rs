@@ -51,8 +51,8 @@ pub use disturb::{Disturbance, disturb, disturbed};
 pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
 pub use graphs::{
-    GridParams, cabin, courtyard, endless_room, linked_copies, room_grid, scaled_world,
-    traced_step, window_tower, with_doors, with_specials,
+    Dwelling, DwellingParams, GridParams, cabin, courtyard, dwelling, endless_room, linked_copies,
+    room_grid, scaled_world, traced_step, window_tower, with_doors, with_specials,
 };
 pub use house::furnished_house;
 pub use impossible::{ImpossibleHouse, impossible_house};

@@ -93,7 +93,7 @@ pub(super) fn first_picture(world: &World) -> anyhow::Result<Figure> {
 }
 
 /// Returns the building with an object of its own in each room.
-fn furnished(world: &World) -> anyhow::Result<World> {
+pub(crate) fn furnished(world: &World) -> anyhow::Result<World> {
     let mut world = world.clone();
     let n = world.details.len();
     Rings::of(&world, TRIANGLES)?.place(&mut world);

@@ -13,6 +13,7 @@ mod site;
 
 use crate::living::{baked, made};
 use crate::rows::Row;
+pub(crate) use first::furnished;
 
 /// Real buildings to walk in.
 const BUILDINGS: &[&str] = &[
