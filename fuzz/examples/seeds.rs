@@ -67,6 +67,12 @@ fn main() -> std::io::Result<()> {
     for (i, name) in NAMES.iter().enumerate() {
         write("files", &i.to_string(), name.as_bytes())?;
     }
+    let (head, skeleton, pieces) = enfilade_fuzz::packed::seeds();
+    write("head", "offices", &head)?;
+    write("skeleton", "offices", &skeleton)?;
+    for (i, piece) in pieces.iter().enumerate() {
+        write("piece", &i.to_string(), piece)?;
+    }
     for (i, seed) in enfilade_fuzz::bake::seeds().iter().enumerate() {
         write("bake", &i.to_string(), seed)?;
     }

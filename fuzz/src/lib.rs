@@ -2,6 +2,7 @@
 
 pub mod bake;
 pub mod files;
+pub mod packed;
 pub mod scene;
 pub mod settings;
 pub mod sight;

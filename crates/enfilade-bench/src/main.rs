@@ -71,6 +71,15 @@ enum What {
     PortalTextures(PortalTextures),
     /// Worlds in pieces over a simulated link: a row per figure, with the value that it must reach.
     Stream(Chosen),
+    /// A step of the row `size` of `stream`, in a process of its own.
+    #[command(hide = true)]
+    Town {
+        step: stream::TownStep,
+        /// The generated town, such as `offices-10000`.
+        scene: String,
+        /// Folder of the packed town.
+        dir: PathBuf,
+    },
     /// Rooms, doors and windows found, compared with those that architects modeled; fails below the floors.
     Score {
         /// Folders with `scene.glb` and `truth.json`; all real scenes if there are none.
@@ -209,6 +218,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
         What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
         What::PortalTextures(options) => return bench_portal_textures(options, args.json),
         What::Stream(chosen) => return bench_rows(stream::ROWS, args.json, chosen),
+        What::Town { step, scene, dir } => return stream::run_step(*step, scene, dir),
         What::Messy(options) => return bench_messy(options, args.json),
         What::Trust(options) => return bench_trust(options, args.json),
         What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),

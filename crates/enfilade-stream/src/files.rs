@@ -114,10 +114,7 @@ impl PackedFiles {
     /// Returns a source of its pieces, which reads on a thread.
     #[must_use]
     pub fn source(&self, head: &Arc<PackedHead>) -> ThreadSource {
-        let fetch = FileFetch {
-            files: self.clone(),
-            file: None,
-        };
+        let fetch = FileFetch::new(self);
         ThreadSource::new(head, &self.pieces.display().to_string(), vec![fetch])
     }
 }
@@ -138,6 +135,17 @@ fn at(path: &Path, error: &std::io::Error) -> PackError {
 pub struct FileFetch {
     files: PackedFiles,
     file: Option<File>,
+}
+
+impl FileFetch {
+    /// Makes one that has not opened its file yet.
+    #[must_use]
+    pub fn new(files: &PackedFiles) -> Self {
+        Self {
+            files: files.clone(),
+            file: None,
+        }
+    }
 }
 
 impl Fetch for FileFetch {

@@ -26,7 +26,7 @@ pub use head::{PackError, PackedHead, PieceAt};
 #[cfg(feature = "http")]
 pub use http::{HttpFetch, PackedHttp};
 pub use link::{LinkOptions, SimulatedLink};
-pub use of_world::WorldPieces;
+pub use of_world::{WorldPieces, images_of};
 pub use pack::PackedWorld;
 pub use place::PackedPlace;
 pub use source::{FetchError, Reply, Source};

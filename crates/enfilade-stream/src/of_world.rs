@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::scene::Primitive;
+use serde_json::Value;
 
 use crate::{Catalog, Piece, PieceId};
 
@@ -100,6 +101,29 @@ impl WorldPieces {
             of_image,
         }
     }
+}
+
+/// Returns the pictures that a material of a world shows, for [`WorldPieces::of_world`]: those of every texture that its glTF names.
+#[must_use]
+pub fn images_of(world: &World, material: u32) -> Vec<u32> {
+    fn visit(value: &Value, textures: &mut Vec<u64>) {
+        if let Value::Object(fields) = value {
+            for (name, field) in fields {
+                if name.ends_with("exture") {
+                    textures.extend(field["index"].as_u64());
+                }
+                visit(field, textures);
+            }
+        }
+    }
+    let material = world.materials.get(material as usize);
+    let json = material.and_then(|m| serde_json::from_str(&m.gltf).ok());
+    let mut textures = Vec::new();
+    if let Some(json) = json {
+        visit(&json, &mut textures);
+    }
+    let image = |t: u64| world.textures.get(usize::try_from(t).ok()?)?.image;
+    textures.into_iter().filter_map(image).collect()
 }
 
 /// Pieces so far, and the pieces that each cell needs.

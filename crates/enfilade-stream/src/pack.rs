@@ -1,12 +1,10 @@
 //! World file → packed world, and back.
 
-use enfilade_cpg::World;
 use enfilade_cpg::wire::{SplitFile, join_file, split_file};
 use enfilade_runtime::{Sight, SightSkeleton};
-use serde_json::Value;
 
 use crate::head::{PackError, PackedHead, PieceAt, compressed, damaged, expanded, hash_of};
-use crate::{Catalog, Piece, PieceId, WorldPieces};
+use crate::{Catalog, Piece, PieceId, WorldPieces, images_of};
 
 /// A packed world in memory.
 #[derive(Clone, Debug)]
@@ -143,26 +141,4 @@ fn range(body: &[u8], offset: u64, size: u64) -> Option<&[u8]> {
     let from = usize::try_from(offset).ok()?;
     let to = from.checked_add(usize::try_from(size).ok()?)?;
     body.get(from..to)
-}
-
-/// Returns the pictures that a material shows.
-fn images_of(world: &World, material: u32) -> Vec<u32> {
-    fn visit(value: &Value, textures: &mut Vec<u64>) {
-        if let Value::Object(fields) = value {
-            for (name, field) in fields {
-                if name.ends_with("exture") {
-                    textures.extend(field["index"].as_u64());
-                }
-                visit(field, textures);
-            }
-        }
-    }
-    let material = world.materials.get(material as usize);
-    let json = material.and_then(|m| serde_json::from_str(&m.gltf).ok());
-    let mut textures = Vec::new();
-    if let Some(json) = json {
-        visit(&json, &mut textures);
-    }
-    let image = |t: u64| world.textures.get(usize::try_from(t).ok()?)?.image;
-    textures.into_iter().filter_map(image).collect()
 }

@@ -149,6 +149,42 @@ fn damaged_heads_and_bodies_are_told() {
     }
 }
 
+// Fuzz targets `head` and `piece` do the same for longer.
+#[test]
+fn hostile_heads_and_pieces_are_told_or_harmless() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    let body = packed.head.encode_body().unwrap();
+    let mut rng = Rng::new(9);
+    let damage = |bytes: &[u8], rng: &mut Rng| {
+        let mut other = bytes.to_vec();
+        for _ in 0..=rng.below(3) {
+            let at = rng.below(other.len());
+            other[at] = match rng.below(3) {
+                0 => other[at] ^ (1 << rng.below(8)),
+                1 => b'0' + rng.below(10) as u8,
+                _ => rng.below(256) as u8,
+            };
+        }
+        other
+    };
+    let mut n_read = [0; 2];
+    for _ in 0..300 {
+        if let Ok(head) = PackedHead::decode_body(&damage(&body, &mut rng)) {
+            n_read[0] += 1;
+            for piece in [0, 1, u32::MAX].map(PieceId) {
+                let _ = head.expand(piece, &body);
+            }
+            let _ = head.sight();
+        }
+        let piece = PieceId(rng.below(packed.head.places.len()) as u32);
+        let bytes = packed.packed(piece).unwrap();
+        let bytes = packed.head.expand(piece, bytes).unwrap();
+        n_read[1] += usize::from(read_piece(&damage(&bytes, &mut rng)).is_ok());
+    }
+    assert!(n_read.iter().all(|n| *n > 0 && *n < 300), "{n_read:?}");
+}
+
 #[test]
 fn pieces_come_from_disk_and_canceled_ones_do_not() {
     let file = encode_glb(&world()).unwrap();

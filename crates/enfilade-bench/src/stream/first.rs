@@ -26,7 +26,7 @@ const MOST_FRAMES: u32 = 18_000;
 /// Furnishes a building, packs it, and opens it over 1 MB/s with a latency of 50 ms, each time anew; returns the longest time
 /// until the eye's room is complete.
 pub(super) fn first_picture(world: &World) -> anyhow::Result<Figure> {
-    let world = furnished(world)?;
+    let world = furnished(world, TRIANGLES)?;
     let site = Streamed::of(&world)?;
     let file = encode_glb(&world)?;
     let packed = PackedWorld::pack(&file)?;
@@ -92,11 +92,11 @@ pub(super) fn first_picture(world: &World) -> anyhow::Result<Figure> {
     })
 }
 
-/// Returns the building with an object of its own in each room.
-pub(crate) fn furnished(world: &World) -> anyhow::Result<World> {
+/// Returns the building with an object of its own in each room, and about `total` triangles.
+pub(crate) fn furnished(world: &World, total: u64) -> anyhow::Result<World> {
     let mut world = world.clone();
     let n = world.details.len();
-    Rings::of(&world, TRIANGLES)?.place(&mut world);
+    Rings::of(&world, total)?.place(&mut world);
     let mut rng = Rng::new(3);
     let Some(ring) = world.detail_meshes.pop() else {
         return Ok(world);

@@ -10,6 +10,9 @@ mod pops;
 mod replay;
 mod settled;
 mod site;
+mod size;
+
+pub(crate) use size::{TownStep, run_step};
 
 use crate::living::{baked, made};
 use crate::rows::Row;
@@ -25,6 +28,8 @@ const BUILDINGS: &[&str] = &[
 ];
 /// Generated towns.
 const TOWNS: &[&str] = &["offices-1000"];
+/// A generated town that is furnished to 2 GB.
+const LARGE: &[&str] = &["offices-10000"];
 
 pub(crate) const ROWS: &[Row] = &[
     made("settled", TOWNS, settled::settled_in),
@@ -49,4 +54,7 @@ pub(crate) const ROWS: &[Row] = &[
     ),
     made("cost of a frame: idle", &["offices-10000"], cost::idle),
     made("cost of a frame: moving", &["offices-10000"], cost::moving),
+    made("size: memory", LARGE, size::memory_of),
+    made("size: absent", LARGE, size::absent),
+    made("size: first picture", LARGE, size::first_picture),
 ];

@@ -6,11 +6,10 @@ use anyhow::Context;
 use enfilade::cpg::{CellSet, Pvs};
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState, View, Viewer};
-use enfilade::stream::{Catalog, InView, PieceId, WorldPieces};
+use enfilade::stream::{Catalog, InView, PieceId, WorldPieces, images_of};
 use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
-use serde_json::Value;
 
 /// Length of a frame.
 pub(super) const FRAME: Duration = Duration::from_micros(16_667);
@@ -26,13 +25,7 @@ pub(super) struct Streamed {
 impl Streamed {
     /// Prepares a world; finds what may be seen from each cell.
     pub(super) fn of(world: &World) -> anyhow::Result<Self> {
-        let mut context = VisContext {
-            on_round: &mut |_, _| true,
-            walls: None,
-            checkpoint: None,
-        };
-        let found = see_world(&world.graph, &VisConfig::default(), &mut context)?;
-        Self::with_pvs(world, found.vis.cells)
+        Self::with_pvs(world, visible_sets(world)?)
     }
 
     pub(super) fn with_pvs(world: &World, pvs: Pvs) -> anyhow::Result<Self> {
@@ -62,6 +55,17 @@ impl Streamed {
     }
 }
 
+/// Finds what may be seen from each cell.
+pub(super) fn visible_sets(world: &World) -> anyhow::Result<Pvs> {
+    let mut context = VisContext {
+        on_round: &mut |_, _| true,
+        walls: None,
+        checkpoint: None,
+    };
+    let found = see_world(&world.graph, &VisConfig::default(), &mut context)?;
+    Ok(found.vis.cells)
+}
+
 /// Generates offices by name, such as `offices-1000`.
 pub(super) fn offices(scene: &str) -> anyhow::Result<World> {
     let (_, n) = scene.rsplit_once('-').context("no number of rooms")?;
@@ -83,28 +87,6 @@ pub(super) fn near_sets(world: &World) -> Pvs {
         set
     };
     Pvs::of_rows(&graph.cell_ids().map(row).collect::<Vec<_>>())
-}
-
-/// Returns the pictures of a material.
-fn images_of(world: &World, material: u32) -> Vec<u32> {
-    fn visit(value: &Value, textures: &mut Vec<usize>) {
-        if let Value::Object(fields) = value {
-            for (name, field) in fields {
-                if name.ends_with("exture") {
-                    textures.extend(field["index"].as_u64().map(|i| i as usize));
-                }
-                visit(field, textures);
-            }
-        }
-    }
-    let material = world.materials.get(material as usize);
-    let json = material.and_then(|m| serde_json::from_str::<Value>(&m.gltf).ok());
-    let mut textures = Vec::new();
-    if let Some(json) = json {
-        visit(&json, &mut textures);
-    }
-    let image = |t: usize| world.textures.get(t).and_then(|t| t.image);
-    textures.into_iter().filter_map(image).collect()
 }
 
 /// A frame of a recorded walk.

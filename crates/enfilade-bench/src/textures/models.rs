@@ -9,6 +9,9 @@ use super::stroll::stroll;
 use crate::rows::baked_scene;
 use crate::stream::furnished;
 
+/// Triangles of a furnished building.
+const FURNISHED: u64 = 820_000;
+
 /// Length of the walk through a baked building. [Units: wu]
 const METERS: usize = 150;
 
@@ -52,7 +55,7 @@ impl WalkedModel {
             "haunted" => DwellingParams::haunted(),
             "tower" => DwellingParams::tower(),
             _ => {
-                let world = baked_scene(scene)?.map(|world| furnished(&world));
+                let world = baked_scene(scene)?.map(|world| furnished(&world, FURNISHED));
                 return Ok(world.transpose()?.map(|world| Self {
                     name: scene.into(),
                     world,

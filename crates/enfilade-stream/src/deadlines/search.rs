@@ -68,6 +68,8 @@ struct Row {
     next: u32,
     due: f32,
     is_open: bool,
+    /// The cell last looked at, and the first of its pieces that has no deadline yet.
+    marking: Option<(CellId, usize)>,
 }
 
 /// The entry of a cell, with the ways out of it that have no lengths yet.
@@ -234,8 +236,21 @@ impl Search {
         }
     }
 
-    /// Reads cells of the open row, 64 at a time.
+    /// Reads cells of the open row, one at a time, and its pieces as far as the work allows.
     fn read_row(&mut self, catalog: &Catalog, work: &mut u32) {
+        if let Some((cell, first)) = self.row.marking {
+            let rest = catalog.pieces_of(cell).get(first..).unwrap_or_default();
+            let n = rest.len().min((*work / COST_OF_PIECE) as usize + 1);
+            *work = work.saturating_sub(COST_OF_PIECE * n as u32);
+            for piece in &rest[..n] {
+                let due = &mut self.due[piece.idx()];
+                if due.0 != self.stamp {
+                    *due = (self.stamp, self.row.due);
+                }
+            }
+            self.row.marking = (n < rest.len()).then_some((cell, first + n));
+            return;
+        }
         let n_cells = self.ways.cells.len() as u32;
         let own = [[self.row.cell, self.row.cell + 1]];
         let all = [[0, n_cells]];
@@ -256,13 +271,13 @@ impl Search {
         let stop = end.min((word + 1) * 64);
         let upto = |n: u32| if n >= 64 { u64::MAX } else { (1 << n) - 1 };
         let mask = upto(stop - word * 64) & !upto(from - word * 64);
-        let mut new = mask & !self.found[word as usize];
-        self.found[word as usize] |= mask;
+        let new = mask & !self.found[word as usize];
         *work = work.saturating_sub(2);
         let Some((_, eye)) = self.eye else { return };
-        while new != 0 {
-            let cell = word * 64 + new.trailing_zeros();
-            new &= new - 1;
+        if new != 0 {
+            let bit = new.trailing_zeros();
+            let cell = word * 64 + bit;
+            self.found[word as usize] |= 1 << bit;
             let distance = gap(&[eye, eye], &self.ways.cells[cell as usize]);
             // A box may be empty: at an infinite distance.
             let key = if distance.is_nan() {
@@ -271,13 +286,11 @@ impl Search {
                 distance
             };
             self.group.push(Reverse((key.to_bits(), cell)));
-            let pieces = catalog.pieces_of(CellId(cell));
-            *work = work.saturating_sub(COST_OF_CELL + COST_OF_PIECE * pieces.len() as u32);
-            for piece in pieces {
-                let due = &mut self.due[piece.idx()];
-                if due.0 != self.stamp {
-                    *due = (self.stamp, self.row.due);
-                }
+            *work = work.saturating_sub(COST_OF_CELL);
+            self.row.marking = Some((CellId(cell), 0));
+            self.row.next = cell + 1;
+            if new & (new - 1) != 0 {
+                return;
             }
         }
         if stop == end {

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 
 use super::frame::{Changes, Eye, Failed, InView, Loaded};
 use super::options::Policy;
-use super::slots::State;
+use super::state::State;
 use super::sweep::Sweep;
 use super::{COST_OF_PIECE, MANY_FAILURES, Streamer, WORK_OF_FRAME};
 use crate::deadlines::{Planned, Search};
@@ -132,7 +132,7 @@ impl Streamer {
         self.wanted
             .look(in_view, min_share, n_first, &self.catalog, &self.slots);
         for &piece in self.slots.in_flight() {
-            if self.wanted.has(piece) {
+            if self.wanted.has(piece, &self.catalog, &self.slots) {
                 self.taken_over.push(piece);
             }
         }
@@ -149,7 +149,7 @@ impl Streamer {
             while let Some(loaded) = self.arrived.get(i) {
                 let piece = loaded.piece;
                 let size = self.slots.of(piece).n_resident;
-                if self.wanted.has(piece) != is_for_view {
+                if self.is_wanted(piece) != is_for_view {
                     i += 1;
                     continue;
                 }
@@ -171,9 +171,8 @@ impl Streamer {
         }
         self.wanted.end(&self.slots);
         let out = &mut changes.stand_ins;
-        let min_share = self.options.min_share;
         self.wanted
-            .stand_ins(in_view, min_share, &self.catalog, &self.slots, out);
+            .stand_ins(in_view, &self.catalog, &self.slots, out);
         self.is_whole = out.is_empty();
     }
 }
@@ -204,25 +203,32 @@ impl Streamer {
         source: &mut S,
         changes: &mut Changes,
     ) {
-        if self.wanted.absent.is_empty() {
+        let is_full = self.slots.in_flight().len() >= self.options.max_in_flight.max(1);
+        if is_full && self.slots.in_flight().iter().all(|p| self.is_wanted(*p)) {
             return;
         }
-        let mut n_asked = 0;
-        while let Some(&piece) = self.wanted.absent.get(n_asked) {
+        while let Some(piece) = self.wanted.next_absent(&self.catalog, &mut self.slots) {
             if let Policy::Delayed { first_share } = self.options.policy {
-                let is_small = self.wanted.share(piece) < first_share;
-                if is_small && self.wanted.is_large_coming(first_share, &self.slots) {
+                let (catalog, slots) = (&self.catalog, &self.slots);
+                let is_small = self.wanted.share(piece, catalog, slots) < first_share;
+                if is_small && self.wanted.is_large_coming(first_share, catalog, slots) {
                     break;
                 }
             }
-            // It may have been asked for as a pinned one.
-            let is_absent = self.slots.state(piece) == State::Absent;
-            if is_absent && !self.fetch_now(source, piece, changes) {
+            if !self.fetch_now(source, piece, changes) {
                 break;
             }
-            n_asked += 1;
         }
-        self.wanted.absent.drain(..n_asked);
+    }
+
+    /// Returns `true` if something in view is on its way or about to be asked for.
+    fn is_waiting(&self) -> bool {
+        self.wanted.is_waiting(&self.catalog, &self.slots)
+    }
+
+    /// Returns `true` if a piece is in view and fits. For pieces in memory, only after [`super::Wanted::mark`].
+    fn is_wanted(&self, piece: PieceId) -> bool {
+        self.wanted.has(piece, &self.catalog, &self.slots)
     }
 
     /// Asks for pieces of pinned cells.
@@ -312,7 +318,7 @@ impl Streamer {
     fn may_go(&self, piece: PieceId) -> bool {
         let slot = self.slots.of(piece);
         let is_coming = slot.state != State::Resident && slot.for_view;
-        slot.n_pins == 0 && !is_coming && !self.wanted.has(piece)
+        slot.n_pins == 0 && !is_coming && !self.is_wanted(piece)
     }
 
     /// Returns `true` if a request of this size is within the limits.
@@ -461,6 +467,9 @@ impl Streamer {
         }
         *work = work.saturating_sub(COST_OF_PIECE);
         while let Some(&piece) = self.catalog.pieces_of(cell).get(self.sweep.piece) {
+            if *work == 0 {
+                return;
+            }
             *work = work.saturating_sub(COST_OF_PIECE);
             let slot = self.slots.of(piece);
             if self.slots.rest(piece).swept != self.sweep.stamp {
@@ -533,7 +542,7 @@ impl Streamer {
             self.sweep.has_lost = true;
             return Attempt::NoRoom;
         }
-        if self.now < self.hold || self.wanted.is_waiting(&self.slots) || !self.may_ask(n_packed) {
+        if self.now < self.hold || self.is_waiting() || !self.may_ask(n_packed) {
             return Attempt::Later;
         }
         let mut room = self.slots.max_kept - self.slots.n_kept;
@@ -547,7 +556,7 @@ impl Streamer {
             }
             let is_later = self.search.due_of(victim.idx()).is_none_or(|d| d > due);
             let slot = self.slots.of(victim);
-            if is_later && slot.n_pins == 0 && !self.wanted.has(victim) {
+            if is_later && slot.n_pins == 0 && !self.is_wanted(victim) {
                 if slot.state == State::InFlight || !self.may_go(victim) {
                     soon += slot.n_resident; // it may go once it is there
                 } else {

@@ -2,33 +2,13 @@
 
 use std::time::Duration;
 
+use enfilade_cpg::CellId;
+
+use super::cells::Cells;
+use super::state::State;
 use crate::{Catalog, PieceId};
 
-/// The state of a piece.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum State {
-    Absent,
-    /// On its way. Its memory is reserved.
-    InFlight,
-    /// Arrived, not handed over.
-    Arrived,
-    /// In memory of the program.
-    Resident,
-    /// Failed; to be asked for again later.
-    Failing,
-    /// The source does not have it.
-    Missing,
-}
-
-impl State {
-    /// Returns `true` if its memory is reserved.
-    #[inline]
-    pub(crate) fn is_kept(self) -> bool {
-        matches!(self, Self::InFlight | Self::Arrived | Self::Resident)
-    }
-}
-
-/// The part of a piece's state that is read for all pieces in view, frame by frame: small.
+/// The part of a piece's state that is read most: small.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slot {
     pub(crate) n_resident: u64,
@@ -60,6 +40,7 @@ pub(crate) struct Slots {
     slots: Vec<Slot>,
     /// One more than pieces: the last is the head of the list.
     rest: Vec<Rest>,
+    pub(crate) cells: Cells,
     /// The piece after which the sweep goes on; the number of pieces for the head of the list.
     mark: u32,
     /// Memory of kept pieces. [Units: bytes]
@@ -69,8 +50,6 @@ pub(crate) struct Slots {
     pub(crate) n_pinned: u64,
     in_flight: Vec<PieceId>,
     pub(crate) bytes_in_flight: u64,
-    /// Goes up when a piece is no longer in memory of the program.
-    pub(crate) n_losses: u64,
     /// Goes up with each change of a state.
     pub(crate) version: u64,
 }
@@ -98,13 +77,13 @@ impl Slots {
         Self {
             slots,
             rest,
+            cells: Cells::new(catalog),
             mark: n,
             n_kept: 0,
             max_kept,
             n_pinned: 0,
             in_flight: Vec::new(),
             bytes_in_flight: 0,
-            n_losses: 0,
             version: 0,
         }
     }
@@ -171,11 +150,11 @@ impl Slots {
     pub(crate) fn reserve(&mut self, piece: PieceId, for_view: bool) {
         let slot = &mut self.slots[piece.idx()];
         debug_assert!(!slot.state.is_kept(), "{piece:?} is kept twice");
-        (slot.state, slot.for_view) = (State::InFlight, for_view);
+        slot.for_view = for_view;
         self.n_kept += slot.n_resident;
         self.in_flight.push(piece);
         self.bytes_in_flight += self.rest[piece.idx()].n_packed;
-        self.version += 1;
+        self.set_state(piece, State::InFlight);
         debug_assert!(self.n_kept <= self.max_kept, "no room was made");
         self.link(piece.0, self.mark);
     }
@@ -183,14 +162,13 @@ impl Slots {
     /// Ends the request of a piece: it arrived.
     pub(crate) fn arrive(&mut self, piece: PieceId) {
         self.land(piece);
-        self.slots[piece.idx()].state = State::Arrived;
+        self.set_state(piece, State::Arrived);
         self.rest[piece.idx()].n_failures = 0;
     }
 
     /// Hands a piece over.
     pub(crate) fn hand_over(&mut self, piece: PieceId) {
-        self.version += 1;
-        self.slots[piece.idx()].state = State::Resident;
+        self.set_state(piece, State::Resident);
     }
 
     /// Frees the memory of a kept piece, whose state becomes `state`.
@@ -198,19 +176,25 @@ impl Slots {
         if self.state(piece) == State::InFlight {
             self.land(piece);
         }
-        self.n_losses += u64::from(self.state(piece) == State::Resident);
-        self.version += 1;
         self.unlink(piece.0);
-        let slot = &mut self.slots[piece.idx()];
+        let slot = &self.slots[piece.idx()];
         debug_assert!(slot.state.is_kept(), "{piece:?} has no memory");
         self.n_kept -= slot.n_resident;
-        slot.state = state;
+        self.set_state(piece, state);
     }
 
-    /// Sets the state of a piece without memory.
+    /// Sets the state of a piece, whose memory stays as it is.
     pub(crate) fn set_state(&mut self, piece: PieceId, state: State) {
         self.version += 1;
-        self.slots[piece.idx()].state = state;
+        let before = std::mem::replace(&mut self.slots[piece.idx()].state, state);
+        self.cells.change(piece, before, state);
+    }
+
+    /// Returns the first absent piece of a cell.
+    pub(crate) fn first_absent(&mut self, cell: CellId, catalog: &Catalog) -> Option<PieceId> {
+        let slots = &self.slots;
+        let is_absent = |p: PieceId| slots[p.idx()].state == State::Absent;
+        self.cells.first_absent(cell, catalog, is_absent)
     }
 
     /// Counts a failure. Returns the time until the next request.

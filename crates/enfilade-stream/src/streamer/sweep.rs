@@ -1,6 +1,7 @@
 //! The pass over cells in the order of their deadlines.
 
-use super::slots::{Slots, State};
+use super::slots::Slots;
+use super::state::State;
 use crate::PieceId;
 
 /// The state of a sweep over the cells in the order in which they are due. It brings the list of kept pieces into this order,

@@ -1,0 +1,4 @@
+#![no_main]
+//! Hostile bytes for the reader of packed worlds' pieces.
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| enfilade_fuzz::packed::piece(data));
