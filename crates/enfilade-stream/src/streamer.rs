@@ -42,7 +42,7 @@ pub use frame::{Cause, Changes, Eye, Failed, Frame, InView, Loaded, StandIn};
 pub use options::{Policy, StreamOptions};
 
 /// Work of a frame for searching and sweeping, in units of about a nanosecond.
-const WORK_OF_FRAME: u32 = 2_000;
+const WORK_OF_FRAME: u32 = 4_000;
 /// Cost of a piece met by the sweep, in the same units.
 const COST_OF_PIECE: u32 = 12;
 /// Failures in a row after which the source counts as out of reach: then nothing is fetched ahead for a while.
