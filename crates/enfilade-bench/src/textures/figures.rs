@@ -38,9 +38,14 @@ impl Quantity {
 }
 
 /// Frames drawn with all pictures made before.
-const WARM: &[DrawMode] = &[DrawMode::Frustum, DrawMode::Portals];
+const WARM: &[DrawMode] = &[DrawMode::Frustum, DrawMode::Portals, DrawMode::Warm];
 /// Frames that make the pictures they need.
-const COLD: &[DrawMode] = &[DrawMode::Portals];
+const COLD: &[DrawMode] = &[
+    DrawMode::Portals,
+    DrawMode::ColdEvery1,
+    DrawMode::ColdEvery10,
+    DrawMode::Cold,
+];
 
 const FIGURES: &[PaperFigure] = &[
     PaperFigure {

@@ -2,7 +2,10 @@
 
 use std::time::Instant;
 
-use enfilade_render::{Camera, Culling, Frame, Picture, Sparing, Studio, Style};
+use enfilade_render::{
+    Camera, Culling, Frame, Picture, PortalTextureCounts, PortalTextureOptions, PortalTexturePaint,
+    Sparing, Studio, Style, Viewpoints,
+};
 
 use crate::measure::quantile;
 
@@ -15,7 +18,20 @@ pub(super) enum DrawMode {
     Portals,
     /// The eye's cell alone, as if each doorway were a picture for nothing: the least that pictures can reach.
     Room,
+    /// Warped textures, those of the walk made before.
+    Warm,
+    /// Warped textures, made as they are needed.
+    Cold,
+    /// Flat textures every degree, made as they are needed.
+    ColdEvery1,
+    /// Flat textures every ten degrees, made as they are needed.
+    ColdEvery10,
+    /// Warped textures, of at most 50,000 triangles a frame.
+    Bound,
 }
+
+/// The bound of [`DrawMode::Bound`].
+pub(super) const MOST_TRIANGLES: u64 = 50_000;
 
 impl DrawMode {
     pub(super) fn label(self) -> &'static str {
@@ -23,6 +39,11 @@ impl DrawMode {
             Self::Frustum => "frustum culling",
             Self::Portals => "portal culling",
             Self::Room => "the eye's room alone",
+            Self::Warm => "portal textures",
+            Self::Cold => "portal textures, cold",
+            Self::ColdEvery1 => "flat textures every degree, cold",
+            Self::ColdEvery10 => "flat textures every 10 degrees, cold",
+            Self::Bound => "portal textures, at most 50,000 triangles",
         }
     }
 
@@ -30,16 +51,43 @@ impl DrawMode {
         match self {
             Self::Frustum => Culling::Frustum,
             Self::Portals | Self::Room => Culling::Portals,
+            _ => Culling::PortalTextures,
         }
     }
 
     /// Readies the studio for a walk. Ways with pictures forget those of the last walk here, or make them.
-    pub(super) fn begin(self, studio: &mut Studio) {
+    pub(super) fn begin(self, studio: &mut Studio) -> anyhow::Result<()> {
+        studio.remove_portal_textures();
+        if let Some(options) = self.textures() {
+            studio.add_portal_textures(options)?;
+        }
         studio.sparing = Sparing {
             // No portal has as many pixels.
             stop_below: if self == Self::Room { 1e9 } else { 0.0 },
             ..Sparing::default()
         };
+        Ok(())
+    }
+
+    /// Returns the settings of portal textures, if it uses any.
+    fn textures(self) -> Option<PortalTextureOptions> {
+        let default = PortalTextureOptions::default();
+        Some(match self {
+            Self::Frustum | Self::Portals | Self::Room => return None,
+            Self::Warm | Self::Cold => default,
+            Self::ColdEvery1 | Self::ColdEvery10 => PortalTextureOptions {
+                viewpoints: Viewpoints::semicircle(if self == Self::ColdEvery1 {
+                    1.0
+                } else {
+                    10.0
+                }),
+                ..default
+            },
+            Self::Bound => PortalTextureOptions {
+                max_triangles: MOST_TRIANGLES,
+                ..default
+            },
+        })
     }
 }
 
@@ -50,6 +98,10 @@ pub(super) struct Series {
     pub(super) triangles: Vec<f64>,
     /// Time of each frame, from its query until it is drawn. [Units: s]
     pub(super) seconds: Vec<f64>,
+    /// Textures made in each frame, those of transitions included, and triangles drawn for them, which count in `triangles`, too.
+    pub(super) made: Vec<[f64; 2]>,
+    /// Most memory of textures. [Units: byte]
+    pub(super) n_bytes: u64,
 }
 
 impl Series {
@@ -90,12 +142,21 @@ pub(super) fn measure(
     let target = studio.target(size)?;
     let aspect = size[0] as f32 / size[1] as f32;
     let mut series = Series::default();
+    mode.begin(studio)?;
+    if mode == DrawMode::Warm {
+        // Each texture once, with room for all.
+        walk_ahead(studio, cameras, size)?;
+    }
     let warm = cameras.iter().take(3).map(|camera| (camera, false));
     for (camera, counts) in warm.chain(cameras.iter().map(|camera| (camera, true))) {
-        if series.seconds.is_empty() {
-            mode.begin(studio);
+        if series.seconds.is_empty() && mode != DrawMode::Warm {
+            studio.clear_portal_textures();
         }
         let begin = Instant::now();
+        let made = match mode.culling() {
+            Culling::PortalTextures => studio.plan_portal_textures(camera, style(), size)?,
+            _ => PortalTextureCounts::default(),
+        };
         let (view, projection) = (camera.view(aspect)?, camera.projection(aspect)?);
         let list = studio.take_list(&view, camera.eye, mode.culling(), size);
         let frame = Frame {
@@ -108,11 +169,23 @@ pub(super) fn measure(
         studio.gpu.wait()?;
         if counts {
             series.seconds.push(begin.elapsed().as_secs_f64());
-            series.triangles.push(list.n_triangles() as f64);
+            let n_made = made.n_made_triangles;
+            series.triangles.push((list.n_triangles() + n_made) as f64);
+            let n_textures = made.n_made + made.n_turning;
+            series.made.push([n_textures as f64, n_made as f64]);
+            series.n_bytes = series.n_bytes.max(made.n_bytes);
         }
         studio.give_list(list);
     }
     Ok(series)
+}
+
+/// Makes the textures of a walk before it, as many as fit.
+fn walk_ahead(studio: &mut Studio, cameras: &[Camera], size: [u32; 2]) -> anyhow::Result<()> {
+    for camera in cameras {
+        studio.plan_portal_textures(camera, style(), size)?;
+    }
+    Ok(())
 }
 
 /// Draws a picture in the style of the walk.
@@ -123,4 +196,48 @@ pub(super) fn shot(
     size: [u32; 2],
 ) -> anyhow::Result<Picture> {
     Ok(studio.picture(camera, mode.culling(), style(), &[], size)?)
+}
+
+/// A frame of textures: the picture, and for each pixel whether a texture fills it, and whether none shows what is there.
+pub(super) struct TexturedShot {
+    pub(super) picture: Picture,
+    pub(super) is_textured: Vec<bool>,
+    pub(super) is_hole: Vec<bool>,
+    pub(super) counts: PortalTextureCounts,
+}
+
+/// Plans a frame of textures once, and draws it in three paints.
+pub(super) fn textured_shot(
+    studio: &mut Studio,
+    camera: &Camera,
+    size: [u32; 2],
+) -> anyhow::Result<TexturedShot> {
+    let aspect = size[0] as f32 / size[1] as f32;
+    let counts = studio.plan_portal_textures(camera, style(), size)?;
+    let view = camera.view(aspect)?;
+    let list = studio.take_list(&view, camera.eye, Culling::PortalTextures, size);
+    let mut draw = |paint| {
+        studio.paint_portal_textures(paint);
+        let frame = Frame {
+            projection: camera.projection(aspect)?,
+            list: &list,
+            style: style(),
+            marks: &[],
+        };
+        anyhow::Ok(studio.picture_of(&frame, size)?)
+    };
+    let tinted = draw(PortalTexturePaint::Tinted)?;
+    let holes = draw(PortalTexturePaint::Holes)?;
+    let picture = draw(PortalTexturePaint::Plain)?;
+    studio.give_list(list);
+    let differs = |other: &Picture| {
+        let pairs = (picture.rgba.chunks_exact(4)).zip(other.rgba.chunks_exact(4));
+        pairs.map(|(a, b)| a != b).collect()
+    };
+    Ok(TexturedShot {
+        is_textured: differs(&tinted),
+        is_hole: differs(&holes),
+        picture,
+        counts,
+    })
 }
