@@ -1,4 +1,4 @@
-//! Portal textures against pictures of the same views through portals. FEATURES X1, X2, X4.
+//! Portal textures against pictures of the same views through portals.
 
 use enfilade_cpg::World;
 use enfilade_render::{
@@ -103,6 +103,7 @@ fn options() -> PortalTextureOptions {
     }
 }
 
+// Covers X1, X4.
 #[test]
 fn warped_textures_show_what_is_behind() {
     let world = offices(40);
@@ -138,6 +139,7 @@ fn warped_textures_show_what_is_behind() {
     assert!(holes * 1000 <= n, "{holes} holes of {n} pixels");
 }
 
+// Covers X1.
 #[test]
 fn flat_textures_are_worse_than_warped_ones() {
     let world = offices(40);
@@ -170,6 +172,7 @@ fn flat_textures_are_worse_than_warped_ones() {
     assert!(flat.iter().all(|f| *f > 2.0 * warped), "{warped} {flat:?}");
 }
 
+// Covers X2.
 #[test]
 fn textures_are_kept_within_the_budget_and_made_again_when_a_style_changes() {
     let world = offices(40);
@@ -279,5 +282,46 @@ fn settings_out_of_range_are_refused() {
             "{options:?}"
         );
         assert!(studio.portal_texture_options().is_none());
+    }
+}
+
+// Covers X3, R7.
+#[test]
+fn a_transition_ends_as_geometry_after_its_frames() {
+    let world = offices(40);
+    let mut studio = studio(&world);
+    let walk = cameras(&world, &studio, 60);
+    for last in [0, 5] {
+        let own = PortalTextureOptions {
+            transition_frames: last,
+            ..options()
+        };
+        studio.add_portal_textures(own).unwrap();
+        let (mut n_turning, mut n_ended, mut n_in_row) = (0, 0, 0);
+        for camera in &walk {
+            // A walk that stands still until all transitions are over.
+            for _ in 0..=last + 1 {
+                let counts = studio.plan_portal_textures(camera, style(), SIZE).unwrap();
+                n_turning += counts.n_turning;
+                n_in_row = if counts.n_turning > 0 {
+                    n_in_row + 1
+                } else {
+                    0
+                };
+                assert!(n_in_row < 2 * last as usize + 2, "a transition ends");
+                let shown = list(&mut studio, camera, Culling::PortalTextures);
+                if counts.n_turning == 0 && counts.n_textured == 0 {
+                    let all = list(&mut studio, camera, Culling::Portals);
+                    assert_eq!(shown.n_triangles(), all.n_triangles());
+                    if n_ended < 3 {
+                        n_ended += 1;
+                        let ours = picture(&mut studio, camera, &shown);
+                        assert!(ours == picture(&mut studio, camera, &all), "{camera:?}");
+                    }
+                }
+            }
+        }
+        assert_eq!(n_turning > 0, last > 0);
+        assert!(n_ended > 0);
     }
 }

@@ -636,3 +636,49 @@ fn portals_of_a_small_share_are_listed_and_not_followed() {
     }
     assert!(n_stopped > 10 && n_spared > 10, "{n_stopped} {n_spared}");
 }
+
+// Covers R7.
+#[test]
+fn a_view_ends_at_stops_and_goes_on_through_those_passed() {
+    let world = room_grid(&GridParams::offices(30, 5));
+    let sight = Sight::build(&world).unwrap();
+    let state = SightState::new(&sight);
+    let mut viewer = Viewer::new(&sight);
+    let mut rng = Rng::new(8);
+    let mut n_passed = 0;
+    for i in 0..40 {
+        let eye = eye_in(&world, &mut rng, i).as_vec3().to_array();
+        let view = View::around(eye).unwrap();
+        let all: BTreeSet<CellId> = viewer
+            .see(&sight, &state, &view)
+            .cells()
+            .iter()
+            .copied()
+            .collect();
+        // Nothing is nearer than 0, but for portals around the eye.
+        viewer.stops_mut().beyond = 0.0;
+        let seen = viewer.see(&sight, &state, &view);
+        let few: BTreeSet<CellId> = seen.cells().iter().copied().collect();
+        let stopped = seen.stopped().to_vec();
+        assert!(few.is_subset(&all));
+        assert!(stopped.iter().all(|(_, into)| all.contains(into)));
+        for &(portal, into) in &stopped {
+            viewer.stops_mut().pass(portal, into);
+            let seen = viewer.see(&sight, &state, &view);
+            assert!(seen.cells().contains(&into), "{portal} into {into}");
+            viewer.stops_mut().stop(portal, into);
+            let seen = viewer.see(&sight, &state, &view);
+            assert!(seen.stopped().contains(&(portal, into)));
+            n_passed += 1;
+        }
+        viewer.stops_mut().clear();
+        let again: BTreeSet<CellId> = viewer
+            .see(&sight, &state, &view)
+            .cells()
+            .iter()
+            .copied()
+            .collect();
+        assert_eq!(again, all);
+    }
+    assert!(n_passed > 20, "{n_passed}");
+}

@@ -175,3 +175,8 @@ struct Living;
 #[cfg(all(doctest, feature = "stream"))]
 #[doc = include_str!("../../../docs/streaming.md")]
 struct Streaming;
+
+/// The page about portal textures, compiled with the tests.
+#[cfg(all(doctest, feature = "render"))]
+#[doc = include_str!("../../../docs/portal-textures.md")]
+struct PortalTextures;

@@ -20,14 +20,14 @@ use enfilade_render::{AdapterChoice, Studio};
 use crate::rows::{Chosen, RowPrinter};
 use models::WalkedModel;
 use series::{DrawMode, Series, measure};
-use stroll::spread;
+use stroll::middle;
 
 /// The options of the bench.
 #[derive(clap::Args)]
 pub(crate) struct PortalTextures {
     #[command(flatten)]
     chosen: Chosen,
-    /// Frames of each walk, evenly from the whole walk.
+    /// Successive frames of each walk, 60 a second, around the middle of the whole walk.
     #[arg(long, default_value_t = 1000)]
     frames: usize,
     /// Pairs of frames of which pictures are compared.
@@ -143,7 +143,7 @@ impl Measurements<'_> {
             let Some((model, studio)) = self.studio(row, scene)? else {
                 return Ok(None);
             };
-            let cameras = spread(&model.cameras(&studio.sight), n);
+            let cameras = middle(&model.cameras(&studio.sight), n);
             let series = measure(studio, &cameras, mode, size)?;
             self.series.insert(key.clone(), series);
         }

@@ -35,10 +35,10 @@ pub(super) fn stroll(eyes: &[[f32; 3]]) -> Vec<Camera> {
     cameras.collect()
 }
 
-/// Returns about `n` cameras, evenly from all.
-pub(super) fn spread(cameras: &[Camera], n: usize) -> Vec<Camera> {
-    let step = cameras.len().div_ceil(n.max(1)).max(1);
-    cameras.iter().copied().step_by(step).collect()
+/// Returns `n` successive cameras around the middle of a walk, or all.
+pub(super) fn middle(cameras: &[Camera], n: usize) -> Vec<Camera> {
+    let first = cameras.len().saturating_sub(n) / 2;
+    cameras[first..].iter().copied().take(n).collect()
 }
 
 /// A polyline by the distance along it.
@@ -97,6 +97,6 @@ mod tests {
         let last = cameras.last().map(|c| c.toward);
         assert!(last.is_some_and(|t| t[2] < -0.999));
         assert!(stroll(&[]).is_empty());
-        assert_eq!(spread(&cameras, 100).len(), 86);
+        assert_eq!(middle(&cameras, 100).len(), 100);
     }
 }

@@ -142,6 +142,16 @@ pub(super) fn quality(all: &mut Measurements<'_>, scene: &str) -> anyhow::Result
     Ok(())
 }
 
+/// Makes the textures of a camera, as if the walk had come there.
+fn settle(studio: &mut Studio, camera: Option<&Camera>, size: [u32; 2]) -> anyhow::Result<()> {
+    for camera in camera.into_iter().cycle().take(200) {
+        if textured_shot(studio, camera, size)?.counts.n_made == 0 {
+            break;
+        }
+    }
+    Ok(())
+}
+
 /// Judges stretches of a walk, each of a few successive frames.
 fn judged(
     studio: &mut Studio,
@@ -157,6 +167,7 @@ fn judged(
     let n_stretches = n.div_ceil(STRETCH);
     let step = (cameras.len() / n_stretches).max(1);
     for stretch in cameras.windows(STRETCH).step_by(step) {
+        settle(studio, stretch.first(), size)?;
         let mut before: Option<(TexturedShot, enfilade_render::Picture)> = None;
         for camera in stretch {
             let own = textured_shot(studio, camera, size)?;

@@ -25,7 +25,7 @@ const WATCHED: f32 = 0.25;
 const HYSTERESIS: f64 = 0.9;
 
 /// Pixels of the screen for one of a texture at most, along one side of a doorway. Nearer ones stay geometry.
-const COARSEST: f64 = 2.0;
+const COARSEST: f64 = 1.0;
 
 /// Time ahead for which textures are made if there is nothing else to make. [Units: frames]
 const AHEAD: f64 = 20.0;
