@@ -42,7 +42,7 @@ impl PortalTextures {
             doorways.extend(is_textured.then_some(*id));
             !is_textured
         });
-        list.cut_to(self.options.max_triangles);
+        list.cut_to((self.options.max_triangles).saturating_sub(self.n_made_triangles));
     }
 
     /// Writes the vertices of the doorways of a list; returns their number. `projection` is in the frame of the first world.

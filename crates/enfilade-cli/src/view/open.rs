@@ -249,11 +249,15 @@ impl Open {
             self.warn(format!("no portal textures: {why}"));
             return;
         }
-        self.studio.paint_portal_textures(if self.shown.tints {
+        self.studio.paint_portal_textures(self.texture_paint());
+    }
+
+    fn texture_paint(&self) -> PortalTexturePaint {
+        if self.shown.tints {
             PortalTexturePaint::Tinted
         } else {
             PortalTexturePaint::Plain
-        });
+        }
     }
 
     fn style(&self) -> Style {
@@ -525,6 +529,14 @@ impl Open {
             self.lived
                 .picture(&mut studio, frame, &camera, style, size)?
         } else {
+            if self.mode == Mode::PortalTextures && self.streamed.is_none() {
+                studio.add_portal_textures(PortalTextureOptions {
+                    // There is one frame for all of them.
+                    max_made: u32::MAX,
+                    ..self.texture_options.clone()
+                })?;
+                studio.paint_portal_textures(self.texture_paint());
+            }
             studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?
         };
         let png = picture.to_png()?;

@@ -67,6 +67,8 @@ pub(crate) struct PortalTextures {
     pub(crate) stops: Stops,
     /// The doorways that textures fill in the frame.
     pub(crate) shown: BTreeMap<DoorwayId, Vec<Component>>,
+    /// Triangles drawn for textures in the frame.
+    pub(crate) n_made_triangles: u64,
     /// True from the plan of a space's frame to its draw.
     pub(crate) is_planned: bool,
     conditions: Option<Conditions>,
@@ -82,9 +84,11 @@ impl PortalTextures {
             arrays,
             doorways: BTreeMap::new(),
             held: BTreeMap::new(),
-            frame: 0,
+            // So that new doorways were not shown in the frame before the first.
+            frame: 1,
             stops: Stops::default(),
             shown: BTreeMap::new(),
+            n_made_triangles: 0,
             is_planned: false,
             conditions: None,
             last_eye: None,

@@ -90,6 +90,7 @@ impl Studio {
         }
         self.viewer.stops_mut().clear();
         own.last_eye = Some(shot.eye);
+        own.n_made_triangles = counts.n_made_triangles;
         counts.n_textured = own.shown.len();
         counts.n_held = own.held.len();
         counts.n_bytes = own.n_bytes();
@@ -330,7 +331,6 @@ impl Studio {
         shot: &PlanShot<'_>,
         counts: &mut PortalTextureCounts,
     ) -> Result<(), RenderError> {
-        let most = own.options.max_triangles;
         let mut n_more = 1;
         let mut stopped = BTreeSet::new();
         loop {
@@ -348,7 +348,7 @@ impl Studio {
             let list = self
                 .lister
                 .seen(&self.world, &self.sight, &seen, &own_shot, &self.sparing);
-            if list.n_triangles() <= most {
+            if list.n_triangles() + counts.n_made_triangles <= own.options.max_triangles {
                 return Ok(());
             }
             // The farthest first.
@@ -442,10 +442,8 @@ impl Studio {
         let mut list = self.lister.take();
         list.leave_out_glass_of(&self.world, doorway.before);
         own.doorway(&self.world, key.0).n_behind = list.n_triangles();
-        let rest = own
-            .options
-            .max_triangles
-            .saturating_sub(counts.n_made_triangles);
+        // Half of the bound is left for what is not a texture.
+        let rest = (own.options.max_triangles / 2).saturating_sub(counts.n_made_triangles);
         if list.n_triangles() > rest {
             self.lister.give(list);
             return Ok(false);
