@@ -1,8 +1,12 @@
 //! Views in which far portals are [textures](crate::portal_textures).
 
+mod ahead;
+mod places;
 mod plan;
 
 use enfilade_world::PartId;
+
+pub use ahead::{MadePortalTextures, PortalTextureMaking, PortalTextureProgress};
 
 use plan::{PlanShot, eye_of};
 
