@@ -25,6 +25,7 @@ pub(crate) enum Format {
     Living,
     Walk,
     Packed,
+    PortalTextures,
 }
 
 struct Row {
@@ -48,7 +49,7 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 18] = [
+const TABLE: [Row; 19] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(
@@ -74,6 +75,7 @@ const TABLE: [Row; 18] = [
     row(Format::Search, "a saved search", &["search", "checkpoint"]),
     row(Format::Walk, "a map of floors", &["walk"]),
     row(Format::Packed, "a packed world", &["enf"]),
+    row(Format::PortalTextures, "portal textures", &["ptx"]),
     row(Format::Manual, "a manual page", &["1"]),
 ];
 

@@ -21,6 +21,7 @@ mod output;
 mod pack;
 mod path;
 mod plan;
+mod portals;
 mod progress;
 mod progress_lines;
 mod pvs;
@@ -70,6 +71,7 @@ enum Command {
     Pack(pack::Pack),
     Path(path::WalkedPath),
     Plan(plan::Plan),
+    Portals(portals::Portals),
     Pvs(pvs::Pvs),
     Render(render::Render),
     Report(report::Report),
@@ -99,6 +101,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Pack(args) => pack::pack(&args),
         Command::Path(args) => path::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Portals(args) => portals::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Report(args) => report::run(&args),

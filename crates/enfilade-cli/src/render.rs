@@ -27,7 +27,7 @@ use options::Colors;
 pub(crate) use options::Render;
 use special::Mirrored;
 use streaming::{Pieces, Setting};
-pub(crate) use whole::{light, light_lamps, tell_of_pictures};
+pub(crate) use whole::{light, light_lamps, open, tell_of_pictures};
 
 /// Draws a picture at twice the size and halves it: smooth edges.
 pub(crate) fn smooth(

@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 20] = [
+const COMMANDS: [(&str, &[&str]); 21] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -32,6 +32,10 @@ const COMMANDS: [(&str, &[&str]); 20] = [
     ("pack world.glb -o w.enf", &["file", "packed", "pieces"]),
     ("unpack w.enf -o u.glb", &["file", "bytes"]),
     ("plan world.glb -o p.svg", &["file", "bytes"]),
+    (
+        "portals world.glb --side 32 --max-bytes 40K --plain --adapter software -o w.ptx",
+        &["file", "bytes", "textures", "left_out"],
+    ),
     ("pvs world.glb -o p.pvs", &["cells", "pairs", "complete"]),
     (
         "render world.glb --size 64x36 --plain --adapter software -o x.png",

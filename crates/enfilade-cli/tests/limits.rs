@@ -47,8 +47,8 @@ impl Folder {
 fn commands_that_can_take_long_have_bounds_and_keep_to_them() {
     let folder = Folder::new("bounds");
     for command in [
-        "edit", "inspect", "locate", "path", "plan", "pvs", "render", "report", "see", "simplify",
-        "sound", "verify",
+        "edit", "inspect", "locate", "path", "plan", "portals", "pvs", "render", "report", "see",
+        "simplify", "sound", "verify",
     ] {
         let done = folder.run(&[command, "--help"]);
         let help = String::from_utf8_lossy(&done.stdout).into_owned();

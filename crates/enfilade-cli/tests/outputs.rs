@@ -47,6 +47,7 @@ fn no_command_writes_over_an_input_or_twice() {
             "render w.glb -o a.png --path p.txt --record p.txt",
             is_input,
         ),
+        ("portals w.glb -o w.glb", is_input),
         ("pvs w.glb -o w.glb", is_input),
         ("pvs w.glb --evidence w.glb", is_input),
         ("pvs w.glb --statistics w.glb", is_input),
@@ -254,7 +255,7 @@ fn files_that_nobody_named_are_not_written_over() {
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         (done.status.code(), said)
     };
-    let n_pages = if cfg!(feature = "view") { 22 } else { 21 };
+    let n_pages = if cfg!(feature = "view") { 23 } else { 22 };
     for (line, file, n_files) in [
         ("demo -o d", "house.glb", 3),
         ("demo -o d", "world.glb", 3),

@@ -59,6 +59,9 @@ pub enum RenderError {
     /// Settings of portal textures that cannot be.
     #[error(transparent)]
     PortalTextures(#[from] crate::portal_texture_options::PortalTextureError),
+    /// Portal textures that cannot be made ahead, or a file of them that cannot be used.
+    #[error(transparent)]
+    PortalTextureFile(#[from] crate::portal_texture_file::PortalTextureFileError),
     /// The device was lost or ran out of memory while drawing.
     #[error("the adapter failed while drawing: {0}")]
     Lost(String),

@@ -88,6 +88,7 @@ mod panes;
 mod picture;
 mod piece_of;
 mod pipelines;
+mod portal_texture_file;
 mod portal_texture_options;
 mod portal_textures;
 mod prop;
@@ -116,6 +117,7 @@ pub use marks::{Mark, MarkShape};
 pub use oracle::Oracle;
 pub use picture::Picture;
 pub use piece_of::PieceOf;
+pub use portal_texture_file::PortalTextureFileError;
 pub use portal_texture_options::{
     PortalTextureCounts, PortalTextureError, PortalTextureOptions, PortalTexturePaint, Viewpoints,
 };
@@ -124,4 +126,5 @@ pub use queries::QueryCounts;
 pub use scene::{GpuPiece, GpuWorld, PieceMaker, Put, StreamLimits, cell_color};
 pub use space::{SpaceCounts, SpaceShot};
 pub use studio::{Culling, Studio, StudioTarget};
+pub use textured::{MadePortalTextures, PortalTextureMaking, PortalTextureProgress};
 pub use viewpoints::{EYE_HEIGHT, FOV, good_camera, portal_looked_at, walk, walk_cameras};

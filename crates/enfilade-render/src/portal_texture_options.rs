@@ -69,7 +69,7 @@ pub struct PortalTextureOptions {
     pub transition_frames: u32,
     /// Memory on the adapter; textures out of view give way to others. [Units: byte]
     pub max_bytes: u64,
-    /// Textures made in one frame at most.
+    /// Textures made in one frame at most. One that was made ahead counts half.
     pub max_made: u32,
     /// Triangles drawn in one frame at most; `u64::MAX` for no bound. Nearer portals become textures until it holds, then
     /// portals without a texture get one color, and at last the farthest surfaces are left out.
@@ -230,6 +230,8 @@ pub struct PortalTextureCounts {
     pub n_plain: usize,
     /// Textures made in this frame.
     pub n_made: usize,
+    /// Textures taken in this frame from those [made ahead](crate::Studio::load_portal_textures).
+    pub n_loaded: usize,
     /// Portals in transition; for each, a texture was drawn in this frame that is not counted as made.
     pub n_turning: usize,
     /// Triangles drawn to make textures.

@@ -13,11 +13,18 @@
 //! A transition to geometry takes a few frames. In each, one more texture is drawn from a viewpoint on the way from the
 //! texture's to the eye: what the source does with a matrix for the vertices (section 3.3), it projects the geometry to the plane of
 //! the portal from that point. But the depth is that of the surface after the homogeneous divide, too.
+//!
+//! Textures can be made ahead, for all places where a walker may stand (`file.rs`, `ahead.rs`): they wait in host memory,
+//! compressed, and are taken from there instead of drawn.
 
+mod ahead;
 mod arrays;
+mod conditions;
 mod doorway;
 mod draw;
+mod file;
 mod store;
+mod texels;
 mod viewpoints;
 
 use crate::camera::Projection;
@@ -25,10 +32,15 @@ use crate::gpu::Gpu;
 use crate::list::RenderList;
 use crate::pipelines::Layouts;
 
+pub(crate) use ahead::{ANCHOR_REACH, AheadTextures, millimeters};
 pub(crate) use arrays::{DoorwayDraw, TextureArrays};
+pub(crate) use conditions::{TextureConditions, textured_light, textured_world};
 pub(crate) use doorway::{Doorway, DoorwayPlace};
 pub(crate) use draw::Component;
-pub(crate) use store::{DoorwayId, HeldTexture, PortalTextures, TextureKey};
+pub(crate) use file::{PtxEntry, PtxHead, PtxWriter, decode_ptx};
+pub(crate) use store::{HeldTexture, PortalTextures};
+pub(crate) use texels::pack;
+pub(crate) use viewpoints::{DoorwayId, TextureKey};
 
 use arrays::DoorwayVariant;
 use draw::{DoorwayFrame, add_corners};

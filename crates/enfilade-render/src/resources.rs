@@ -98,6 +98,16 @@ pub(crate) fn depth_attachment(
 pub(crate) fn read_texture(
     gpu: &Gpu,
     texture: &wgpu::Texture,
+    size: [u32; 2],
+    bytes_per_pixel: u32,
+) -> Result<Vec<u8>, RenderError> {
+    read_layer(gpu, (texture, 0), size, bytes_per_pixel)
+}
+
+/// As [`read_texture`], of one layer of an array.
+pub(crate) fn read_layer(
+    gpu: &Gpu,
+    (texture, layer): (&wgpu::Texture, u32),
     [width, height]: [u32; 2],
     bytes_per_pixel: u32,
 ) -> Result<Vec<u8>, RenderError> {
@@ -113,7 +123,13 @@ pub(crate) fn read_texture(
         .device
         .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
+        wgpu::TexelCopyTextureInfo {
+            origin: wgpu::Origin3d {
+                z: layer,
+                ..wgpu::Origin3d::ZERO
+            },
+            ..texture.as_image_copy()
+        },
         wgpu::TexelCopyBufferInfo {
             buffer: &buffer,
             layout: wgpu::TexelCopyBufferLayout {

@@ -1,11 +1,15 @@
 //! Views in which far portals are [textures](crate::portal_textures).
 
+mod ahead;
+mod places;
 mod plan;
 
 use enfilade_cpg::CellId;
 use enfilade_runtime::Stops;
 use enfilade_world::PartId;
 use glam::Vec3;
+
+pub use ahead::{MadePortalTextures, PortalTextureMaking, PortalTextureProgress};
 
 use plan::{PlanShot, eye_of};
 

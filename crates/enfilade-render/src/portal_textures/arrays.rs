@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use super::texels::Texels;
 use crate::formats::COLOR;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, RenderError};
 use crate::pipelines::{Kind, Layouts, NEARER, SKY, pipeline, shader};
-use crate::resources::{Grown, color_attachment};
+use crate::resources::{Grown, color_attachment, read_layer};
 use crate::targets::Targets;
 
 /// Distance of a surface: depth of the texture's projection.
@@ -13,6 +14,7 @@ const STORED: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 
 /// One view for each layer.
 struct LayerViews {
+    texture: wgpu::Texture,
     all: wgpu::TextureView,
     each: Vec<wgpu::TextureView>,
 }
@@ -51,7 +53,38 @@ impl LayerViews {
         Self {
             all: texture.create_view(&array),
             each: (0..n).map(one).collect(),
+            texture,
         }
+    }
+
+    /// Writes the texels of a layer, 4 bytes each.
+    fn write(&self, gpu: &Gpu, layer: usize, bytes: &[u8]) {
+        let size = self.texture.size();
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d {
+                    z: layer as u32,
+                    ..wgpu::Origin3d::ZERO
+                },
+                ..self.texture.as_image_copy()
+            },
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(4 * size.width),
+                rows_per_image: None,
+            },
+            wgpu::Extent3d {
+                depth_or_array_layers: 1,
+                ..size
+            },
+        );
+    }
+
+    /// Returns the texels of a layer, 4 bytes each.
+    fn read(&self, gpu: &Gpu, layer: usize) -> Result<Vec<u8>, RenderError> {
+        let size = [self.texture.width(), self.texture.height()];
+        read_layer(gpu, (&self.texture, layer as u32), size, 4)
     }
 }
 
@@ -201,6 +234,26 @@ impl TextureArrays {
             pass.draw(0..3, 0..1);
         }
         gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Writes a layer.
+    pub(crate) fn write(&self, gpu: &Gpu, layer: usize, texels: &Texels) {
+        self.colors.write(gpu, layer, &texels.colors);
+        self.depths.write(gpu, layer, &texels.depths);
+    }
+
+    /// Returns a layer.
+    pub(crate) fn read(&self, gpu: &Gpu, layer: usize) -> Result<Texels, RenderError> {
+        Ok(Texels {
+            colors: self.colors.read(gpu, layer)?,
+            depths: self.depths.read(gpu, layer)?,
+        })
+    }
+
+    /// Returns `true` if blue is the first of the four bytes of a color.
+    pub(crate) fn is_blue_first(&self) -> bool {
+        use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb};
+        matches!(self.format, Bgra8Unorm | Bgra8UnormSrgb)
     }
 
     /// Makes a pipeline unless it exists.

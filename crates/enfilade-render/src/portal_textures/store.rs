@@ -2,22 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{CellId, PortalId};
+use enfilade_cpg::CellId;
 use enfilade_runtime::{SightState, Stops};
+use glam::DVec2;
 
+use super::ahead::{ANCHOR_REACH, AheadTextures, millimeters};
 use super::arrays::TextureArrays;
+use super::conditions::TextureConditions;
 use super::doorway::{Doorway, DoorwayPlace};
 use super::draw::Component;
-use super::viewpoints::ViewpointIndex;
+use super::texels::unpack;
+use super::viewpoints::{DoorwayId, TextureKey};
 use crate::frame::Style;
+use crate::gpu::Gpu;
 use crate::portal_texture_options::PortalTextureOptions;
 use crate::scene::GpuWorld;
-
-/// A portal with the cell behind it.
-pub(crate) type DoorwayId = (PortalId, CellId);
-
-/// A texture's doorway and viewpoint; `None` for the one of a transition.
-pub(crate) type TextureKey = (DoorwayId, Option<ViewpointIndex>);
 
 /// A texture on the adapter.
 #[derive(Clone, Debug)]
@@ -40,18 +39,35 @@ pub(crate) struct DoorwayState {
     pub(crate) turn: u32,
     /// Height at which a walker's eye sees it: [`Viewpoints::of`](super::Viewpoints). [Units: mm]
     pub(crate) anchor: i32,
+    /// True if there are textures made ahead at this height.
+    pub(crate) is_anchored_ahead: bool,
     /// True if a special portal is in view behind it, which textures do not show.
     pub(crate) is_special: bool,
     /// Triangles of the last texture.
     pub(crate) n_behind: u64,
 }
 
-/// Conditions under which textures stay true.
-#[derive(Clone, Debug, PartialEq)]
-struct Conditions {
-    shares: Vec<Option<f32>>,
-    shut: Vec<PortalId>,
-    look: String,
+impl DoorwayState {
+    /// Chooses the height of viewpoints for an eye that comes into view of it.
+    pub(crate) fn anchor_at(&mut self, eye: DoorwayPlace, ahead: Option<i32>) {
+        self.is_anchored_ahead = ahead.is_some();
+        self.anchor = ahead.unwrap_or_else(|| millimeters(eye.at.y));
+    }
+
+    /// Returns the place for which viewpoints are chosen: an eye near the height of textures made ahead counts as at that
+    /// height, and a higher or lower one is that much nearer to it, so that the choice changes evenly.
+    pub(crate) fn lattice_place(&self, eye: DoorwayPlace) -> DoorwayPlace {
+        if !self.is_anchored_ahead {
+            return eye;
+        }
+        let anchor = f64::from(self.anchor) * 1e-3;
+        let off = eye.at.y - anchor;
+        let left = (off.abs() - f64::from(ANCHOR_REACH) * 1e-3).max(0.0);
+        DoorwayPlace {
+            at: DVec2::new(eye.at.x, anchor + left.copysign(off)),
+            ..eye
+        }
+    }
 }
 
 /// Textures of the portals of one world, and what of them is in a frame.
@@ -71,7 +87,9 @@ pub(crate) struct PortalTextures {
     pub(crate) n_made_triangles: u64,
     /// True from the plan of a space's frame to its draw.
     pub(crate) is_planned: bool,
-    conditions: Option<Conditions>,
+    conditions: Option<TextureConditions>,
+    /// Textures in host memory that were made ahead.
+    pub(crate) ahead: Option<AheadTextures>,
     /// Eye of the last frame, in the root. [Units: wu]
     pub(crate) last_eye: Option<glam::DVec3>,
 }
@@ -91,6 +109,7 @@ impl PortalTextures {
             n_made_triangles: 0,
             is_planned: false,
             conditions: None,
+            ahead: None,
             last_eye: None,
         }
     }
@@ -99,33 +118,21 @@ impl PortalTextures {
     pub(crate) fn begin(&mut self, world: &GpuWorld, state: &SightState, style: &Style, day: f32) {
         self.frame += 1;
         self.shown.clear();
-        let now = Conditions {
-            shares: state.shares().to_vec(),
-            shut: state.shut_portals().collect(),
-            look: format!("{style:?} {day}"),
-        };
-        let Some(before) = self.conditions.replace(now) else {
-            return;
-        };
-        let Some(now) = &self.conditions else { return };
-        if before == *now {
-            return;
+        let now = TextureConditions::now(state, style, day);
+        if let Some(ahead) = &mut self.ahead {
+            ahead.follow(world, &now);
         }
-        if before.look != now.look || before.shares.len() != now.shares.len() {
-            self.clear();
+        let Some(before) = self.conditions.take() else {
+            self.conditions = Some(now);
             return;
-        }
-        let mut changed: Vec<CellId> = Vec::new();
-        for (leaf, (a, b)) in before.shares.iter().zip(&now.shares).enumerate() {
-            if a != b {
-                changed.extend(world.cells_of_leaf(leaf));
+        };
+        if before != now {
+            match before.changed_cells(world, &now) {
+                Some(changed) => self.drop_in(&changed),
+                None => self.clear(),
             }
         }
-        let differs = |p: &&PortalId| before.shut.contains(p) != now.shut.contains(p);
-        for portal in before.shut.iter().chain(&now.shut).filter(differs) {
-            changed.extend(world.portal_cells[portal.idx()]);
-        }
-        self.drop_in(&changed);
+        self.conditions = Some(now);
     }
 
     /// Drops the textures that show one of some cells.
@@ -157,6 +164,7 @@ impl PortalTextures {
             frame: 0,
             turn: 0,
             anchor: 0,
+            is_anchored_ahead: false,
             is_special: false,
             n_behind: 0,
         })
@@ -200,6 +208,51 @@ impl PortalTextures {
         let own = self.held.range((id, None)..);
         own.take_while(move |(key, _)| key.0 == id)
             .map(|(_, held)| held)
+    }
+
+    /// Returns the height of the textures of a doorway that were made ahead for eyes like this, if there are any. [Units: mm]
+    pub(crate) fn anchor_ahead(&self, id: DoorwayId, eye: DoorwayPlace) -> Option<i32> {
+        let ahead = self.ahead.as_ref()?;
+        let is_anchored = self.options.viewpoints.are_warped();
+        is_anchored.then(|| ahead.anchor(id, millimeters(eye.at.y)))?
+    }
+
+    /// Takes a texture from those made ahead. Returns `false` if it is not there, or not true, or if all layers are needed.
+    pub(crate) fn load(
+        &mut self,
+        gpu: &Gpu,
+        world: &GpuWorld,
+        key: TextureKey,
+        from: DoorwayPlace,
+    ) -> bool {
+        let Some(ahead) = &mut self.ahead else {
+            return false;
+        };
+        let Some(entry) = ahead.find(key) else {
+            return false;
+        };
+        let side = self.options.side as usize;
+        let Some(texels) = unpack(&entry.packed, side, self.arrays.is_blue_first()) else {
+            ahead.forget(key);
+            return false;
+        };
+        let (exposure, cells, n_triangles) =
+            (entry.exposure, entry.cells.clone(), entry.n_triangles);
+        let Some(layer) = self.free_layer() else {
+            return false;
+        };
+        self.arrays.write(gpu, layer, &texels);
+        self.doorway(world, key.0).n_behind = n_triangles;
+        self.put(
+            key,
+            HeldTexture {
+                layer,
+                from,
+                exposure,
+                cells,
+            },
+        );
+        true
     }
 
     /// Returns the memory of the textures held. [Units: byte]

@@ -1,5 +1,6 @@
 //! The viewpoints of textures for an eye before a doorway.
 
+use enfilade_cpg::{CellId, PortalId};
 use glam::DVec2;
 
 use super::doorway::{Doorway, DoorwayPlace};
@@ -9,6 +10,12 @@ use crate::portal_texture_options::Viewpoints;
 ///
 /// The last two are the fineness and the anchor of the lattice.
 pub(crate) type ViewpointIndex = [i32; 5];
+
+/// A portal with the cell behind it.
+pub(crate) type DoorwayId = (PortalId, CellId);
+
+/// A texture's doorway and viewpoint; `None` for the one of a transition.
+pub(crate) type TextureKey = (DoorwayId, Option<ViewpointIndex>);
 
 /// Viewpoints from which a view is composed, with weights that sum to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

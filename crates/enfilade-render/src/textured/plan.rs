@@ -18,14 +18,17 @@ use crate::shown::{DrawnPart, Shown};
 use crate::studio::Studio;
 
 /// Share of the transition distance from which on doorways are watched: transitions begun at that distance end before.
-const WATCHED: f32 = 0.25;
+pub(super) const WATCHED: f32 = 0.25;
 
 /// Share by which a doorway must be nearer than the transition distance to turn back into geometry: an eye at that distance
 /// does not make it turn again and again.
 const HYSTERESIS: f64 = 0.9;
 
 /// Pixels of the screen for one of a texture at most, along one side of a doorway. Nearer ones stay geometry.
-const COARSEST: f64 = 1.0;
+pub(super) const COARSEST: f64 = 1.0;
+
+/// Least height of an eye over the plane of a doorway, as a share of its distance. Lower ones see nothing of a texture.
+pub(super) const GRAZING: f64 = 1e-2;
 
 /// Time ahead for which textures are made if there is nothing else to make. [Units: frames]
 const AHEAD: f64 = 20.0;
@@ -116,12 +119,13 @@ impl Studio {
         };
         let eye = doorway.place(shot.eye);
         if !was_shown {
-            own.doorway(&self.world, id).anchor = (eye.at.y * 1e3).round() as i32;
+            let ahead = own.anchor_ahead(id, eye);
+            own.doorway(&self.world, id).anchor_at(eye, ahead);
         }
         let distance = doorway.distance(eye);
         let is_near = distance < far * if turn == 0 { HYSTERESIS } else { 1.0 };
-        let is_coarse = pixels_across(&doorway, eye, shot) > COARSEST * side;
-        let is_geometry = is_near || is_coarse || eye.height < 1e-2 * distance;
+        let is_coarse = pixels_across(&doorway, eye, (shot.fov_y, shot.size[1])) > COARSEST * side;
+        let is_geometry = is_near || is_coarse || eye.height < GRAZING * distance;
         let to = if is_geometry { last } else { 0 };
         let turn = if was_shown && own.may_turn(id) {
             to.clamp(turn.saturating_sub(1), turn + 1)
@@ -162,8 +166,8 @@ impl Studio {
         (lacking, counts): (&mut Vec<Lacking>, &mut PortalTextureCounts),
     ) -> Result<bool, RenderError> {
         let viewpoints = own.options.viewpoints.clone();
-        let anchor = own.doorway(&self.world, id).anchor;
-        let Some(composed) = viewpoints.of(doorway, eye, anchor) else {
+        let state = own.doorway(&self.world, id);
+        let Some(composed) = viewpoints.of(doorway, state.lattice_place(eye), state.anchor) else {
             return Ok(false);
         };
         let mut components = Vec::new();
@@ -302,11 +306,11 @@ impl Studio {
                 .collect::<Vec<_>>()
             {
                 let state = own.doorway(&self.world, id);
-                let anchor = state.anchor;
                 let Some(doorway) = state.doorway.clone() else {
                     continue;
                 };
-                let Some(composed) = viewpoints.of(&doorway, doorway.place(soon), anchor) else {
+                let place = state.lattice_place(doorway.place(soon));
+                let Some(composed) = viewpoints.of(&doorway, place, state.anchor) else {
                     continue;
                 };
                 for (index, _) in composed.iter() {
@@ -388,7 +392,8 @@ impl Studio {
         }
     }
 
-    /// Makes a texture unless the frame's share is used up. Returns `true` if it was made.
+    /// Makes a texture unless the frame's share is used up: takes one that was made ahead, or draws it. Returns `true` if it
+    /// was made.
     fn make(
         &mut self,
         own: &mut PortalTextures,
@@ -397,7 +402,14 @@ impl Studio {
         (doorway, from): (&Doorway, DoorwayPlace),
         counts: &mut PortalTextureCounts,
     ) -> Result<bool, RenderError> {
-        if counts.n_made >= own.options.max_made as usize {
+        // A texture that was made ahead counts half.
+        let used = 2 * counts.n_made + counts.n_loaded;
+        let rest = (2 * own.options.max_made as usize).saturating_sub(used);
+        if rest >= 1 && own.load(&self.gpu, &self.world, key, from) {
+            counts.n_loaded += 1;
+            return Ok(true);
+        }
+        if rest < 2 {
             return Ok(false);
         }
         let is_made = self.draw_texture(own, shot, key, (doorway, from), counts)?;
@@ -407,7 +419,7 @@ impl Studio {
 
     /// Draws a texture to a free layer. Returns `false` if there is none, if the bound on triangles would not hold, or if a
     /// special portal is in view.
-    fn draw_texture(
+    pub(super) fn draw_texture(
         &mut self,
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
@@ -510,10 +522,14 @@ pub(crate) fn state_of<'a>(space: Option<&'a Space>, own: &'a SightState) -> &'a
     space.map_or(own, |space| space.state(PartId::ROOT))
 }
 
-/// Returns the extent of a doorway on the screen, along its longer side. [Units: px]
-fn pixels_across(doorway: &Doorway, eye: DoorwayPlace, shot: &PlanShot<'_>) -> f64 {
+/// Returns the extent of a doorway on a screen of an angle and a number of lines, along its longer side. [Units: px]
+pub(super) fn pixels_across(
+    doorway: &Doorway,
+    eye: DoorwayPlace,
+    (fov_y, lines): (f32, u32),
+) -> f64 {
     let size = doorway.high - doorway.low;
-    let per_meter = f64::from(shot.size[1]) / (2.0 * (f64::from(shot.fov_y) * 0.5).tan());
+    let per_meter = f64::from(lines) / (2.0 * (f64::from(fov_y) * 0.5).tan());
     // Seen from the side, it is narrower.
     let facing = (eye.height / doorway.distance(eye).max(1e-6)).min(1.0);
     let wide = (size.x * facing).max(size.y);
