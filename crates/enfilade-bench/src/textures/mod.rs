@@ -144,7 +144,7 @@ impl Measurements<'_> {
                 return Ok(None);
             };
             let cameras = middle(&model.cameras(&studio.sight), n);
-            let series = measure(studio, &cameras, mode, size)?;
+            let series = measure(studio, (&model.world, &cameras), mode, size)?;
             self.series.insert(key.clone(), series);
         }
         Ok(self.series.get(&key))

@@ -1,10 +1,12 @@
 //! A walk drawn one way: triangles and time of each frame.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
+use enfilade::World;
 use enfilade_render::{
-    Camera, Culling, Frame, Picture, PortalTextureCounts, PortalTextureOptions, PortalTexturePaint,
-    Sparing, Studio, Style, Viewpoints,
+    Camera, Culling, Frame, Picture, PortalTextureCounts, PortalTextureMaking,
+    PortalTextureOptions, PortalTexturePaint, Sparing, Studio, Style, Viewpoints,
 };
 
 use crate::measure::quantile;
@@ -102,6 +104,8 @@ pub(super) struct Series {
     pub(super) made: Vec<[f64; 2]>,
     /// Most memory of textures. [Units: byte]
     pub(super) n_bytes: u64,
+    /// Number of textures made before the walk.
+    pub(super) n_ahead: usize,
 }
 
 impl Series {
@@ -135,7 +139,7 @@ fn style() -> Style {
 /// have grown.
 pub(super) fn measure(
     studio: &mut Studio,
-    cameras: &[Camera],
+    (world, cameras): (&World, &[Camera]),
     mode: DrawMode,
     size: [u32; 2],
 ) -> anyhow::Result<Series> {
@@ -144,8 +148,7 @@ pub(super) fn measure(
     let mut series = Series::default();
     mode.begin(studio)?;
     if mode == DrawMode::Warm {
-        // Each texture once, with room for all.
-        walk_ahead(studio, cameras, size)?;
+        series.n_ahead = make_ahead(studio, world, size[1])?;
     }
     let warm = cameras.iter().take(3).map(|camera| (camera, false));
     for (camera, counts) in warm.chain(cameras.iter().map(|camera| (camera, true))) {
@@ -180,12 +183,15 @@ pub(super) fn measure(
     Ok(series)
 }
 
-/// Makes the textures of a walk before it, as many as fit.
-fn walk_ahead(studio: &mut Studio, cameras: &[Camera], size: [u32; 2]) -> anyhow::Result<()> {
-    for camera in cameras {
-        studio.plan_portal_textures(camera, style(), size)?;
-    }
-    Ok(())
+/// Makes the textures of a whole world before the walk, and loads them; returns their number.
+fn make_ahead(studio: &mut Studio, world: &World, height: u32) -> anyhow::Result<usize> {
+    let making = PortalTextureMaking {
+        style: style(),
+        max_bytes: 64 << 20,
+        lines: height,
+    };
+    let made = studio.make_portal_textures(world, &making, &mut |_| ControlFlow::Continue(()))?;
+    Ok(studio.load_portal_textures(&made.bytes)?)
 }
 
 /// Draws a picture in the style of the walk.

@@ -89,6 +89,9 @@ pub(crate) struct View {
     /// Draw far portals as textures of what lies behind them: M changes that, T tints them.
     #[arg(long)]
     portal_textures: bool,
+    /// Textures made ahead by `enfilade portals` for this world; others are made as they are needed.
+    #[arg(long, value_name = "PTX", requires = "portal_textures")]
+    textures: Option<PathBuf>,
     /// Triangles drawn in a frame at most: nearer portals become textures, too, until it holds.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     max_triangles: Option<u64>,
@@ -105,6 +108,7 @@ pub(crate) struct View {
 pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     args.limits.begin()?;
     let inputs = [&args.world].into_iter().chain(&args.path);
+    let inputs = inputs.chain(&args.textures);
     let outputs = Outputs::reading(inputs.chain(&args.living))?;
     // Writability is tested when a key requests a file: most walks write none.
     for (option, format, path) in [
@@ -365,6 +369,9 @@ impl App<'_> {
             } else {
                 Mode::default()
             },
+            textures_ahead: (self.args.textures.as_ref())
+                .map(|path| std::fs::read(path).with_context(|| path.display().to_string()))
+                .transpose()?,
             texture_options: PortalTextureOptions {
                 max_triangles: self.args.max_triangles.unwrap_or(u64::MAX),
                 ..PortalTextureOptions::default()

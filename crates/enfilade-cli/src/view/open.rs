@@ -58,6 +58,8 @@ pub(super) struct Open {
     pub(super) pressed_at: Option<[f64; 2]>,
     pub(super) shown: Shown,
     pub(super) mode: Mode,
+    /// A file of textures made ahead.
+    pub(super) textures_ahead: Option<Vec<u8>>,
     /// Settings of portal textures, until they are on.
     pub(super) texture_options: PortalTextureOptions,
     /// `true` if the pointer is held in the window, and its movements turn the view.
@@ -242,12 +244,18 @@ impl Open {
         if self.mode != Mode::PortalTextures {
             return;
         }
-        if self.studio.portal_texture_options().is_none()
-            && let Err(why) = (self.studio).add_portal_textures(self.texture_options.clone())
-        {
-            self.mode = Mode::Portals;
-            self.warn(format!("no portal textures: {why}"));
-            return;
+        if self.studio.portal_texture_options().is_none() {
+            if let Err(why) = (self.studio).add_portal_textures(self.texture_options.clone()) {
+                self.mode = Mode::Portals;
+                self.warn(format!("no portal textures: {why}"));
+                return;
+            }
+            if let Some(bytes) = &self.textures_ahead {
+                match self.studio.load_portal_textures(bytes) {
+                    Ok(n) => self.say(format!("{n} portal textures were made ahead")),
+                    Err(why) => self.warn(format!("without textures made ahead: {why}")),
+                }
+            }
         }
         self.studio.paint_portal_textures(self.texture_paint());
     }

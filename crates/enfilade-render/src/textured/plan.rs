@@ -137,7 +137,7 @@ impl Studio {
             return Ok(false);
         }
         let is_made = self.compose(own, shot, (id, &doorway, eye), (lacking, counts))?;
-        // What stands behind it may move, and its own view would stop here.
+        // Parts behind it may move, and its own view would stop here.
         let has_guest = |space: &Space, cell| {
             let part = PartId::ROOT;
             !space.guests(Place { part, cell }).is_empty()
