@@ -1,7 +1,7 @@
 //! `bench portal-textures`: doorways drawn as pictures of the rooms behind, against portal culling and frustum culling.
 //!
 //! After Aliaga & Lastra, "Architectural Walkthroughs Using Portal Textures" (IEEE Visualization 1997), §5. To add a way to
-//! draw, add a variant to [`DrawMode`](series::DrawMode) and name it in `FIGURES` in `figures.rs`; to add a row, a line in [`PARTS`].
+//! draw, add a variant to [`DrawMode`] and name it in `FIGURES` in `figures.rs`; to add a row, a line in [`PARTS`].
 
 mod errors;
 mod figures;
