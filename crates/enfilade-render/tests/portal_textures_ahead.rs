@@ -11,7 +11,7 @@ use enfilade_render::{
 use enfilade_testkit::{GridParams, room_grid};
 use enfilade_world::PartId;
 
-const SIZE: [u32; 2] = [160, 120];
+const SIZE: [u32; 2] = [80, 60];
 
 const ASPECT: f32 = 4.0 / 3.0;
 
