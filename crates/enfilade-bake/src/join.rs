@@ -9,12 +9,9 @@ use enfilade_geom::{DVec3, Sets};
 use crate::complex::{Complex, LeafCells, OpenContact, Partition, Vote};
 use crate::structure::OUTDOORS;
 
-/// Bit that marks the label of a void; the other bits are the region that the void belongs to.
-pub(crate) const VOID: u32 = 1 << 31;
-
-/// Merges each cell with a void's label into the largest cell of its region, and renumbers the cells.
-/// Voids that have grown and now have portals stay as they are.
-pub(crate) fn join_voids(partition: &mut Partition) {
+/// Merges each cell without portals into the largest cell of its region, and renumbers the cells: shallow voids, the
+/// insides of stairs.
+pub(crate) fn join_enclosed(partition: &mut Partition) {
     let n = partition.label_of_cell.len();
     let mut home_of_label: BTreeMap<u32, u32> = BTreeMap::new();
     for (c, &label) in partition.label_of_cell.iter().enumerate() {
@@ -29,10 +26,11 @@ pub(crate) fn join_voids(partition: &mut Partition) {
     }
     let home = |c: usize| {
         let label = partition.label_of_cell[c];
-        let is_void = label & VOID != 0 && label != u32::MAX && !has_portal[c];
-        is_void
-            .then(|| home_of_label.get(&(label & !VOID)).copied())
-            .flatten()
+        if has_portal[c] || [OUTDOORS, u32::MAX].contains(&label) {
+            return None;
+        }
+        let of_region = home_of_label.get(&label);
+        of_region.copied().filter(|&h| h != c as u32)
     };
     let homes: Vec<Option<u32>> = (0..n).map(home).collect();
     if homes.iter().all(Option::is_none) {

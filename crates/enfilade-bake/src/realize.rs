@@ -8,8 +8,8 @@ use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
 
 use crate::assemble::{Cut, assemble};
-use crate::complex::{Complex, ComplexInput, Partition, Vote, build_complex_within};
-use crate::join::{VOID, join_unparted, join_voids};
+use crate::complex::{Complex, ComplexInput, LeafCells, Partition, Vote, build_complex_within};
+use crate::join::{join_enclosed, join_unparted};
 use crate::proposal::Proposal;
 use crate::structure::Structure;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
@@ -96,8 +96,8 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     while *joins_unparted && join_unparted(complex, &cells, votes, voids) {
         cells = complex.label(votes, label);
     }
-    // Voids that rays found above ceilings and that no room's votes reached.
-    let unreached: Vec<Vote> = std::mem::take(voids)
+    // Voids that no room's votes reached.
+    let mut unreached: Vec<Vote> = std::mem::take(voids)
         .into_iter()
         .filter(|(p, _)| complex.cell_at(&cells, *p).is_none())
         .map(|(point, region)| Vote {
@@ -106,29 +106,35 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
             weight: 1e-3,
         })
         .collect();
-    if unreached.is_empty() {
-        return complex.realize(cells);
-    }
-    let n = votes.len();
-    votes.extend(unreached);
-    cells = complex.label(votes, label);
-    // A void that opens to something is a cavity of the construction: left as it was.
-    let contacts = complex.contacts(&cells);
-    let opening: BTreeSet<u32> = contacts.into_keys().flatten().collect();
-    let mut rest = votes.split_off(n);
-    let n_voids = rest.len();
-    rest.retain(|v| {
-        let cell = complex.cell_at(&cells, v.point);
-        cell.is_none_or(|c| !opening.contains(&c))
-    });
-    let is_final = rest.len() == n_voids;
-    votes.extend(rest);
-    if !is_final {
+    if !unreached.is_empty() {
+        let n = votes.len();
+        votes.append(&mut unreached);
+        cells = complex.label(votes, label);
+        unreached = votes.split_off(n);
+        // A void that opens to another room than its own is a cavity of the construction: left as it was.
+        let opening = opening_elsewhere(complex, &cells);
+        unreached.retain(|v| {
+            let cell = complex.cell_at(&cells, v.point);
+            cell.is_none_or(|c| !opening.contains(&c))
+        });
+        unreached.iter_mut().for_each(|v| v.label &= !VOID);
+        votes.append(&mut unreached);
         cells = complex.label(votes, label);
     }
     let mut partition = complex.realize(cells);
-    join_voids(&mut partition);
+    join_enclosed(&mut partition);
     partition
+}
+
+/// Bit that sets the labels of voids apart; the other bits are the region that the void belongs to.
+const VOID: u32 = 1 << 31;
+
+/// Returns the cells that open to a cell of another region.
+fn opening_elsewhere(complex: &Complex<'_>, cells: &LeafCells) -> BTreeSet<u32> {
+    let region = |c: u32| cells.label_of_cell[c as usize] & !VOID;
+    let pairs = complex.contacts(cells).into_keys();
+    let elsewhere = pairs.filter(|[a, b]| region(*a) != region(*b));
+    elsewhere.flatten().collect()
 }
 
 /// Assigns the geometry and records the provenance of the world.

@@ -13,8 +13,8 @@ use std::collections::HashMap;
 use enfilade_geom::scene::TriangleSource;
 use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
 
-/// Rise from one step to the next. [Units: wu]
-const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.25;
+/// Rise from one step to the next: of stairs to climb up to that of space-saving stairs and tiers of seats. [Units: wu]
+const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.40;
 /// Horizontal distance between the middles of one step and the next. [Units: wu]
 const GOING: std::ops::RangeInclusive<f64> = 0.12..=1.2;
 /// Area of a step. [Units: wu²]

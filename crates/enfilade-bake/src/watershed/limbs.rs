@@ -26,7 +26,7 @@ use crate::voxel::{BitVolume, Grid, Labels, distance};
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
 use super::regions::Regions;
-use super::sections::section_ratio;
+use super::sections::section_of;
 use crate::MergeSettings;
 use crate::structure::OUTDOORS;
 
@@ -133,7 +133,7 @@ fn join_limbs(
         let (Some(&s), Some(&t)) = (thickness.get(&a), thickness.get(&b)) else {
             continue;
         };
-        if b < first || s.max(t) >= THICKER * s.min(t) {
+        if b < first {
             continue;
         }
         let is_lesser = |i: usize| region_of(flooded.labels.get(i)) == a;
@@ -141,10 +141,12 @@ fn join_limbs(
         let Some(front) = fronts.first() else {
             continue;
         };
-        if front.opening.closed < settings.closed_share
-            && section_ratio(flooded, settings, front, [a, b], &region_of).0
-                >= settings.wall_threshold
-        {
+        if front.opening.closed >= settings.closed_share {
+            continue;
+        }
+        let section = section_of(flooded, settings, front, [a, b], &region_of);
+        let is_as_thick = s.max(t) < THICKER * s.min(t);
+        if !section.is_framed || is_as_thick && section.ratio >= settings.wall_threshold {
             sets.join(a, b);
             any = true;
         }

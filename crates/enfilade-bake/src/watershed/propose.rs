@@ -13,7 +13,7 @@ use super::refill::flood_closures;
 use super::regions::{Regions, merge_basins};
 use super::rims::rim_caps;
 use super::slabs::cut_at_slabs;
-use super::voids::shallow_voids;
+use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
 use crate::config::BYTES_A_VOXEL;
 use crate::proposal::Proposal;
@@ -101,9 +101,15 @@ pub(crate) fn propose(
     let ballots = Ballots::cast(&grid, &labels, &regions, not_air, allowance);
     drop(stairs);
     let region_at = |p| region_at(&grid, &labels, &regions, p);
-    let mut voids = Vec::new();
+    let mut voids = inside_stairs(&structure.stairs, &structure.bvh, &region_at, allowance);
+    voids.retain(|(_, region)| matter.regions.binary_search(region).is_err());
     if matter.fronts_face_air {
-        voids = shallow_voids(&structure.walls, &structure.bvh, &region_at, allowance);
+        voids.extend(shallow_voids(
+            &structure.walls,
+            &structure.bvh,
+            &region_at,
+            allowance,
+        ));
     }
     drop(labels);
     // From here on, everything is in scene coordinates.

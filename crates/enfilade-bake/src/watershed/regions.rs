@@ -27,7 +27,7 @@ use rayon::prelude::*;
 
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::{Faces, group_faces, is_in};
-use super::sections::section_ratio;
+use super::sections::section_of;
 use crate::MergeSettings;
 use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms, lies_in_slab};
 
@@ -295,12 +295,17 @@ impl Mergeable for BasinMerger<'_> {
                     return 0.0;
                 }
                 let cell_of = |label: u32| self.cell[label as usize];
-                let (mut ratio, wall) =
-                    section_ratio(self.flooded, self.settings, front, [a, b], &cell_of);
+                let section = section_of(self.flooded, self.settings, front, [a, b], &cell_of);
                 if a == OUTDOORS {
-                    ratio *= self.settings.outdoor_gain;
+                    let ratio = section.ratio * self.settings.outdoor_gain;
+                    return self.settings.openness(ratio, section.wall).min(low);
                 }
-                self.settings.openness(ratio, wall).min(low)
+                let openness = self.settings.openness(section.ratio, section.wall).min(low);
+                if section.is_framed {
+                    openness
+                } else {
+                    openness.max(1.0)
+                }
             })
             .fold(0.0, f64::max)
     }

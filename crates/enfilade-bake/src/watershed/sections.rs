@@ -6,7 +6,7 @@ use enfilade_geom::DVec3;
 use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
 use crate::MergeSettings;
-use crate::structure::{OUTDOORS, Opening, connected_count, rim_share};
+use crate::structure::{OUTDOORS, Opening, connected_count, is_framed, rim_share};
 use crate::voxel::{Grid, Labels};
 
 /// Least share of a front that leaves hold if it stands between them.
@@ -14,59 +14,61 @@ const LEAVES: f64 = 0.2;
 /// An opening lies away from the flood's front if it is narrower there by this factor.
 const PINCHED: f64 = 0.9;
 
+/// Vertical part of the normal above which an opening lies in a floor or roof rather than in a wall.
+const STEEP: f64 = 0.5;
+
 /// Lattice steps around an opening's rim within which most pinches show: a pass over the full surround costs ten
 /// times as much around a small opening.
 const CLOSE: f64 = 3.0;
 
-/// Returns the area of the opening of `front`, between the cells of `pair`, ÷ the smaller of their largest
-/// cross-sections beside it; and the share of its rim that is wall. `cell_of` returns the cell of a basin.
-///
-/// Below the threshold of `settings`, the ratio uses the first sections found to be large enough.
-pub(super) fn section_ratio(
+/// Measures of an opening and the space beside it.
+pub(super) struct Section {
+    /// Area of the opening ÷ the smaller of the largest cross-sections of its two cells. Below the threshold of the
+    /// settings, the first sections found to be large enough are taken.
+    pub(super) ratio: f64,
+    /// Share of the rim that is wall. 0 below the threshold.
+    pub(super) wall: f64,
+    /// Has a lintel or two jambs, or is not upright, or leaves hang in it.
+    pub(super) is_framed: bool,
+}
+
+/// Measures the opening of `front`, between the cells of `pair`. `cell_of` returns the cell of a basin.
+pub(super) fn section_of(
     flooded: Flooded<'_>,
     settings: &MergeSettings,
     front: &Front,
     pair: [u32; 2],
     cell_of: &(impl Fn(u32) -> u32 + Sync),
-) -> (f64, f64) {
+) -> Section {
     let step = lattice_step(flooded.grid);
     // The same lattice: a section that is large enough there is no smaller in the full surround.
     let rest = ((settings.surround / step).floor() - CLOSE).max(0.0);
     if rest > 0.0 && front.opening.closed < LEAVES {
         let close = settings.surround - rest * step;
         let slices = Slices::beside(flooded, close, front, cell_of);
-        if let Sections::Pinch(ratio) = sections(&slices, settings, &front.opening, pair) {
-            return (ratio, 0.0);
+        let section = measured(&slices, settings, &front.opening, pair);
+        if section.ratio < settings.threshold {
+            return section;
         }
     }
     let slices = Slices::beside(flooded, settings.surround, front, cell_of);
-    match sections(&slices, settings, &front.opening, pair) {
-        Sections::Pinch(ratio) => (ratio, 0.0),
-        Sections::All { ratio, wall } => (ratio, wall),
-    }
+    measured(&slices, settings, &front.opening, pair)
 }
 
-/// Sizes of the sections beside an opening.
-enum Sections {
-    /// So large that the opening is a pinch in any case: its area ÷ the section.
-    Pinch(f64),
-    /// Its area ÷ the smaller of the largest, and the share of its rim that is wall.
-    All { ratio: f64, wall: f64 },
-}
-
-fn sections(
+fn measured(
     slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>,
     settings: &MergeSettings,
     opening: &Opening,
     [a, b]: [u32; 2],
-) -> Sections {
+) -> Section {
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
 
     // The flood's front may stand beyond the doorway, between the leaves of an open door, say: the
     // opening is where the two cells together are narrowest.
     let (mut n_open, mut at) = (opening.area / unit, 0);
-    if opening.closed >= LEAVES {
+    let has_leaves = opening.closed >= LEAVES;
+    if has_leaves {
         let (mut inside, mut stack) = (vec![false; slices.seeds.len()], Vec::new());
         for s in (1..=reach).flat_map(|s| [s, -s]) {
             slices.visit(s, |k, cell| inside[k] = cell == a || cell == b);
@@ -80,6 +82,8 @@ fn sections(
     // Once both are this large, the opening is a pinch in any case.
     let enough = n_open / settings.threshold;
     let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
+    let is_level = opening.plane.normal.y.abs() > STEEP;
+    let mut is_framed = is_level || has_leaves;
     // From the opening outward, as far sections are the large ones.
     for s in 0..=reach + at.abs() {
         let [before, after] = &mut sides;
@@ -92,16 +96,25 @@ fn sections(
         }
         let n = smaller(&sides, a) as f64;
         if n > enough {
-            return Sections::Pinch(n_open / n);
+            is_framed = is_framed || slices.is_framed(&sides);
+            if is_framed {
+                return Section {
+                    ratio: n_open / n,
+                    wall: 0.0,
+                    is_framed,
+                };
+            }
         }
     }
     let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
-    let wall = rim_share(&slices.seeds, slices.side, is_wall);
-    let ratio = match smaller(&sides, a) {
-        0 => 1.0,
-        n => n_open / n as f64,
-    };
-    Sections::All { ratio, wall }
+    Section {
+        ratio: match smaller(&sides, a) {
+            0 => 1.0,
+            n => n_open / n as f64,
+        },
+        wall: rim_share(&slices.seeds, slices.side, is_wall),
+        is_framed: is_framed || slices.is_framed(&sides),
+    }
 }
 
 /// Slices with fewer points than this are visited on one thread.
@@ -212,6 +225,13 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             side,
             seeds,
         }
+    }
+
+    /// Returns `true` if space on either side reaches past the opening's rim above, or both left and right.
+    fn is_framed(&self, sides: &[Side; 2]) -> bool {
+        let up = DVec3::from(self.along.map(|d| d.y)) * (self.flooded.grid.voxel / self.step);
+        let is_beside = |k: usize| sides.iter().any(|side| side.beside[k]);
+        is_framed(&self.seeds, self.side, [up.x, up.y], is_beside)
     }
 
     /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.

@@ -75,6 +75,31 @@ pub(crate) fn shallow_voids(
         .collect()
 }
 
+/// Returns a point behind each triangle of the `stairs`, half way to the next surface, with the region that the flood
+/// found there: it ignores stairs. A flight belongs to the room that it stands in, with everything inside it.
+#[must_use]
+pub(crate) fn inside_stairs(
+    stairs: &[Triangle],
+    bvh: &Bvh,
+    region_at: &(dyn Fn(DVec3) -> u32 + Sync),
+    allowance: &Allowance,
+) -> Vec<(DVec3, u32)> {
+    let in_turn = stairs.par_iter().filter(allowance.each(WORK_A_SAMPLE));
+    let inside = in_turn.filter_map(|t| {
+        let inward = -triangle_area_normal(t).try_normalize()?;
+        let origin = (t[0] + t[1] + t[2]) / 3.0 + inward * 1e-4;
+        let ray = Ray {
+            origin,
+            direction: inward,
+            t_max: f64::INFINITY,
+        };
+        let hit = bvh.closest_hit(&ray, |_| false)?;
+        let middle = origin + inward * (hit.t * 0.5);
+        Some((middle, region_at(middle))).filter(|_| !hit.front)
+    });
+    inside.filter(|(_, region)| *region != 0).collect()
+}
+
 /// Returns the `k`-th of `n` points spread over a triangle by the R2 sequence (Roberts 2018), folded.
 fn sample(t: &Triangle, k: usize, n: usize) -> DVec3 {
     if n == 1 {
