@@ -9,8 +9,11 @@ use enfilade_geom::{DVec3, Sets};
 use crate::complex::{Complex, LeafCells, OpenContact, Partition, Vote};
 use crate::structure::OUTDOORS;
 
-/// Merges each cell without portals into the largest cell of its region, and renumbers the cells: shallow voids, the
-/// insides of stairs.
+/// Bit that marks the label of a void; the other bits are the region that the void belongs to.
+pub(crate) const VOID: u32 = 1 << 31;
+
+/// Merges each cell that opens to no other region into the largest cell of its region, and renumbers the cells: shallow
+/// voids, the insides of stairs.
 pub(crate) fn join_enclosed(partition: &mut Partition) {
     let n = partition.label_of_cell.len();
     let mut home_of_label: BTreeMap<u32, u32> = BTreeMap::new();
@@ -20,16 +23,21 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
             *best = c as u32;
         }
     }
-    let mut has_portal = vec![false; n];
+    let region = |c: u32| partition.label_of_cell[c as usize] & !VOID;
+    let mut opens_elsewhere = vec![false; n];
     for p in &partition.portals {
-        p.cells.iter().for_each(|&c| has_portal[c as usize] = true);
+        if region(p.cells[0]) != region(p.cells[1]) {
+            p.cells
+                .iter()
+                .for_each(|&c| opens_elsewhere[c as usize] = true);
+        }
     }
     let home = |c: usize| {
         let label = partition.label_of_cell[c];
-        if has_portal[c] || [OUTDOORS, u32::MAX].contains(&label) {
+        if opens_elsewhere[c] || [OUTDOORS, u32::MAX].contains(&label) {
             return None;
         }
-        let of_region = home_of_label.get(&label);
+        let of_region = home_of_label.get(&(label & !VOID));
         of_region.copied().filter(|&h| h != c as u32)
     };
     let homes: Vec<Option<u32>> = (0..n).map(home).collect();
@@ -66,6 +74,10 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
     for l in &mut partition.leaks {
         l.cells = l.cells.map(|c| number[c as usize]);
     }
+    let parts = |cells: [u32; 2]| cells[0] != cells[1];
+    partition.portals.retain(|p| parts(p.cells));
+    partition.hairlines.retain(|p| parts(p.cells));
+    partition.leaks.retain(|l| parts(l.cells));
     partition.triangle_cells = partition.triangle_cells.renumbered(&number);
     renumber_locator(&mut partition.locator, &number);
 }

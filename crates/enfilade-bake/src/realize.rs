@@ -9,7 +9,7 @@ use enfilade_geom::scene::Role;
 
 use crate::assemble::{Cut, assemble};
 use crate::complex::{Complex, ComplexInput, LeafCells, Partition, Vote, build_complex_within};
-use crate::join::{join_enclosed, join_unparted};
+use crate::join::{VOID, join_enclosed, join_unparted};
 use crate::proposal::Proposal;
 use crate::structure::Structure;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
@@ -113,21 +113,21 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         unreached = votes.split_off(n);
         // A void that opens to another room than its own is a cavity of the construction: left as it was.
         let opening = opening_elsewhere(complex, &cells);
+        let n_unreached = unreached.len();
         unreached.retain(|v| {
             let cell = complex.cell_at(&cells, v.point);
             cell.is_none_or(|c| !opening.contains(&c))
         });
-        unreached.iter_mut().for_each(|v| v.label &= !VOID);
+        let is_final = unreached.len() == n_unreached;
         votes.append(&mut unreached);
-        cells = complex.label(votes, label);
+        if !is_final {
+            cells = complex.label(votes, label);
+        }
     }
     let mut partition = complex.realize(cells);
     join_enclosed(&mut partition);
     partition
 }
-
-/// Bit that sets the labels of voids apart; the other bits are the region that the void belongs to.
-const VOID: u32 = 1 << 31;
 
 /// Returns the cells that open to a cell of another region.
 fn opening_elsewhere(complex: &Complex<'_>, cells: &LeafCells) -> BTreeSet<u32> {

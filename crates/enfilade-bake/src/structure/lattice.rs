@@ -16,8 +16,7 @@ fn for_rim(mask: &[bool], side: [usize; 2], mut visit: impl FnMut(usize)) {
         for i in 0..side[0] {
             let k = j * side[0] + i;
             let near = |k: usize, n: usize| k.saturating_sub(2)..(k + 3).min(n);
-            if !mask[k]
-                && near(j, side[1]).any(|y| near(i, side[0]).any(|x| mask[y * side[0] + x]))
+            if !mask[k] && near(j, side[1]).any(|y| near(i, side[0]).any(|x| mask[y * side[0] + x]))
             {
                 visit(k);
             }

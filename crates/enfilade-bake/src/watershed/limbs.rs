@@ -3,7 +3,7 @@
 //! At the mouth of a corridor as high as the room, nothing is narrower than the corridor itself. So no
 //! ratio of an opening to the space beside it shows where the room ends, and the floods meet in the
 //! middle of the corridor. The local thickness in plan does show it: a limb is an area that fits no disc of
-//! twice its own width, and it is a room if it is at least two of its widths long. An alcove is
+//! twice its own width, and it is a room if it is at least two and a half of its widths long. An alcove is
 //! shorter. A bend or a crossing of corridors of equal width has no space for the larger disc, so
 //! corridors that meet are one limb.
 //!
@@ -32,8 +32,8 @@ use crate::structure::OUTDOORS;
 
 /// A limb opens to areas at least this many times as thick: its section is at most half of theirs.
 const THICKER: f64 = 2.0;
-/// … and is at least this many of its widths long.
-const LONG: f64 = 2.0;
+/// … and is at least this many of its widths long, of which up to half a width lies in the room before its mouth.
+const LONG: f64 = 2.5;
 /// Factor from one width tried to the next.
 const STEP: f64 = 1.15;
 
@@ -133,7 +133,7 @@ fn join_limbs(
         let (Some(&s), Some(&t)) = (thickness.get(&a), thickness.get(&b)) else {
             continue;
         };
-        if b < first {
+        if b < first || s.max(t) >= THICKER * s.min(t) {
             continue;
         }
         let is_lesser = |i: usize| region_of(flooded.labels.get(i)) == a;
@@ -141,12 +141,10 @@ fn join_limbs(
         let Some(front) = fronts.first() else {
             continue;
         };
-        if front.opening.closed >= settings.closed_share {
-            continue;
-        }
-        let section = section_of(flooded, settings, front, [a, b], &region_of);
-        let is_as_thick = s.max(t) < THICKER * s.min(t);
-        if !section.is_framed || is_as_thick && section.ratio >= settings.wall_threshold {
+        if front.opening.closed < settings.closed_share
+            && section_of(flooded, settings, front, [a, b], &region_of).ratio
+                >= settings.wall_threshold
+        {
             sets.join(a, b);
             any = true;
         }
