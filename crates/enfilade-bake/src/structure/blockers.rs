@@ -26,7 +26,11 @@ const MIN_HELD: f64 = 0.7;
 /// Samples along each side of a plate's rim.
 const RIM_SAMPLES: usize = 8;
 
-/// Returns the triangles of each detail object that is flat enough to close an opening.
+/// Least share of an object's surface in a sheet that stands for all of it: a leaf with its rails, drive or closer.
+const MOST: f64 = 0.5;
+
+/// Returns the triangles of each detail object that is flat enough to close an opening, and the leaves of those that
+/// reach farther: the panels of an overhead door without its rails.
 #[must_use]
 pub(crate) fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
     let mut out = Vec::new();
@@ -42,6 +46,8 @@ pub(crate) fn plates(scene: &Scene) -> Vec<Vec<Triangle>> {
         if current != Some(source.object) {
             if is_flat(&object) {
                 out.push(std::mem::take(&mut object));
+            } else {
+                out.extend(leaf_among(&object));
             }
             object.clear();
             current = Some(source.object);
@@ -152,6 +158,42 @@ impl Plate {
         };
         (0..4).flat_map(along).collect()
     }
+}
+
+/// Returns the triangles in the sheet that holds most of an object's surface, if it is a leaf.
+///
+/// `O(n log n)`.
+fn leaf_among(triangles: &[Triangle]) -> Option<Vec<Triangle>> {
+    let area = |t: &Triangle| 0.5 * triangle_area_normal(t).length();
+    let total: f64 = triangles.iter().map(area).sum();
+    if total == 0.0 {
+        return None;
+    }
+    let n = thin_direction(triangles);
+    let range = |t: &Triangle| {
+        let d = t.map(|p| n.dot(p));
+        (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2]))
+    };
+    let mut by_place: Vec<(f64, f64, f64)> = triangles
+        .iter()
+        .map(|t| (range(t).0, range(t).1, area(t)))
+        .filter(|(low, high, _)| high - low < MAX_THICKNESS)
+        .collect();
+    by_place.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let sheet = |first: usize| {
+        let low = by_place[first].0;
+        let from = by_place[first..].iter();
+        let within = from.take_while(|t| t.0 < low + MAX_THICKNESS);
+        let held = within.filter(|t| t.1 < low + MAX_THICKNESS);
+        (low, held.map(|t| t.2).sum::<f64>())
+    };
+    let (low, most) = (0..by_place.len())
+        .map(sheet)
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let is_in = |t: &&Triangle| range(t).0 >= low && range(t).1 < low + MAX_THICKNESS;
+    let leaf: Vec<Triangle> = triangles.iter().filter(is_in).copied().collect();
+    let plate = Plate::of(&leaf);
+    (most >= MOST * total && plate.is_flat() && plate.is_leaf(most)).then_some(leaf)
 }
 
 fn is_flat(triangles: &[Triangle]) -> bool {

@@ -27,40 +27,59 @@ fn for_rim(mask: &[bool], side: [usize; 2], mut visit: impl FnMut(usize)) {
 /// Least share of one side of an opening's rim at which the space beside it must reach farther, for a lintel or jamb.
 const FRAMED: f64 = 0.5;
 
-/// Returns `true` if the opening `mask` has a lintel or two jambs: the space beside it (where `is_beside` holds) reaches
-/// past its rim above, or both left and right. Without either, walls and ceiling run through: a bend, an alcove, an arm of
-/// a room. `up` is the height gained with each step along a row and along a column.
-pub(crate) fn is_framed(
-    mask: &[bool],
-    side: [usize; 2],
-    up: [f64; 2],
-    is_beside: impl Fn(usize) -> bool,
-) -> bool {
-    // Position across and up.
-    let at = |k: usize| {
-        let [i, j] = [(k % side[0]) as f64, (k / side[0]) as f64];
-        [i * up[1] - j * up[0], i * up[0] + j * up[1]]
-    };
-    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for p in (0..mask.len()).filter(|&k| mask[k]).map(at) {
-        low = [low[0].min(p[0]), low[1].min(p[1])];
-        high = [high[0].max(p[0]), high[1].max(p[1])];
+/// The sides of an opening at which the space beside it reaches past its rim. Where it does not, a wall or the ceiling
+/// runs through.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Jambs {
+    pub(crate) left: bool,
+    pub(crate) right: bool,
+    pub(crate) lintel: bool,
+}
+
+impl Jambs {
+    /// Returns `true` for an opening in a wall. Any other is a bend, an alcove, an arm of a room.
+    pub(crate) fn frame(self) -> bool {
+        self.lintel || self.left && self.right
     }
-    // Left, right, above.
-    let (mut rim, mut beside) = ([0_usize; 3], [0_usize; 3]);
-    for_rim(mask, side, |k| {
-        let p = at(k);
-        for (n, is_there) in [p[0] < low[0], p[0] > high[0], p[1] > high[1]]
-            .into_iter()
-            .enumerate()
-        {
-            rim[n] += usize::from(is_there);
-            beside[n] += usize::from(is_there && is_beside(k));
+
+    /// Measures the opening `mask`; `is_beside` holds where there is space beside it. `up` is the height gained with each
+    /// step along a row and along a column.
+    pub(crate) fn of(
+        mask: &[bool],
+        side: [usize; 2],
+        up: [f64; 2],
+        is_beside: impl Fn(usize) -> bool,
+    ) -> Self {
+        // Position across and up.
+        let at = |k: usize| {
+            let [i, j] = [(k % side[0]) as f64, (k / side[0]) as f64];
+            [i * up[1] - j * up[0], i * up[0] + j * up[1]]
+        };
+        let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+        for p in (0..mask.len()).filter(|&k| mask[k]).map(at) {
+            low = [low[0].min(p[0]), low[1].min(p[1])];
+            high = [high[0].max(p[0]), high[1].max(p[1])];
         }
-    });
-    let [left, right, above] =
-        [0, 1, 2].map(|n| rim[n] > 0 && beside[n] as f64 >= FRAMED * rim[n] as f64);
-    above || left && right
+        // Left, right, above.
+        let (mut rim, mut beside) = ([0_usize; 3], [0_usize; 3]);
+        for_rim(mask, side, |k| {
+            let p = at(k);
+            for (n, is_there) in [p[0] < low[0], p[0] > high[0], p[1] > high[1]]
+                .into_iter()
+                .enumerate()
+            {
+                rim[n] += usize::from(is_there);
+                beside[n] += usize::from(is_there && is_beside(k));
+            }
+        });
+        let [left, right, lintel] =
+            [0, 1, 2].map(|n| rim[n] > 0 && beside[n] as f64 >= FRAMED * rim[n] as f64);
+        Self {
+            left,
+            right,
+            lintel,
+        }
+    }
 }
 
 /// Returns the number of points of `inside` (a lattice of size `side`) connected to a seed. Clears those

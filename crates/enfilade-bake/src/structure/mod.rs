@@ -28,7 +28,7 @@ pub(crate) use backs::{BACKS, POINTS, count_backs, is_crevice, is_inside, rays_f
 pub(crate) use blockers::{MAX_THICKNESS, plates, thin_direction};
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
-pub(crate) use lattice::{connected_count, is_framed, rim_share};
+pub(crate) use lattice::{Jambs, connected_count, rim_share};
 pub(crate) use of::{
     OUTDOORS, SceneStructure, Structure, bounds_of, in_own_order, structural_triangles,
 };

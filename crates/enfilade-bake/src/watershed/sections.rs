@@ -6,7 +6,7 @@ use enfilade_geom::DVec3;
 use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
 use crate::MergeSettings;
-use crate::structure::{OUTDOORS, Opening, connected_count, is_framed, rim_share};
+use crate::structure::{Jambs, OUTDOORS, Opening, connected_count, rim_share};
 use crate::voxel::{Grid, Labels};
 
 /// Least share of a front that leaves hold if it stands between them.
@@ -83,7 +83,7 @@ fn measured(
     let enough = n_open / settings.threshold;
     let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
     let is_level = opening.plane.normal.y.abs() > STEEP;
-    let mut is_framed = is_level || has_leaves;
+    let is_framed = |jambs: Jambs| is_level || has_leaves || jambs.frame();
     // From the opening outward, as far sections are the large ones.
     for s in 0..=reach + at.abs() {
         let [before, after] = &mut sides;
@@ -95,25 +95,29 @@ fn measured(
             rayon::join(|| look(before, 0, at - s), || look(after, 1, at + s));
         }
         let n = smaller(&sides, a) as f64;
-        if n > enough {
-            is_framed = is_framed || slices.is_framed(&sides);
-            if is_framed {
-                return Section {
-                    ratio: n_open / n,
-                    wall: 0.0,
-                    is_framed,
-                };
-            }
+        if n > enough && is_framed(slices.jambs(&sides)) {
+            return Section {
+                ratio: n_open / n,
+                wall: 0.0,
+                is_framed: true,
+            };
         }
     }
+    let jambs = slices.jambs(&sides);
     let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
+    // A beam across the whole room is no wall.
+    let has_wall = is_level || jambs.left && jambs.right;
     Section {
         ratio: match smaller(&sides, a) {
             0 => 1.0,
             n => n_open / n as f64,
         },
-        wall: rim_share(&slices.seeds, slices.side, is_wall),
-        is_framed: is_framed || slices.is_framed(&sides),
+        wall: if has_wall {
+            rim_share(&slices.seeds, slices.side, is_wall)
+        } else {
+            0.0
+        },
+        is_framed: is_framed(jambs),
     }
 }
 
@@ -227,11 +231,10 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
         }
     }
 
-    /// Returns `true` if space on either side reaches past the opening's rim above, or both left and right.
-    fn is_framed(&self, sides: &[Side; 2]) -> bool {
+    fn jambs(&self, sides: &[Side; 2]) -> Jambs {
         let up = DVec3::from(self.along.map(|d| d.y)) * (self.flooded.grid.voxel / self.step);
         let is_beside = |k: usize| sides.iter().any(|side| side.beside[k]);
-        is_framed(&self.seeds, self.side, [up.x, up.y], is_beside)
+        Jambs::of(&self.seeds, self.side, [up.x, up.y], is_beside)
     }
 
     /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
