@@ -13,6 +13,7 @@ mod fronts;
 mod hollow;
 mod lids;
 mod limbs;
+mod low;
 mod propose;
 mod refill;
 mod regions;

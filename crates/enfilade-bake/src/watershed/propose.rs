@@ -9,6 +9,7 @@ use super::flooded::Flooded;
 use super::hollow::find_matter;
 use super::lids::{Lids, find_lids};
 use super::limbs::split_limbs;
+use super::low::join_low;
 use super::refill::flood_closures;
 use super::regions::{Regions, merge_basins};
 use super::rims::rim_caps;
@@ -71,6 +72,7 @@ pub(crate) fn propose(
         &config.merge,
         allowance,
     );
+    join_low(&grid, &basins.labels, &mut regions, allowance);
     context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;

@@ -40,6 +40,23 @@ pub(crate) struct Regions {
     pub(crate) contacts: BTreeMap<(u32, u32), Faces>,
 }
 
+impl Regions {
+    /// Gives each region the name that `name` returns; regions of one name are one.
+    pub(super) fn rename(&mut self, name: impl Fn(u32) -> u32) {
+        for region in &mut self.region_of_basin {
+            *region = name(*region);
+        }
+        for ((a, b), faces) in std::mem::take(&mut self.contacts) {
+            let (a, b) = (name(a), name(b));
+            if a != b {
+                let of = self.contacts.entry((a.min(b), a.max(b))).or_default();
+                of.extend(faces);
+            }
+        }
+        self.contacts.values_mut().for_each(|f| f.sort_unstable());
+    }
+}
+
 /// Merges the basins of `flooded` into rooms. `saddles` holds the saddle distance of each pair of
 /// touching basins, lower label first. [Units: vx]
 #[must_use]
