@@ -126,7 +126,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             _ => args.mode.culling(),
         };
         let shot = (camera, drawn_size, culling);
-        let mut drawn = Drawn::new(to, &mut studio, &world, shot, textures)?;
+        let mut drawn = Drawn::new(&to, &mut studio, &world, shot, textures)?;
         drawn.loaded_bytes = pieces.as_ref().map(|p| p.counts().loaded);
         if args.json {
             all.push(drawn);
@@ -261,7 +261,7 @@ struct Drawn {
 
 impl Drawn {
     fn new(
-        file: PathBuf,
+        file: &Path,
         studio: &mut Studio,
         world: &World,
         // The size before halving: sparing depends on its pixels.
