@@ -6,13 +6,16 @@ use std::path::{Path, PathBuf};
 
 use enfilade::cpg::World;
 use enfilade::world::PartId;
-use enfilade_render::{Camera, Mark, MarkShape, Paint, Picture, Sparing, Studio, Style};
+use enfilade_render::{
+    Camera, Culling, Mark, MarkShape, Paint, Picture, PortalTextureCounts, Sparing, Studio, Style,
+};
 use serde_json::json;
 
 mod above;
 mod options;
 mod special;
 mod streaming;
+mod textured;
 mod whole;
 
 use crate::formats::Format;
@@ -25,8 +28,10 @@ use enfilade_cli::cameras::{path_text, read_path};
 pub(crate) use above::above;
 use options::Colors;
 pub(crate) use options::Render;
+use options::RenderMode;
 use special::Mirrored;
 use streaming::{Pieces, Setting};
+use textured::{add_textures, read_textures, settle};
 pub(crate) use whole::{light, light_lamps, open, tell_of_pictures};
 
 /// Draws a picture at twice the size and halves it: smooth edges.
@@ -46,7 +51,9 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     let fov = args.fov.to_radians();
     let is_path = args.path.is_some() || args.walk.is_some();
     let inputs = [&args.world].into_iter().chain(&args.path);
+    let inputs = inputs.chain(&args.textures);
     let mut outputs = Outputs::reading(inputs.chain(&args.living))?;
+    let ahead = read_textures(args)?;
     if let Some(record) = &args.record {
         outputs.write("--record", Format::Cameras, record)?;
     }
@@ -75,16 +82,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             .collect();
         outputs.write_all("-o", Format::Picture, &pictures)?;
     }
-    if args.lod > 0.0 {
-        studio.add_levels(&world)?;
-    }
-    if !args.plain || args.above || args.paint == Colors::Cells {
-        light(&mut studio, &world)?;
-    }
-    if !args.plain && !args.no_lamps {
-        light_lamps(&mut studio, &world)?;
-    }
-    studio.day = args.daylight;
+    prepare(args, (&world, &mut studio), ahead.as_deref())?;
     let mut lived = match &args.living {
         Some(path) => {
             let lived = Lived::read(path, &world, WorldFile::of(&args.world))?;
@@ -104,10 +102,13 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         if let Some(pieces) = &mut pieces {
             pieces.settle(&mut studio, i)?;
         }
+        let mut counts = PortalTextureCounts::default();
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
             let live = (lived.as_mut(), mirrored.as_mut());
-            draw(args, (&world, &mut studio), live, camera, size)
+            let (picture, own) = draw(args, (&world, &mut studio), live, camera, size)?;
+            counts = own;
+            Ok(picture)
         })?;
         let to = if is_path {
             numbered(&args.output, i + 1)
@@ -118,7 +119,14 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             picture.add_overdraw_scale();
         }
         write_whole(&to, &picture.to_png()?)?;
-        let mut drawn = Drawn::new(args, &mut studio, &world, camera, (to, drawn_size))?;
+        let textures = (args.mode == RenderMode::PortalTextures).then_some(counts);
+        let culling = match textures {
+            // A mirror in view leaves no portal as a texture.
+            Some(none) if mirrored.is_some() && none.n_textured == 0 => Culling::Portals,
+            _ => args.mode.culling(),
+        };
+        let shot = (camera, drawn_size, culling);
+        let mut drawn = Drawn::new(&to, &mut studio, &world, shot, textures)?;
         drawn.loaded_bytes = pieces.as_ref().map(|p| p.counts().loaded);
         if args.json {
             all.push(drawn);
@@ -137,14 +145,34 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
     }
 }
 
-/// Draws a picture of a size, which may be a multiple of the requested one.
+/// Adds what the pictures need: levels of detail, light, lamps, and textures of far portals.
+fn prepare(
+    args: &Render,
+    (world, studio): (&World, &mut Studio),
+    ahead: Option<&[u8]>,
+) -> anyhow::Result<()> {
+    if args.lod > 0.0 {
+        studio.add_levels(world)?;
+    }
+    if !args.plain || args.above || args.paint == Colors::Cells {
+        light(studio, world)?;
+    }
+    if !args.plain && !args.no_lamps {
+        light_lamps(studio, world)?;
+    }
+    studio.day = args.daylight;
+    add_textures(args, studio, ahead)
+}
+
+/// Draws a picture of a size, which may be a multiple of the requested one. Counts the textures in it.
 fn draw(
     args: &Render,
     (world, studio): (&World, &mut Studio),
     (lived, mirrored): (Option<&mut Lived>, Option<&mut Mirrored>),
     camera: &Camera,
     size: [u32; 2],
-) -> anyhow::Result<Picture> {
+) -> anyhow::Result<(Picture, PortalTextureCounts)> {
+    let none = PortalTextureCounts::default();
     let scale = (size[0] as f32 / args.size[0] as f32).powi(2);
     studio.sparing = Sparing {
         stop_below: args.stop * scale,
@@ -155,10 +183,13 @@ fn draw(
     };
     let style = style_of(args);
     if let Some(lived) = lived {
-        return lived.picture(studio, PartId::ROOT, camera, style, size);
+        return Ok((
+            lived.picture(studio, PartId::ROOT, camera, style, size)?,
+            none,
+        ));
     }
     if args.above {
-        return above(studio, world, camera, args.cut, size);
+        return Ok((above(studio, world, camera, args.cut, size)?, none));
     }
     let marks = if args.portals {
         portal_marks(studio, world, camera, size)?
@@ -169,7 +200,13 @@ fn draw(
     if let Some(mirrored) = mirrored {
         return mirrored.picture(studio, (camera, culling), style, &marks, size);
     }
-    Ok(studio.picture(camera, culling, style, &marks, size)?)
+    let counts = if culling == Culling::PortalTextures {
+        settle(studio, |s| Ok(s.plan_portal_textures(camera, style, size)?))?
+    } else {
+        none
+    };
+    let picture = studio.picture(camera, culling, style, &marks, size)?;
+    Ok((picture, counts))
 }
 
 /// The look of pictures.
@@ -207,6 +244,16 @@ struct Drawn {
     of_triangles: u64,
     draws: usize,
     adapter: String,
+    /// Portals that are textures, and those of one color because of the bound on triangles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    textured_portals: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plain_portals: Option<usize>,
+    /// Textures drawn for the picture, and taken from those made ahead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    textures_made: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    textures_loaded: Option<usize>,
     /// Size of the pieces loaded so far and of all, as packed; of packed worlds.
     #[serde(skip_serializing_if = "Option::is_none")]
     loaded_bytes: Option<[u64; 2]>,
@@ -214,15 +261,15 @@ struct Drawn {
 
 impl Drawn {
     fn new(
-        args: &Render,
+        file: &Path,
         studio: &mut Studio,
         world: &World,
-        camera: &Camera,
         // The size before halving: sparing depends on its pixels.
-        (file, size): (PathBuf, [u32; 2]),
+        (camera, size, culling): (&Camera, [u32; 2], Culling),
+        textures: Option<PortalTextureCounts>,
     ) -> anyhow::Result<Self> {
         let view = camera.view(size[0] as f32 / size[1] as f32)?;
-        let list = studio.list(&view, camera.eye, args.mode.culling(), size);
+        let list = studio.list(&view, camera.eye, culling, size);
         let (triangles, draws) = (list.n_triangles(), list.n_draws());
         let cell = studio.sight.locate(camera.eye);
         Ok(Self {
@@ -235,6 +282,10 @@ impl Drawn {
             of_triangles: studio.world.n_triangles(),
             draws,
             adapter: studio.gpu.name(),
+            textured_portals: textures.map(|t| t.n_textured),
+            plain_portals: textures.map(|t| t.n_plain),
+            textures_made: textures.map(|t| t.n_made),
+            textures_loaded: textures.map(|t| t.n_loaded),
             loaded_bytes: None,
         })
     }
@@ -255,6 +306,9 @@ impl fmt::Display for Drawn {
             self.draws,
             self.adapter
         )?;
+        if let (Some(n), Some(plain)) = (self.textured_portals, self.plain_portals) {
+            write!(f, ", {n} portals are textures, {plain} of one color")?;
+        }
         if let Some([loaded, all]) = self.loaded_bytes {
             let [loaded, all] = [loaded, all].map(|n| n as f64 / 1e6);
             write!(f, ", {loaded:.2} of {all:.2} MB loaded")?;

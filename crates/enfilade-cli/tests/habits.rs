@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 21] = [
+const COMMANDS: [(&str, &[&str]); 22] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -44,6 +44,10 @@ const COMMANDS: [(&str, &[&str]); 21] = [
     (
         "render world.glb --size 64x36 --plain --adapter software --walk 2 -o x.png",
         &["pictures"],
+    ),
+    (
+        "render world.glb --size 64x36 --plain --adapter software --mode portal-textures -o x.png",
+        &["textured_portals", "plain_portals", "textures_made"],
     ),
     (
         "path world.glb --from 2,1,2 --to 8,1,3.6",

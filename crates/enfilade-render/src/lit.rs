@@ -144,7 +144,7 @@ impl Studio {
     }
 
     /// Returns what a lamp reaches: lists of draws and cells, by part.
-    fn reached(
+    pub(crate) fn reached(
         &mut self,
         space: Option<&Space>,
         light: &LampLight,

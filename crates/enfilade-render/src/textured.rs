@@ -3,6 +3,7 @@
 mod ahead;
 mod places;
 mod plan;
+mod relit;
 
 use enfilade_cpg::CellId;
 use enfilade_runtime::Stops;
@@ -43,7 +44,9 @@ impl Studio {
         let (format, layouts) = (self.renderer.format(), &self.renderer.layouts);
         let arrays = TextureArrays::new(&self.gpu, layouts, format, side, n.max(1));
         self.gpu.check_failed()?;
-        self.portal_textures = Some(Box::new(PortalTextures::new(options, arrays)));
+        let mut own = PortalTextures::new(options, arrays);
+        own.lamps.clone_from(&self.lamps.lights);
+        self.portal_textures = Some(Box::new(own));
         Ok(())
     }
 

@@ -3,6 +3,8 @@
 //! After Aliaga & Lastra, "Architectural Walkthroughs Using Portal Textures" (IEEE Visualization 1997), §5. To add a way to
 //! draw, add a variant to [`DrawMode`] and name it in `FIGURES` in `figures.rs`; to add a row, a line in [`PARTS`].
 
+mod bad;
+mod ends;
 mod errors;
 mod figures;
 mod models;
@@ -14,7 +16,7 @@ mod textured;
 
 use std::collections::BTreeMap;
 
-use enfilade_cli::values::size;
+use enfilade_cli::values::{bytes, size};
 use enfilade_render::{AdapterChoice, Studio};
 
 use crate::rows::{Chosen, RowPrinter};
@@ -36,6 +38,9 @@ pub(crate) struct PortalTextures {
     /// Size of the frames.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "640x480")]
     size: [u32; 2],
+    /// Largest file of textures made ahead: a number and K, M, G or T.
+    #[arg(long, value_name = "BYTES", default_value = "64M", value_parser = bytes)]
+    ahead: u64,
     /// Adapter: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
@@ -67,17 +72,24 @@ const PARTS: &[(&str, &[&str], TexturesPart)] = &[
         ],
         textured::quality,
     ),
+    ("ends", &["institute", "duplex", "fzk-haus"], ends::ends),
+    (
+        "bad input",
+        &["institute", "duplex", "fzk-haus"],
+        bad::bad_input,
+    ),
     ("bound", &["institute", "tower"], textured::bound),
     ("figures", &["brooks", "haunted"], figures::draw),
 ];
 
 /// Scenes in the order of their rows.
-const SCENES: [&str; 6] = [
+const SCENES: [&str; 7] = [
     "brooks",
     "haunted",
     "institute",
     "duplex",
     "aws-small-house",
+    "fzk-haus",
     "tower",
 ];
 
@@ -140,11 +152,12 @@ impl Measurements<'_> {
         let key = (scene.to_owned(), mode);
         if !self.series.contains_key(&key) {
             let (n, size) = (self.options.frames, self.options.size);
+            let frames = (size, self.options.ahead);
             let Some((model, studio)) = self.studio(row, scene)? else {
                 return Ok(None);
             };
             let cameras = middle(&model.cameras(&studio.sight), n);
-            let series = measure(studio, (&model.world, &cameras), mode, size)?;
+            let series = measure(studio, (&model.world, &cameras), mode, frames)?;
             self.series.insert(key.clone(), series);
         }
         Ok(self.series.get(&key))

@@ -4,7 +4,10 @@ use std::fmt::Write;
 
 /// Size of a plot, and its margins left, above, right and below. [Units: px]
 const SIZE: [f64; 2] = [800.0, 400.0];
-const MARGINS: [f64; 4] = [64.0, 36.0, 16.0, 48.0];
+const MARGINS: [f64; 4] = [64.0, 52.0, 16.0, 48.0];
+/// Width of a character of the legend, and of the line before a label with its gaps; estimated. [Units: px]
+const LETTER: f64 = 5.7;
+const SAMPLE: f64 = 34.0;
 /// Colors that are told apart without seeing red or green (Okabe & Ito 2008).
 const COLORS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000"];
 
@@ -65,6 +68,7 @@ impl Plot<'_> {
         let middle = top + inner_h * 0.5;
         let turned = format!(" transform=\"rotate(-90 14 {middle:.1})\"");
         out += &text([14.0, middle], "middle", &turned, self.y);
+        let mut at = left;
         for (i, line) in self.lines.iter().enumerate() {
             let color = COLORS[i % COLORS.len()];
             let mut points = String::new();
@@ -74,11 +78,12 @@ impl Plot<'_> {
             }
             let points = points.trim_end();
             out += &format!("<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\"/>\n");
-            // From the right, a place of 150 pixels for each.
-            let at = width - right - 150.0 * (self.lines.len() - i) as f64;
             let to = at + 18.0;
-            out += &format!("<path d=\"M{at} 28H{to}\" stroke=\"{color}\" stroke-width=\"3\"/>\n");
-            out += &text([to + 5.0, 32.0], "start", "", line.label);
+            out += &format!(
+                "<path d=\"M{at:.1} 36H{to:.1}\" stroke=\"{color}\" stroke-width=\"3\"/>\n"
+            );
+            out += &text([to + 5.0, 40.0], "start", " font-size=\"11\"", line.label);
+            at += SAMPLE + LETTER * line.label.len() as f64;
         }
         out + "</svg>\n"
     }

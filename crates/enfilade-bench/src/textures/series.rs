@@ -104,8 +104,10 @@ pub(super) struct Series {
     pub(super) made: Vec<[f64; 2]>,
     /// Most memory of textures. [Units: byte]
     pub(super) n_bytes: u64,
-    /// Number of textures made before the walk.
-    pub(super) n_ahead: usize,
+    /// Numbers of textures made before the walk, and left out for want of room.
+    pub(super) ahead: [usize; 2],
+    /// Number of textures taken from them.
+    pub(super) n_loaded: usize,
 }
 
 impl Series {
@@ -126,7 +128,7 @@ impl Series {
 }
 
 /// Surfaces lit alike: what a picture of a room holds does not depend on where it is looked at from.
-fn style() -> Style {
+pub(super) fn style() -> Style {
     Style {
         dark_corners: false,
         shadows: false,
@@ -141,14 +143,14 @@ pub(super) fn measure(
     studio: &mut Studio,
     (world, cameras): (&World, &[Camera]),
     mode: DrawMode,
-    size: [u32; 2],
+    (size, ahead): ([u32; 2], u64),
 ) -> anyhow::Result<Series> {
     let target = studio.target(size)?;
     let aspect = size[0] as f32 / size[1] as f32;
     let mut series = Series::default();
     mode.begin(studio)?;
     if mode == DrawMode::Warm {
-        series.n_ahead = make_ahead(studio, world, size[1])?;
+        series.ahead = make_ahead(studio, world, (size[1], ahead))?;
     }
     let warm = cameras.iter().take(3).map(|camera| (camera, false));
     for (camera, counts) in warm.chain(cameras.iter().map(|camera| (camera, true))) {
@@ -176,6 +178,7 @@ pub(super) fn measure(
             series.triangles.push((list.n_triangles() + n_made) as f64);
             let n_textures = made.n_made + made.n_turning;
             series.made.push([n_textures as f64, n_made as f64]);
+            series.n_loaded += made.n_loaded;
             series.n_bytes = series.n_bytes.max(made.n_bytes);
         }
         studio.give_list(list);
@@ -183,15 +186,20 @@ pub(super) fn measure(
     Ok(series)
 }
 
-/// Makes the textures of a whole world before the walk, and loads them; returns their number.
-fn make_ahead(studio: &mut Studio, world: &World, height: u32) -> anyhow::Result<usize> {
+/// Makes the textures of a whole world before the walk, and loads them; returns their number, and that of those left out.
+fn make_ahead(
+    studio: &mut Studio,
+    world: &World,
+    (lines, max_bytes): (u32, u64),
+) -> anyhow::Result<[usize; 2]> {
     let making = PortalTextureMaking {
         style: style(),
-        max_bytes: 64 << 20,
-        lines: height,
+        max_bytes,
+        lines,
     };
     let made = studio.make_portal_textures(world, &making, &mut |_| ControlFlow::Continue(()))?;
-    Ok(studio.load_portal_textures(&made.bytes)?)
+    let n = studio.load_portal_textures(&made.bytes)?;
+    Ok([n, made.n_left_out])
 }
 
 /// Draws a picture in the style of the walk.

@@ -48,13 +48,15 @@ pub(super) fn gains(all: &mut Measurements<'_>, scene: &str) -> anyhow::Result<(
         let [[before, ..], [mean, median, p99]] = [portals.times(), own.times()];
         let note = format!(
             "triangles a frame: {:.0} by portals, {:.0} by textures, {for_them:.0} of them to make {made:.2} textures; ms a frame: \
-             {before:.2} by portals, {mean:.2} by textures, {:.2} times faster, p99 ÷ median {:.2}; {} MiB; {} textures ahead; {} frames",
+             {before:.2} by portals, {mean:.2} by textures, {:.2} times faster, p99 ÷ median {:.2}; {} MiB; {} textures ahead, {} left out, {:.2} taken a frame; {} frames",
             portals.mean_triangles(),
             own.mean_triangles(),
             before / mean,
             p99 / median,
             own.n_bytes >> 20,
-            own.n_ahead,
+            own.ahead[0],
+            own.ahead[1],
+            own.n_loaded as f64 / n,
             own.seconds.len(),
         );
         let gain = portals.mean_triangles() / own.mean_triangles();

@@ -38,9 +38,17 @@ pub(crate) struct Render {
     /// Width and height of the picture.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
     pub(super) size: [u32; 2],
-    /// Set of things to draw: everything, all in the view, or all visible through portals.
+    /// Set of things to draw: everything, all in the view, all visible through portals, or the same with far portals as
+    /// textures of what lies behind them.
     #[arg(long, value_enum, default_value_t = RenderMode::Portals)]
     pub(super) mode: RenderMode,
+    /// Textures made ahead by `enfilade portals` for this world and light, with --mode portal-textures; others are made for the
+    /// picture.
+    #[arg(long, value_name = "PTX")]
+    pub(super) textures: Option<PathBuf>,
+    /// Triangles of the picture at most, with --mode portal-textures: nearer portals become textures, too, until it holds.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(super) max_triangles: Option<u64>,
     /// Colors of surfaces: lit materials, one color per cell, or how often pixels are drawn.
     #[arg(long, value_enum, default_value_t = Colors::Lit)]
     pub(super) paint: Colors,
@@ -105,6 +113,7 @@ pub(crate) enum RenderMode {
     Everything,
     Frustum,
     Portals,
+    PortalTextures,
 }
 
 impl RenderMode {
@@ -113,6 +122,7 @@ impl RenderMode {
             Self::Everything => Culling::Everything,
             Self::Frustum => Culling::Frustum,
             Self::Portals => Culling::Portals,
+            Self::PortalTextures => Culling::PortalTextures,
         }
     }
 }

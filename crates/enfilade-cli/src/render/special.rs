@@ -5,8 +5,11 @@ use std::collections::BTreeMap;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::runtime::{Sight, View};
 use enfilade::world::{PartId, Space, SpaceViewer};
-use enfilade_render::{Camera, Culling, Mark, Picture, SpaceShot, Studio, Style};
+use enfilade_render::{
+    Camera, Culling, Mark, Picture, PortalTextureCounts, SpaceShot, Studio, Style,
+};
 
+use super::textured::settle;
 use enfilade_cli::streamed::cells_in_view;
 
 /// A world whose special portals are looked into.
@@ -48,7 +51,7 @@ impl Mirrored {
         }
     }
 
-    /// Draws a picture.
+    /// Draws a picture. Counts textures, of which there are none while a special portal is in view.
     ///
     /// # Errors
     ///
@@ -60,19 +63,37 @@ impl Mirrored {
         style: Style,
         marks: &[Mark],
         size: [u32; 2],
-    ) -> anyhow::Result<Picture> {
+    ) -> anyhow::Result<(Picture, PortalTextureCounts)> {
         let view = camera.view(size[0] as f32 / size[1] as f32)?;
-        let seen = self.viewer.see(&self.space, PartId::ROOT, &view);
         let shot = SpaceShot {
             space: &self.space,
             frame: PartId::ROOT,
             camera: *camera,
-            seen: (culling == Culling::Portals).then_some(seen),
+            seen: None,
             style,
             marks,
             props: &[],
             lamps: None,
         };
-        Ok(studio.space_picture(&shot, size)?.0)
+        let mut counts = PortalTextureCounts::default();
+        self.viewer.stops_mut().clear();
+        if culling == Culling::PortalTextures {
+            counts = settle(studio, |s| Ok(s.plan_space_textures(&shot, size)?))?;
+            if let Some(stops) = studio.portal_texture_stops() {
+                self.viewer.stops_mut().clone_from(stops);
+            }
+            let seen = self.viewer.see(&self.space, PartId::ROOT, &view);
+            if seen.contexts().len() > 1 || !seen.stopped_specials().is_empty() {
+                self.viewer.stops_mut().clear();
+                counts = PortalTextureCounts::default();
+            }
+        }
+        let is_culled = matches!(culling, Culling::Portals | Culling::PortalTextures);
+        let seen = self.viewer.see(&self.space, PartId::ROOT, &view);
+        let shot = SpaceShot {
+            seen: is_culled.then_some(seen),
+            ..shot
+        };
+        Ok((studio.space_picture(&shot, size)?.0, counts))
     }
 }

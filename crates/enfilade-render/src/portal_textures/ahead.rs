@@ -7,6 +7,7 @@ use enfilade_cpg::CellId;
 use super::conditions::TextureConditions;
 use super::file::PtxEntry;
 use super::viewpoints::{DoorwayId, TextureKey};
+use crate::lamps::LampLight;
 use crate::scene::GpuWorld;
 
 /// Greatest difference of an eye's height from that of textures made ahead at which they are used as if it were there: walkers
@@ -22,6 +23,10 @@ pub(crate) fn millimeters(length: f64) -> i32 {
 pub(crate) struct AheadTextures {
     /// Conditions at the making.
     conditions: TextureConditions,
+    /// Lamps at the making.
+    pub(crate) lamps: Vec<LampLight>,
+    /// Cells lit by lamps that differ from those; `None` if all may look different.
+    pub(crate) relit: Option<Vec<CellId>>,
     entries: BTreeMap<TextureKey, PtxEntry>,
     /// Heights of the viewpoints of each doorway. [Units: mm]
     anchors: BTreeMap<DoorwayId, Vec<i32>>,
@@ -32,7 +37,11 @@ pub(crate) struct AheadTextures {
 }
 
 impl AheadTextures {
-    pub(crate) fn new(conditions: TextureConditions, entries: Vec<PtxEntry>) -> Self {
+    pub(crate) fn new(
+        conditions: TextureConditions,
+        lamps: Vec<LampLight>,
+        entries: Vec<PtxEntry>,
+    ) -> Self {
         let mut anchors: BTreeMap<DoorwayId, Vec<i32>> = BTreeMap::new();
         for entry in &entries {
             let of = anchors.entry(entry.id).or_default();
@@ -43,6 +52,8 @@ impl AheadTextures {
         let keyed = entries.into_iter().map(|e| ((e.id, Some(e.index)), e));
         Self {
             conditions,
+            lamps,
+            relit: Some(Vec::new()),
             entries: keyed.collect(),
             anchors,
             followed: None,
@@ -64,9 +75,10 @@ impl AheadTextures {
 
     /// Returns a texture if there is one that is true.
     pub(crate) fn find(&self, key: TextureKey) -> Option<&PtxEntry> {
-        let changed = self.changed.as_ref()?;
+        let (changed, relit) = (self.changed.as_ref()?, self.relit.as_ref()?);
         let entry = self.entries.get(&key)?;
-        let is_true = !changed.iter().any(|c| entry.cells.binary_search(c).is_ok());
+        let mut all = changed.iter().chain(relit);
+        let is_true = !all.any(|c| entry.cells.binary_search(c).is_ok());
         is_true.then_some(entry)
     }
 
@@ -77,7 +89,7 @@ impl AheadTextures {
 
     /// Returns the height of a doorway's textures that is nearest to an eye's, if it is near. [Units: mm]
     pub(crate) fn anchor(&self, id: DoorwayId, height: i32) -> Option<i32> {
-        self.changed.as_ref()?;
+        self.changed.as_ref().and(self.relit.as_ref())?;
         let off = |anchor: &i32| anchor.abs_diff(height);
         let all = self.anchors.get(&id)?.iter().copied();
         let nearest = all.min_by_key(|a| off(a))?;

@@ -15,6 +15,7 @@ use super::texels::unpack;
 use super::viewpoints::{DoorwayId, TextureKey};
 use crate::frame::Style;
 use crate::gpu::Gpu;
+use crate::lamps::LampLight;
 use crate::portal_texture_options::PortalTextureOptions;
 use crate::scene::GpuWorld;
 
@@ -88,6 +89,8 @@ pub(crate) struct PortalTextures {
     /// True from the plan of a space's frame to its draw.
     pub(crate) is_planned: bool,
     conditions: Option<TextureConditions>,
+    /// Lamps of the last frame.
+    pub(crate) lamps: Vec<LampLight>,
     /// Textures in host memory that were made ahead.
     pub(crate) ahead: Option<AheadTextures>,
     /// Eye of the last frame, in the root. [Units: wu]
@@ -109,6 +112,7 @@ impl PortalTextures {
             n_made_triangles: 0,
             is_planned: false,
             conditions: None,
+            lamps: Vec::new(),
             ahead: None,
             last_eye: None,
         }
@@ -155,6 +159,7 @@ impl PortalTextures {
         self.held.clear();
         self.layers.fill((None, 0));
         self.doorways.clear();
+        self.last_eye = None;
     }
 
     /// Returns the state of a doorway.

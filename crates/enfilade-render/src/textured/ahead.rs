@@ -146,7 +146,8 @@ impl Studio {
 
     /// Loads textures that [were made ahead](Studio::make_portal_textures) to host memory, instead of those loaded before;
     /// returns their number. Those whose doors stand as at the making are taken from there instead of drawn, in frames of
-    /// the same style and time of day. [`Studio::add_portal_textures`], which drops them, comes first; lamps and daylight, too.
+    /// the same style and time of day, and where no lamp has changed since. [`Studio::add_portal_textures`], which drops them,
+    /// comes first; lamps and daylight, too.
     ///
     /// # Errors
     ///
@@ -172,7 +173,8 @@ impl Studio {
         if let Some(why) = refused {
             return Err(why.into());
         }
-        let ahead = AheadTextures::new(head.conditions, entries);
+        let lamps = self.lamps.lights.clone();
+        let ahead = AheadTextures::new(head.conditions, lamps, entries);
         let n = ahead.len();
         own.clear();
         own.ahead = Some(ahead);

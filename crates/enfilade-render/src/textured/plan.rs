@@ -61,6 +61,7 @@ impl Studio {
         shot: &PlanShot<'_>,
     ) -> Result<PortalTextureCounts, RenderError> {
         let mut counts = PortalTextureCounts::default();
+        self.follow_texture_lamps(own, shot.space);
         let state = state_of(shot.space, &self.state);
         own.begin(&self.world, state, &shot.style, self.day);
         own.stops.clear();
@@ -128,7 +129,7 @@ impl Studio {
         let is_geometry = is_near || is_coarse || eye.height < GRAZING * distance;
         let to = if is_geometry { last } else { 0 };
         let turn = if was_shown && own.may_turn(id) {
-            to.clamp(turn.saturating_sub(1), turn + 1)
+            to.clamp(turn.saturating_sub(1), turn.saturating_add(1))
         } else {
             to
         };
@@ -238,11 +239,12 @@ impl Studio {
         let mut mixed = Vec::new();
         if is_warped {
             let total: f64 = parts.iter().map(|c| c.weight).sum();
+            // At the first moment, weights are exactly those of the texture.
             mixed.extend(parts.iter().map(|c| Component {
-                weight: c.weight / total * (1.0 - share),
+                weight: c.weight * (1.0 - share),
                 ..*c
             }));
-            mixed.push(component(held, share));
+            mixed.push(component(held, share * total));
         } else {
             mixed.push(component(held, 1.0));
         }
