@@ -40,6 +40,8 @@ struct Judged {
     kind: PortalKind,
     /// Its lower edge is at a floor, with no sill below it.
     is_on_floor: bool,
+    /// A leaf or pane fills it.
+    is_filled: bool,
 }
 
 pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
@@ -70,9 +72,11 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
             portal: p.clone(),
             kind,
             is_on_floor,
+            is_filled: is_filled(cut, p),
         }
     });
-    let portals: Vec<Portal> = bays::join_bays(judged.collect())
+    let bays = bays::join_bays(judged.collect());
+    let portals: Vec<Portal> = bays::join_slits(bays)
         .iter()
         .filter_map(|j| portal(cut, j))
         .collect();
@@ -262,15 +266,18 @@ const PARAPET: f64 = 0.4;
 /// Least height of a door: a lower opening with a pane or leaf is a window. [Units: wu]
 const LEAST_DOOR: f64 = 1.5;
 
+/// Returns `true` if a leaf or pane fills an opening.
+fn is_filled(cut: &Cut<'_>, p: &PartitionPortal) -> bool {
+    let closed = |c: u32| cut.candidates[c as usize].closed;
+    p.candidate.map_or(0.0, closed) >= cut.closed_share
+}
+
 /// Returns the kind of a portal, and `true` if its lower edge is at a floor.
 fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
         return (PortalKind::Crack, false);
     }
-    let closed = p
-        .candidate
-        .map_or(0.0, |s| cut.candidates[s as usize].closed);
-    let is_closed = closed >= cut.closed_share;
+    let is_closed = is_filled(cut, p);
     let is_upright = p.plane.normal.y.abs() < 0.5;
     let up = p.outline.points.iter().map(|q| q.y);
     let bottom = up.clone().fold(f64::MAX, f64::min);

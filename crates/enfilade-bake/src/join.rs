@@ -1,7 +1,7 @@
 //! Joins cells that belong together: a shallow void and the room below it, although no opening connects
 //! them, and regions that no plane separates.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::{DVec3, Sets};
@@ -12,9 +12,9 @@ use crate::structure::OUTDOORS;
 /// Bit that marks the label of a void; the other bits are the region that the void belongs to.
 pub(crate) const VOID: u32 = 1 << 31;
 
-/// Merges each cell that opens to no other region into the largest cell of its region, and renumbers the cells: shallow
-/// voids, the insides of stairs.
-pub(crate) fn join_enclosed(partition: &mut Partition) {
+/// Merges cells that are one space, and renumbers the rest: each that opens to no other region with the largest cell of
+/// its region (shallow voids, the insides of stairs), and cells of `low` regions that open to each other.
+pub(crate) fn join_enclosed(partition: &mut Partition, low: &BTreeSet<u32>) {
     let n = partition.label_of_cell.len();
     let mut home_of_label: BTreeMap<u32, u32> = BTreeMap::new();
     for (c, &label) in partition.label_of_cell.iter().enumerate() {
@@ -24,41 +24,56 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
         }
     }
     let region = |c: u32| partition.label_of_cell[c as usize] & !VOID;
+    let mut sets = Sets::new(n);
     let mut opens_elsewhere = vec![false; n];
     for p in &partition.portals {
-        if region(p.cells[0]) != region(p.cells[1]) {
+        let regions = p.cells.map(region);
+        if regions.iter().all(|r| low.contains(r)) {
+            sets.join(p.cells[0], p.cells[1]);
+        } else if regions[0] != regions[1] {
             p.cells
                 .iter()
                 .for_each(|&c| opens_elsewhere[c as usize] = true);
         }
     }
-    let home = |c: usize| {
-        let label = partition.label_of_cell[c];
-        if opens_elsewhere[c] || [OUTDOORS, u32::MAX].contains(&label) {
-            return None;
+    for c in 0..n as u32 {
+        let label = partition.label_of_cell[c as usize];
+        let is_enclosed = !opens_elsewhere[c as usize] && ![OUTDOORS, u32::MAX].contains(&label);
+        if is_enclosed && let Some(&home) = home_of_label.get(&(label & !VOID)) {
+            sets.join(home, c);
         }
-        let of_region = home_of_label.get(&(label & !VOID));
-        of_region.copied().filter(|&h| h != c as u32)
-    };
-    let homes: Vec<Option<u32>> = (0..n).map(home).collect();
-    if homes.iter().all(Option::is_none) {
+    }
+    let least = sets.into_least();
+    // The largest cell of each set stands for all of it.
+    let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
+    for (c, &set) in (0..).zip(&least) {
+        let best = stands_for.entry(set).or_insert(c);
+        if partition.volumes[c as usize] > partition.volumes[*best as usize] {
+            *best = c;
+        }
+    }
+    if stands_for.len() == n {
         return;
     }
+    let home = |c: usize| stands_for[&least[c]];
+    let kept: Vec<usize> = (0..n).filter(|&c| home(c) == c as u32).collect();
     let mut number = vec![0_u32; n];
-    let mut kept = Vec::new();
-    for c in 0..n {
-        if homes[c].is_none() {
-            number[c] = kept.len() as u32;
-            kept.push(c);
-        }
+    for (i, &c) in kept.iter().enumerate() {
+        number[c] = i as u32;
     }
     for c in 0..n {
-        if let Some(h) = homes[c] {
-            number[c] = number[h as usize];
-            partition.volumes[h as usize] += partition.volumes[c];
-            partition.aabbs[h as usize] = partition.aabbs[h as usize].union(partition.aabbs[c]);
+        let h = home(c) as usize;
+        if h != c {
+            number[c] = number[h];
+            partition.volumes[h] += partition.volumes[c];
+            partition.aabbs[h] = partition.aabbs[h].union(partition.aabbs[c]);
         }
     }
+    renumber(partition, &number, &kept);
+}
+
+/// Gives each cell its new `number`; `kept` are the cells that stay, in order. Portals within a cell vanish.
+fn renumber(partition: &mut Partition, number: &[u32], kept: &[usize]) {
     partition.label_of_cell = kept.iter().map(|&c| partition.label_of_cell[c]).collect();
     partition.volumes = kept.iter().map(|&c| partition.volumes[c]).collect();
     partition.aabbs = kept.iter().map(|&c| partition.aabbs[c]).collect();
@@ -78,8 +93,8 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
     partition.portals.retain(|p| parts(p.cells));
     partition.hairlines.retain(|p| parts(p.cells));
     partition.leaks.retain(|l| parts(l.cells));
-    partition.triangle_cells = partition.triangle_cells.renumbered(&number);
-    renumber_locator(&mut partition.locator, &number);
+    partition.triangle_cells = partition.triangle_cells.renumbered(number);
+    renumber_locator(&mut partition.locator, number);
 }
 
 fn renumbered(child: i32, number: &[u32]) -> i32 {
@@ -111,6 +126,7 @@ pub(crate) fn join_unparted(
     cells: &LeafCells,
     votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],
+    low: &mut BTreeSet<u32>,
 ) -> bool {
     let mut between: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
     for (pair, contact) in complex.contacts(cells) {
@@ -140,6 +156,12 @@ pub(crate) fn join_unparted(
             *label = labels[stands_for[i] as usize];
         }
     };
+    for (i, &least) in stands_for.iter().enumerate() {
+        // Together with a room, a low space is a part of it.
+        if !low.contains(&labels[i]) {
+            low.remove(&labels[least as usize]);
+        }
+    }
     votes.iter_mut().for_each(|v| relabel(&mut v.label));
     voids.iter_mut().for_each(|(_, region)| relabel(region));
     (0..).zip(&stands_for).any(|(i, &least)| i != least)

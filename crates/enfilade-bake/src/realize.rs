@@ -88,12 +88,13 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     let Proposal {
         votes,
         voids,
+        low,
         label,
         joins_unparted,
         ..
     } = proposal;
     let mut cells = complex.label(votes, label);
-    while *joins_unparted && join_unparted(complex, &cells, votes, voids) {
+    while *joins_unparted && join_unparted(complex, &cells, votes, voids, low) {
         cells = complex.label(votes, label);
     }
     // Voids that no room's votes reached.
@@ -125,7 +126,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         }
     }
     let mut partition = complex.realize(cells);
-    join_enclosed(&mut partition);
+    join_enclosed(&mut partition, low);
     partition
 }
 

@@ -1,9 +1,11 @@
-//! Merges the panes of a glazed bay into one window portal.
+//! Merges the panes of a glazed bay into one window portal, and slits in one plane into one portal.
 //!
 //! In a glazed wall, vertical mullions separate the bays, and horizontal transoms divide each bay into panes. Panes
 //! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay
 //! separate.
-//! **Limit:** panes whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
+//! Slits, too narrow to climb through, are one portal for each plane between two cells: the gaps between the tops of walls
+//! and a ribbed roof.
+//! **Limit:** panes and slits whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
 //!
 //! Time `O(p log p)` in windows, as long as few lie in one column of one plane.
 
@@ -19,6 +21,9 @@ use crate::complex::PartitionPortal;
 const BAR: f64 = 0.15;
 /// Greatest distance between the planes of two windows that count as coplanar. [Units: wu]
 const ONE_PLANE: f64 = 1e-6;
+
+/// Least width of an opening that anybody climbs through. [Units: wu]
+const SLIT: f64 = 0.3;
 
 /// Where a window lies in its facade. [Units: wu]
 struct Extent {
@@ -69,15 +74,7 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
             let is_near = |w: &&(usize, Extent)| w.1.across[0] - a.across[0] <= BAR;
             for (j, b) in windows[k + 1..].iter().take_while(is_near) {
                 let [p, q] = [&portals[*i].portal, &portals[*j].portal];
-                let is_one_plane = q
-                    .outline
-                    .points
-                    .iter()
-                    .all(|&x| p.plane.signed_distance(x).abs() <= ONE_PLANE);
-                if is_one_plane
-                    && p.plane.normal.dot(q.plane.normal) > 0.0
-                    && (a.carries(b) || b.carries(a))
-                {
+                if is_coplanar(p, q) && (a.carries(b) || b.carries(a)) {
                     sets.join(*i as u32, *j as u32);
                 }
             }
@@ -100,6 +97,36 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
         }
     }
     out
+}
+
+/// Joins slits of one kind between the same two cells in one plane: each plane has one portal with all its pieces, in
+/// place of its first slit.
+///
+/// Time: quadratic in the planes between two cells.
+pub(super) fn join_slits(portals: Vec<Judged>) -> Vec<Judged> {
+    let mut out: Vec<Judged> = Vec::with_capacity(portals.len());
+    let mut slits: BTreeMap<([u32; 2], PortalKind), Vec<usize>> = BTreeMap::new();
+    for judged in portals {
+        if judged.portal.width < SLIT && !judged.is_filled {
+            let planes = slits.entry((judged.portal.cells, judged.kind)).or_default();
+            let home = planes
+                .iter()
+                .find(|&&at| is_coplanar(&out[at].portal, &judged.portal));
+            if let Some(&at) = home {
+                out[at].take_in(judged.portal);
+                continue;
+            }
+            planes.push(out.len());
+        }
+        out.push(judged);
+    }
+    out
+}
+
+/// Returns `true` if two portals lie in one plane and lead the same way.
+fn is_coplanar(p: &PartitionPortal, q: &PartitionPortal) -> bool {
+    let is_near = |x: &DVec3| p.plane.signed_distance(*x).abs() <= ONE_PLANE;
+    p.plane.normal.dot(q.plane.normal) > 0.0 && q.outline.points.iter().all(is_near)
 }
 
 impl Judged {

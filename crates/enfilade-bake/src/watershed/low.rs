@@ -28,13 +28,13 @@ const WIDTH: f64 = 0.4;
 /// Greatest step up or down at a doorway. [Units: wu]
 const STEP: f64 = 0.4;
 
-/// Joins the regions of low spaces that touch, in the labels of a flooded volume.
+/// Joins the regions of low spaces that touch, in the labels of a flooded volume. Returns those regions.
 pub(super) fn join_low(
     grid: &Grid,
     labels: &Labels,
     regions: &mut Regions,
     allowance: &Allowance,
-) {
+) -> BTreeSet<u32> {
     let low = low_regions(grid, labels, regions, allowance);
     let mut sets = Sets::new(regions.region_of_basin.len());
     for (a, b) in regions.contacts.keys() {
@@ -43,7 +43,9 @@ pub(super) fn join_low(
         }
     }
     let stands_for = sets.into_least();
-    regions.rename(|region| stands_for[region as usize]);
+    let name = |region: u32| stands_for[region as usize];
+    regions.rename(name);
+    low.into_iter().map(name).collect()
 }
 
 /// Returns the regions in which nobody stands and into which no doorway leads.
@@ -124,9 +126,9 @@ fn is_doorway(grid: &Grid, labels: &Labels, faces: &Faces) -> bool {
     let has_floor = |[axis, x, z]: [usize; 3], y: usize| {
         let below = (STEP / grid.voxel).round() as usize + 1;
         let beside = [0, [1, nx, nx * ny][axis]];
-        beside.iter().all(|step| {
-            (1..=below.min(y)).any(|d| labels.get(grid.index(x, y - d, z) + step) == 0)
-        })
+        beside
+            .iter()
+            .all(|step| (1..=below.min(y)).any(|d| labels.get(grid.index(x, y - d, z) + step) == 0))
     };
     let least = (DOORWAY / grid.voxel).round() as usize;
     let is_wide = |(at, heights): (&[usize; 3], &mut Vec<usize>)| {

@@ -72,7 +72,7 @@ pub(crate) fn propose(
         &config.merge,
         allowance,
     );
-    join_low(&grid, &basins.labels, &mut regions, allowance);
+    let low = join_low(&grid, &basins.labels, &mut regions, allowance);
     context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;
@@ -126,6 +126,7 @@ pub(crate) fn propose(
     Ok(Proposal {
         candidates,
         voids,
+        low,
         counts,
         notes,
         settings: config.watershed_settings(),
