@@ -2,7 +2,8 @@
 //!
 //! The test is about the wall, not the leaf: *does the wall continue, in the plane of the thing, on three of
 //! its four sides, with air before and behind both?* A lintel has the wall on two sides, a wall between two
-//! others and two slabs on none or on two. A thing in such a hole is a filler if it is much thinner than the
+//! others and two slabs on none or on two. A leaf as high as the room has a jamb on either side and no lintel: it is told
+//! from a piece of wall by its thickness alone. A thing in such a hole is a filler if it is much thinner than the
 //! wall, or if a single connected surface surrounds it: walls are built beside each other, and only openings
 //! are cut out of one.
 
@@ -172,9 +173,7 @@ impl Held {
         held.n_by_one = n_by.iter().map(|h| h.1).max().unwrap_or(0);
         let [left, right, _, above] = held.sides;
         let has_end = |k: usize| members.iter().any(|c| c.ends[k]);
-        held.is_in_corner = above
-            && (left && has_end(1) || right && has_end(0))
-            && members.iter().all(|c| c.is_upright);
+        held.is_in_corner = above && (left && has_end(1) || right && has_end(0));
         held
     }
 
@@ -183,7 +182,9 @@ impl Held {
     }
 
     fn has_opening(&self, c: &Candidate) -> bool {
-        self.n_sides() >= SIDES || self.is_in_corner && c.leaf <= LEAF
+        let [left, right, ..] = self.sides;
+        let is_leaf = c.is_upright && c.leaf <= LEAF;
+        self.n_sides() >= SIDES || is_leaf && (self.is_in_corner || left && right)
     }
 
     fn is_thin(&self, c: &Candidate) -> bool {
