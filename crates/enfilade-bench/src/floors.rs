@@ -16,8 +16,8 @@ type Floor = (&'static str, [f64; 3]);
 const FLOORS: [Floor; 6] = [
     ("duplex", [0.89, 0.99, 0.99]),
     ("fzk-haus", [0.99, 0.99, 0.99]),
-    ("institute", [0.98, 0.99, 0.99]),
-    ("jasmin-sun", [0.89, 0.87, 0.91]),
+    ("institute", [0.99, 0.99, 0.99]),
+    ("jasmin-sun", [0.99, 0.87, 0.91]),
     ("kit-edc", [0.99, 0.99, 0.99]),
     ("samplehouse4", [0.74, 0.99, 0.99]),
 ];

@@ -15,6 +15,7 @@ mod measure;
 mod messy;
 mod portals;
 mod process;
+mod rooms;
 mod rows;
 mod score;
 mod sight;
@@ -62,6 +63,9 @@ struct Cli {
 enum What {
     /// Value of worlds to programs and modelers: a row per figure, with the value that it must reach.
     Bring(Chosen),
+    /// Rooms and doors as architects mean them: a row per figure, with the value that it must reach.
+    /// Rows: first, more, each with rooms, doors, windows, extra, cells.
+    Rooms(Chosen),
     /// Things, paths, sound, contacts and moving rooms: a row per figure, with the value that it must reach.
     Living(Chosen),
     /// Special portals, such as mirrors: a row per figure, with the value that it must reach.
@@ -214,6 +218,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
+        What::Rooms(chosen) => return rooms::bench_rooms(chosen, args.json),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
         What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
         What::PortalTextures(options) => return bench_portal_textures(options, args.json),

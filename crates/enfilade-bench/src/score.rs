@@ -68,11 +68,16 @@ pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
 /// One row of the table; `None` if a scene has nothing of the kind.
 pub(crate) struct Score {
     pub(crate) name: String,
-    n_rooms: usize,
+    pub(crate) n_rooms: usize,
+    /// Usable doors and windows of the truth.
+    pub(crate) n_doors: usize,
+    pub(crate) n_windows: usize,
+    /// Cells of the world, outdoors included.
+    pub(crate) n_cells: usize,
     /// In the order of [`COLUMNS`].
     pub(crate) figures: [Option<f64>; 6],
     seconds: f64,
-    failed: Vec<String>,
+    pub(crate) failed: Vec<String>,
 }
 
 /// Scores `dirs`, or all real scenes if that is empty; prints the table and the misses in each scene, and writes the
@@ -197,7 +202,8 @@ fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
     group
 }
 
-fn score_scene(dir: &Path, baked: Option<&Path>) -> anyhow::Result<Score> {
+/// Bakes and scores a scene, or scores the world in the folder `baked`.
+pub(crate) fn score_scene(dir: &Path, baked: Option<&Path>) -> anyhow::Result<Score> {
     let name = dir.file_name().unwrap_or_default().to_string_lossy();
     let world = match baked {
         Some(folder) => folder.join(format!("{name}.glb")),
@@ -250,6 +256,9 @@ pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Re
     Ok(Score {
         name,
         n_rooms: n,
+        n_doors: found.n_tried("door"),
+        n_windows: found.n_tried("window"),
+        n_cells: list(&graph["cells"]).len(),
         figures: [
             per_n(n_good),
             found.share("door"),
@@ -411,6 +420,10 @@ struct FoundOpenings {
 }
 
 impl FoundOpenings {
+    fn n_tried(&self, kind: &str) -> usize {
+        self.tried.get(kind).copied().unwrap_or(0)
+    }
+
     fn share(&self, kind: &str) -> Option<f64> {
         let n_hit = self.hits.get(kind).copied().unwrap_or(0);
         self.tried.get(kind).map(|&n| n_hit as f64 / n as f64)

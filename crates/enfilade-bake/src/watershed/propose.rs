@@ -6,7 +6,7 @@ use enfilade_geom::{Allowance, DVec3};
 
 use super::candidates::fit_candidates;
 use super::flooded::Flooded;
-use super::hollow::find_matter;
+use super::hollow::{Matter, find_matter};
 use super::lids::{Lids, find_lids};
 use super::limbs::split_limbs;
 use super::low::join_low;
@@ -85,7 +85,7 @@ pub(crate) fn propose(
         config.merge.min_radius,
         allowance,
     );
-    notes.extend(matter.notes);
+    notes.extend_from_slice(&matter.notes);
 
     context.begin(Stage::Candidates)?;
     let mut candidates = fit_candidates(
@@ -103,16 +103,7 @@ pub(crate) fn propose(
     let ballots = Ballots::cast(&grid, &labels, &regions, not_air, allowance);
     drop(stairs);
     let region_at = |p| region_at(&grid, &labels, &regions, p);
-    let mut voids = inside_stairs(&structure.stairs, &structure.bvh, &region_at, allowance);
-    voids.retain(|(_, region)| matter.regions.binary_search(region).is_err());
-    if matter.fronts_face_air {
-        voids.extend(shallow_voids(
-            &structure.walls,
-            &structure.bvh,
-            &region_at,
-            allowance,
-        ));
-    }
+    let voids = voids_of(structure, &matter, &region_at, allowance);
     drop(labels);
     // From here on, everything is in scene coordinates.
     let frame = &structure.frame;
@@ -136,6 +127,22 @@ pub(crate) fn propose(
             ballots.count(&grid, frame),
         )
     })
+}
+
+/// Returns points of air that no opening connects to its region: inside stairs, and in shallow voids.
+fn voids_of(
+    structure: &Structure<'_>,
+    matter: &Matter,
+    region_at: &(dyn Fn(DVec3) -> u32 + Sync),
+    allowance: &Allowance,
+) -> Vec<(DVec3, u32)> {
+    let mut voids = inside_stairs(&structure.stairs, &structure.bvh, region_at, allowance);
+    voids.retain(|(_, region)| matter.regions.binary_search(region).is_err());
+    if matter.fronts_face_air {
+        let (walls, bvh) = (&structure.walls, &structure.bvh);
+        voids.extend(shallow_voids(walls, bvh, region_at, allowance));
+    }
+    voids
 }
 
 /// Returns counts for the file: of the grid, and of its contents.

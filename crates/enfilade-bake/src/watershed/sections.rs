@@ -22,7 +22,7 @@ const STEEP: f64 = 0.5;
 const CLOSE: f64 = 3.0;
 
 /// Measures of an opening and the space beside it.
-pub(super) struct Section {
+pub(super) struct OpeningSection {
     /// Area of the opening ÷ the smaller of the largest cross-sections of its two cells. Below the threshold of the
     /// settings, the first sections found to be large enough are taken.
     pub(super) ratio: f64,
@@ -39,7 +39,7 @@ pub(super) fn section_of(
     front: &Front,
     pair: [u32; 2],
     cell_of: &(impl Fn(u32) -> u32 + Sync),
-) -> Section {
+) -> OpeningSection {
     let step = lattice_step(flooded.grid);
     // The same lattice: a section that is large enough there is no smaller in the full surround.
     let rest = ((settings.surround / step).floor() - CLOSE).max(0.0);
@@ -60,7 +60,7 @@ fn measured(
     settings: &MergeSettings,
     opening: &Opening,
     [a, b]: [u32; 2],
-) -> Section {
+) -> OpeningSection {
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
 
@@ -96,7 +96,7 @@ fn measured(
         }
         let n = smaller(&sides, a) as f64;
         if n > enough && is_framed(slices.jambs(&sides)) {
-            return Section {
+            return OpeningSection {
                 ratio: n_open / n,
                 wall: 0.0,
                 is_framed: true,
@@ -105,9 +105,9 @@ fn measured(
     }
     let jambs = slices.jambs(&sides);
     let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
-    // A beam across the whole room is no wall.
+    // A beam across the whole room does not make a wall.
     let has_wall = is_level || jambs.left && jambs.right;
-    Section {
+    OpeningSection {
         ratio: match smaller(&sides, a) {
             0 => 1.0,
             n => n_open / n as f64,
