@@ -143,3 +143,81 @@ impl Judged {
         whole.outline = Winding::hull_in_plane(&whole.plane, &corners);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::Plane;
+
+    /// A slit 1 m long across `x`, at the heights given, between cells 1 and 2.
+    fn slit(x: f64, up: [f64; 2]) -> Judged {
+        let plane = Plane::through(DVec3::X * x, DVec3::X);
+        let corners = [(up[0], 0.0), (up[1], 0.0), (up[1], 1.0), (up[0], 1.0)];
+        let corners = corners.map(|(y, z)| DVec3::new(x, y, z));
+        let outline = Winding::hull_in_plane(&plane, &corners);
+        Judged {
+            portal: PartitionPortal {
+                cells: [1, 2],
+                plane,
+                pieces: vec![outline.clone()],
+                area: outline.area(),
+                outline,
+                candidate: None,
+                width: up[1] - up[0],
+                kind: PortalKind::Open,
+                is_leak: false,
+            },
+            kind: PortalKind::Open,
+            is_on_floor: false,
+            is_filled: false,
+        }
+    }
+
+    /// Returns the number of pieces of each portal once slits are joined.
+    fn n_pieces(portals: Vec<Judged>) -> Vec<usize> {
+        let joined = join_slits(portals);
+        joined.iter().map(|j| j.portal.pieces.len()).collect()
+    }
+
+    #[test]
+    fn slits_in_one_plane_are_one_portal() {
+        let joined = join_slits(vec![
+            slit(0.0, [2.0, 2.1]),
+            slit(0.0, [2.5, 2.7]),
+            slit(0.0, [3.0, 3.05]),
+        ]);
+        let [Judged { portal, .. }] = &joined[..] else {
+            panic!("{} portals", joined.len());
+        };
+        let areas: Vec<f64> = portal.pieces.iter().map(Winding::area).collect();
+        assert_eq!(areas.len(), 3);
+        assert!(areas.is_sorted_by(|a, b| a >= b), "{areas:?}");
+        assert!((portal.area - 0.35).abs() < 1e-9 && (portal.width - 0.2).abs() < 1e-9);
+        assert!((portal.outline.area() - 1.05).abs() < 1e-9);
+    }
+
+    #[test]
+    fn slits_of_other_planes_cells_and_fillings_stay() {
+        let first = || slit(0.0, [2.0, 2.1]);
+        let second = || slit(0.0, [2.5, 2.7]);
+        assert_eq!(n_pieces(vec![first(), slit(0.2, [2.5, 2.7])]), [1, 1]);
+        let filled = Judged {
+            is_filled: true,
+            ..second()
+        };
+        assert_eq!(n_pieces(vec![first(), filled]), [1, 1]);
+        let window = Judged {
+            kind: PortalKind::Window,
+            ..second()
+        };
+        assert_eq!(n_pieces(vec![first(), window]), [1, 1]);
+        let mut elsewhere = second();
+        elsewhere.portal.cells = [1, 3];
+        assert_eq!(n_pieces(vec![first(), elsewhere]), [1, 1]);
+        // Wide enough to climb through.
+        assert_eq!(n_pieces(vec![first(), slit(0.0, [2.5, 2.9])]), [1, 1]);
+        // One between two others in another plane is no obstacle.
+        let between = slit(0.2, [2.5, 2.7]);
+        assert_eq!(n_pieces(vec![first(), between, second()]), [2, 1]);
+    }
+}

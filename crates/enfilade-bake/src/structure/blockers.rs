@@ -271,6 +271,30 @@ mod tests {
     }
 
     #[test]
+    fn an_overhead_door_is_its_leaf_without_the_rails() {
+        let leaf = box_triangles(DVec3::new(3.0, 3.0, 0.05));
+        // Open profiles: an upright and a level strip each.
+        let strip = |x: f64, side: DVec3| {
+            let (a, along) = (DVec3::new(x, 2.95, 0.05), DVec3::Z * 3.0);
+            [
+                [a, a + along, a + along + side],
+                [a, a + along + side, a + side],
+            ]
+        };
+        let rails = [0.0, 2.95].map(|x| [DVec3::X, DVec3::Y].map(|d| strip(x, d * 0.05)));
+        let rails = rails.as_flattened().as_flattened();
+        for door in [[rails, &leaf].concat(), [&leaf, rails].concat()] {
+            assert!(!is_flat(&door));
+            assert_eq!(leaf_among(&door).as_ref(), Some(&leaf));
+        }
+        let wardrobe = box_triangles(DVec3::new(1.2, 2.0, 0.6));
+        assert_eq!(leaf_among(&wardrobe), None);
+        // Neither are a board and its posts, lower than a door.
+        let low = box_triangles(DVec3::new(3.0, 1.2, 0.05));
+        assert_eq!(leaf_among(&[rails, &low].concat()), None);
+    }
+
+    #[test]
     fn small_triangles_that_face_anywhere_do_not_hide_which_way_a_leaf_faces() {
         // Moldings with vertices moved by a scanner come first in the file, in more directions than the limit.
         let mut rng = enfilade_testkit::Rng::new(7);

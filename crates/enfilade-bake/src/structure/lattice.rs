@@ -116,3 +116,73 @@ pub(crate) fn connected_count(
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: [usize; 2] = [61, 57];
+
+    /// Range across and range up, from the middle of the lattice. [Units: lattice steps]
+    type Rectangle = [[f64; 2]; 2];
+
+    const ROOM: Rectangle = [[-15.0, 15.0], [-10.0, 12.0]];
+
+    /// Ways that a lattice lies in an upright plane: the height gained along a row and along a column.
+    const LIES: [[f64; 2]; 6] = [
+        [0.0, 1.0],
+        [1.0, 0.0],
+        [0.0, -1.0],
+        [-1.0, 0.0],
+        [0.6, 0.8],
+        [-0.8, 0.6],
+    ];
+
+    /// Returns left jamb, right jamb and lintel of an opening in front of a room.
+    fn jambs(opening: Rectangle, room: Rectangle, up: [f64; 2]) -> [bool; 3] {
+        let is_in = |[across, height]: Rectangle| {
+            move |k: usize| {
+                let i = (k % SIDE[0]) as f64 - 30.0;
+                let j = (k / SIDE[0]) as f64 - 28.0;
+                let (x, y) = (i * up[1] - j * up[0], i * up[0] + j * up[1]);
+                (across[0]..=across[1]).contains(&x) && (height[0]..=height[1]).contains(&y)
+            }
+        };
+        let mask: Vec<bool> = (0..SIDE[0] * SIDE[1]).map(is_in(opening)).collect();
+        let jambs = Jambs::of(&mask, SIDE, up, is_in(room));
+        [jambs.left, jambs.right, jambs.lintel]
+    }
+
+    #[test]
+    fn an_opening_in_a_wall_is_told_from_a_niche_and_a_bend() {
+        let [floor, ceiling] = ROOM[1];
+        for up in LIES {
+            let doorway = [[-5.0, 5.0], [floor, 5.0]];
+            assert_eq!(jambs(doorway, ROOM, up), [true; 3], "doorway, {up:?}");
+            // As high as the room.
+            let gap = [[-5.0, 5.0], [floor, ceiling]];
+            assert_eq!(jambs(gap, ROOM, up), [true, true, false], "gap, {up:?}");
+            let niche = [[-5.0, 15.0], [floor, ceiling]];
+            let mirrored = [[-15.0, 5.0], [floor, ceiling]];
+            assert_eq!(jambs(niche, ROOM, up), [true, false, false], "{up:?}");
+            assert_eq!(jambs(mirrored, ROOM, up), [false, true, false], "{up:?}");
+            assert_eq!(jambs(ROOM, ROOM, up), [false; 3], "bend, {up:?}");
+            let below_beam = [ROOM[0], [floor, 5.0]];
+            let [left, right, lintel] = jambs(below_beam, ROOM, up);
+            assert!(lintel && !left && !right, "beam, {up:?}");
+        }
+    }
+
+    #[test]
+    fn an_opening_has_a_frame_with_a_lintel_or_two_jambs() {
+        for bits in 0..8 {
+            let [left, right, lintel] = [1, 2, 4].map(|bit| bits & bit != 0);
+            let jambs = Jambs {
+                left,
+                right,
+                lintel,
+            };
+            assert_eq!(jambs.frame(), bits >= 3, "{jambs:?}");
+        }
+    }
+}

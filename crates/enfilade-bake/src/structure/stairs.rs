@@ -185,9 +185,13 @@ mod tests {
 
     /// `n` treads, each `going` further along x and 0.18 m higher.
     fn treads(n: usize, going: f64) -> Vec<Triangle> {
+        steep_treads(n, going, 0.18)
+    }
+
+    fn steep_treads(n: usize, going: f64, rise: f64) -> Vec<Triangle> {
         let mut out = Vec::new();
         for i in 0..n {
-            let at = DVec3::new(i as f64 * going, i as f64 * 0.18, 0.0);
+            let at = DVec3::new(i as f64 * going, i as f64 * rise, 0.0);
             quad(&mut out, at, DVec3::Z, DVec3::X * 0.28);
         }
         out
@@ -211,6 +215,15 @@ mod tests {
         assert!(!find_stairs(&sources(16), &shelf).iter().any(|&s| s));
         let two_steps = treads(3, 0.28);
         assert!(!find_stairs(&sources(6), &two_steps).iter().any(|&s| s));
+    }
+
+    #[test]
+    fn a_steep_flight_is_found_up_to_what_somebody_climbs() {
+        for (rise, is_climbed) in [(0.345, true), (0.395, true), (0.45, false)] {
+            let flight = steep_treads(8, 0.25, rise);
+            let found = find_stairs(&sources(16), &flight);
+            assert!(found.iter().all(|&s| s == is_climbed), "{rise}");
+        }
     }
 
     #[test]

@@ -446,11 +446,13 @@ mod tests {
             assert_eq!(found.len(), 1, "{half}");
             let [lo, hi] = found[0];
             assert!(lo.abs_diff(70) <= 4 && hi.abs_diff(269) <= 4, "{lo} {hi}");
-            // Dead ends: three widths long, and one.
+            // Dead ends: three widths long, one, and two.
             let dead = [70, 100 - half, 70 + 6 * half, 100 + half];
             assert_eq!(spans(&plan(&[rooms[0], dead])).len(), 1);
             let alcove = [70, 100 - half, 70 + 2 * half, 100 + half];
             assert!(spans(&plan(&[rooms[0], alcove])).is_empty());
+            let arm = [70, 100 - half, 70 + 4 * half, 100 + half];
+            assert!(spans(&plan(&[rooms[0], arm])).is_empty(), "{half}");
         }
     }
 

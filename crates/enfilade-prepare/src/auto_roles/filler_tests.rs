@@ -103,6 +103,19 @@ fn a_leaf_in_a_corner_fills_an_opening() {
     assert_eq!(b.details(), ["leaf"]);
 }
 
+/// Without a lintel only its thickness tells it from a piece of the wall.
+#[test]
+fn a_leaf_as_high_as_the_room_fills_the_gap_between_two_jambs() {
+    for (name, thickness, expected) in [("leaf", 0.05, &["leaf"][..]), ("piece", 0.12, &[])] {
+        let (front, back) = (3.06 - thickness * 0.5, 3.06 + thickness * 0.5);
+        let mut b = shell();
+        b.block("left", [0.0, 0.0, 3.0], [2.0, 2.6, 3.12])
+            .block("right", [3.0, 0.0, 3.0], [6.0, 2.6, 3.12])
+            .block(name, [2.0, 0.0, front], [3.0, 2.6, back]);
+        assert_eq!(b.details(), expected, "{thickness}");
+    }
+}
+
 #[test]
 fn casings_handles_and_the_windows_of_a_whole_wall_go_together() {
     let mut b = two_rooms();
