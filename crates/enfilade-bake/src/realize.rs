@@ -104,7 +104,8 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         .map(|(point, region)| Vote {
             point,
             label: VOID | region,
-            weight: 1e-3,
+            // Nobody else votes there.
+            weight: 1.0,
         })
         .collect();
     if !unreached.is_empty() {
