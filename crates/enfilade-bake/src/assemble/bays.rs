@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(n_pieces(vec![first(), elsewhere]), [1, 1]);
         // Wide enough to climb through.
         assert_eq!(n_pieces(vec![first(), slit(0.0, [2.5, 2.9])]), [1, 1]);
-        // One between two others in another plane is no obstacle.
+        // One in another plane, between two others, does not keep these apart.
         let between = slit(0.2, [2.5, 2.7]);
         assert_eq!(n_pieces(vec![first(), between, second()]), [2, 1]);
     }
