@@ -83,6 +83,10 @@ pub(crate) fn realize(
     })
 }
 
+/// Weight of a point in a void that no room's votes reached: enough for its own component, with a few points for each cubic
+/// meter, however many others the void of its region has: a flight of closed boxes. [Units: wu³]
+const VOID_WEIGHT: f32 = 0.1;
+
 /// Divides the leaves of the complex among cells.
 fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     let Proposal {
@@ -104,7 +108,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         .map(|(point, region)| Vote {
             point,
             label: VOID | region,
-            weight: 1e-3,
+            weight: VOID_WEIGHT,
         })
         .collect();
     if !unreached.is_empty() {

@@ -152,11 +152,21 @@ fn the_inside_of_a_massive_flight_belongs_to_its_room() {
         ([x, 0.0, 2.0], [x + 0.3, 0.18 * (i + 1) as f64, 5.0])
     };
     let steps: Vec<Block> = (0..15).map(step).collect();
-    let graph = baked(&[([0.0, 0.0, 0.0], [8.0, 3.6, 6.0])], vec![union(&steps)]);
-    assert_eq!(n_indoors(&graph), 1);
-    let room = at(&graph, [7.0, 1.2, 5.0]);
-    for (min, max) in &steps[2..] {
-        let x = 0.5 * (min[0] + max[0]);
-        assert_eq!(at(&graph, [x, 0.4, 2.7]), room, "inside {max:?}");
+    // One solid, and as many closed boxes as steps; boxes smaller than any cell stay solid.
+    let mut apart = MeshBuilder::new(0);
+    for b in boxes(&steps[..7]) {
+        apart.cuboid(b);
+    }
+    for (flight, inside) in [
+        (union(&steps), &steps[2..]),
+        (apart.build("", &[]), &steps[3..7]),
+    ] {
+        let graph = baked(&[([0.0, 0.0, 0.0], [8.0, 3.6, 6.0])], vec![flight]);
+        assert_eq!(n_indoors(&graph), 1);
+        let room = at(&graph, [7.0, 1.2, 5.0]);
+        for (min, max) in inside {
+            let x = 0.5 * (min[0] + max[0]);
+            assert_eq!(at(&graph, [x, 0.4, 2.7]), room, "inside {max:?}");
+        }
     }
 }
