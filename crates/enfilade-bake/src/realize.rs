@@ -83,6 +83,10 @@ pub(crate) fn realize(
     })
 }
 
+/// Weight of a point in a void that no room's votes reached: enough for its own component, however small a part it is of all
+/// voids of its region: a flight of closed boxes. [Units: wu³]
+const VOID_WEIGHT: f32 = 1.0;
+
 /// Divides the leaves of the complex among cells.
 fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
     let Proposal {
@@ -104,8 +108,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         .map(|(point, region)| Vote {
             point,
             label: VOID | region,
-            // Nobody else votes there.
-            weight: 1.0,
+            weight: VOID_WEIGHT,
         })
         .collect();
     if !unreached.is_empty() {

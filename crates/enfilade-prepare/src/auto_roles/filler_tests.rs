@@ -106,13 +106,19 @@ fn a_leaf_in_a_corner_fills_an_opening() {
 /// Without a lintel only its thickness tells it from a piece of the wall.
 #[test]
 fn a_leaf_as_high_as_the_room_fills_the_gap_between_two_jambs() {
-    for (name, thickness, expected) in [("leaf", 0.05, &["leaf"][..]), ("piece", 0.12, &[])] {
-        let (front, back) = (3.06 - thickness * 0.5, 3.06 + thickness * 0.5);
+    let fills = |thickness: f64, wall: f64| {
+        let middle = 3.0 + 0.5 * wall;
+        let (front, back) = (middle - 0.5 * thickness, middle + 0.5 * thickness);
         let mut b = shell();
-        b.block("left", [0.0, 0.0, 3.0], [2.0, 2.6, 3.12])
-            .block("right", [3.0, 0.0, 3.0], [6.0, 2.6, 3.12])
-            .block(name, [2.0, 0.0, front], [3.0, 2.6, back]);
-        assert_eq!(b.details(), expected, "{thickness}");
+        b.block("left", [0.0, 0.0, 3.0], [2.0, 2.6, 3.0 + wall])
+            .block("right", [3.0, 0.0, 3.0], [6.0, 2.6, 3.0 + wall])
+            .block("leaf", [2.0, 0.0, front], [3.0, 2.6, back]);
+        b.details() == ["leaf"]
+    };
+    assert!(fills(0.05, 0.12));
+    // A piece of the wall, one hardly thinner, and a partition between columns.
+    for [thickness, wall] in [[0.12, 0.12], [0.065, 0.12], [0.1, 0.24]] {
+        assert!(!fills(thickness, wall), "{thickness} in {wall}");
     }
 }
 
