@@ -161,28 +161,16 @@ impl BakeConfig {
 
     /// Returns the settings of the watershed as text, by name, for the provenance of the file.
     pub(crate) fn watershed_settings(&self) -> BTreeMap<String, String> {
-        let m = &self.merge;
-        [
-            (
-                "voxel",
-                self.voxel
-                    .map_or_else(|| "auto".to_owned(), |v| v.to_string()),
-            ),
+        let voxel = self.voxel.map(|v| v.to_string());
+        let own = [
+            ("voxel", voxel.unwrap_or_else(|| "auto".to_owned())),
             ("min_opening", self.min_opening.to_string()),
             ("max_voxels", self.max_voxels.to_string()),
             ("noise", self.noise.to_string()),
-            ("merge.threshold", m.threshold.to_string()),
-            ("merge.wall_threshold", m.wall_threshold.to_string()),
-            ("merge.wall_rim", m.wall_rim.to_string()),
-            ("merge.radius_gain", m.radius_gain.to_string()),
-            ("merge.reach", m.reach.to_string()),
-            ("merge.surround", m.surround.to_string()),
-            ("merge.outdoor_gain", m.outdoor_gain.to_string()),
-            ("merge.closed_share", m.closed_share.to_string()),
-            ("merge.min_radius", m.min_radius.to_string()),
-        ]
-        .map(|(k, v)| (k.to_owned(), v))
-        .into()
+        ];
+        let mut out = self.merge.to_settings();
+        out.extend(own.map(|(k, v)| (k.to_owned(), v)));
+        out
     }
 
     /// Checks the width of the narrowest opening.

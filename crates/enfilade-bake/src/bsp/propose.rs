@@ -177,6 +177,7 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
         ("bsp.boxes", guide.boxes.len().to_string()),
     ];
     let mut out = config.costs.to_settings();
+    out.extend(config.merge.to_settings());
     out.extend(own.map(|(k, v)| (k.to_owned(), v)));
     out
 }

@@ -1,5 +1,7 @@
 //! Settings that decide where rooms end.
 
+use std::collections::BTreeMap;
+
 /// Settings of merging. Lengths are in world units, all else is dimensionless.
 #[derive(Clone, Debug)]
 pub struct MergeSettings {
@@ -43,5 +45,56 @@ impl Default for MergeSettings {
             min_radius: 0.3,
             bay_share: 0.7,
         }
+    }
+}
+
+impl MergeSettings {
+    /// Returns all settings as text, by name, for the provenance of the file.
+    pub(crate) fn to_settings(&self) -> BTreeMap<String, String> {
+        // Complete by construction: a setting that is not named here does not compile.
+        let Self {
+            threshold,
+            wall_threshold,
+            wall_rim,
+            radius_gain,
+            reach,
+            surround,
+            outdoor_gain,
+            closed_share,
+            min_radius,
+            bay_share,
+        } = self;
+        [
+            ("threshold", threshold),
+            ("wall_threshold", wall_threshold),
+            ("wall_rim", wall_rim),
+            ("radius_gain", radius_gain),
+            ("reach", reach),
+            ("surround", surround),
+            ("outdoor_gain", outdoor_gain),
+            ("closed_share", closed_share),
+            ("min_radius", min_radius),
+            ("bay_share", bay_share),
+        ]
+        .map(|(k, v)| (format!("merge.{k}"), v.to_string()))
+        .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::BakeConfig;
+
+    #[test]
+    fn every_setting_of_merging_changes_what_a_world_records() {
+        let as_is = MergeSettings::default().to_settings();
+        let with_bays = MergeSettings {
+            bay_share: 0.6,
+            ..MergeSettings::default()
+        };
+        assert_ne!(as_is, with_bays.to_settings());
+        let recorded = BakeConfig::default().watershed_settings();
+        assert!(as_is.keys().all(|k| recorded.contains_key(k)));
     }
 }

@@ -82,7 +82,9 @@ pub(crate) fn propose_of(
     ];
     let DelaunayConfig { weight, stop, .. } = &config.delaunay;
     let stop = stop.unwrap_or_else(|| default_stop(*weight));
-    let mut settings = config.watershed_settings();
+    let mut settings = config.merge.to_settings();
+    settings.retain(|k, _| ["merge.min_radius", "merge.closed_share"].contains(&k.as_str()));
+    settings.insert("min_opening".to_owned(), config.min_opening.to_string());
     settings.insert("weight".to_owned(), format!("{weight:?}"));
     settings.insert("stop".to_owned(), stop.to_string());
     Ok(Proposal {
