@@ -1,5 +1,7 @@
 //! Counts on a lattice of points in a plane: connected points, and their surroundings.
 
+use std::collections::BTreeMap;
+
 /// Returns the share of the rim of `mask` (points within two steps of it) where `is_wall` holds.
 pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
     let (mut rim, mut wall) = (0_usize, 0_usize);
@@ -55,19 +57,27 @@ impl Jambs {
             let [i, j] = [(k % side[0]) as f64, (k / side[0]) as f64];
             [i * up[1] - j * up[0], i * up[0] + j * up[1]]
         };
-        let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for p in (0..mask.len()).filter(|&k| mask[k]).map(at) {
-            low = [low[0].min(p[0]), low[1].min(p[1])];
-            high = [high[0].max(p[0]), high[1].max(p[1])];
+        // The opening may lean: its ends at each height, and its top at each place across.
+        let band = |t: f64| t.round() as i64;
+        let mut ends: BTreeMap<i64, [f64; 2]> = BTreeMap::new();
+        let mut tops: BTreeMap<i64, f64> = BTreeMap::new();
+        for [across, height] in (0..mask.len()).filter(|&k| mask[k]).map(at) {
+            let of = ends.entry(band(height)).or_insert([across; 2]);
+            *of = [of[0].min(across), of[1].max(across)];
+            let top = tops.entry(band(across)).or_insert(height);
+            *top = top.max(height);
         }
         // Left, right, above.
         let (mut rim, mut beside) = ([0_usize; 3], [0_usize; 3]);
         for_rim(mask, side, |k| {
-            let p = at(k);
-            for (n, is_there) in [p[0] < low[0], p[0] > high[0], p[1] > high[1]]
-                .into_iter()
-                .enumerate()
-            {
+            let [across, height] = at(k);
+            let of = ends.get(&band(height));
+            let is_there = [
+                of.is_some_and(|e| across < e[0]),
+                of.is_some_and(|e| across > e[1]),
+                tops.get(&band(across)).is_some_and(|top| height > *top),
+            ];
+            for (n, is_there) in is_there.into_iter().enumerate() {
                 rim[n] += usize::from(is_there);
                 beside[n] += usize::from(is_there && is_beside(k));
             }
