@@ -227,7 +227,10 @@ pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 
     let mut stops = Vec::new();
     let graph = &world.graph;
     let mut been = vec![0_u32; graph.cells.len()];
-    let Some((first, _)) = graph.indoor_cells().next() else {
+    // A closed pocket may come first.
+    let goes_on = |c: &CellId| graph.exits(*c).any(|exit| !graph[exit.to].outdoor);
+    let mut indoors = graph.indoor_cells().map(|(c, _)| c);
+    let Some(first) = indoors.clone().find(goes_on).or_else(|| indoors.next()) else {
         return Vec::new();
     };
     let (mut cell, mut came_by) = (first, None);

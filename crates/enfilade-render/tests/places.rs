@@ -3,7 +3,7 @@
 use enfilade_cpg::{Batch, CellId, World};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, Frame, Gpu, Paint, Picture, Projection, Studio, Style,
-    cell_color,
+    cell_color, walk_cameras,
 };
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
@@ -284,4 +284,22 @@ fn glass_mirrors_the_sky_at_a_grazing_angle_and_is_seen_through_from_before() {
     let (below, far) = (green_at([0.01, 0.0, 0.0]), green_at([40.0, 0.0, 0.0]));
     assert!(below < 110, "black shows through: {below}");
     assert!(far > 180, "the sky is mirrored: {far}");
+}
+
+#[test]
+fn a_walk_begins_where_it_can_go_on() {
+    let mut world = room_grid(&GridParams::offices(30, 1));
+    let sight = enfilade_runtime::Sight::build(&world).unwrap();
+    let whole = walk_cameras(&world, &sight, 20, 1.0);
+    assert_eq!(whole.len(), 20);
+    let (first, _) = world.graph.indoor_cells().next().unwrap();
+    assert_eq!(sight.locate(whole[0].eye), Some(first));
+    // Its first cell becomes a closed pocket.
+    let portals = world.graph.portals.clone();
+    for cell in &mut world.graph.cells {
+        cell.portals
+            .retain(|p| !portals[p.idx()].cells.contains(&first));
+    }
+    let rest = walk_cameras(&world, &sight, 20, 1.0);
+    assert_eq!(rest.len(), 20);
 }
