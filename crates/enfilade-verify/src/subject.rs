@@ -330,9 +330,29 @@ impl<'a> Subject<'a> {
     }
 
     /// Returns `true` if the segment passes an edge of a blocking triangle, or the rim of a portal's piece, closer than
-    /// `2 eps`.
+    /// `2 eps`, or runs along a portal.
     pub(crate) fn is_grazing(&self, a: DVec3, b: DVec3) -> bool {
-        self.edge_clearance(a, b, 2.0 * self.eps) < 2.0 * self.eps
+        self.edge_clearance(a, b, 2.0 * self.eps) < 2.0 * self.eps || self.runs_along_portal(a, b)
+    }
+
+    /// Returns `true` if the segment lies in the plane of a portal that it touches, within `2 eps`: rounding decides on
+    /// which side of the portal each of its points is.
+    fn runs_along_portal(&self, a: DVec3, b: DVec3) -> bool {
+        let reach = 2.0 * self.eps;
+        let along = self
+            .portal_bvh
+            .for_each_around_segment(a, b, reach, |_, t| {
+                let is_in = |plane: Plane| {
+                    let far = [a, b].map(|p| plane.signed_distance(p).abs());
+                    far[0].max(far[1]) <= reach
+                };
+                if Plane::of_triangle(t).is_some_and(is_in) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+        along.is_break()
     }
 
     /// Returns the distance from the segment to the nearest edge of a blocking triangle or rim of a portal's piece:
