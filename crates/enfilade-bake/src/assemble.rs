@@ -4,6 +4,7 @@
 //! each is stored, and drawn, once. Detail objects keep their identity and list the cells they touch.
 
 mod bays;
+mod fillers;
 mod fittings;
 mod seals;
 
@@ -19,7 +20,7 @@ use rayon::prelude::*;
 
 use crate::complex::{Partition, PartitionPortal};
 use crate::layout::{Layout, layout_of};
-use crate::structure::{Candidate, SceneStructure};
+use crate::structure::{Candidate, SceneStructure, plates};
 
 /// A scene divided into cells: input of the last stage, which all builders share.
 pub(crate) struct Cut<'a> {
@@ -65,15 +66,22 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
             }
         })
         .collect();
+    let plates = plates(scene).into_iter();
+    let plates: Vec<_> = plates.map(fillers::FlatObject::new).collect();
     let in_turn = partition.portals.par_iter();
-    let judged = in_turn.filter(cut.allowance.each(WORK_A_PORTAL)).map(|p| {
-        let (kind, is_on_floor) = kind_of(cut, p);
-        Judged {
-            portal: p.clone(),
-            kind,
-            is_on_floor,
-            is_filled: is_filled(cut, p),
-        }
+    let in_turn = in_turn.filter(cut.allowance.each(WORK_A_PORTAL));
+    let judged = in_turn.flat_map_iter(|p| {
+        let parts = fillers::divided(p, &plates, cut.allowance);
+        let is_filled = is_filled(cut, p) || parts.len() > 1;
+        parts.into_iter().map(move |portal| {
+            let (kind, is_on_floor) = kind_of(cut, &portal, is_filled);
+            Judged {
+                portal,
+                kind,
+                is_on_floor,
+                is_filled,
+            }
+        })
     });
     let bays = bays::join_bays(judged.collect());
     let portals: Vec<Portal> = bays::join_slits(bays)
@@ -273,17 +281,16 @@ fn is_filled(cut: &Cut<'_>, p: &PartitionPortal) -> bool {
 }
 
 /// Returns the kind of a portal, and `true` if its lower edge is at a floor.
-fn kind_of(cut: &Cut<'_>, p: &PartitionPortal) -> (PortalKind, bool) {
+fn kind_of(cut: &Cut<'_>, p: &PartitionPortal, is_filled: bool) -> (PortalKind, bool) {
     if p.kind == PortalKind::Crack {
         return (PortalKind::Crack, false);
     }
-    let is_closed = is_filled(cut, p);
     let is_upright = p.plane.normal.y.abs() < 0.5;
     let up = p.outline.points.iter().map(|q| q.y);
     let bottom = up.clone().fold(f64::MAX, f64::min);
     let height = up.fold(f64::MIN, f64::max) - bottom;
     let has_sill = is_upright && sill(cut, p, bottom) > PARAPET;
-    let kind = match (is_closed, is_upright) {
+    let kind = match (is_filled, is_upright) {
         (_, true) if has_sill => PortalKind::Window,
         (true, true) if height >= LEAST_DOOR => PortalKind::Door,
         (true, _) => PortalKind::Window,

@@ -19,7 +19,10 @@ use enfilade_geom::scene::Mesh;
 use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Triangle};
 use rayon::prelude::*;
 
-use opening::Rectangle;
+pub(super) use opening::Rectangle;
+pub(super) use parts::{DEEP, FULL};
+pub(super) use shells::shells;
+
 use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
 use swing::Around;
 
@@ -154,7 +157,7 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
 impl Object {
     fn of(world: &World, detail: u32) -> Self {
         let triangles = triangles_of(world, &world.details[detail as usize]);
-        let (shells, n_shells) = shells::shells(&triangles);
+        let (shells, n_shells) = shells(&triangles);
         let mut bounds = vec![Aabb::EMPTY; n_shells];
         for (t, &shell) in triangles.iter().zip(&shells) {
             let own = &mut bounds[shell as usize];

@@ -10,21 +10,21 @@ const LEVEL: f64 = 0.5;
 
 /// The rectangle around an upright opening or a plate, and coordinates along it.
 #[derive(Clone, Debug)]
-pub(super) struct Rectangle {
+pub(crate) struct Rectangle {
     /// Horizontal direction along it.
-    pub(super) across: DVec3,
+    pub(crate) across: DVec3,
     /// Upward direction along it.
-    pub(super) up: DVec3,
+    pub(crate) up: DVec3,
     /// Direction out of it.
-    pub(super) normal: DVec3,
+    pub(crate) normal: DVec3,
     /// Least and greatest coordinate along `across`, `up` and `normal`. [Units: wu]
-    pub(super) low: DVec3,
-    pub(super) high: DVec3,
+    pub(crate) low: DVec3,
+    pub(crate) high: DVec3,
 }
 
 impl Rectangle {
     /// Returns the rectangle around a portal's pieces; `None` if the portal is not upright.
-    pub(super) fn of_portal(portal: &Portal) -> Option<Self> {
+    pub(crate) fn of_portal(portal: &Portal) -> Option<Self> {
         let normal = DVec3::from(portal.normal.map(f64::from));
         if normal.y.abs() >= LEVEL {
             return None;
@@ -35,7 +35,7 @@ impl Rectangle {
     }
 
     /// Returns the rectangle around points, with `normal` pointing out of it.
-    pub(super) fn around(normal: DVec3, points: &[DVec3]) -> Self {
+    pub(crate) fn around(normal: DVec3, points: &[DVec3]) -> Self {
         let across = DVec3::Y.cross(normal).normalize_or(DVec3::X);
         let up = normal.cross(across);
         let mut out = Self {
@@ -53,28 +53,28 @@ impl Rectangle {
     }
 
     /// Returns the coordinates of a point along its three directions. [Units: wu]
-    pub(super) fn place(&self, p: DVec3) -> DVec3 {
+    pub(crate) fn place(&self, p: DVec3) -> DVec3 {
         DVec3::new(self.across.dot(p), self.up.dot(p), self.normal.dot(p))
     }
 
     /// Returns the point with these coordinates.
-    pub(super) fn point(&self, place: DVec3) -> DVec3 {
+    pub(crate) fn point(&self, place: DVec3) -> DVec3 {
         self.across * place.x + self.up * place.y + self.normal * place.z
     }
 
     /// Returns width, height and depth. [Units: wu]
-    pub(super) fn size(&self) -> DVec3 {
+    pub(crate) fn size(&self) -> DVec3 {
         self.high - self.low
     }
 
     /// Returns the bounding box of triangles along its directions.
-    pub(super) fn bounds(&self, triangles: &[Triangle]) -> Aabb {
+    pub(crate) fn bounds(&self, triangles: &[Triangle]) -> Aabb {
         let corners = triangles.iter().flatten();
         corners.fold(Aabb::EMPTY, |b, p| b.including(self.place(*p)))
     }
 
     /// Returns the samples that the triangles cover, seen along its normal.
-    pub(super) fn mask(&self, triangles: impl Iterator<Item = Triangle>) -> Mask {
+    pub(crate) fn mask(&self, triangles: impl Iterator<Item = Triangle>) -> Mask {
         let mut mask = Mask::default();
         let size = self.size().truncate();
         let step = size / SAMPLES as f64;
@@ -89,7 +89,7 @@ impl Rectangle {
     }
 
     /// Returns the samples that a portal's pieces cover.
-    pub(super) fn open(&self, portal: &Portal) -> Mask {
+    pub(crate) fn open(&self, portal: &Portal) -> Mask {
         let corner = |p: [f32; 3]| DVec3::from(p.map(f64::from));
         let fans = portal.pieces.iter().flat_map(|piece| {
             (2..piece.len()).map(move |i| [piece[0], piece[i - 1], piece[i]].map(corner))
@@ -100,7 +100,7 @@ impl Rectangle {
 
 /// One bit per sample; rows from the bottom up.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Mask([u32; SAMPLES]);
+pub(crate) struct Mask([u32; SAMPLES]);
 
 impl Mask {
     /// Adds a triangle, in units of samples.
@@ -150,7 +150,7 @@ impl Mask {
     }
 
     /// Returns these samples as a share of the whole rectangle.
-    pub(super) fn share(&self) -> f64 {
+    pub(crate) fn share(&self) -> f64 {
         f64::from(self.n()) / (SAMPLES * SAMPLES) as f64
     }
 

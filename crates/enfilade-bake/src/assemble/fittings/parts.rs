@@ -20,7 +20,7 @@ const WIDTH: [f64; 2] = [0.2, 1.1];
 /// Width of an open leaf over that of its opening, for a single leaf and for one of two.
 const OPEN_WIDTHS: [[f64; 2]; 2] = [[0.8, 1.1], [0.4, 0.55]];
 /// Least share of its own rectangle that a body covers; a ring covers less.
-const FULL: f64 = 0.6;
+pub(crate) const FULL: f64 = 0.6;
 /// A shut leaf is tilted from the opening's plane by less: the sine of 3 degrees.
 const SHUT: f64 = 0.05;
 /// Largest angle of an open leaf: beyond it, the object would lie along the wall, as a cupboard does. [Units: degrees]
@@ -32,7 +32,7 @@ const OFF: f64 = 0.15;
 /// Greatest distance by which an object on a leaf reaches over its edges. [Units: wu]
 const HAIR: f64 = 0.01;
 /// Greatest distance of a leaf or frame from the portal's plane, within a wall. [Units: wu]
-pub(super) const DEEP: f64 = 0.4;
+pub(crate) const DEEP: f64 = 0.4;
 /// Range of widths of openings that have doors. [Units: wu]
 const DOOR_WIDTH: [f64; 2] = [0.5, 6.0];
 /// Least share of a door that an object covers to be its leaf if none of its shells is a plate.

@@ -22,7 +22,7 @@ const MAX_TRIANGLES: usize = 50_000;
 /// Two triangles belong to one shell if a path across edges joins them. Where solids touch along an edge, more than two
 /// triangles meet; there the path goes around the solid between them, so that a leaf that touches its frame stays
 /// separate. `O(n log n)`, as long as few vertices lie in one place.
-pub(super) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
+pub(crate) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
     if triangles.len() > MAX_TRIANGLES {
         return (vec![0; triangles.len()], 1);
     }
