@@ -71,8 +71,10 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     let in_turn = partition.portals.par_iter();
     let in_turn = in_turn.filter(cut.allowance.each(WORK_A_PORTAL));
     let judged = in_turn.flat_map_iter(|p| {
-        let parts = fillers::divided(p, &plates, cut.allowance);
-        let is_filled = is_filled(cut, p) || parts.len() > 1;
+        let is_whole_filled = is_filled(cut, p);
+        let (_, is_on_floor) = kind_of(cut, p, is_whole_filled);
+        let parts = fillers::divided(p, is_on_floor, &plates, cut.allowance);
+        let is_filled = is_whole_filled || parts.len() > 1;
         parts.into_iter().map(move |portal| {
             let (kind, is_on_floor) = kind_of(cut, &portal, is_filled);
             Judged {
@@ -271,9 +273,6 @@ const WORK_A_TRIANGLE: u64 = 10;
 /// Least height of a parapet that makes an opening a window. [Units: wu]
 const PARAPET: f64 = 0.4;
 
-/// Least height of a door: a lower opening with a pane or leaf is a window. [Units: wu]
-const LEAST_DOOR: f64 = 1.5;
-
 /// Returns `true` if a leaf or pane fills an opening.
 fn is_filled(cut: &Cut<'_>, p: &PartitionPortal) -> bool {
     let closed = |c: u32| cut.candidates[c as usize].closed;
@@ -292,7 +291,7 @@ fn kind_of(cut: &Cut<'_>, p: &PartitionPortal, is_filled: bool) -> (PortalKind, 
     let has_sill = is_upright && sill(cut, p, bottom) > PARAPET;
     let kind = match (is_filled, is_upright) {
         (_, true) if has_sill => PortalKind::Window,
-        (true, true) if height >= LEAST_DOOR => PortalKind::Door,
+        (true, true) if height >= fittings::LEAST_DOOR => PortalKind::Door,
         (true, _) => PortalKind::Window,
         (false, _) => PortalKind::Open,
     };

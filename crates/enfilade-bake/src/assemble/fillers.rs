@@ -1,15 +1,15 @@
 //! Divides openings between the objects that fill them, so that each door and each window has a portal of its own: a
 //! door and the window beside it, windows in one row without a pier between them.
 //!
-//! Cuts run between objects, first from side to side, then from foot to head. Bare panes and leaves side by side are
-//! one filling: the two leaves of a door, a row of panes.
+//! Cuts run between objects, first from side to side, then from foot to head. Bare panes side by side are one filling,
+//! and so are the leaves of a double door, whatever they are made of.
 //!
 //! `O(portals · plates)` comparisons of boxes; each cut is exact, so both parts together are the opening.
 
 use enfilade_cpg::PortalKind;
 use enfilade_geom::{Aabb, Allowance, DVec3, Plane, Triangle, Winding, poly};
 
-use super::fittings::{DEEP, FULL, Rectangle, shells};
+use super::fittings::{DEEP, FULL, LEAST_DOOR, Rectangle, WIDEST_TURN, shells};
 use crate::complex::PartitionPortal;
 use crate::structure::MAX_THICKNESS;
 
@@ -31,8 +31,10 @@ struct Filler {
     /// Ranges across and up. [Units: wu]
     across: [f64; 2],
     up: [f64; 2],
-    /// No frame of its own runs around it.
+    /// It has no frame of its own.
     is_bare: bool,
+    /// It may be a leaf of a double door.
+    is_leaf: bool,
 }
 
 /// A flat object that may fill an opening.
@@ -52,6 +54,7 @@ impl FlatObject {
 /// otherwise each part has its filler.
 pub(super) fn divided(
     portal: &PartitionPortal,
+    is_on_floor: bool,
     plates: &[FlatObject],
     allowance: &Allowance,
 ) -> Vec<PartitionPortal> {
@@ -67,7 +70,8 @@ pub(super) fn divided(
     let opening = Rectangle::around(portal.plane.normal, &corners);
     let reach = Aabb::of_points(&corners).expanded(DEEP);
     let near = plates.iter().filter(|p| p.aabb.overlaps(&reach));
-    let fillers: Vec<Filler> = near.filter_map(|p| filler(&opening, p)).collect();
+    let fillers = near.filter_map(|p| filler(&opening, is_on_floor, p));
+    let fillers: Vec<Filler> = fillers.collect();
     if fillers.len() < 2 {
         return whole();
     }
@@ -82,7 +86,7 @@ pub(super) fn divided(
 }
 
 /// Returns the plate as a filler of the opening; `None` if it does not lie in it.
-fn filler(opening: &Rectangle, plate: &FlatObject) -> Option<Filler> {
+fn filler(opening: &Rectangle, is_on_floor: bool, plate: &FlatObject) -> Option<Filler> {
     let bounds = opening.bounds(&plate.triangles);
     let size = bounds.size();
     let z = (bounds.min.z + bounds.max.z) * 0.5 - opening.low.z;
@@ -93,10 +97,15 @@ fn filler(opening: &Rectangle, plate: &FlatObject) -> Option<Filler> {
     if common.x.min(common.y) <= 0.0 || common.x * common.y < WITHIN * size.x * size.y {
         return None;
     }
+    let is_leaf = is_on_floor
+        && bounds.min.y < opening.low.y + REBATE
+        && size.y >= LEAST_DOOR
+        && size.x <= WIDEST_TURN;
     Some(Filler {
         across: [bounds.min.x, bounds.max.x],
         up: [bounds.min.y, bounds.max.y],
         is_bare: is_bare(opening, &plate.triangles),
+        is_leaf,
     })
 }
 
@@ -145,13 +154,15 @@ fn cut(
     None
 }
 
-/// Returns `true` if bare fillers continue beyond a cut at the same height.
+/// Returns `true` if a row of panes, or of leaves of one width, continues beyond a cut.
 fn is_row(before: &[Filler], after: &[Filler]) -> bool {
-    let is_same = |a: &Filler, b: &Filler| {
-        let off = |k: usize| (a.up[k] - b.up[k]).abs();
-        a.is_bare && b.is_bare && off(0) <= REBATE && off(1) <= REBATE
+    let width = |f: &Filler| f.across[1] - f.across[0];
+    let is_one = |a: &Filler, b: &Filler| {
+        let is_level = (0..2).all(|k| (a.up[k] - b.up[k]).abs() <= REBATE);
+        let are_leaves = a.is_leaf && b.is_leaf && (width(a) - width(b)).abs() <= REBATE;
+        is_level && (a.is_bare && b.is_bare || are_leaves)
     };
-    before.iter().any(|a| after.iter().any(|b| is_same(a, b)))
+    before.iter().any(|a| after.iter().any(|b| is_one(a, b)))
 }
 
 /// Returns the parts of a portal in front of and behind a plane; `None` if one of them is too small.
@@ -230,7 +241,11 @@ mod tests {
 
     /// Returns the areas of the parts, in units of 0.01 m², ascending.
     fn areas(plates: &[FlatObject]) -> Vec<i64> {
-        let parts = divided(&opening(), plates, &Allowance::default());
+        areas_over(plates, false)
+    }
+
+    fn areas_over(plates: &[FlatObject], is_on_floor: bool) -> Vec<i64> {
+        let parts = divided(&opening(), is_on_floor, plates, &Allowance::default());
         let mut areas: Vec<i64> = parts
             .iter()
             .map(|p| (p.area * 100.0).round() as i64)
@@ -271,6 +286,16 @@ mod tests {
             .map(|(x, y)| bare([x, y, x + 1.0, y + 1.2]))
             .collect();
         assert_eq!(areas(&grid), [480, 480]);
+    }
+
+    #[test]
+    fn leaves_of_a_double_door_are_one_filling_and_what_stands_beside_them_is_not() {
+        let left = || window([0.0, 0.0, 1.2, 2.4]);
+        let right = || window([1.2, 0.0, 2.4, 2.4]);
+        let light = || window([2.4, 0.0, 4.0, 2.4]);
+        assert_eq!(areas_over(&[left(), right(), light()], true), [384, 576]);
+        // Above a sill they are windows.
+        assert_eq!(areas(&[left(), right(), light()]), [288, 288, 384]);
     }
 
     #[test]

@@ -20,8 +20,9 @@ use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Triangle};
 use rayon::prelude::*;
 
 pub(super) use opening::Rectangle;
-pub(super) use parts::{DEEP, FULL};
+pub(super) use parts::{DEEP, FULL, LEAST_DOOR};
 pub(super) use shells::shells;
+pub(super) use swing::WIDEST_TURN;
 
 use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
 use swing::Around;

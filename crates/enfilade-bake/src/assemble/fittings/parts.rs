@@ -10,7 +10,6 @@ use enfilade_cpg::{Portal, PortalKind};
 use enfilade_geom::{Aabb, DVec3, Triangle};
 
 use super::opening::{Mask, Rectangle};
-use crate::assemble::LEAST_DOOR;
 use crate::structure::{MAX_THICKNESS, thin_direction};
 
 /// Height of a leaf over that of its opening; less if a light is above the door, more if it overlaps the frame.
@@ -33,6 +32,8 @@ const OFF: f64 = 0.15;
 const HAIR: f64 = 0.01;
 /// Greatest distance of a leaf or frame from the portal's plane, within a wall. [Units: wu]
 pub(crate) const DEEP: f64 = 0.4;
+/// Least height of a door: a lower opening with a pane or leaf is a window. [Units: wu]
+pub(crate) const LEAST_DOOR: f64 = 1.5;
 /// Range of widths of openings that have doors. [Units: wu]
 const DOOR_WIDTH: [f64; 2] = [0.5, 6.0];
 /// Least share of a door that an object covers to be its leaf if none of its shells is a plate.

@@ -15,7 +15,7 @@ use super::parts::{Leaf, Pose};
 
 /// A wider single leaf slides: hinged leaves are made up to 1.25 m wide (DIN 18101), plus some margin for other things
 /// in a model. [Units: wu]
-const WIDEST_TURN: f64 = 1.45;
+pub(crate) const WIDEST_TURN: f64 = 1.45;
 /// Least offset of a handle from the middle, as a share of half the leaf's width.
 const HANDLE: f64 = 0.3;
 /// A leaf is flush with one side of its frame if its middle is off the frame's by more. [Units: wu]
