@@ -90,6 +90,25 @@ fn a_beam_across_a_hall_parts_nothing() {
     assert_eq!(n_indoors(&graph), 1);
 }
 
+/// A hall of 9 m x 12 m, 3.7 m high, with a beam across its middle that leaves 3.2 m, and a wall of `jamb` m on both sides
+/// below it.
+fn hall_with_beam(jamb: f64) -> CellPortalGraph {
+    baked(
+        &[
+            ([0.0, 0.0, 0.0], [9.0, 3.7, 6.0]),
+            ([0.0, 0.0, 6.3], [9.0, 3.7, 12.3]),
+            ([jamb, 0.0, 6.0], [9.0 - jamb, 3.2, 6.3]),
+        ],
+        Vec::new(),
+    )
+}
+
+#[test]
+fn a_beam_on_pilasters_parts_nothing_and_walls_below_it_do() {
+    assert_eq!(n_indoors(&hall_with_beam(0.3)), 1);
+    assert_eq!(n_indoors(&hall_with_beam(1.5)), 2);
+}
+
 /// Returns two rooms with a door between them below one plenum, which three beams in each room divide. Above each beam is
 /// a slit of the given height.
 fn below_a_plenum(slit: f64) -> CellPortalGraph {

@@ -36,6 +36,8 @@ pub(crate) struct Jambs {
     pub(crate) left: bool,
     pub(crate) right: bool,
     pub(crate) lintel: bool,
+    /// The part of the width of the space that lies beside the opening.
+    pub(crate) share: f64,
 }
 
 impl Jambs {
@@ -67,6 +69,14 @@ impl Jambs {
             let top = tops.entry(band(across)).or_insert(height);
             *top = top.max(height);
         }
+        let n_open = mask.iter().filter(|&&is_open| is_open).count();
+        let is_at_side = |k: usize| {
+            let [across, height] = at(k);
+            let of = ends.get(&band(height));
+            of.is_some_and(|e| across < e[0] || across > e[1])
+        };
+        let n_beside = (0..mask.len()).filter(|&k| !mask[k] && is_beside(k) && is_at_side(k));
+        let n_beside = n_beside.count();
         // Left, right, above.
         let (mut rim, mut beside) = ([0_usize; 3], [0_usize; 3]);
         for_rim(mask, side, |k| {
@@ -88,6 +98,7 @@ impl Jambs {
             left,
             right,
             lintel,
+            share: n_beside as f64 / (n_beside + n_open).max(1) as f64,
         }
     }
 }
@@ -184,6 +195,25 @@ mod tests {
     }
 
     #[test]
+    fn the_share_of_jambs_is_that_of_the_width_beside_the_opening() {
+        let [floor, ceiling] = ROOM[1];
+        for height in [5.0, ceiling] {
+            let side = SIDE;
+            let opening = [[-10.0, 12.0], [floor, height]];
+            let is_in = |[across, up]: Rectangle| {
+                move |k: usize| {
+                    let (x, y) = ((k % side[0]) as f64 - 30.0, (k / side[0]) as f64 - 28.0);
+                    (across[0]..=across[1]).contains(&x) && (up[0]..=up[1]).contains(&y)
+                }
+            };
+            let mask: Vec<bool> = (0..side[0] * side[1]).map(is_in(opening)).collect();
+            let jambs = Jambs::of(&mask, side, [0.0, 1.0], is_in(ROOM));
+            // 31 points of the room, 23 of them open.
+            assert!((jambs.share - 8.0 / 31.0).abs() < 1e-9, "{jambs:?}");
+        }
+    }
+
+    #[test]
     fn an_opening_has_a_frame_with_a_lintel_or_two_jambs() {
         for bits in 0..8 {
             let [left, right, lintel] = [1, 2, 4].map(|bit| bits & bit != 0);
@@ -191,6 +221,7 @@ mod tests {
                 left,
                 right,
                 lintel,
+                share: 0.0,
             };
             assert_eq!(jambs.frame(), bits >= 3, "{jambs:?}");
         }

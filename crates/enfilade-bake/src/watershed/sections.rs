@@ -14,6 +14,9 @@ const LEAVES: f64 = 0.2;
 /// An opening lies away from the flood's front if it is narrower there by this factor.
 const PINCHED: f64 = 0.9;
 
+/// Jambs that take a smaller part of the width of the space are pilasters.
+const PILASTERS: f64 = 0.125;
+
 /// Vertical part of the normal above which an opening lies in a floor or roof rather than in a wall.
 const STEEP: f64 = 0.5;
 
@@ -105,8 +108,8 @@ fn measured(
     }
     let jambs = slices.jambs(&sides);
     let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
-    // A beam across the whole room does not make a wall.
-    let has_wall = is_level || jambs.left && jambs.right;
+    // A beam across the whole room does not make a wall, and neither do pilasters.
+    let has_wall = is_level || jambs.left && jambs.right && jambs.share >= PILASTERS;
     OpeningSection {
         ratio: match smaller(&sides, a) {
             0 => 1.0,
