@@ -31,10 +31,10 @@ pub struct BakeConfig {
     pub merge: MergeSettings,
     /// Bounds on the cost of cells, and the model of costs; no bounds by default.
     pub costs: SimplifySettings,
-    /// Watershed: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. An edge
+    /// Watershed, and BSP in buildings: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. An edge
     /// that does not fit the budget is refused. [Units: wu] [Limit: above 0]
     pub voxel: Option<f64>,
-    /// Watershed: most voxels. A larger scene gets larger voxels, up to the width of the narrowest opening; beyond
+    /// Watershed, and BSP in buildings: most voxels. A larger scene gets larger voxels, up to the width of the narrowest opening; beyond
     /// that, the bake fails. About 3 bytes each. [Limit: at least 1,000]
     pub max_voxels: usize,
     /// Limits on the resources of a bake.
@@ -159,14 +159,13 @@ impl BakeConfig {
         }
     }
 
-    /// Returns the settings of the watershed as text, by name, for the provenance of the file.
-    pub(crate) fn watershed_settings(&self) -> BTreeMap<String, String> {
+    /// Returns the settings of rooms found in voxels as text, by name, for the provenance of the file.
+    pub(crate) fn voxel_settings(&self) -> BTreeMap<String, String> {
         let voxel = self.voxel.map(|v| v.to_string());
         let own = [
             ("voxel", voxel.unwrap_or_else(|| "auto".to_owned())),
             ("min_opening", self.min_opening.to_string()),
             ("max_voxels", self.max_voxels.to_string()),
-            ("noise", self.noise.to_string()),
         ];
         let mut out = self.merge.to_settings();
         out.extend(own.map(|(k, v)| (k.to_owned(), v)));

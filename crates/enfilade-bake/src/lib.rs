@@ -6,7 +6,8 @@
 //! | module | purpose |
 //! | --- | --- |
 //! | `structure` | the input: walls, stairs, door leaves and panes, slabs; which openings are a pinch |
-//! | [`watershed`], [`bsp`], [`delaunay`] | where rooms end: three methods, independent of each other |
+//! | [`watershed`], [`bsp`], [`delaunay`] | a division of the air: three methods, independent of each other |
+//! | `rooms` | where rooms end: which parts are one room, and the openings between rooms, by one rule for all methods |
 //! | [`complex`] | which space is open: convex leaves and the facets between them, exactly |
 //! | `realize`, `assemble` | the world: which leaves form a cell, which geometry each cell sees |
 //! | [`simplify`], [`bound`], [`edit`] | changes to a finished world |
@@ -31,6 +32,7 @@ mod method;
 mod output;
 mod proposal;
 mod realize;
+mod rooms;
 pub mod simplify;
 mod specials;
 mod stage;

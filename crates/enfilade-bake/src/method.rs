@@ -26,7 +26,8 @@ impl Method {
         }
     }
 
-    /// Returns the stages of a bake with this method, in order.
+    /// Returns the stages of a bake with this method, in order. A level of brushes has no stages in voxels by
+    /// [`Method::Bsp`].
     #[must_use]
     pub fn stages(self) -> &'static [Stage] {
         use Stage::{
@@ -38,7 +39,10 @@ impl Method {
                 Structure, Voxelize, Distance, Flood, Rooms, Candidates, Complex, Partition,
                 Geometry,
             ],
-            Self::Bsp => &[Structure, Tree, Separators, Complex, Partition, Geometry],
+            Self::Bsp => &[
+                Structure, Tree, Separators, Voxelize, Distance, Rooms, Candidates, Complex,
+                Partition, Geometry,
+            ],
             Self::Delaunay => &[
                 Structure, Tetrahedra, Decimation, Candidates, Complex, Partition, Geometry,
             ],

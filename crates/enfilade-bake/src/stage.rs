@@ -6,13 +6,13 @@
 pub enum Stage {
     /// Structural triangles, separated from stairs, with a bounding volume hierarchy.
     Structure,
-    /// Watershed: triangles to voxels.
+    /// Triangles to voxels.
     Voxelize,
-    /// Watershed: distance of each air voxel to the nearest surface.
+    /// Distance of each air voxel to the nearest surface.
     Distance,
     /// Watershed: the flood, which yields basins.
     Flood,
-    /// Watershed: basins merged into rooms.
+    /// Parts of the air merged into rooms.
     Rooms,
     /// BSP: leaves and the portals between them.
     Tree,

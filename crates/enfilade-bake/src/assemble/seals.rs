@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use enfilade_cpg::{Batch, CellId};
 use enfilade_geom::scene::Primitive;
-use enfilade_geom::{DVec3, Plane, Winding};
+use enfilade_geom::{DVec3, Winding};
 
 use super::Cut;
 use crate::complex::Seal;
+use crate::structure::grown;
 
 /// Returns the seals, one batch for each set of cells that see them and material of the nearest surface.
 ///
@@ -45,25 +46,6 @@ fn material_near(cut: &Cut<'_>, seal: &Seal) -> Option<u32> {
     let source = cut.structure.sources[nearest.triangle as usize];
     let mesh = cut.structure.scene.objects[source.object as usize].mesh;
     cut.structure.scene.meshes[mesh as usize].primitives[source.primitive as usize].material
-}
-
-/// Largest growth of a seal at a sharp vertex, as a multiple of its growth elsewhere.
-const MITER: f64 = 4.0;
-
-/// Returns `outline` with its rim moved outward by about `by`.
-fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
-    let points = &outline.points;
-    let n = points.len();
-    let outward = |i: usize| {
-        let edge = points[(i + 1) % n] - points[i % n];
-        edge.cross(plane.normal).normalize_or_zero()
-    };
-    let moved = (0..n).map(|i| {
-        let both = outward(i + n - 1) + outward(i);
-        let length = both.length().max(2.0 / MITER);
-        points[i] + both * (2.0 * by / (length * length))
-    });
-    Winding::new(moved.collect())
 }
 
 fn add_fan(to: &mut Primitive, outline: &Winding) {

@@ -18,7 +18,7 @@ use crate::complex::poly::{self, Poly, Sides};
 use super::leaves::Bsp;
 use super::portals::{LeafPortal, leaf_portals};
 use super::tree::{Node, Tree, leaf_index};
-use super::{rooms, separator};
+use super::{lattice, separator};
 
 /// Sections tried for each portal and surface of the tree; buildings need 1 to 5.
 const TRIALS: usize = 8;
@@ -68,7 +68,7 @@ pub(super) fn refine(bsp: &mut Bsp<'_>, settings: &MergeSettings) {
     let cuts: Vec<(u32, Poly)> = separator::find_in_walls(bsp)
         .into_par_iter()
         .filter(|s| s.portals.iter().any(|&p| p as usize >= n_portals))
-        .filter(|s| rooms::may_be_pinch(bsp, s, settings))
+        .filter(|s| lattice::may_be_pinch(bsp, s, settings))
         .flat_map_iter(|s| {
             let is_trial = move |p: &u32| *p as usize >= n_portals;
             s.portals.into_iter().filter(is_trial)

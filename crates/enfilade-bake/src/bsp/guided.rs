@@ -8,11 +8,13 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, BoxTree, Purse, Sets};
+use enfilade_geom::{Aabb, BoxTree, Purse};
 
 use crate::config::{Guide, Heuristic};
+use crate::proposal::Proposal;
+use crate::structure::OUTDOORS;
 
-use super::cells::{self, LeafCells, NO_CELL};
+use super::cells;
 use super::input::BspInput;
 use super::leaves::Bsp;
 use super::separator::{self, Separator};
@@ -38,11 +40,11 @@ pub(super) fn build<'a>(
     bsp
 }
 
-/// Divides rooms further by separators with a round rim in planes of guides.
-pub(super) fn part(bsp: &Bsp<'_>, rooms: LeafCells) -> LeafCells {
+/// Returns the separators with a round rim in planes of guides.
+pub(super) fn separators(bsp: &Bsp<'_>) -> Vec<Separator> {
     let found = separator::find_in_guides(bsp);
     if found.is_empty() {
-        return rooms;
+        return found;
     }
     let boxes: Vec<Aabb> = bsp
         .surfaces
@@ -56,36 +58,17 @@ pub(super) fn part(bsp: &Bsp<'_>, rooms: LeafCells) -> LeafCells {
         let longest: f64 = sides.iter().take(2).sum();
         longest < FLAT * sides.iter().sum::<f64>()
     };
-    let guides = uncrossed(bsp, found.into_iter().filter(is_round).collect());
-    let mut is_cut = vec![false; bsp.portals.len()];
-    for &p in guides.iter().flat_map(|s| &s.portals) {
-        is_cut[p as usize] = true;
-    }
-    let mut sets = Sets::new(bsp.is_open.len());
-    for (p, _) in bsp.portals.iter().zip(&is_cut).filter(|(_, cut)| !**cut) {
-        let [a, b] = p.leaves;
-        if rooms.of_leaf[a as usize] == rooms.of_leaf[b as usize] {
-            sets.join(a, b);
-        }
-    }
+    uncrossed(bsp, found.into_iter().filter(is_round).collect())
+}
+
+/// Divides the rooms of a proposal by such separators.
+pub(super) fn divide(bsp: &Bsp<'_>, guides: &[Separator], proposal: &mut Proposal) {
+    let (of_leaf, _) = cells::components(bsp, guides);
     let mut number = BTreeMap::new();
-    let of_leaf: Vec<u32> = (0..bsp.is_open.len() as u32)
-        .map(|leaf| {
-            if rooms.of_leaf[leaf as usize] == NO_CELL {
-                return NO_CELL;
-            }
-            let next = number.len() as u32;
-            *number.entry(sets.find(leaf)).or_insert(next)
-        })
-        .collect();
-    let mut separators = rooms.separators;
-    separators.extend(guides);
-    LeafCells {
-        of_leaf,
-        n_cells: number.len(),
-        separators,
-        n_crossing: rooms.n_crossing,
-        n_useless: rooms.n_useless,
+    for vote in proposal.votes.iter_mut().filter(|v| v.label != OUTDOORS) {
+        let part = of_leaf[bsp.tree.leaf_of(vote.point) as usize];
+        let next = OUTDOORS + 1 + number.len() as u32;
+        vote.label = *number.entry((vote.label, part)).or_insert(next);
     }
 }
 

@@ -1,11 +1,9 @@
-//! Measures how narrow the opening of a separator is, on sections of space beside it, sampled by lattices.
-
-use std::sync::OnceLock;
+//! Compares a separator with the sections of space beside it, sampled by lattices.
 
 use enfilade_geom::DVec3;
 
 use crate::MergeSettings;
-use crate::structure::{connected_count, rim_share};
+use crate::structure::connected_count;
 
 use super::leaves::Bsp;
 use super::separator::Separator;
@@ -15,32 +13,39 @@ use super::tree::leaf_index;
 const POINTS: f64 = 40.0;
 const MIN_STEP: f64 = 0.1;
 /// Sections on each side of a separator.
-pub(super) const SLICES: usize = 6;
-/// Marks the absence of a leaf or portal.
-pub(super) const NONE: u32 = u32::MAX;
+const SLICES: usize = 6;
+/// Marks the absence of a leaf.
+const NONE: u32 = u32::MAX;
+
+/// Returns `true` if a separator can be a pinch for some division of the space around it: if the larger of the two
+/// sections beside it, with all open space taken together, is larger than the separator.
+pub(super) fn may_be_pinch(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSettings) -> bool {
+    let lattice = Lattice::of(bsp, s, settings);
+    let enough = s.area / (settings.wall_threshold * lattice.step * lattice.step);
+    let mut stack = Vec::new();
+    (0..2 * SLICES).any(|k| {
+        let mut is_open: Vec<bool> = lattice
+            .slice(bsp, k, settings)
+            .iter()
+            .map(|&l| l != NONE)
+            .collect();
+        let (side, seeds) = (lattice.side, &lattice.is_in);
+        connected_count(&mut is_open, side, seeds, &mut stack, |_| ()) as f64 > enough
+    })
+}
 
 /// The sampled space around a separator.
-pub(super) struct Lattice {
-    pub(super) side: [usize; 2],
-    pub(super) step: f64,
-    /// The portal of the separator at each point, as an index into the separator's list.
-    pub(super) portal_at: Vec<u32>,
-    /// Leaves at each point of the sections, outwards; the first, third, … lie on the positive side.
-    slices: Vec<OnceLock<Vec<u32>>>,
+struct Lattice {
+    side: [usize; 2],
+    step: f64,
+    /// `true` for each point in the separator.
+    is_in: Vec<bool>,
     base: DVec3,
     across: [DVec3; 3],
 }
 
-/// Narrowness of an opening.
-pub(super) struct Section {
-    /// Its area divided by that of the smaller of the two sections beside it.
-    pub(super) ratio: f64,
-    /// Share of its rim that is a wall with both cells beside it.
-    pub(super) wall: f64,
-}
-
 impl Lattice {
-    pub(super) fn of(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSettings) -> Self {
+    fn of(bsp: &Bsp<'_>, s: &Separator, settings: &MergeSettings) -> Self {
         let plane = &bsp.tree.planes[s.plane as usize];
         let (u, v) = plane.basis();
         let polygon = |p: u32| &bsp.portals[p as usize].points;
@@ -60,8 +65,8 @@ impl Lattice {
         let side = [0, 1].map(|k| ((hi[k] - lo[k]) / step).ceil() as usize + 1);
         let base = plane.normal * -plane.d + u * lo[0] + v * lo[1];
         let at = |i: usize, j: usize| base + u * (i as f64 * step) + v * (j as f64 * step);
-        let mut portal_at = vec![NONE; side[0] * side[1]];
-        for (n, &p) in s.portals.iter().enumerate() {
+        let mut is_in = vec![false; side[0] * side[1]];
+        for &p in &s.portals {
             let points = polygon(p);
             let place = |p: DVec3| {
                 let f = flat(p);
@@ -80,38 +85,34 @@ impl Lattice {
                 }
                 for i in from[0].ceil() as usize..=to[0].floor() as usize {
                     if contains(points, plane.normal, at(i, j)) {
-                        portal_at[j * side[0] + i] = n as u32;
+                        is_in[j * side[0] + i] = true;
                     }
                 }
             }
             // Even the smallest portal has a point.
             let middle = points.iter().sum::<DVec3>() / points.len() as f64;
             let [i, j] = place(middle).map(|t| t.round() as usize);
-            let slot = &mut portal_at[j * side[0] + i];
-            if *slot == NONE {
-                *slot = n as u32;
-            }
+            is_in[j * side[0] + i] = true;
         }
         Self {
             side,
             step,
-            portal_at,
-            slices: vec![OnceLock::new(); 2 * SLICES],
+            is_in,
             base,
             across: [u * step, v * step, plane.normal],
         }
     }
 
-    /// Returns the leaves at the points of section `k`. Looks them up on first use, as most measures need few.
-    pub(super) fn slice(&self, bsp: &Bsp<'_>, k: usize, settings: &MergeSettings) -> &[u32] {
-        self.slices[k].get_or_init(|| {
-            let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
-            let off = self.across[2] * if k.is_multiple_of(2) { off } else { -off };
-            let mut leaves = vec![NONE; self.side[0] * self.side[1]];
+    /// Returns the leaves at the points of section `k`, outwards; the first, third, … lie on the positive side.
+    fn slice(&self, bsp: &Bsp<'_>, k: usize, settings: &MergeSettings) -> Vec<u32> {
+        let off = settings.reach * (k / 2 + 1) as f64 / SLICES as f64;
+        let off = self.across[2] * if k.is_multiple_of(2) { off } else { -off };
+        let mut leaves = vec![NONE; self.side[0] * self.side[1]];
+        if bsp.purse.spend(1 + leaves.len() as u64 / 8) {
             let all = [[0, self.side[0] - 1], [0, self.side[1] - 1]];
             self.look_up(bsp, off, bsp.tree.root, all, &mut leaves);
-            leaves
-        })
+        }
+        leaves
     }
 
     /// Looks up a block of points (first and last along each side), from a node of the tree on: if its outermost
@@ -175,64 +176,6 @@ impl Lattice {
                 leaves[j * self.side[0] + i0..=j * self.side[0] + i1].fill(leaf);
             }
         }
-    }
-
-    /// Measures the opening, of this area, of the portals that satisfy `is_seed`, between two sides. `in_side`
-    /// returns the side of a leaf (0 or 1; anything else is neither), given its position before (0) or behind (1)
-    /// the plane. One side may be endless.
-    pub(super) fn section(
-        &self,
-        bsp: &Bsp<'_>,
-        area: f64,
-        is_seed: &dyn Fn(u32) -> bool,
-        in_side: &dyn Fn(usize, u32) -> u8,
-        endless: Option<usize>,
-        settings: &MergeSettings,
-    ) -> Section {
-        let seeds: Vec<bool> = self
-            .portal_at
-            .iter()
-            .map(|&p| p != NONE && is_seed(p))
-            .collect();
-        let mut beside = [vec![false; seeds.len()], vec![false; seeds.len()]];
-        let mut best = [0_usize; 2];
-        let mut stack = Vec::new();
-        let unit = self.step * self.step;
-        // Once both are this large, it is a pinch, whatever other sections show.
-        let enough = area / (settings.threshold * unit);
-        let smaller = |best: [usize; 2]| match endless {
-            Some(side) => best[1 - side],
-            None => best[0].min(best[1]),
-        };
-        for k in 0..self.slices.len() {
-            if !bsp.purse.spend(1 + seeds.len() as u64 / 8) {
-                break;
-            }
-            let of: Vec<u8> = self
-                .slice(bsp, k, settings)
-                .iter()
-                .map(|&l| if l == NONE { 2 } else { in_side(k % 2, l) })
-                .collect();
-            for c in 0..2 {
-                let mut inside: Vec<bool> = of.iter().map(|&o| usize::from(o) == c).collect();
-                let count = connected_count(&mut inside, self.side, &seeds, &mut stack, |k| {
-                    beside[c][k] = true;
-                });
-                best[c] = best[c].max(count);
-            }
-            if smaller(best) as f64 > enough {
-                return Section {
-                    ratio: area / (smaller(best) as f64 * unit),
-                    wall: 0.0,
-                };
-            }
-        }
-        let ratio = match smaller(best) {
-            0 => 1.0,
-            n => area / (n as f64 * unit),
-        };
-        let wall = rim_share(&seeds, self.side, |k| beside[0][k] && beside[1][k]);
-        Section { ratio, wall }
     }
 }
 

@@ -3,62 +3,115 @@
 use std::collections::BTreeMap;
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Purse, Winding};
+use enfilade_geom::{DVec3, Purse, Winding};
+use rayon::prelude::*;
 
 use crate::complex::region::RegionShape;
 use crate::complex::{LabelSettings, Vote};
 use crate::config::{BspConfig, Rooms};
 use crate::proposal::Proposal;
-use crate::structure::{Candidate, OUTDOORS, Structure};
+use crate::rooms::{self, Basins, VoxelAir};
+use crate::structure::{Candidate, OUTDOORS, Structure, grown};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 use super::cells::{self, LeafCells, NO_CELL};
 use super::input::input_of;
 use super::inside::Soup;
 use super::leaves::Bsp;
-use super::rooms::{self, Evidence};
-use super::{arrange, guided, leak, separator, shape};
+use super::separator::{self, Separator};
+use super::{arrange, guided, lattice, leak, shape};
 
 /// Finds rooms by binary space partition and separators, for levels made of brushes and for clean architectural models.
 ///
 /// # Errors
-/// If the caller cancels.
+/// If a setting is invalid, the scene is too large for the voxel budget, or the caller cancels.
 pub(crate) fn propose(
     structure: &Structure<'_>,
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Proposal, BakeError> {
-    let scene = structure.scene;
     context.begin(Stage::Tree)?;
     let mut bsp = tree_of(structure, &config.bsp, context.allowance().into());
-    let counts = bsp.counts();
+    let of_tree = bsp.counts();
     context.begin(Stage::Separators)?;
-    let parted = Parted::of(structure, &mut bsp, config, context.allowance());
+    let are_rooms_wanted = match config.bsp.rooms {
+        Rooms::Auto => structure.scene.solids.is_empty(),
+        rooms => rooms == Rooms::Always,
+    };
+    let mut proposal = if are_rooms_wanted {
+        rooms_of(structure, &mut bsp, config, context)?
+    } else {
+        cells_of(structure, &bsp)
+    };
     context.check()?;
-    let mut votes = parted.votes(&bsp);
+    proposal.counts.extend([
+        ("bsp_polygons", of_tree.n_polygons as f64),
+        ("bsp_pieces", of_tree.n_pieces as f64),
+        ("bsp_splits", of_tree.n_splits as f64),
+        ("bsp_leaves", of_tree.n_leaves as f64),
+        ("bsp_portals", of_tree.n_portals as f64),
+    ]);
+    proposal.settings.extend(settings_of(config));
+    Ok(proposal)
+}
+
+/// Proposes the rooms of a building. The separators that may be a pinch divide the air; which of these parts are one room
+/// is decided as for all builders.
+fn rooms_of(
+    structure: &Structure<'_>,
+    bsp: &mut Bsp<'_>,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Proposal, BakeError> {
+    arrange::refine(bsp, &config.merge);
+    let found = separator::find_in_walls(bsp).into_par_iter();
+    let kept = found.filter(|s| lattice::may_be_pinch(bsp, s, &config.merge));
+    let kept: Vec<Separator> = kept.collect();
+    let (cell_of_leaf, n_cells) = cells::components(bsp, &kept);
+    let guides = guided::separators(bsp);
+    let air = rooms::prepare(structure, config, context)?;
+    let cell_at = |p| match cell_of_leaf[bsp.tree.leaf_of(p) as usize] {
+        NO_CELL => None,
+        cell => Some(cell),
+    };
+    let basins = Basins::of_parts(&air, cell_at, context.allowance());
+    let VoxelAir { grid, solid, .. } = air;
+    let mut proposal = rooms::propose(structure, (grid, solid, basins), config, context)?;
+    proposal.label = label_settings(structure.scene);
+    if !bsp.is_open[bsp.outer_leaf() as usize] {
+        // The void around a level.
+        proposal.votes.retain(|v| v.label != OUTDOORS);
+    }
+    if !guides.is_empty() {
+        guided::divide(bsp, &guides, &mut proposal);
+        proposal.candidates.extend(candidates_of(bsp, &guides));
+    }
+    proposal.counts.extend([
+        ("separators", kept.len() as f64),
+        ("cells_before", n_cells as f64),
+    ]);
+    Ok(proposal)
+}
+
+/// Proposes all cells between separators that cross no other.
+fn cells_of(structure: &Structure<'_>, bsp: &Bsp<'_>) -> Proposal {
+    let cells = cells::part(bsp, separator::find(bsp));
+    let mut votes = votes_of(bsp, &cells);
     if !structure.stairs.is_empty() {
         let matter = Soup::of(&structure.stairs, &[]);
         votes.retain(|v| !matter.is_inside(v.point, bsp.purse));
     }
-    let cells = &parted.cells;
-    let counts = vec![
-        ("bsp_polygons", counts.n_polygons as f64),
-        ("bsp_pieces", counts.n_pieces as f64),
-        ("bsp_splits", counts.n_splits as f64),
-        ("bsp_leaves", counts.n_leaves as f64),
-        ("bsp_portals", counts.n_portals as f64),
-        ("separators", cells.separators.len() as f64),
-        ("crossing_separators", cells.n_crossing as f64),
-        ("cells_before", cells.n_cells as f64),
-    ];
-    Ok(Proposal {
-        candidates: candidates_of(&bsp, cells),
-        label: label_settings(scene),
+    Proposal {
+        candidates: candidates_of(bsp, &cells.separators),
+        label: label_settings(structure.scene),
         joins_unparted: false,
-        counts,
-        settings: settings_of(config),
+        counts: vec![
+            ("separators", cells.separators.len() as f64),
+            ("crossing_separators", cells.n_crossing as f64),
+            ("cells_before", cells.n_cells as f64),
+        ],
         ..Proposal::new(structure.bounds().expanded(1.0), votes)
-    })
+    }
 }
 
 fn tree_of<'a>(structure: &Structure<'_>, config: &BspConfig, purse: Purse<'a>) -> Bsp<'a> {
@@ -85,79 +138,32 @@ fn label_settings(scene: &Scene) -> LabelSettings {
     }
 }
 
-/// Leaves divided into cells.
-struct Parted {
-    cells: LeafCells,
-    shapes: Vec<Option<RegionShape>>,
-    /// `true` for each leaf of a cell too narrow for a room, if shape decides on rooms; a guide may make narrower
-    /// cells.
-    is_narrow: Vec<bool>,
-}
-
-impl Parted {
-    fn of(
-        structure: &Structure<'_>,
-        bsp: &mut Bsp<'_>,
-        config: &BakeConfig,
-        allowance: &Allowance,
-    ) -> Self {
-        let by_shape = match config.bsp.rooms {
-            Rooms::Auto => structure.scene.solids.is_empty(),
-            rooms => rooms == Rooms::Always,
-        };
-        if !by_shape {
-            return Self {
-                cells: cells::part(bsp, separator::find(bsp)),
-                shapes: shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse),
-                is_narrow: Vec::new(),
-            };
+/// Returns a vote of each leaf for its cell.
+fn votes_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Vote> {
+    // With triangles, the air around everything is a cell, and is labeled as such.
+    let outer = cells.of_leaf[bsp.outer_leaf() as usize];
+    let label = |cell: u32| {
+        if cell == outer {
+            OUTDOORS
+        } else {
+            OUTDOORS + 1 + cell
         }
-        let settings = &config.merge;
-        let mut closures = structure.blockers(&Bvh::build(&structure.walls));
-        closures.extend(&structure.missing);
-        arrange::refine(bsp, settings);
-        let shapes = shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse);
-        let evidence = Evidence {
-            shapes: &shapes,
-            closures: &Bvh::build(&closures),
-            slabs: &structure.slabs(),
-            allowance,
-        };
-        let rooms = rooms::part(bsp, separator::find_in_walls(bsp), &evidence, settings);
-        let narrow = rooms::narrow_cells(bsp, &rooms, settings);
-        let outer = rooms.of_leaf[bsp.outer_leaf() as usize];
-        let of_leaf = |&c: &u32| c != outer && narrow.get(c as usize).is_some_and(|n| *n);
-        Self {
-            is_narrow: rooms.of_leaf.iter().map(of_leaf).collect(),
-            cells: guided::part(bsp, rooms),
-            shapes,
-        }
-    }
-
-    /// Returns a vote of each leaf for its cell.
-    fn votes(&self, bsp: &Bsp<'_>) -> Vec<Vote> {
-        let cells = &self.cells;
-        // With triangles, the air around everything is a cell, and is labeled as such.
-        let outer = cells.of_leaf[bsp.outer_leaf() as usize];
-        let label = |cell: u32| {
-            if cell == outer {
-                OUTDOORS
-            } else {
-                OUTDOORS + 1 + cell
-            }
-        };
-        let of_leaf = |(leaf, shape): (usize, &Option<RegionShape>)| {
-            let (cell, shape) = (cells.of_leaf[leaf], (*shape)?);
-            // A narrow cell that leaks into a room is part of that room; the complex sees to it.
-            let counts = cell != NO_CELL && !self.is_narrow.get(leaf).is_some_and(|n| *n);
-            counts.then(|| Vote {
-                point: shape.middle,
-                label: label(cell),
-                weight: shape.volume as f32,
-            })
-        };
-        self.shapes.iter().enumerate().filter_map(of_leaf).collect()
-    }
+    };
+    let shapes = shape::shapes(&bsp.tree, &bsp.tolerance, bsp.purse);
+    let of_leaf = |(&cell, shape): (&u32, Option<RegionShape>)| {
+        let shape = shape.filter(|_| cell != NO_CELL)?;
+        Some(Vote {
+            point: shape.middle,
+            label: label(cell),
+            weight: shape.volume as f32,
+        })
+    };
+    cells
+        .of_leaf
+        .iter()
+        .zip(shapes)
+        .filter_map(of_leaf)
+        .collect()
 }
 
 /// Returns the settings of the partition as text, by name, for the provenance of the file.
@@ -183,9 +189,9 @@ fn settings_of(config: &BakeConfig) -> BTreeMap<String, String> {
 }
 
 /// Returns one candidate for each separator whose portals fill their hull, else one for each of its portals.
-fn candidates_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Candidate> {
+fn candidates_of(bsp: &Bsp<'_>, separators: &[Separator]) -> Vec<Candidate> {
     let mut out = Vec::new();
-    for s in &cells.separators {
+    for s in separators {
         let plane = bsp.tree.planes[s.plane as usize];
         let all: Vec<DVec3> = s
             .portals
@@ -202,26 +208,10 @@ fn candidates_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Candidate> {
                 .collect()
         };
         out.extend(windings.into_iter().map(|w| Candidate {
+            // A candidate must reach past the rim of its opening.
             winding: grown(&w, &plane, 4.0 * bsp.tolerance.plane),
             closed: 0.0,
         }));
     }
     out
-}
-
-/// Returns the polygon with each vertex moved out: a candidate must reach past the rim of its opening.
-fn grown(w: &Winding, plane: &Plane, by: f64) -> Winding {
-    let n = w.points.len();
-    let moved = (0..n).map(|i| {
-        let (a, p, b) = (
-            w.points[(i + n - 1) % n],
-            w.points[i],
-            w.points[(i + 1) % n],
-        );
-        let out = |e: DVec3| e.normalize_or_zero().cross(plane.normal);
-        let (m, k) = (out(p - a), out(b - p));
-        // Sharp vertices would move too far.
-        p + (m + k) * (by / (1.0 + m.dot(k)).max(0.1))
-    });
-    Winding::new(moved.collect())
 }

@@ -283,15 +283,6 @@ fn shared(a: DVec3, b: DVec3, other: &[DVec3], eps: f64) -> Option<Interval> {
     })
 }
 
-/// Returns `true` if two polygons share part of an edge, whatever their orientations.
-pub(super) fn touch(a: &[DVec3], b: &[DVec3], eps: f64) -> bool {
-    let n = a.len();
-    (0..n).any(|i| {
-        let (p, q) = (a[i], a[(i + 1) % n]);
-        p.distance(q) > 4.0 * eps && (shared(p, q, b, eps).or(shared(q, p, b, eps))).is_some()
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -94,7 +94,7 @@ mod tests {
             ..MergeSettings::default()
         };
         assert_ne!(as_is, with_bays.to_settings());
-        let recorded = BakeConfig::default().watershed_settings();
+        let recorded = BakeConfig::default().voxel_settings();
         assert!(as_is.keys().all(|k| recorded.contains_key(k)));
     }
 }

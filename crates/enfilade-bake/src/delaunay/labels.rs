@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use smallvec::SmallVec;
+
 use super::space::Space;
+use crate::rooms::THICKER;
 
 /// The parts that lie in branches.
 pub(super) struct Branches {
@@ -18,8 +21,10 @@ pub(super) struct Branches {
 pub(super) struct BranchMouth {
     /// Radius of the trunk's largest ball near the mouth ÷ that of the branch's largest ball well inside.
     pub(super) weight: f64,
-    /// Radius of the branch's largest ball well inside. [Units: wu]
+    /// Radius of the branch's largest ball well inside; half-width of a limb. [Units: wu]
     pub(super) radius: f64,
+    /// It is that of a limb in plan.
+    pub(super) is_limb: bool,
 }
 
 impl Branches {
@@ -61,16 +66,21 @@ impl Branches {
     }
 
     /// Returns the weight of an opening between two parts as a mouth, by their labels: the narrower branch ends there.
-    /// 0 within a branch, and away from branches.
+    /// 0 within a branch, away from branches, and between limbs of which neither is thick enough to be a room beside the
+    /// other: they meet in a corridor.
     pub(super) fn weight(&self, [a, b]: [u32; 2]) -> f64 {
         if a == b {
             return 0.0;
         }
         let mouths = [a, b].into_iter().filter(|&l| l > 0);
-        let mouths = mouths.map(|l| self.mouths[l as usize - 1]);
-        mouths
-            .min_by(|p, q| p.radius.total_cmp(&q.radius))
-            .map_or(0.0, |m| m.weight)
+        let mut mouths: SmallVec<[BranchMouth; 2]> =
+            mouths.map(|l| self.mouths[l as usize - 1]).collect();
+        mouths.sort_by(|p, q| p.radius.total_cmp(&q.radius));
+        match mouths[..] {
+            [p, q] if p.is_limb && q.is_limb && q.radius < THICKER * p.radius => 0.0,
+            [narrower, ..] => narrower.weight,
+            [] => 0.0,
+        }
     }
 }
 
@@ -108,6 +118,7 @@ mod tests {
         let mouth = BranchMouth {
             weight: 2.0,
             radius: 0.7,
+            is_limb: false,
         };
         let branches = Branches {
             label_of_part: labels.clone(),

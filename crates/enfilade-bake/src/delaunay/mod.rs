@@ -11,6 +11,7 @@
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | merging of parts of the air between which nothing narrows | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches`; `labels`: the result | ours, after Matheron 1975 |
+//! | corridors that leave a room without a pinch | `limbs`, by the rule of [`crate::rooms`] | ours |
 //! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | remaining rooms, and matter | `standing` | ours |
 //! | candidates and votes | `rooms` | ours |
@@ -24,6 +25,7 @@ mod cut;
 mod decimate;
 mod insert;
 mod labels;
+mod limbs;
 mod limits;
 mod openings;
 mod order;

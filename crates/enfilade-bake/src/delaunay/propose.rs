@@ -6,9 +6,11 @@ use super::decimate::default_stop;
 use super::rooms::find_rooms;
 use super::session::Session;
 use super::space::box_points;
+
 use crate::complex::{LabelSettings, Vote};
 use crate::config::DelaunayConfig;
 use crate::proposal::Proposal;
+use crate::rooms::inside_stairs;
 use crate::structure::{OUTDOORS, Structure};
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
@@ -68,6 +70,13 @@ pub(crate) fn propose_of(
         config.merge.min_radius,
         context.allowance(),
     );
+    // Points outside the tetrahedra have no room.
+    let region_at = |p| {
+        let part = session.space.part_at(p, 0, &session.bvh);
+        part.map_or(0, |t| rooms.label_of_part[t as usize])
+    };
+    let (stairs, bvh) = (&structure.stairs, &structure.bvh);
+    let voids = inside_stairs(stairs, bvh, &region_at, context.allowance());
     let bounds = structure.bounds();
     let around = bounds.expanded(AROUND);
     let mut votes = rooms.votes;
@@ -89,6 +98,7 @@ pub(crate) fn propose_of(
     settings.insert("stop".to_owned(), stop.to_string());
     Ok(Proposal {
         candidates: rooms.candidates,
+        voids,
         label: LabelSettings {
             keeps_closed: false,
             ..LabelSettings::default()

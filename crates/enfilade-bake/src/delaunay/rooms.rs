@@ -33,6 +33,8 @@ const MIN_AREA: f64 = 0.04;
 pub(super) struct FoundRooms {
     pub(super) candidates: Vec<Candidate>,
     pub(super) votes: Vec<Vote>,
+    /// Label of each part; 0 for those that are not rooms.
+    pub(super) label_of_part: Vec<u32>,
 }
 
 /// Returns the label of a cell: regions count from [`OUTDOORS`] on.
@@ -78,22 +80,8 @@ pub(super) fn find_rooms(
         })
         .collect();
 
-    let key = |p: DVec3| (p / UNSURE).floor().to_array().map(|x| x as i64);
-    let mut unsure: BTreeMap<[i64; 3], Vec<DVec3>> = BTreeMap::new();
-    for (centers, _) in &found {
-        for &p in centers {
-            unsure.entry(key(p)).or_default().push(p);
-        }
-    }
-    let is_unsure = |p: DVec3| {
-        let [x, y, z] = key(p);
-        (0..27).any(|i| {
-            let cell = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
-            unsure
-                .get(&cell)
-                .is_some_and(|list| list.iter().any(|q| q.distance(p) < UNSURE))
-        })
-    };
+    let centers = found.iter().flat_map(|(centers, _)| centers);
+    let is_unsure = near_any(&centers.copied().collect::<Vec<_>>());
     let n = space.middles.len();
     let sure: Vec<bool> = (0..n)
         .into_par_iter()
@@ -134,9 +122,33 @@ pub(super) fn find_rooms(
             .filter(|(room, _)| !heard.contains(room))
             .map(|(_, &t)| vote(t)),
     );
+    let label_of = |t: u32| {
+        Some(room_at(t))
+            .filter(|r| !hollow.contains(r))
+            .map_or(0, label)
+    };
     FoundRooms {
         candidates: found.into_iter().filter_map(|f| f.1).collect(),
         votes,
+        label_of_part: (0..n as u32).map(label_of).collect(),
+    }
+}
+
+/// Returns a test if a point is nearer than [`UNSURE`] to any of `centers`.
+fn near_any(centers: &[DVec3]) -> impl Fn(DVec3) -> bool + use<> {
+    let key = |p: DVec3| (p / UNSURE).floor().to_array().map(|x| x as i64);
+    let mut unsure: BTreeMap<[i64; 3], Vec<DVec3>> = BTreeMap::new();
+    for &p in centers {
+        unsure.entry(key(p)).or_default().push(p);
+    }
+    move |p: DVec3| {
+        let [x, y, z] = key(p);
+        (0..27).any(|i| {
+            let cell = [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
+            unsure
+                .get(&cell)
+                .is_some_and(|list| list.iter().any(|q| q.distance(p) < UNSURE))
+        })
     }
 }
 

@@ -3,9 +3,10 @@
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Allowance, Bvh, Triangle};
 
-use super::branches::find_branches;
+use super::branches::{Walls, find_branches};
 use super::cells::{Cells, divided_at_mouths, flow_together};
 use super::decimate::{Decimation, decimate, default_stop};
+use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
 use super::standing::count_rooms;
@@ -79,9 +80,11 @@ impl Session {
         let cells = with_branches(
             &space,
             flow_together(&space),
-            config.merge.min_radius,
-            &walls,
-            &bvh,
+            [config.min_opening, config.merge.min_radius],
+            &Walls {
+                triangles: &walls,
+                bvh: &bvh,
+            },
             context.allowance(),
         );
         let mut session = Self {
@@ -138,13 +141,12 @@ impl Session {
     }
 }
 
-/// Divides cells where branches leave the rooms with which a decimation without choices ends.
+/// Divides cells where branches and corridors leave the rooms with which a decimation without choices ends.
 fn with_branches(
     space: &Space,
     cells: Cells,
-    min_radius: f64,
-    walls: &[Triangle],
-    bvh: &Bvh,
+    [narrowest, min_radius]: [f64; 2],
+    walls: &Walls<'_>,
     allowance: &Allowance,
 ) -> Cells {
     let weight = Weight::ScaleFree;
@@ -160,7 +162,14 @@ fn with_branches(
     let room_of_cell = rooms.after(rooms.stop);
     let room = |&c: &u32| room_of_cell[c as usize];
     let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
-    let branches = find_branches(space, &room_of_part, walls, bvh, allowance);
+    let rooms = RoomSpace {
+        space,
+        walls,
+        room_of_part: &room_of_part,
+        allowance,
+    };
+    let branches = find_branches(space, &room_of_part, walls, allowance);
+    let branches = branches.with_limbs(&rooms, narrowest, min_radius);
     if branches.is_empty() {
         cells
     } else {

@@ -504,6 +504,33 @@ impl Space {
             .collect()
     }
 
+    /// Returns the part that contains a point: in a tetrahedron that is cut, the nearest of its parts that none of the
+    /// `walls` separates from it. The search begins at part `hint`: the nearer, the faster.
+    pub(super) fn part_at(&self, p: DVec3, hint: u32, walls: &Bvh) -> Option<u32> {
+        let n = self.delaunay.n_finite;
+        let t = self
+            .delaunay
+            .locate(p, self.tetrahedron_of_part[hint as usize]);
+        if t as usize >= n {
+            return None;
+        }
+        let further = &self.tetrahedron_of_part[n..];
+        let first = further.partition_point(|&of| of < t);
+        let n_further = further[first..].partition_point(|&of| of == t);
+        if n_further == 0 {
+            return Some(t);
+        }
+        let further = (0..n_further).map(|k| (n + first + k) as u32);
+        let middle = |part: u32| self.middles[part as usize];
+        std::iter::once(t)
+            .chain(further)
+            .filter(|&part| !walls.any_hit(p, middle(part), |_| false))
+            .min_by(|&a, &b| {
+                let [a, b] = [a, b].map(|part| middle(part).distance_squared(p));
+                a.total_cmp(&b)
+            })
+    }
+
     /// Returns `true` if the opening that polygons leave in a facet is too narrow for a portal.
     pub(super) fn is_crack(&self, link: &Link) -> bool {
         link.n_vertices > 0 && width(&self.outline(link)) < self.crack

@@ -9,7 +9,7 @@
 //! | where surfaces end, which triangles are missing | `rims` |
 //! | which side of a surface is matter | `backs` |
 //! | where cells are one room | `pinch`, `lattice` |
-//! | which plane an opening lies in | `candidate`, `picture` |
+//! | which plane an opening lies in, and an outline that covers it | `candidate`, `picture`, `outline` |
 
 mod backs;
 mod blockers;
@@ -18,6 +18,7 @@ mod frame;
 mod lattice;
 mod misfit;
 mod of;
+mod outline;
 mod picture;
 mod pinch;
 mod rims;
@@ -32,6 +33,7 @@ pub(crate) use lattice::{Jambs, connected_count, rim_share};
 pub(crate) use of::{
     OUTDOORS, SceneStructure, Structure, bounds_of, in_own_order, structural_triangles,
 };
+pub(crate) use outline::grown;
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};
 pub(crate) use rims::{RimVertex, Rims};
 pub(crate) use slabs::lies_in_slab;

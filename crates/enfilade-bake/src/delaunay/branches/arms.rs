@@ -14,10 +14,10 @@ use super::rule::{Arm, ArmFacts, classify_arm};
 /// Rays about an axis: enough for a polygon of a dozen sides to count as round.
 const RAYS: usize = 32;
 
-/// The walls around a fork, for normals.
-pub(super) struct Walls<'a> {
-    pub(super) triangles: &'a [Triangle],
-    pub(super) bvh: &'a Bvh,
+/// The walls around a place, for normals.
+pub(in super::super) struct Walls<'a> {
+    pub(in super::super) triangles: &'a [Triangle],
+    pub(in super::super) bvh: &'a Bvh,
 }
 
 /// A piece of the space around a fork.
@@ -65,6 +65,33 @@ impl TubeRegions<'_> {
             mouth,
             kind: classify_arm(&facts),
         }
+    }
+}
+
+impl Walls<'_> {
+    /// Returns `true` if the walls around a point are those of a corridor, not of a tube. The axis is the level direction
+    /// in which the nearest wall is farthest.
+    pub(in super::super) fn are_of_corridor(&self, origin: DVec3, radius: f64) -> bool {
+        let level = (0..RAYS).map(|i| {
+            let (sin, cos) = (TAU * i as f64 / RAYS as f64).sin_cos();
+            let direction = DVec3::new(cos, 0.0, sin);
+            let ray = Ray {
+                origin,
+                direction,
+                t_max: f64::INFINITY,
+            };
+            let hit = self.bvh.closest_hit(&ray, |_| false);
+            (hit.map_or(f64::INFINITY, |h| h.t), direction)
+        });
+        let axis = level.max_by(|a, b| a.0.total_cmp(&b.0));
+        let (enclosed, squareness) = squareness(origin, axis.map_or(DVec3::X, |a| a.1), self);
+        let facts = ArmFacts {
+            depth: f64::INFINITY,
+            radius,
+            enclosed,
+            squareness,
+        };
+        classify_arm(&facts) == Arm::Corridor
     }
 }
 

@@ -36,11 +36,11 @@ mod separate;
 
 use std::collections::BTreeSet;
 
-use enfilade_geom::{Allowance, Bvh, Triangle};
+use enfilade_geom::Allowance;
 
 use super::labels::Branches;
 use super::space::Space;
-use arms::Walls;
+pub(super) use arms::Walls;
 use regions::{NONE, TubeRegions};
 use rule::{LimbKind, classify};
 
@@ -50,8 +50,7 @@ use rule::{LimbKind, classify};
 pub(super) fn find_branches(
     space: &Space,
     room_of_part: &[u32],
-    walls: &[Triangle],
-    bvh: &Bvh,
+    walls: &Walls<'_>,
     allowance: &Allowance,
 ) -> Branches {
     let mut regions = TubeRegions::new(space, room_of_part, allowance);
@@ -62,10 +61,7 @@ pub(super) fn find_branches(
             settle(&mut regions, limb);
         }
     }
-    regions.separate_forks(&Walls {
-        triangles: walls,
-        bvh,
-    });
+    regions.separate_forks(walls);
     regions.finished()
 }
 

@@ -158,6 +158,7 @@ pub(super) fn classify(limb: &LimbFacts) -> LimbKind {
     LimbKind::Branch(BranchMouth {
         weight,
         radius: body,
+        is_limb: false,
     })
 }
 
@@ -252,6 +253,7 @@ mod tests {
     const BRANCH: LimbKind = LimbKind::Branch(BranchMouth {
         weight: 2.0,
         radius: 1.0,
+        is_limb: false,
     });
 
     type Change = fn(&mut LimbFacts);
@@ -286,6 +288,7 @@ mod tests {
         let just_narrow = LimbKind::Branch(BranchMouth {
             weight: 1.5,
             radius: 1.0,
+            is_limb: false,
         });
         check(&[
             ("a tube", |_| {}, BRANCH),

@@ -103,6 +103,7 @@ impl TubeRegions<'_> {
                 let mouth = BranchMouth {
                     weight: ARM_WEIGHS,
                     radius,
+                    is_limb: false,
                 };
                 region_of_piece.insert(piece, self.push(radius, Some(mouth)));
             }

@@ -31,9 +31,11 @@ use crate::MergeSettings;
 use crate::structure::OUTDOORS;
 
 /// A limb opens to areas at least this many times as thick: its section is at most half of theirs.
-const THICKER: f64 = 2.0;
+pub(crate) const THICKER: f64 = 2.0;
 /// … and is at least this many of its widths long, of which up to half a width lies in the room before its mouth.
 const LONG: f64 = 2.5;
+/// Cells on the axis of a limb are farther from its walls than this share of its half-width.
+const ON_AXIS: f64 = 0.9;
 /// Factor from one width tried to the next.
 const STEP: f64 = 1.15;
 
@@ -156,7 +158,7 @@ fn join_limbs(
 }
 
 /// The largest layer of a region.
-struct Plan {
+pub(crate) struct Plan {
     row: usize,
     /// Column of the first cell.
     first: [usize; 2],
@@ -166,10 +168,10 @@ struct Plan {
 }
 
 /// A limb of a plan.
-struct Limb {
-    cells: Vec<usize>,
+pub(crate) struct Limb {
+    pub(crate) cells: Vec<usize>,
     /// [Units: vx]
-    half_width: f64,
+    pub(crate) half_width: f64,
 }
 
 /// Position of one layer of a region.
@@ -224,7 +226,7 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
 
 impl Plan {
     /// Makes the plan of the free columns from the lowest to the highest.
-    fn of(
+    pub(crate) fn of(
         row: usize,
         [least, greatest]: [[usize; 2]; 2],
         is_free: &dyn Fn(usize, usize) -> bool,
@@ -244,18 +246,22 @@ impl Plan {
         plan
     }
 
-    fn column(&self, cell: usize) -> [usize; 2] {
+    /// Returns the column of a cell.
+    pub(crate) fn column(&self, cell: usize) -> [usize; 2] {
         let [x, z] = [cell % self.side[0], cell / self.side[0]];
         [x + self.first[0] - 1, z + self.first[1] - 1]
     }
 
     /// Returns the largest half-width, and the limbs whose half-width is at least `least`, narrow ones first.
     /// [Units: vx]
-    fn limbs(&self, least: f64, allowance: &Allowance) -> (f64, Vec<Limb>) {
+    pub(crate) fn limbs(&self, least: f64, allowance: &Allowance) -> (f64, Vec<Limb>) {
         let to_wall = self.distance_to(|c| !self.is_free[c]);
         // A cell center next to a wall is already half a cell away from it.
         let thickness = |c: usize| f64::from(to_wall[c]) - 0.5;
         let thickest = (0..to_wall.len()).map(thickness).fold(0.0, f64::max);
+        // A mouth may be wide enough for a room and what is behind it a crevice.
+        let to_room = self.distance_to(|c| thickness(c) >= least);
+        let is_crevice = |c: usize| f64::from(to_room[c]) > least + 0.5;
         let mut rest = self.is_free.clone();
         let mut out = Vec::new();
         let mut half_width = least;
@@ -271,10 +277,11 @@ impl Plan {
             let mut found = Vec::new();
             for cells in narrow.1 {
                 let widest = cells.iter().map(|&c| thickness(c)).fold(0.0, f64::max);
+                let roomy: Vec<usize> = cells.iter().copied().filter(|&c| !is_crevice(c)).collect();
                 if widest >= least
                     && widest <= half_width
                     && allowance.spend(self.is_free.len() as u64 / 16 + 5 * cells.len() as u64)
-                    && self.length(&cells, &core.0) >= LONG * 2.0 * widest
+                    && self.length(&roomy, &core.0) >= LONG * 2.0 * widest
                 {
                     found.push(Limb {
                         cells,
@@ -289,6 +296,28 @@ impl Plan {
             half_width *= STEP;
         }
         (thickest, out)
+    }
+
+    /// Returns a cell about on the axis of a limb, away from where its list of cells begins.
+    pub(crate) fn middle(&self, limb: &Limb) -> usize {
+        let to_wall = self.distance_to(|c| !self.is_free[c]);
+        let from_half = limb.cells.len() / 2..;
+        let rest = limb.cells[from_half].iter().chain(&limb.cells).copied();
+        let is_wide = |&c: &usize| f64::from(to_wall[c]) - 0.5 >= ON_AXIS * limb.half_width;
+        rest.clone()
+            .find(is_wide)
+            .or(rest.clone().next())
+            .unwrap_or(0)
+    }
+
+    /// Returns the cells of a limb, up to the line across each mouth: there a disc of the room reaches into the limb.
+    pub(crate) fn up_to_mouths(&self, limb: &Limb) -> Vec<usize> {
+        let sagitta = (THICKER - (THICKER * THICKER - 1.0).sqrt()) * limb.half_width;
+        let mut is_in = vec![false; self.is_free.len()];
+        limb.cells.iter().for_each(|&c| is_in[c] = true);
+        let to_limb = self.distance_to(|c| is_in[c]);
+        let is_near = |&c: &usize| self.is_free[c] && f64::from(to_limb[c]) <= sagitta;
+        (0..is_in.len()).filter(is_near).collect()
     }
 
     /// Returns the length of an area between the thicker parts `core`: from mouth to mouth, or to its end. 0 if
@@ -454,6 +483,16 @@ mod tests {
             let arm = [70, 100 - half, 70 + 4 * half, 100 + half];
             assert!(spans(&plan(&[rooms[0], arm])).is_empty(), "{half}");
         }
+    }
+
+    #[test]
+    fn a_crevice_behind_a_wider_mouth_is_no_limb() {
+        // Behind a lining of one cell: a mouth of 5 cells in front of the gap.
+        let behind = |gap: usize| {
+            let room = [10, 10, 50, 46];
+            spans(&plan(&[room, [44, 46, 49, 47], [10, 47, 50, 47 + gap]])).len()
+        };
+        assert_eq!([4, 7].map(behind), [0, 1]);
     }
 
     #[test]

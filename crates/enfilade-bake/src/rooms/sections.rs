@@ -25,6 +25,7 @@ const STEEP: f64 = 0.5;
 const CLOSE: f64 = 3.0;
 
 /// Measures of an opening and the space beside it.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct OpeningSection {
     /// Area of the opening ÷ the smaller of the largest cross-sections of its two cells. Below the threshold of the
     /// settings, the first sections found to be large enough are taken.

@@ -27,6 +27,7 @@ use rayon::prelude::*;
 
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::{Faces, group_faces, is_in};
+use super::judge::{OpeningFacts, judge};
 use super::sections::section_of;
 use crate::MergeSettings;
 use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms, lies_in_slab};
@@ -307,22 +308,15 @@ impl Mergeable for BasinMerger<'_> {
             .iter()
             .take(2)
             .map(|front| {
-                let apart = self.storeys_apart && self.lies_in_slab(&front.opening);
-                if apart || front.opening.closed >= self.settings.closed_share {
-                    return 0.0;
-                }
+                let facts = OpeningFacts {
+                    is_between_storeys: self.storeys_apart && self.lies_in_slab(&front.opening),
+                    closed: front.opening.closed,
+                    is_to_outdoors: a == OUTDOORS,
+                    by_balls: low,
+                };
                 let cell_of = |label: u32| self.cell[label as usize];
-                let section = section_of(self.flooded, self.settings, front, [a, b], &cell_of);
-                if a == OUTDOORS {
-                    let ratio = section.ratio * self.settings.outdoor_gain;
-                    return self.settings.openness(ratio, section.wall).min(low);
-                }
-                let openness = self.settings.openness(section.ratio, section.wall).min(low);
-                if section.is_framed {
-                    openness
-                } else {
-                    openness.max(1.0)
-                }
+                let section = || section_of(self.flooded, self.settings, front, [a, b], &cell_of);
+                judge(self.settings, &facts, section).1
             })
             .fold(0.0, f64::max)
     }

@@ -1,0 +1,158 @@
+//! Basins: the parts into which a builder divides the air, before they are merged into rooms.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::{Allowance, DVec3};
+
+use rayon::prelude::*;
+
+use super::air::VoxelAir;
+use super::flooded::{Flooded, contact_faces};
+use super::refill::flood_closures;
+use super::regions::{Regions, merge_basins};
+use super::slabs::cut_at_slabs;
+use crate::BakeConfig;
+use crate::structure::OUTDOORS;
+use crate::voxel::{BitVolume, Grid, Labels, border};
+
+/// Marks a voxel that has a part, but no basin yet; the other bits are the part.
+const WAITING: u32 = 1 << 31;
+
+/// Parts of the air. The outdoors is the basin [`OUTDOORS`](crate::structure::OUTDOORS).
+pub(crate) struct Basins {
+    /// Basin of each voxel; 0 where it is solid or shut.
+    pub(crate) labels: Labels,
+    /// Largest distance in each basin, by label. [Units: vx]
+    pub(crate) peaks: Vec<f32>,
+    /// Greatest distance at which two basins touch, lower label first. [Units: vx]
+    pub(crate) saddles: BTreeMap<(u32, u32), f32>,
+    pub(crate) n_basins: usize,
+}
+
+impl Basins {
+    /// Makes a basin of each connected set of air voxels in one part. `part_at` returns the part of a point, below 2³¹, or
+    /// `None` for matter. Everything that connects to the border is outdoors.
+    ///
+    /// Linear in voxels, besides the calls of `part_at` for those that are not far from everything; 4 bytes a voxel.
+    pub(crate) fn of_parts(
+        air: &VoxelAir,
+        part_at: impl Fn(DVec3) -> Option<u32> + Sync,
+        allowance: &Allowance,
+    ) -> Self {
+        let dims = air.grid.dims;
+        let mut outdoors = border(dims);
+        outdoors.union_with(&air.far);
+        let part_of = |i: usize| {
+            if air.distances[i] == 0 || !allowance.spend(1) {
+                return 0;
+            }
+            if outdoors.get_index(i) {
+                return OUTDOORS;
+            }
+            let [x, y, z] = air.grid.coords(i);
+            part_at(air.grid.center(x, y, z)).map_or(0, |part| WAITING | part)
+        };
+        let mut labels: Vec<u32> = (0..air.distances.len())
+            .into_par_iter()
+            .map(part_of)
+            .collect();
+        let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
+        let n = number_parts(dims, &mut labels, outer);
+        let mut peaks = vec![0_u16; n];
+        for (&label, &distance) in labels.iter().zip(&air.distances) {
+            let peak = &mut peaks[label as usize];
+            *peak = distance.max(*peak);
+        }
+        let radius = |squared: u16| f32::from(squared).sqrt();
+        let mut peaks: Vec<f32> = peaks.into_iter().map(radius).collect();
+        peaks[OUTDOORS as usize] = f32::INFINITY;
+        let labels = if n > usize::from(u16::MAX) {
+            Labels::U32(labels)
+        } else {
+            Labels::U16(labels.into_iter().map(|l| l as u16).collect())
+        };
+        let [nx, ny, _] = dims;
+        let saddle = |faces: &Vec<u64>| {
+            let distance = |&face: &u64| {
+                let (i, axis) = ((face / 4) as usize, (face % 4) as usize);
+                air.distances[i].min(air.distances[i + [1, nx, nx * ny][axis]])
+            };
+            radius(faces.iter().map(distance).max().unwrap_or(0))
+        };
+        let contacts = contact_faces(dims, &labels);
+        Self {
+            saddles: contacts
+                .iter()
+                .map(|(&pair, f)| (pair, saddle(f)))
+                .collect(),
+            n_basins: n - 1,
+            labels,
+            peaks,
+        }
+    }
+
+    /// Gives the air inside closures to the basins beside it.
+    pub(super) fn refill(&mut self, grid: &Grid, occupied: &BitVolume) {
+        flood_closures(grid.dims, &mut self.labels, occupied);
+    }
+
+    /// Cuts basins where a slab ends a storey.
+    pub(super) fn cut(&mut self, grid: &Grid, slabs: &[f64]) {
+        for parent in cut_at_slabs(grid, &mut self.labels, self.peaks.len(), slabs) {
+            self.peaks.push(self.peaks[parent as usize]);
+        }
+    }
+
+    pub(super) fn merge(
+        &self,
+        grid: &Grid,
+        shut: &BitVolume,
+        slabs: &[f64],
+        config: &BakeConfig,
+        allowance: &Allowance,
+    ) -> Regions {
+        let flooded = Flooded {
+            grid,
+            labels: &self.labels,
+            peaks: &self.peaks,
+            closures: Some(shut),
+            slabs,
+            allowance,
+        };
+        merge_basins(flooded, &self.saddles, &config.merge)
+    }
+}
+
+/// Replaces the parts of voxels by basins, numbered in order of their first voxels; returns the number of labels. Waiting
+/// voxels of part `outer` that connect to those that are outdoors are, too.
+fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> usize {
+    let mut stack: Vec<usize> = (0..labels.len())
+        .filter(|&i| labels[i] == OUTDOORS)
+        .collect();
+    let flood = |labels: &mut [u32], stack: &mut Vec<usize>, from: u32, to: u32| {
+        while let Some(i) = stack.pop() {
+            let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
+            for (at, n, step) in [(x, nx, 1), (y, ny, nx), (z, nz, nx * ny)] {
+                let next = [(at > 0, i.wrapping_sub(step)), (at + 1 < n, i + step)];
+                for (_, j) in next.into_iter().filter(|n| n.0) {
+                    if labels[j] == from {
+                        labels[j] = to;
+                        stack.push(j);
+                    }
+                }
+            }
+        }
+    };
+    flood(labels, &mut stack, WAITING | outer, OUTDOORS);
+    let mut n = OUTDOORS + 1;
+    for i in 0..labels.len() {
+        let part = labels[i];
+        if part & WAITING != 0 {
+            labels[i] = n;
+            stack.push(i);
+            flood(labels, &mut stack, part, n);
+            n += 1;
+        }
+    }
+    n as usize
+}

@@ -1,0 +1,151 @@
+//! The stages from a division of the air to a proposal, the same for all builders that divide it: parts → rooms → candidate
+//! portals and votes.
+//!
+//! A builder begins with [`prepare`](super::prepare), divides the air into [`Basins`] in its own way, and ends with [`propose`].
+
+use enfilade_geom::{Allowance, DVec3};
+
+use super::air::{Solid, resolution_of};
+use super::basins::Basins;
+use super::candidates::fit_candidates;
+use super::hollow::{Matter, find_matter};
+use super::limbs::split_limbs;
+use super::low::join_low;
+use super::regions::Regions;
+use super::voids::{inside_stairs, shallow_voids};
+use super::votes::{Ballots, inside_of};
+use crate::proposal::Proposal;
+use crate::structure::{Frame, Structure};
+use crate::voxel::{Grid, Labels};
+use crate::{BakeConfig, BakeContext, BakeError, Stage};
+
+/// Proposes the rooms that the given parts of the air make.
+///
+/// # Errors
+/// If the caller cancels.
+pub(crate) fn propose(
+    structure: &Structure<'_>,
+    (grid, solid, mut basins): (Grid, Solid, Basins),
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Proposal, BakeError> {
+    let allowance = context.allowance();
+    basins.refill(&grid, &solid.occupied);
+    let slabs = structure.slabs();
+    basins.cut(&grid, &slabs);
+    let n_occupied = solid.occupied.count();
+    let mut notes = solid.lids.notes(&grid);
+    let Solid {
+        shut,
+        closures,
+        lids,
+        ..
+    } = solid;
+
+    context.begin(Stage::Rooms)?;
+    let mut regions = basins.merge(&grid, &shut, &slabs, config, allowance);
+    context.check()?;
+    split_limbs(
+        &grid,
+        &mut basins.labels,
+        &mut regions,
+        &mut basins.peaks,
+        &shut,
+        &config.merge,
+        allowance,
+    );
+    let low = join_low(&grid, &basins.labels, &mut regions, allowance);
+    context.check()?;
+    drop(shut);
+    let Basins { labels, peaks, .. } = basins;
+    let matter = find_matter(
+        &grid,
+        &labels,
+        &regions,
+        &peaks,
+        &structure.bvh,
+        config.merge.min_radius,
+        allowance,
+    );
+    notes.extend_from_slice(&matter.notes);
+
+    context.begin(Stage::Candidates)?;
+    let mut candidates = fit_candidates(
+        &grid,
+        &labels,
+        &regions,
+        (&closures, &lids),
+        &structure.walls,
+        [config.merge.closed_share, structure.hole.gap()],
+        allowance,
+    );
+    drop((closures, lids));
+    let stairs = inside_of(&structure.stairs, &grid, &structure.bvh, allowance);
+    let not_air = (&matter.regions[..], &stairs);
+    let ballots = Ballots::cast(&grid, &labels, &regions, not_air, allowance);
+    drop(stairs);
+    let region_at = |p| region_at(&grid, &labels, &regions, p);
+    let voids = voids_of(structure, &matter, &region_at, allowance);
+    drop(labels);
+    // From here on, everything is in scene coordinates.
+    let frame = &structure.frame;
+    for candidate in &mut candidates {
+        candidate.winding = frame.winding_to_scene(&candidate.winding);
+    }
+    let voids = voids.into_iter().map(|(p, r)| (frame.to_scene(p), r));
+    let voids = voids.collect();
+    let found = [n_occupied, basins.n_basins, candidates.len()];
+    let counts = counts_of(&grid, frame, found);
+    Ok(Proposal {
+        candidates,
+        voids,
+        low,
+        counts,
+        notes,
+        settings: config.voxel_settings(),
+        resolution: resolution_of(&grid),
+        ..Proposal::new(
+            frame.aabb_to_scene(&grid.aabb()),
+            ballots.count(&grid, frame),
+        )
+    })
+}
+
+/// Returns points of air that no opening connects to its region: inside stairs, and in shallow voids.
+fn voids_of(
+    structure: &Structure<'_>,
+    matter: &Matter,
+    region_at: &(dyn Fn(DVec3) -> u32 + Sync),
+    allowance: &Allowance,
+) -> Vec<(DVec3, u32)> {
+    let mut voids = inside_stairs(&structure.stairs, &structure.bvh, region_at, allowance);
+    voids.retain(|(_, region)| matter.regions.binary_search(region).is_err());
+    if matter.fronts_face_air {
+        let (walls, bvh) = (&structure.walls, &structure.bvh);
+        voids.extend(shallow_voids(walls, bvh, region_at, allowance));
+    }
+    voids
+}
+
+/// Returns counts for the file: of the grid, and of its contents.
+fn counts_of(
+    grid: &Grid,
+    frame: &Frame,
+    [n_occupied, n_basins, n_screens]: [usize; 3],
+) -> Vec<(&'static str, f64)> {
+    vec![
+        ("voxel_size", grid.voxel),
+        ("grid_turn_degrees", frame.degrees()),
+        ("voxels", grid.n_voxels() as f64),
+        ("occupied_voxels", n_occupied as f64),
+        ("basins", n_basins as f64),
+        ("screens", n_screens as f64),
+    ]
+}
+
+/// Returns the region of a point, 0 if there is none.
+fn region_at(grid: &Grid, labels: &Labels, regions: &Regions, p: DVec3) -> u32 {
+    grid.voxel_at(p).map_or(0, |[x, y, z]| {
+        regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
+    })
+}

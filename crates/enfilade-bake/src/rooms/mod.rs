@@ -1,0 +1,32 @@
+//! Rooms and openings found in a voxel volume, of whatever parts a builder divides the air into.
+//!
+//! All builders measure openings here, so that one rule (`judge`) tells a doorway from a mouth, a niche or a beam. They
+//! differ in the parts that they begin with: basins of a flood, cells of a tree, bundles of tetrahedra. The results are
+//! not portals but candidates in the real opening, which the cell complex then realizes exactly.
+//!
+//! Read `find.rs` first: it calls the steps in order.
+
+mod air;
+mod basins;
+mod candidates;
+mod find;
+mod flooded;
+mod fronts;
+mod hollow;
+mod judge;
+mod lids;
+mod limbs;
+mod low;
+mod refill;
+mod regions;
+mod rims;
+mod sections;
+mod slabs;
+mod voids;
+mod votes;
+
+pub(crate) use air::{VoxelAir, prepare};
+pub(crate) use basins::Basins;
+pub(crate) use find::propose;
+pub(crate) use limbs::{Limb, Plan, THICKER};
+pub(crate) use voids::inside_stairs;
