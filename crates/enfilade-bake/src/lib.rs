@@ -37,6 +37,7 @@ mod stage;
 mod structure;
 mod subset;
 mod vessel;
+mod void;
 pub use enfilade_voxel as voxel;
 pub mod watershed;
 

@@ -6,7 +6,7 @@ use enfilade_geom::scene::Scene;
 use enfilade_geom::{Allowance, Bvh, DVec3, Plane, Purse, Winding};
 
 use crate::complex::region::RegionShape;
-use crate::complex::{LabelSettings, Vote};
+use crate::complex::{Label, LabelSettings, Vote};
 use crate::config::{BspConfig, Rooms};
 use crate::proposal::Proposal;
 use crate::structure::{Candidate, OUTDOORS, Structure};
@@ -152,7 +152,7 @@ impl Parted {
             let counts = cell != NO_CELL && !self.is_narrow.get(leaf).is_some_and(|n| *n);
             counts.then(|| Vote {
                 point: shape.middle,
-                label: label(cell),
+                label: Label::Region(label(cell)),
                 weight: shape.volume as f32,
             })
         };

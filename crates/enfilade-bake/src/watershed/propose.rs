@@ -72,7 +72,7 @@ pub(crate) fn propose(
         &config.merge,
         allowance,
     );
-    let low = join_low(&grid, &basins.labels, &mut regions, allowance);
+    join_low(&grid, &basins.labels, &mut regions, allowance);
     context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;
@@ -117,7 +117,6 @@ pub(crate) fn propose(
     Ok(Proposal {
         candidates,
         voids,
-        low,
         counts,
         notes,
         settings: config.watershed_settings(),

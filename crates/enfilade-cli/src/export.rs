@@ -1,0 +1,88 @@
+//! `enfilade export`: writes a world as plain data for other programs.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use enfilade::cpg::World;
+use enfilade_report::{cells_csv, graph_dot, graph_graphml, graph_json, portals_csv, surfaces_obj};
+
+use crate::formats::Format;
+use crate::limits::Limits;
+use crate::output::{Outputs, Written, write_whole};
+use crate::screen::print_json;
+use enfilade_cli::input::{is_stream, name_of};
+use enfilade_cli::world::read_world;
+
+/// Writes the graph or the surfaces of a world as plain data, for programs that do not read our extension of glTF.
+///
+/// The name's ending chooses: `.json` has cells, portals with their polygons, the tree that finds the cell of a point,
+/// and visible cells if computed; `.graphml` and `.dot` are for programs that draw graphs; `.csv` is a table of the
+/// portals or, with `--cells`, of the cells; `.obj` has the surfaces in groups by cell, without door leaves, for
+/// programs that build navigation meshes. Special portals and materials are left out.
+#[derive(clap::Args)]
+pub(crate) struct Export {
+    /// World written by `enfilade bake`; `-` for standard input.
+    world: PathBuf,
+    /// File to write: .json, .graphml, .dot, .csv or .obj. `-` is JSON to standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Write the table of the cells, not of the portals.
+    #[arg(long)]
+    cells: bool,
+    /// Print a report on the file as JSON for machines; nothing else is printed.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+pub(crate) fn run(args: &Export) -> anyhow::Result<()> {
+    args.limits.begin()?;
+    let text_of = writer(args)?;
+    let mut outputs = Outputs::reading([&args.world])?;
+    outputs.write("-o", Format::PlainData, &args.output)?;
+    let world = read_world(&args.world)?;
+    if let Err(errors) = world.validate() {
+        let first = errors.first().map(ToString::to_string).unwrap_or_default();
+        bail!(
+            "{}: the world is broken, so it is not exported: {first}",
+            name_of(&args.world)
+        );
+    }
+    let text = text_of(&world)?.into_bytes();
+    write_whole(&args.output, &text)?;
+    let written = Written::new(&args.output, &text);
+    if args.json {
+        return print_json(outputs.printed(), &written);
+    }
+    writeln!(outputs.printed(), "{written}")?;
+    Ok(())
+}
+
+type Writer = fn(&World) -> anyhow::Result<String>;
+
+/// Returns the writer by the extension.
+fn writer(args: &Export) -> anyhow::Result<Writer> {
+    let path: &Path = &args.output;
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let extension = extension.to_ascii_lowercase();
+    if args.cells && extension != "csv" {
+        bail!(
+            "--cells applies only to a .csv file; leave it out, or give -o a name that ends in .csv"
+        );
+    }
+    Ok(match extension.as_str() {
+        "json" => |w| graph_json(w).context("cannot write JSON"),
+        _ if is_stream(path) => |w| graph_json(w).context("cannot write JSON"),
+        "graphml" => |w| Ok(graph_graphml(w)),
+        "dot" | "gv" => |w| Ok(graph_dot(w)),
+        "csv" if args.cells => |w| Ok(cells_csv(w)),
+        "csv" => |w| Ok(portals_csv(w)),
+        "obj" => |w| Ok(surfaces_obj(w)),
+        _ => bail!(
+            "{}: the name does not say what to write; end it in .json, .graphml, .dot, .csv or .obj",
+            path.display()
+        ),
+    })
+}
