@@ -11,7 +11,6 @@ mod decimate;
 mod demo;
 mod edit;
 mod exact;
-mod export;
 mod formats;
 mod inspect;
 mod limits;
@@ -66,7 +65,6 @@ enum Command {
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Edit(edit::Edit),
-    Export(export::Export),
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Man(manual::Man),
@@ -97,7 +95,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Edit(args) => edit::run(&args),
-        Command::Export(args) => export::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),
