@@ -18,7 +18,7 @@ use enfilade_geom::scene::{Mesh, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, Allowance, DMat3, DVec3, Plane, Ray, Winding};
 use rayon::prelude::*;
 
-use crate::complex::{Partition, PartitionPortal};
+use crate::complex::{Label, Partition, PartitionPortal};
 use crate::layout::{Layout, layout_of};
 use crate::structure::{Candidate, SceneStructure, plates};
 
@@ -50,6 +50,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     let mut cells: Vec<Cell> = (0..partition.label_of_cell.len())
         .map(|i| {
             let outdoor = partition.outside == Some(i as u32);
+            let is_void = !outdoor && matches!(partition.label_of_cell[i], Label::Void(_));
             let b = partition.aabbs[i];
             Cell {
                 name: if outdoor {
@@ -63,6 +64,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
                 n_detail_triangles: 0,
                 portals: Vec::new(),
                 outdoor,
+                is_void,
             }
         })
         .collect();
@@ -86,7 +88,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         })
     });
     let bays = bays::join_bays(judged.collect());
-    let portals: Vec<Portal> = bays::join_slits(bays)
+    let portals: Vec<Portal> = bays::join_slits(bays, |c| cells[c as usize].is_void)
         .iter()
         .filter_map(|j| portal(cut, j))
         .collect();

@@ -1,36 +1,31 @@
 //! Joins cells that belong together: a shallow void and the room below it, although no opening connects
-//! them, and regions that no plane separates.
+//! them, voids that open to each other, and regions that no plane separates.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::{DVec3, Sets};
 
-use crate::complex::{Complex, LeafCells, OpenContact, Partition, Vote};
+use crate::complex::{Complex, Label, LeafCells, OpenContact, Partition, Vote};
 use crate::structure::OUTDOORS;
 
-/// Bit that marks the label of a void; the other bits are the region that the void belongs to.
-pub(crate) const VOID: u32 = 1 << 31;
-
-/// Merges cells that are one space, and renumbers the rest: each that opens to no other region with the largest cell of
-/// its region (shallow voids, the insides of stairs), and cells of `low` regions that open to each other.
-pub(crate) fn join_enclosed(partition: &mut Partition, low: &BTreeSet<u32>) {
+/// Merges each cell that opens to no other region with the largest cell of its region: shallow voids, the insides of
+/// stairs.
+pub(crate) fn join_enclosed(partition: &mut Partition) {
     let n = partition.label_of_cell.len();
-    let mut home_of_label: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut home_of_label: BTreeMap<Label, u32> = BTreeMap::new();
     for (c, &label) in partition.label_of_cell.iter().enumerate() {
         let best = home_of_label.entry(label).or_insert(c as u32);
         if partition.volumes[c] > partition.volumes[*best as usize] {
             *best = c as u32;
         }
     }
-    let region = |c: u32| partition.label_of_cell[c as usize] & !VOID;
+    let region = |c: u32| partition.label_of_cell[c as usize].region();
     let mut sets = Sets::new(n);
     let mut opens_elsewhere = vec![false; n];
     for p in &partition.portals {
         let regions = p.cells.map(region);
-        if regions.iter().all(|r| low.contains(r)) {
-            sets.join(p.cells[0], p.cells[1]);
-        } else if regions[0] != regions[1] {
+        if regions[0] != regions[1] {
             p.cells
                 .iter()
                 .for_each(|&c| opens_elsewhere[c as usize] = true);
@@ -38,11 +33,34 @@ pub(crate) fn join_enclosed(partition: &mut Partition, low: &BTreeSet<u32>) {
     }
     for c in 0..n as u32 {
         let label = partition.label_of_cell[c as usize];
-        let is_enclosed = !opens_elsewhere[c as usize] && ![OUTDOORS, u32::MAX].contains(&label);
-        if is_enclosed && let Some(&home) = home_of_label.get(&(label & !VOID)) {
+        if !opens_elsewhere[c as usize]
+            && label != Label::Region(OUTDOORS)
+            && let Some(region) = label.region()
+            && let Some(&home) = home_of_label.get(&Label::Region(region))
+        {
             sets.join(home, c);
         }
     }
+    join(partition, sets);
+}
+
+/// Merges voids that open to each other: beams, ribs and ducts divide what is one space to whoever crawls there.
+pub(crate) fn join_voids(partition: &mut Partition) {
+    let mut sets = Sets::new(partition.label_of_cell.len());
+    let is_void = |c: &u32| matches!(partition.label_of_cell[*c as usize], Label::Void(_));
+    for p in partition
+        .portals
+        .iter()
+        .filter(|p| p.cells.iter().all(is_void))
+    {
+        sets.join(p.cells[0], p.cells[1]);
+    }
+    join(partition, sets);
+}
+
+/// Merges the cells of each set, and renumbers the rest.
+fn join(partition: &mut Partition, sets: Sets) {
+    let n = partition.label_of_cell.len();
     let least = sets.into_least();
     // The largest cell of each set stands for all of it.
     let mut stands_for: BTreeMap<u32, u32> = BTreeMap::new();
@@ -126,12 +144,13 @@ pub(crate) fn join_unparted(
     cells: &LeafCells,
     votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],
-    low: &mut BTreeSet<u32>,
 ) -> bool {
     let mut between: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
     for (pair, contact) in complex.contacts(cells) {
-        let [a, b] = pair.map(|c| cells.label_of_cell[c as usize]);
-        if a != b && ![a, b].contains(&u32::MAX) {
+        let [a, b] = pair.map(|c| cells.label_of_cell[c as usize].region());
+        if let (Some(a), Some(b)) = (a, b)
+            && a != b
+        {
             let sum = between.entry([a.min(b), a.max(b)]).or_default();
             sum.on_candidates += contact.on_candidates;
             sum.beside += contact.beside;
@@ -156,13 +175,11 @@ pub(crate) fn join_unparted(
             *label = labels[stands_for[i] as usize];
         }
     };
-    for (i, &least) in stands_for.iter().enumerate() {
-        // Together with a room, a low space is a part of it.
-        if !low.contains(&labels[i]) {
-            low.remove(&labels[least as usize]);
+    for vote in votes {
+        if let Label::Region(region) = &mut vote.label {
+            relabel(region);
         }
     }
-    votes.iter_mut().for_each(|v| relabel(&mut v.label));
     voids.iter_mut().for_each(|(_, region)| relabel(region));
     (0..).zip(&stands_for).any(|(i, &least)| i != least)
 }

@@ -39,6 +39,7 @@ mod stage;
 mod structure;
 mod subset;
 mod vessel;
+mod void;
 pub use enfilade_voxel as voxel;
 pub mod watershed;
 

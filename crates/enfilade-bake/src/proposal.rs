@@ -1,6 +1,6 @@
 //! A builder's proposal: rooms and possible portals. [`realize`](crate::realize) makes it exact.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use enfilade_geom::{Aabb, DVec3};
 
@@ -18,11 +18,9 @@ pub(crate) struct Proposal {
     pub(crate) votes: Vec<Vote>,
     /// Points in shallow voids, each with its region, although no opening connects the two.
     pub(crate) voids: Vec<(DVec3, u32)>,
-    /// Regions that nobody walks into: one space wherever they open to each other.
-    pub(crate) low: BTreeSet<u32>,
     /// How votes become cells.
     pub(crate) label: LabelSettings,
-    /// Joins regions that no plane separates: see [`crate::join::join_unparted`].
+    /// Joins regions that no plane separates, and voids that open to each other: see [`crate::join`].
     pub(crate) joins_unparted: bool,
     /// Numbers for the statistics of the file.
     pub(crate) counts: Vec<(&'static str, f64)>,
@@ -41,7 +39,6 @@ impl Proposal {
             candidates: Vec::new(),
             votes,
             voids: Vec::new(),
-            low: BTreeSet::new(),
             label: LabelSettings::default(),
             joins_unparted: true,
             counts: Vec::new(),

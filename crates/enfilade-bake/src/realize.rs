@@ -4,14 +4,17 @@
 use std::collections::BTreeSet;
 
 use enfilade_cpg::{Provenance, Statistics, World};
-use enfilade_geom::Triangle;
 use enfilade_geom::scene::Role;
+use enfilade_geom::{Allowance, Triangle};
 
 use crate::assemble::{Cut, assemble};
-use crate::complex::{Complex, ComplexInput, LeafCells, Partition, Vote, build_complex_within};
-use crate::join::{VOID, join_enclosed, join_unparted};
+use crate::complex::{
+    Complex, ComplexInput, Label, LeafCells, Partition, Vote, build_complex_within,
+};
+use crate::join::{join_enclosed, join_unparted, join_voids};
 use crate::proposal::Proposal;
 use crate::structure::Structure;
+use crate::void::mark_voids;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
 
 /// Turns a method's proposal into a world.
@@ -53,7 +56,7 @@ pub(crate) fn realize(
     };
     let complex = build_complex_within(&input, context.allowance());
     context.begin(Stage::Partition)?;
-    let partition = part(&complex, &mut proposal);
+    let partition = part(&complex, &mut proposal, context.allowance());
     proposal.counts.push(("leaves", complex.n_leaves() as f64));
     proposal.votes = Vec::new();
     let outward = complex.opening_tolerance();
@@ -88,17 +91,16 @@ pub(crate) fn realize(
 const VOID_WEIGHT: f32 = 1.0;
 
 /// Divides the leaves of the complex among cells.
-fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
+fn part(complex: &Complex<'_>, proposal: &mut Proposal, allowance: &Allowance) -> Partition {
     let Proposal {
         votes,
         voids,
-        low,
         label,
         joins_unparted,
         ..
     } = proposal;
     let mut cells = complex.label(votes, label);
-    while *joins_unparted && join_unparted(complex, &cells, votes, voids, low) {
+    while *joins_unparted && join_unparted(complex, &cells, votes, voids) {
         cells = complex.label(votes, label);
     }
     // Voids that no room's votes reached.
@@ -107,7 +109,7 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         .filter(|(p, _)| complex.cell_at(&cells, *p).is_none())
         .map(|(point, region)| Vote {
             point,
-            label: VOID | region,
+            label: Label::Void(region),
             weight: VOID_WEIGHT,
         })
         .collect();
@@ -130,13 +132,18 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal) -> Partition {
         }
     }
     let mut partition = complex.realize(cells);
-    join_enclosed(&mut partition, low);
+    join_enclosed(&mut partition);
+    mark_voids(&mut partition, allowance);
+    // Methods whose regions are never joined make the cells that they are asked for.
+    if *joins_unparted {
+        join_voids(&mut partition);
+    }
     partition
 }
 
 /// Returns the cells that open to a cell of another region.
 fn opening_elsewhere(complex: &Complex<'_>, cells: &LeafCells) -> BTreeSet<u32> {
-    let region = |c: u32| cells.label_of_cell[c as usize] & !VOID;
+    let region = |c: u32| cells.label_of_cell[c as usize].region();
     let pairs = complex.contacts(cells).into_keys();
     let elsewhere = pairs.filter(|[a, b]| region(*a) != region(*b));
     elsewhere.flatten().collect()

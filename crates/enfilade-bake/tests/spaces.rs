@@ -58,6 +58,10 @@ fn n_indoors(graph: &CellPortalGraph) -> usize {
     graph.indoor_cells().count()
 }
 
+fn is_void(graph: &CellPortalGraph, p: [f64; 3]) -> bool {
+    graph[at(graph, p)].is_void
+}
+
 /// A living room of 6 m x 5 m and a kitchen of 2.4 m x 2.5 m beside it, 2.5 m high, with an opening between them.
 fn living_and_kitchen(method: Method, kitchen: [f64; 2], hole: Block) -> CellPortalGraph {
     baked(
@@ -92,8 +96,9 @@ fn a_beam_across_a_hall_parts_nothing(method: Method) {
 
 /// A hall of 9 m x 12 m, 3.7 m high, with a beam across its middle that leaves 3.2 m, and a wall of `jamb` m on both sides
 /// below it.
-fn hall_with_beam(jamb: f64) -> CellPortalGraph {
+fn hall_with_beam(method: Method, jamb: f64) -> CellPortalGraph {
     baked(
+        method,
         &[
             ([0.0, 0.0, 0.0], [9.0, 3.7, 6.0]),
             ([0.0, 0.0, 6.3], [9.0, 3.7, 12.3]),
@@ -103,10 +108,9 @@ fn hall_with_beam(jamb: f64) -> CellPortalGraph {
     )
 }
 
-#[test]
-fn a_beam_on_pilasters_parts_nothing_and_walls_below_it_do() {
-    assert_eq!(n_indoors(&hall_with_beam(0.3)), 1);
-    assert_eq!(n_indoors(&hall_with_beam(1.5)), 2);
+fn a_beam_on_pilasters_parts_nothing_and_walls_below_it_do(method: Method) {
+    assert_eq!(n_indoors(&hall_with_beam(method, 0.3)), 1);
+    assert_eq!(n_indoors(&hall_with_beam(method, 1.5)), 2);
 }
 
 /// Returns two rooms with a door between them below one plenum, which three beams in each room divide. Above each beam is
@@ -137,6 +141,7 @@ fn the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits(method: Me
             assert_eq!(at(&graph, [x, 3.3, 2.5]), above, "above {x}, slit {slit}");
         }
         assert!(west != east && above != west && above != east);
+        assert!(graph[above].is_void && graph[west].is_room() && graph[east].is_room());
         assert_eq!(n_indoors(&graph), 3, "slit {slit}");
     }
 }
@@ -159,7 +164,84 @@ fn cellars_with_doorways_stay_rooms(method: Method) {
         ];
         let graph = baked(method, &air.map(mirrored), Vec::new());
         assert_eq!(n_indoors(&graph), 4, "mirrored: {is_mirrored}");
+        assert_eq!(graph.rooms().count(), 4, "mirrored: {is_mirrored}");
     }
+}
+
+#[test]
+fn spaces_without_room_to_stand_or_a_doorway_are_voids_for_each_method() {
+    // A duct behind a grille, a crawl space with a hatch in the room's floor, and a closed space as high as a room.
+    let air = [
+        ([0.0, 0.0, 0.0], [5.0, 2.6, 5.0]),
+        ([5.3, 0.0, 0.0], [10.3, 0.6, 1.0]),
+        ([5.0, 0.1, 0.2], [5.3, 0.5, 0.8]),
+        ([0.0, -1.5, 0.0], [5.0, -0.3, 5.0]),
+        ([2.0, -0.3, 2.0], [2.8, 0.0, 2.8]),
+        ([5.3, 0.0, 2.0], [8.3, 2.6, 5.0]),
+    ];
+    for method in [Method::Watershed, Method::Bsp, Method::Delaunay] {
+        let graph = baked(method, &air, Vec::new());
+        assert!(is_void(&graph, [7.0, 0.3, 0.5]), "duct, {method:?}");
+        assert!(is_void(&graph, [1.0, -0.9, 1.0]), "crawl space, {method:?}");
+        assert!(!is_void(&graph, [7.0, 1.2, 3.5]), "closet, {method:?}");
+        assert!(!is_void(&graph, [1.0, 1.2, 1.0]), "room, {method:?}");
+    }
+}
+
+/// A model in another unit, or a vessel.
+#[test]
+fn where_nobody_can_stand_anywhere_nothing_is_a_void() {
+    let air = [
+        ([0.0, 0.0, 0.0], [1.5, 0.8, 1.5]),
+        ([1.6, 0.0, 0.0], [3.1, 0.8, 1.5]),
+    ];
+    for graph in [Method::Watershed, Method::Bsp].map(|m| baked(m, &air, Vec::new())) {
+        assert!(graph.cells.iter().all(|c| !c.is_void));
+    }
+}
+
+/// The ridge of the roof is 2.3 m above the floor of the upper attic, 1.8 m above that of the lower; hatches lead to both.
+#[test]
+fn an_attic_is_a_room_if_somebody_can_stand_below_its_ridge() {
+    let roof = |ridge: f64, x: f64| {
+        let steps = (0..46).map(|k| {
+            let z = 0.1 * f64::from(k);
+            let top = ridge - (z + 0.05 - 2.3).abs();
+            ([x, 2.6 + top.max(0.05), z], [x + 4.0, 5.0, z + 0.1])
+        });
+        union(&steps.collect::<Vec<_>>())
+    };
+    let air = [
+        ([0.0, 0.0, 0.0], [8.3, 2.3, 4.6]),
+        ([0.0, 2.6, 0.0], [4.0, 4.95, 4.6]),
+        ([4.3, 2.6, 0.0], [8.3, 4.95, 4.6]),
+        ([1.0, 2.3, 1.8], [1.7, 2.6, 2.5]),
+        ([6.0, 2.3, 1.8], [6.7, 2.6, 2.5]),
+    ];
+    let graph = baked(
+        Method::Watershed,
+        &air,
+        vec![roof(2.3, 0.0), roof(1.8, 4.3)],
+    );
+    assert!(!is_void(&graph, [3.0, 3.0, 2.3]));
+    assert!(is_void(&graph, [7.3, 3.0, 2.3]));
+}
+
+#[test]
+fn openings_from_a_room_into_a_void_are_one_portal_for_each_plane() {
+    let lamp = |x: f64| ([x, 2.4, 2.0], [x + 0.6, 2.5, 3.0]);
+    let mut air = vec![
+        ([0.0, 0.0, 0.0], [6.0, 2.4, 5.0]),
+        ([0.0, 2.5, 0.0], [6.0, 3.5, 5.0]),
+    ];
+    air.extend([0.5, 2.5, 4.5].map(lamp));
+    let graph = baked(Method::Watershed, &air, Vec::new());
+    let [room, above] = [[3.0, 1.2, 4.0], [3.0, 3.0, 4.0]].map(|p| at(&graph, p));
+    assert!(graph[above].is_void && graph[room].is_room());
+    let between: Vec<_> = graph.exits(room).filter(|e| e.to == above).collect();
+    assert_eq!(between.len(), 1);
+    assert_eq!(between[0].portal.pieces.len(), 3);
+    assert!((between[0].portal.area - 1.8).abs() < 0.01);
 }
 
 fn the_inside_of_a_massive_flight_belongs_to_its_room(method: Method) {
@@ -205,12 +287,14 @@ by! {
     watershed Watershed:
         a_niche_open_at_full_height_is_part_of_its_room,
         a_beam_across_a_hall_parts_nothing,
+        a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
         the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
     bsp Bsp:
         a_niche_open_at_full_height_is_part_of_its_room,
         a_beam_across_a_hall_parts_nothing,
+        a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
         the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
@@ -218,6 +302,7 @@ by! {
     delaunay Delaunay:
         a_niche_open_at_full_height_is_part_of_its_room,
         a_beam_across_a_hall_parts_nothing,
+        a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
 }

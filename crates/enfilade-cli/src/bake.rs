@@ -286,6 +286,8 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
 pub(crate) struct Summary {
     triangles: usize,
     cells_indoors: usize,
+    /// Those of them in which nobody can stand.
+    voids: usize,
     portals: usize,
     doors: usize,
     windows: usize,
@@ -303,6 +305,7 @@ impl Summary {
         Self {
             triangles: triangles.copied().unwrap_or(0.0) as usize,
             cells_indoors: graph.indoor_cells().count(),
+            voids: graph.cells.iter().filter(|c| c.is_void).count(),
             portals: graph.portals.len(),
             doors: count(PortalKind::Door),
             windows: count(PortalKind::Window),
@@ -320,6 +323,7 @@ pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<(
     for (name, n) in [
         ("triangles", summary.triangles),
         ("cells indoors", summary.cells_indoors),
+        ("  voids", summary.voids),
         ("portals", summary.portals),
         ("  doors", summary.doors),
         ("  windows", summary.windows),

@@ -71,6 +71,8 @@ struct CellReport<'a> {
     detail_triangles: u32,
     portals: Vec<u32>,
     outdoor: bool,
+    /// `room`, `outdoors` or `void`.
+    kind: &'static str,
 }
 
 #[derive(Serialize)]
@@ -131,6 +133,7 @@ fn report(world: &World) -> Inspection<'_> {
         detail_triangles: c.n_detail_triangles,
         portals: c.portals.iter().map(|p| p.0).collect(),
         outdoor: c.outdoor,
+        kind: cell_kind(c),
     });
     let scores = portal_scores(world, &CostModel::default());
     let portals = graph
@@ -197,6 +200,14 @@ fn input_triangles(world: &World) -> u64 {
         .map_or(0, |&n| n as u64)
 }
 
+fn cell_kind(cell: &Cell) -> &'static str {
+    match (cell.outdoor, cell.is_void) {
+        (true, _) => "outdoors",
+        (_, true) => "void",
+        _ => "room",
+    }
+}
+
 fn kind_name(kind: PortalKind) -> &'static str {
     match kind {
         PortalKind::Open => "open",
@@ -213,15 +224,16 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
     by_volume.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     writeln!(
         out,
-        "{:>6}  {:<16} {:>12} {:>10} {:>10} {:>8}  size in m (x × y × z)",
-        "cell", "name", "volume m³", "triangles", "detail", "portals"
+        "{:>6}  {:<16} {:<8} {:>12} {:>10} {:>10} {:>8}  size in m (x × y × z)",
+        "cell", "name", "kind", "volume m³", "triangles", "detail", "portals"
     )?;
     for (id, c) in by_volume {
         let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
         writeln!(
             out,
-            "{id:>6}  {:<16} {:>12.2} {:>10} {:>10} {:>8}  {x:.2} × {y:.2} × {z:.2}",
+            "{id:>6}  {:<16} {:<8} {:>12.2} {:>10} {:>10} {:>8}  {x:.2} × {y:.2} × {z:.2}",
             c.name,
+            cell_kind(c),
             c.volume,
             c.n_triangles,
             c.n_detail_triangles,
@@ -335,7 +347,12 @@ fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
     } else {
         ""
     };
-    row("cells", format!("{indoor}{outdoors}"))?;
+    let n_rooms = graph.rooms().count();
+    let rooms = match indoor - n_rooms {
+        0 => indoor.to_string(),
+        n => format!("{n_rooms} rooms, {n} voids"),
+    };
+    row("cells", format!("{rooms}{outdoors}"))?;
     let mut kinds = BTreeMap::new();
     for p in &graph.portals {
         *kinds.entry(p.kind).or_insert(0_usize) += 1;

@@ -188,7 +188,12 @@ fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
         note: "The numbers by which the literature describes scenes.".into(),
         rows: vec![
             row(&["", "all", "mean of a room", "most of a room"]),
-            row(&["rooms (outdoors included)", &n_cells.to_string(), "", ""]),
+            row(&[
+                "cells (outdoors and voids included)",
+                &n_cells.to_string(),
+                "",
+                "",
+            ]),
             row(&[
                 "doorways",
                 &n_portals.to_string(),

@@ -356,6 +356,7 @@ fn cut(
 mod tests {
     use super::super::graph::OpenFacet;
     use super::*;
+    use crate::Label;
     use enfilade_geom::Purse;
 
     #[test]
@@ -381,14 +382,14 @@ mod tests {
         };
         let cells = || LeafCells {
             cell_of_leaf: vec![0, 1, 2, 1, 1],
-            label_of_cell: vec![7, 8, 9],
+            label_of_cell: [7, 8, 9].map(Label::Region).to_vec(),
             volumes: vec![5.0, 3e-6, 5.0],
             outside: Some(2),
         };
         let mut found = cells();
         dissolve_slivers(&graph, &mut found);
         assert_eq!(found.cell_of_leaf, [0, 1, 1, SOLID, 1]);
-        assert_eq!(found.label_of_cell, [7, 9]);
+        assert_eq!(found.label_of_cell, [7, 9].map(Label::Region));
         assert_eq!(found.volumes, [5.0, 5.0 + 2e-6]);
         assert_eq!(found.outside, Some(1));
         // A closet of a liter is a cell.

@@ -10,11 +10,11 @@ use std::ops::Range;
 
 use enfilade_geom::{DVec3, Sets, Winding, poly};
 
-use super::Complex;
 use super::facet::{Cover, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::graph::{box_faces, sides_of_border};
 use super::leaf_cells::{LeafCells, SOLID};
 use super::partition::{self, Partition};
+use super::{Complex, Label};
 
 /// The cell of [`Complex::divided`] in front of the candidate's plane.
 pub const FRONT: u32 = 0;
@@ -141,7 +141,7 @@ impl Complex<'_> {
             self,
             LeafCells {
                 cell_of_leaf,
-                label_of_cell: vec![FRONT, BACK],
+                label_of_cell: [FRONT, BACK].map(Label::Region).to_vec(),
                 volumes,
                 outside,
             },

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use super::cut::{absorb_chips, dissolve_slivers, move_borders};
 use super::graph::{LeafGraph, NO_CANDIDATE, OpenFacet};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
-use super::{LabelSettings, Vote};
+use super::{Label, LabelSettings, Vote};
 
 fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
     let mut out = Tally::new();
@@ -39,7 +39,7 @@ struct Group {
     /// Its least leaf. Merging keeps the id of a group, so that a large group need not update all its neighbors
     /// whenever it takes in another.
     root: u32,
-    label: Option<u32>,
+    label: Option<Label>,
     /// It is a cell, whatever happens around it.
     keeps: bool,
     volume: f64,
@@ -72,7 +72,7 @@ pub(super) fn label_leaves(
     let leaves: Vec<Option<u32>> = votes.par_iter().with_min_len(1024).map(leaf_of).collect();
     for (vote, leaf) in votes.iter().zip(leaves) {
         if let Some(leaf) = leaf
-            && vote.label != SOLID
+            && vote.label != Label::Solid
         {
             *tally.entry((leaf, vote.label)).or_default() += f64::from(vote.weight);
         }
@@ -80,7 +80,7 @@ pub(super) fn label_leaves(
     let mut component_of = components(graph, |_| false);
     let mut strong = strong_labels(graph, &tally, &component_of, settings);
     let has_leak =
-        |strong: &BTreeMap<u32, Vec<u32>>, c: u32| strong.get(&c).is_some_and(|s| s.len() > 1);
+        |strong: &BTreeMap<u32, Vec<Label>>, c: u32| strong.get(&c).is_some_and(|s| s.len() > 1);
     if strong.keys().any(|&c| has_leak(&strong, c)) {
         // Rooms leak into each other, perhaps only through cracks.
         let leaked: Vec<bool> = component_of.iter().map(|&c| has_leak(&strong, c)).collect();
@@ -90,7 +90,7 @@ pub(super) fn label_leaves(
 
     // Leaves of components with several strong labels are grown together; all others are joined at once.
     let mut sets = Sets::new(n_leaves);
-    let mut label_of_set: Vec<u32> = vec![SOLID; n_leaves];
+    let mut label_of_set = vec![Label::Solid; n_leaves];
     let leaked = |leaf: u32| {
         strong
             .get(&component_of[leaf as usize])
@@ -106,7 +106,7 @@ pub(super) fn label_leaves(
             label_of_set[component as usize] = label;
         }
     }
-    let mut best_of_leaf: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    let mut best_of_leaf: BTreeMap<u32, (f64, Label)> = BTreeMap::new();
     for (&(leaf, label), &w) in &tally {
         let labels = strong
             .get(&component_of[leaf as usize])
@@ -170,19 +170,19 @@ fn strong_labels(
     tally: &Tally,
     component_of: &[u32],
     settings: &LabelSettings,
-) -> BTreeMap<u32, Vec<u32>> {
+) -> BTreeMap<u32, Vec<Label>> {
     let mut volume: BTreeMap<u32, f64> = BTreeMap::new();
     for (leaf, &c) in component_of.iter().enumerate() {
         *volume.entry(c).or_default() += graph.volumes[leaf];
     }
     let by_component = tally_by(tally, |leaf| component_of[leaf as usize]);
     let (mut of_label, mut of_component) =
-        (BTreeMap::<u32, f64>::new(), BTreeMap::<u32, f64>::new());
+        (BTreeMap::<Label, f64>::new(), BTreeMap::<u32, f64>::new());
     for (&(c, label), &w) in &by_component {
         *of_label.entry(label).or_default() += w;
         *of_component.entry(c).or_default() += w;
     }
-    let mut strong: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let mut strong: BTreeMap<u32, Vec<Label>> = BTreeMap::new();
     for (&(c, label), &w) in &by_component {
         // A share of the label, not of the component: a toilet that leaks into a hall is a small part of both
         // together, yet all of the toilet.
@@ -200,7 +200,7 @@ fn strong_labels(
 fn grow_together(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
-    label_of_set: &mut [u32],
+    label_of_set: &mut [Label],
     component_of: &[u32],
     leaked: impl Fn(u32) -> bool,
 ) {
@@ -221,7 +221,7 @@ fn grow_together(
     for i in order {
         let [a, b] = graph.facets[i as usize].leaves.map(|l| sets.find(l));
         let (la, lb) = (label_of_set[a as usize], label_of_set[b as usize]);
-        if a != b && (la == lb || la == SOLID || lb == SOLID) {
+        if a != b && (la == lb || la == Label::Solid || lb == Label::Solid) {
             label_of_set[sets.join(a, b) as usize] = la.min(lb);
         }
     }
@@ -229,20 +229,20 @@ fn grow_together(
 
 /// Joins parts of one region that only a candidate separates: a candidate reaches beyond its opening, and two
 /// candidates of one opening have a slice of a room between them.
-fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [u32]) {
+fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [Label]) {
     for f in &graph.facets {
         let [a, b] = f.leaves.map(|l| sets.find(l));
         let label = label_of_set[a as usize];
-        if a != b && label != SOLID && label == label_of_set[b as usize] {
+        if a != b && label != Label::Solid && label == label_of_set[b as usize] {
             label_of_set[sets.join(a, b) as usize] = label;
         }
     }
 }
 
 /// Returns, by least leaf, the sets that have a label or an opening other than a gap to another set.
-fn open_sets(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &[u32]) -> Vec<bool> {
+fn open_sets(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &[Label]) -> Vec<bool> {
     graph.spend_pass();
-    let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != SOLID).collect();
+    let mut is_open: Vec<bool> = label_of_set.iter().map(|&l| l != Label::Solid).collect();
     for f in graph.facets.iter().filter(|f| !f.is_gap) {
         let [a, b] = f.leaves.map(|l| sets.find(l));
         if a != b {
@@ -263,7 +263,7 @@ fn may_merge(graph: &LeafGraph<'_>, a: &Group, b: &Group) -> bool {
 fn merge_groups(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
-    label_of_set: &[u32],
+    label_of_set: &[Label],
     settings: &LabelSettings,
 ) -> BTreeMap<u32, Group> {
     let is_open = open_sets(graph, sets, label_of_set);
@@ -276,7 +276,7 @@ fn merge_groups(
         let label = label_of_set[set as usize];
         let group = groups.entry(set).or_insert(Group {
             root: set,
-            label: (label != SOLID).then_some(label),
+            label: (label != Label::Solid).then_some(label),
             keeps: false,
             volume: 0.0,
             neighbors: BTreeMap::new(),
@@ -300,7 +300,7 @@ fn merge_groups(
         }
     }
     // The largest group of each label keeps it, whatever its size.
-    let mut main: BTreeMap<u32, (f64, Reverse<u32>)> = BTreeMap::new();
+    let mut main: BTreeMap<Label, (f64, Reverse<u32>)> = BTreeMap::new();
     for (&id, group) in &groups {
         if let Some(label) = group.label {
             let key = (group.volume, Reverse(id));
@@ -454,7 +454,7 @@ fn number_cells(
             .collect(),
         label_of_cell: cells
             .iter()
-            .map(|(_, g)| g.label.unwrap_or(SOLID))
+            .map(|(_, g)| g.label.unwrap_or(Label::Solid))
             .collect(),
         volumes,
         outside,
@@ -490,7 +490,8 @@ mod tests {
         let settings = LabelSettings::default();
         let home = |graph: &LeafGraph<'_>| {
             let mut sets = Sets::new(3);
-            merge_groups(graph, &mut sets, &[10, 20, SOLID], &settings);
+            let labels = [Label::Region(10), Label::Region(20), Label::Solid];
+            merge_groups(graph, &mut sets, &labels, &settings);
             (0..2).find(|&room| sets.find(room) == sets.find(2))
         };
         assert_eq!(home(&graph), Some(0));
@@ -527,7 +528,7 @@ mod tests {
             let groups = merge_groups(
                 &graph,
                 &mut sets,
-                &[10, SOLID, SOLID],
+                &[Label::Region(10), Label::Solid, Label::Solid],
                 &LabelSettings::default(),
             );
             give_away_crumbs(&graph, &mut sets, groups, true);

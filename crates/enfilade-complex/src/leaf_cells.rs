@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-/// The label of leaves in no cell.
+use super::Label;
+
+/// The cell of leaves in no cell.
 pub(super) const SOLID: u32 = u32::MAX;
 
 /// The cell of each leaf.
@@ -11,7 +13,7 @@ pub struct LeafCells {
     /// Cell of each leaf, or [`SOLID`].
     pub(super) cell_of_leaf: Vec<u32>,
     /// The vote label of each cell; several cells may share one.
-    pub label_of_cell: Vec<u32>,
+    pub label_of_cell: Vec<Label>,
     /// Volume of each cell.
     pub(super) volumes: Vec<f64>,
     /// The cell with the largest volume of leaves at the border of the box, if any touches it.
@@ -19,7 +21,7 @@ pub struct LeafCells {
 }
 
 /// Weight of the votes of a leaf or component for a label.
-pub(super) type Tally = BTreeMap<(u32, u32), f64>;
+pub(super) type Tally = BTreeMap<(u32, Label), f64>;
 
 impl LeafCells {
     /// Renumbers the cells without those that lost every leaf, and recomputes their volumes from the leaves.

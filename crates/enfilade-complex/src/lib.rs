@@ -87,13 +87,35 @@ pub struct ComplexInput<'a> {
     pub has_seals: bool,
 }
 
-/// A statement that a point belongs to a region.
+/// The space that a vote or a cell belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Label {
+    /// A region of the caller's.
+    Region(u32),
+    /// A void of that region, which no opening connects with the rest of it, or in which nobody can stand.
+    Void(u32),
+    /// No space. Votes with it do not count.
+    Solid,
+}
+
+impl Label {
+    /// Returns the region, also that of a void.
+    #[must_use]
+    pub fn region(self) -> Option<u32> {
+        match self {
+            Self::Region(region) | Self::Void(region) => Some(region),
+            Self::Solid => None,
+        }
+    }
+}
+
+/// A statement that a point belongs to a space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vote {
     /// A position, e.g. the center of a voxel. [Units: wu]
     pub point: DVec3,
-    /// The region. Votes with `u32::MAX` do not count.
-    pub label: u32,
+    /// The space.
+    pub label: Label,
     /// The volume that it stands for. [Units: wu³]
     pub weight: f32,
 }

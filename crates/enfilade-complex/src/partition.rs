@@ -13,13 +13,13 @@ use super::pieces::{self, Opening, Piece, Rules};
 use super::seen::{self, TriangleCells};
 use super::surface::{NO_PLANE, Source, Surface};
 use super::tagged::{MIXED, TaggedTree};
-use super::{CRACK_WIDTH, Complex};
+use super::{CRACK_WIDTH, Complex, Label};
 
 /// Exact cells and portals.
 #[derive(Clone, Debug)]
 pub struct Partition {
     /// The vote label of each cell; several cells may share one.
-    pub label_of_cell: Vec<u32>,
+    pub label_of_cell: Vec<Label>,
     /// Volume of each cell. [Units: wu³]
     pub volumes: Vec<f64>,
     /// Box of each cell.

@@ -179,7 +179,7 @@ fn votes(b: &Aabb, step: f64, label: impl Fn(DVec3) -> Option<u32>) -> Vec<Vote>
                 if let Some(label) = label(point) {
                     out.push(Vote {
                         point,
-                        label,
+                        label: Label::Region(label),
                         weight: (step * step * step) as f32,
                     });
                 }
@@ -246,7 +246,7 @@ fn a_door_between_two_rooms_is_one_portal_of_the_exact_area() {
     let t = two_rooms(0.0);
     let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
-    assert_eq!(p.label_of_cell, [10, 20, 99]);
+    assert_eq!(p.label_of_cell, [10, 20, 99].map(Label::Region));
     assert_eq!(p.outside, Some(2));
     assert_eq!(p.portals.len(), 1);
     let portal = &p.portals[0];
@@ -334,7 +334,7 @@ fn a_crack_beside_the_door_becomes_a_portal_of_its_own() {
     let t = two_rooms(0.005);
     let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
-    assert_eq!(p.label_of_cell, [10, 20, 99]);
+    assert_eq!(p.label_of_cell, [10, 20, 99].map(Label::Region));
     let cracks: Vec<_> = p
         .portals
         .iter()
@@ -365,7 +365,7 @@ fn a_candidate_that_misses_part_of_the_door_leaves_a_leak_and_no_hole() {
     let t = two_rooms(0.0);
     let c = build(&t, &[candidate_at_x(3.1, [-0.1, 1.7], [0.8, 2.1])]);
     let p = c.partition(&room_votes(&c.bounds()), &LabelSettings::default());
-    assert_eq!(p.label_of_cell, [10, 20, 99]);
+    assert_eq!(p.label_of_cell, [10, 20, 99].map(Label::Region));
     let total: f64 = p.portals.iter().map(|q| q.area).sum();
     assert!(total > 1.88, "{total}");
     assert_promises(&t, &p, &c.bounds(), 20_000);
@@ -389,7 +389,7 @@ fn walls_without_thickness_part_rooms_and_show_both_sides() {
         }),
         &LabelSettings::default(),
     );
-    assert_eq!(p.label_of_cell, [1, 2, 3]);
+    assert_eq!(p.label_of_cell, [1, 2, 3].map(Label::Region));
     assert_eq!(p.portals.len(), 1);
     assert!((p.portals[0].area - 2.0).abs() < 1e-6);
     for sheet in 12..t.len() {
@@ -432,7 +432,7 @@ fn slivers_in_an_opening_are_as_open_as_the_rest() {
         })
     };
     let p = c.partition(&votes(&c.bounds(), 0.1, label), &LabelSettings::default());
-    assert_eq!(p.label_of_cell, [1, 2, 3]);
+    assert_eq!(p.label_of_cell, [1, 2, 3].map(Label::Region));
     let thin = Aabb::new(DVec3::new(-6e-6, 0.1, 0.5), DVec3::new(6e-6, 2.4, 3.5));
     let found = walk(&t, &p, &thin, 20_000, 3);
     assert_eq!((found.n_unsealed, found.n_incomplete), (0, 0), "{found:?}");
@@ -486,12 +486,16 @@ fn what_rounding_leaves_between_surfaces_is_no_cell() {
     votes.retain(|v| v.point.distance(between) > 1.0);
     votes.push(Vote {
         point: between,
-        label: 30,
+        label: Label::Region(30),
         weight: 1.0,
     });
     let p = c.partition(&votes, &LabelSettings::default());
     assert_promises(&t, &p, &c.bounds(), 2_000);
-    assert!(!p.label_of_cell.contains(&30), "{:?}", p.label_of_cell);
+    assert!(
+        !p.label_of_cell.contains(&Label::Region(30)),
+        "{:?}",
+        p.label_of_cell
+    );
     assert_eq!(p.locator.locate(between), None);
 }
 
@@ -615,7 +619,7 @@ fn a_cone_of_many_triangles_is_cut_in_full() {
     );
     assert_eq!(
         (p.label_of_cell.as_slice(), p.portals.len()),
-        (&[0, 1][..], 0)
+        (&[0, 1].map(Label::Region)[..], 0)
     );
     let polygon = 0.5 * 100.0 * (std::f64::consts::TAU / 100.0).sin();
     assert!(
@@ -749,7 +753,7 @@ fn two_regions_at_the_border_are_one_outside() {
         (!walls.contains(p)).then_some(if p.x < 3.1 { 98 } else { 99 })
     });
     let mut all = room_votes(&c.bounds());
-    all.retain(|v| v.label != 99);
+    all.retain(|v| v.label != Label::Region(99));
     all.extend(sides);
     let p = c.partition(&all, &LabelSettings::default());
     assert_eq!(p.label_of_cell.len(), 3, "{:?}", p.label_of_cell);

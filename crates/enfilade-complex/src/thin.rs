@@ -322,7 +322,7 @@ impl CutBox {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ComplexInput, LabelSettings, Vote, build_complex};
+    use super::super::{ComplexInput, Label, LabelSettings, Vote, build_complex};
     use super::*;
 
     /// A wall whose triangles miss each other by a millimeter: a sliver between two of them is cut once at the edge
@@ -394,7 +394,7 @@ mod tests {
             .zip(rooms)
             .map(|(label, room)| Vote {
                 point: at(room, 1.0),
-                label,
+                label: Label::Region(label),
                 weight: 40.0,
             })
             .collect();

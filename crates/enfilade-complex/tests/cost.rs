@@ -1,6 +1,6 @@
 //! Cost of the complex: copies of triangles, and bounds by an allowance.
 
-use enfilade_complex::{ComplexInput, LabelSettings, Vote, build_complex_within};
+use enfilade_complex::{ComplexInput, Label, LabelSettings, Vote, build_complex_within};
 use enfilade_geom::{Aabb, Allowance, DVec3, Triangle};
 
 /// Deterministic numbers in `0..1` (SplitMix64).
@@ -34,7 +34,7 @@ fn copies_of_a_triangle_cost_next_to_nothing_and_are_seen_like_it() {
     let bounds = Aabb::new(DVec3::splat(-2.0), DVec3::splat(6.0));
     let votes = [Vote {
         point: DVec3::splat(5.5),
-        label: 1,
+        label: Label::Region(1),
         weight: 1.0,
     }];
     let input = ComplexInput {

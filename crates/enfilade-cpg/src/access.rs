@@ -55,10 +55,15 @@ impl CellPortalGraph {
         })
     }
 
-    /// Returns all cells but the outdoors, ascending. O(cells).
+    /// Returns all cells but the outdoors, rooms and voids, ascending. O(cells).
     pub fn indoor_cells(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
         let numbered = (0..).map(CellId).zip(&self.cells);
         numbered.filter(|(_, cell)| !cell.outdoor)
+    }
+
+    /// Returns the rooms: all cells but the outdoors and voids, ascending. O(cells).
+    pub fn rooms(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
+        self.indoor_cells().filter(|(_, cell)| !cell.is_void)
     }
 
     /// Returns the outdoors, if there is one. O(cells).

@@ -23,6 +23,17 @@ pub struct Cell {
     pub portals: Vec<PortalId>,
     /// `true` for the space around the building, which is all one cell.
     pub outdoor: bool,
+    /// `true` for a space in which nobody can stand and into which no doorway leads: above a hung ceiling, in a shaft or a
+    /// hollow wall. Sight and sound pass it as any other cell, but it counts as no room. Never outdoors.
+    pub is_void: bool,
+}
+
+impl Cell {
+    /// Returns `true` if it is neither outdoors nor a void.
+    #[must_use]
+    pub fn is_room(&self) -> bool {
+        !self.outdoor && !self.is_void
+    }
 }
 
 /// A planar opening that joins exactly two cells.

@@ -131,6 +131,9 @@ fn check_cells(graph: &CellPortalGraph, found: &mut Findings) {
                 found.push(GraphError::TwoOutdoors { first, second: i });
             }
             outdoors = outdoors.or(Some(i));
+            if cell.is_void {
+                found.push(GraphError::OutdoorVoid { cell: i });
+            }
         }
         let [min, max] = cell.aabb;
         let ordered = (0..3).all(|k| min[k].is_finite() && max[k].is_finite() && min[k] <= max[k]);

@@ -65,6 +65,22 @@ fn taking_a_file_apart_and_together_changes_nothing() {
 }
 
 #[test]
+fn files_of_builds_that_did_not_tell_voids_have_rooms_and_no_file_has_the_outdoors_for_a_void() {
+    let mut world = two_rooms();
+    world.graph.cells[1].is_void = true;
+    let (json, bin) = parts_of(&world);
+    assert_eq!(decode_glb(&glb(&json, &bin)).unwrap().graph, world.graph);
+    let old = json.replacen(",\"void\":true", "", 1);
+    assert_ne!(old, json);
+    let read = decode_glb(&glb(&old, &bin)).unwrap();
+    let rooms = read.graph.rooms().map(|(id, _)| id.0);
+    assert_eq!(rooms.collect::<Vec<_>>(), [0, 1]);
+    let both = with("\"outdoor\":true", "\"outdoor\":true,\"void\":true");
+    assert!(matches!(both, Err(WireError::Invalid(_))));
+    assert!(with("\"outdoor\":true", "\"outdoor\":true,\"void\":1").is_err());
+}
+
+#[test]
 fn every_prefix_is_an_error() {
     every_prefix_of(&two_rooms_with_parts());
     every_prefix_of(&two_rooms_with_specials());

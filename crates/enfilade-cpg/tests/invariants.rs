@@ -43,6 +43,8 @@ breaks! {
         => GraphError::DuplicateName { first: 0, second: 1, .. },
     there_is_one_outdoors: |w| w.graph.cells[0].outdoor = true
         => GraphError::TwoOutdoors { first: 0, second: 2 },
+    the_outdoors_is_no_void: |w| w.graph.cells[2].is_void = true
+        => GraphError::OutdoorVoid { cell: 2 },
     a_box_is_not_inside_out: |w| w.graph.cells[1].aabb.swap(0, 1)
         => GraphError::CellExtent { cell: 1, .. },
     a_box_is_finite: |w| w.graph.cells[1].aabb[1][2] = f32::INFINITY

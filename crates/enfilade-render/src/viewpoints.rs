@@ -73,7 +73,7 @@ fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
         // Beyond this size, a larger hall is not better.
         floor.min(150.0) * (1.0 + (objects[id.idx()] as f32).ln_1p())
     };
-    let mut out: Vec<_> = (world.graph.indoor_cells())
+    let mut out: Vec<_> = (world.graph.rooms())
         .filter(|(_, cell)| cell.volume > 0.0)
         .map(|(id, cell)| (id, cell, worth(id, cell)))
         .collect();
@@ -228,9 +228,9 @@ pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 
     let graph = &world.graph;
     let mut been = vec![0_u32; graph.cells.len()];
     // A closed pocket may come first.
-    let goes_on = |c: &CellId| graph.exits(*c).any(|exit| !graph[exit.to].outdoor);
-    let mut indoors = graph.indoor_cells().map(|(c, _)| c);
-    let Some(first) = indoors.clone().find(goes_on).or_else(|| indoors.next()) else {
+    let goes_on = |c: &CellId| graph.exits(*c).any(|exit| graph[exit.to].is_room());
+    let mut rooms = graph.rooms().map(|(c, _)| c);
+    let Some(first) = rooms.clone().find(goes_on).or_else(|| rooms.next()) else {
         return Vec::new();
     };
     let (mut cell, mut came_by) = (first, None);
@@ -240,7 +240,7 @@ pub fn walk(world: &World, sight: &Sight, views: usize) -> Vec<([f32; 3], [f32; 
         been[cell.idx()] += 1;
         let next = graph
             .exits(cell)
-            .filter(|exit| !graph[exit.to].outdoor)
+            .filter(|exit| graph[exit.to].is_room())
             .min_by_key(|exit| (been[exit.to.idx()], Some(exit.id) == came_by, exit.id));
         let Some(exit) = next else { break };
         stops.push(exit.portal.center());

@@ -73,6 +73,7 @@ pub(crate) enum Class {
     Beyond,
     Thin,
     Solid,
+    Void,
     Wall,
     Detail,
     Open,
@@ -85,11 +86,12 @@ pub(crate) enum Class {
     Gap,
 }
 
-pub(crate) const CLASSES: [Class; 14] = [
+pub(crate) const CLASSES: [Class; 15] = [
     Class::Cell,
     Class::Beyond,
     Class::Thin,
     Class::Solid,
+    Class::Void,
     Class::Wall,
     Class::Detail,
     Class::Open,
@@ -134,6 +136,7 @@ impl Class {
             Self::Beyond => filled("beyond", [0xff; 3], 0.35),
             Self::Thin => line("thin", [0x66; 3], 3.0, &[6.0, 6.0]),
             Self::Solid => filled("solid", [0x5a; 3], 1.0),
+            Self::Void => line("hatching", [0x99; 3], 1.0, &[]),
             Self::Wall => line("wall", BLACK, 2.0, &[]),
             Self::Detail => Look {
                 stroke: Some(([0x99; 3], 1.0)),

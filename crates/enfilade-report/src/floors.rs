@@ -49,7 +49,7 @@ pub(crate) struct Level {
 pub(crate) struct Floors {
     /// Floors to stand on, cells ascending, the largest of a cell first.
     pub(crate) levels: Vec<Level>,
-    /// Cells without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
+    /// Rooms without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
     pub(crate) unfloored: Vec<CellId>,
     /// Side of a tile. [Units: wu]
     pub(crate) tile: f64,
@@ -71,7 +71,7 @@ pub(crate) fn find_floors(world: &World) -> Floors {
         unfloored: Vec::new(),
         tile,
     };
-    for (cell, _) in world.graph.indoor_cells() {
+    for (cell, _) in world.graph.rooms() {
         match samples.get(&cell) {
             Some(samples) => levels_of(cell, samples, tile, &mut out.levels),
             None => out.unfloored.push(cell),
@@ -90,7 +90,7 @@ pub(crate) fn tile_at(x: f64, z: f64, tile: f64) -> (i32, i32) {
 fn tile_of(world: &World) -> f64 {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let mut reach = 0.0_f64;
-    for (_, cell) in world.graph.indoor_cells() {
+    for (_, cell) in world.graph.rooms() {
         let [a, b] = cell.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
         reach = reach.max((b - a).length());
         (low, high) = (low.min(a), high.max(b));
@@ -99,12 +99,12 @@ fn tile_of(world: &World) -> f64 {
     SPACING.max(reach / MAX_ROWS as f64).max(whole / MAX_TILES)
 }
 
-/// Sample points on the surfaces that an indoor cell stands on, by cell.
+/// Sample points on the surfaces that a room stands on, by cell.
 fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
     let mut out = BTreeMap::new();
     for batch in &world.batches {
-        let is_indoor = |c: &CellId| !world.graph[*c].outdoor;
-        if !batch.cells.iter().any(is_indoor) {
+        let is_room = |c: &CellId| world.graph[*c].is_room();
+        if !batch.cells.iter().any(is_room) {
             continue;
         }
         let p = &batch.primitive;
@@ -149,7 +149,7 @@ fn ask(
             );
             let p = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
             let above = |up: f64| locator.locate(p + DVec3::Y * up);
-            let Some(cell) = above(JUST_ABOVE).filter(|&c| !world.graph[c].outdoor) else {
+            let Some(cell) = above(JUST_ABOVE).filter(|&c| world.graph[c].is_room()) else {
                 continue;
             };
             // The top of a suspended ceiling, or of a wall under the roof, is not a floor of either cell.

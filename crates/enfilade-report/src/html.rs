@@ -69,7 +69,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
          <title>{title}: rooms and doorways</title>\n<style>{STYLE}</style></head><body data-voids=\"{}\">\n\
          <header><h1>{title}</h1><p>{}</p></header>\n",
         voids.join(" "),
-        escaped(&summary(world, &storeys))
+        escaped(&summary(world, &storeys, voids.len()))
     );
     for note in &parts.notes {
         let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(note));
@@ -106,8 +106,13 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     for t in &parts.tables {
         table(&mut out, t, &[]);
     }
-    let (rooms, cells) = rooms(world, &storeys);
+    let is_void = |c: CellId| plans.voids().any(|v| v == c);
+    let (rooms, cells) = rooms(world, &storeys, "Rooms", |c| !is_void(c));
     table(&mut out, &rooms, &cells);
+    if !voids.is_empty() {
+        let (rows, cells) = self::rooms(world, &storeys, "Voids", is_void);
+        table(&mut out, &rows, &cells);
+    }
     if !rest.is_empty() {
         out.push_str("<section><h2>Pictures</h2>\n");
         figures(&mut out, rest);
@@ -153,14 +158,18 @@ footer{color:#777;font-size:.8rem;margin-top:2rem;overflow-wrap:anywhere}\
 @media print{body{max-width:none;padding:0;font-size:11px}section{break-inside:avoid-page}\
 .wide{overflow:visible}h2{break-after:avoid}tr,figure{break-inside:avoid}th{-webkit-print-color-adjust:exact;print-color-adjust:exact}}";
 
-fn summary(world: &World, storeys: &[&Storey]) -> String {
+fn summary(world: &World, storeys: &[&Storey], n_voids: usize) -> String {
     let graph = &world.graph;
     let indoors = graph.indoor_cells().map(|(_, c)| c);
     let n = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
     let volume: f32 = indoors.clone().map(|c| c.volume).sum();
+    let voids = match n_voids {
+        0 => String::new(),
+        n => format!(" and {n} voids"),
+    };
     format!(
-        "{} rooms in {} storeys, {volume:.0} m³ of air; {} doors, {} windows, {} open passages, {} cracks; {} objects",
-        indoors.count(),
+        "{} rooms in {} storeys{voids}, {volume:.0} m³ of air; {} doors, {} windows, {} open passages, {} cracks; {} objects",
+        indoors.count() - n_voids,
         storeys.iter().filter(|s| !s.is_between).count(),
         n(PortalKind::Door),
         n(PortalKind::Window),
@@ -208,12 +217,15 @@ fn table(out: &mut String, t: &Table, cells: &[CellId]) {
     out.push_str("</table></div></section>\n");
 }
 
-/// The table of rooms, and the cells of its rows.
-fn rooms(world: &World, storeys: &[&Storey]) -> (Table, Vec<CellId>) {
-    let mut cells: Vec<_> = (0..)
-        .zip(&world.graph.cells)
-        .filter(|c| !c.1.outdoor)
-        .collect();
+/// The table of those indoor cells that `is_listed` accepts, and the cells of its rows.
+fn rooms(
+    world: &World,
+    storeys: &[&Storey],
+    title: &str,
+    is_listed: impl Fn(CellId) -> bool,
+) -> (Table, Vec<CellId>) {
+    let indoors = world.graph.indoor_cells().filter(|c| is_listed(c.0));
+    let mut cells: Vec<_> = indoors.map(|(id, c)| (id.0, c)).collect();
     cells.sort_by(|a: &(u32, _), b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     let n = cells.len();
     cells.truncate(MAX_ROWS);
@@ -222,7 +234,7 @@ fn rooms(world: &World, storeys: &[&Storey]) -> (Table, Vec<CellId>) {
         on.map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")
     };
     let head = [
-        "room",
+        "name",
         "storey",
         "volume m³",
         "size m",
@@ -244,7 +256,7 @@ fn rooms(world: &World, storeys: &[&Storey]) -> (Table, Vec<CellId>) {
         ]
     }));
     let table = Table {
-        title: "Rooms".into(),
+        title: title.into(),
         note: if n > MAX_ROWS {
             format!("The {MAX_ROWS} largest of {n}.")
         } else {
@@ -324,6 +336,30 @@ mod tests {
         assert!(page.contains("M0 0h11v11h-11z"), "a room sees itself");
         assert!(page.contains("data:image/png;base64,AQID"));
         assert_eq!(page, report_html(&world, &parts));
+    }
+
+    #[test]
+    fn voids_are_counted_and_listed_apart() {
+        let mut world = World::default();
+        for (name, is_void) in [("cell-0", false), ("cell-1", true)] {
+            world.graph.cells.push(Cell {
+                name: name.into(),
+                aabb: [[0.0; 3], [4.0, 3.0, 5.0]],
+                is_void,
+                ..Cell::default()
+            });
+        }
+        // Without a floor of its own, a room is listed with the voids.
+        let page = report_html(&world, &ReportParts::default());
+        assert!(page.contains("0 rooms in 0 storeys and 2 voids"), "{page}");
+        let [_, tables] = [
+            page.split("<h2>Rooms").next(),
+            page.split("<h2>Rooms").nth(1),
+        ];
+        let (rooms, voids) = tables
+            .and_then(|t| t.split_once("<h2>Voids"))
+            .unwrap_or_default();
+        assert!(!rooms.contains("cell-1") && voids.contains("cell-1"));
     }
 
     #[test]

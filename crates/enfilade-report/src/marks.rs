@@ -36,7 +36,16 @@ fn point(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
+/// Distance of the lines that hatch voids. [Units: wu]
+const HATCHING: f64 = 0.3;
+
 impl View<'_> {
+    /// Slanting lines across the voids of the page; `None` without any.
+    pub(crate) fn hatching(&self) -> Option<Item> {
+        let lines = self.section.hatching(HATCHING);
+        (!lines.is_empty()).then(|| path(Class::Void, lines, false, None))
+    }
+
     /// Structural triangles cut at the heights of the page, as one path.
     pub(crate) fn walls(&self) -> Item {
         // In tenths of millimeters, so that the two sides of a thin sheet become one line.

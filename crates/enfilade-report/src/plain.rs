@@ -27,7 +27,11 @@ fn portal_kind(kind: PortalKind) -> &'static str {
 
 /// Returns the name of a cell's kind.
 fn cell_kind(cell: &Cell) -> &'static str {
-    if cell.outdoor { "outdoors" } else { "room" }
+    match (cell.outdoor, cell.is_void) {
+        (true, _) => "outdoors",
+        (_, true) => "void",
+        _ => "room",
+    }
 }
 
 /// Returns the cells on the other sides of a cell's portals, ascending, each once.

@@ -37,8 +37,9 @@ impl Default for PlanOptions {
 
 /// The plans of all storeys of a world.
 ///
-/// At least one plan shows and names each indoor cell: where its floor is; for a space without a floor, beside its
-/// neighbors or on a plan of such spaces; for a cell thinner than the drawing resolves, as the outline of its box.
+/// At least one plan shows and names each room: where its floor is; for a space without a floor, beside its
+/// neighbors or on a plan of such spaces; for a cell thinner than the drawing resolves, as the outline of its box. Voids
+/// are hatched where a cut passes through them.
 pub struct Plans<'a> {
     world: &'a World,
     cut_height: f64,
@@ -72,6 +73,7 @@ impl Drawn {
             heights: &heights,
         };
         let mut marks = view.details();
+        marks.extend(view.hatching());
         marks.push(view.walls());
         marks.extend(world.graph.portal_ids().filter_map(|id| view.portal(id)));
         Self {
@@ -84,13 +86,13 @@ impl Drawn {
     }
 }
 
-/// The indoor cells that are on no plan.
+/// The rooms that are on no plan.
 fn hidden_cells(world: &World, pages: &[Drawn]) -> BTreeSet<CellId> {
     let regions = pages.iter().flat_map(|p| &p.regions);
     let shown = regions.filter_map(|r| cell_of(r.0)).filter(|c| c.1);
     let shown: BTreeSet<CellId> = shown.map(|c| c.0).collect();
-    let indoor = world.graph.indoor_cells().map(|c| c.0);
-    indoor.filter(|c| !shown.contains(c)).collect()
+    let rooms = world.graph.rooms().map(|c| c.0);
+    rooms.filter(|c| !shown.contains(c)).collect()
 }
 
 /// Draws the floor plans of all storeys as one SVG document; x points right and z down, as seen from above. One
@@ -109,7 +111,15 @@ impl<'a> Plans<'a> {
     #[must_use]
     pub fn new(world: &'a World, options: &PlanOptions) -> Self {
         let (min, max) = extent(world);
-        let (pages, voids) = find_pages(world);
+        let (pages, mut voids) = find_pages(world);
+        voids.extend(
+            world
+                .graph
+                .indoor_cells()
+                .filter(|c| c.1.is_void)
+                .map(|c| c.0),
+        );
+        voids.sort_unstable();
         let draw = |page: Page| Drawn::new(world, page, options.cut_height, (min, max));
         let mut pages: Vec<Drawn> = pages.into_iter().map(draw).collect();
         // A cell missed by its neighbors' cut, or hidden under one of them, is cut at a height of its own.
@@ -136,7 +146,7 @@ impl<'a> Plans<'a> {
         }
     }
 
-    /// The cells without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
+    /// Voids and rooms without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
     pub fn voids(&self) -> impl ExactSizeIterator<Item = CellId> {
         self.voids.iter().copied()
     }
@@ -212,7 +222,7 @@ impl<'a> Plans<'a> {
             at: origin,
             storey: Some(storey.name.clone()),
         });
-        for (label, region) in &drawn.regions {
+        for (label, region) in drawn.regions.iter().filter(|r| r.0 != Label::Void) {
             sheet.items.push(self.region(*label, region));
         }
         sheet.items.extend_from_slice(&drawn.marks);
@@ -271,7 +281,7 @@ impl<'a> Plans<'a> {
             class: match label {
                 Label::Cell(_) => Class::Cell,
                 Label::Beyond(_) => Class::Beyond,
-                Label::Solid | Label::Outdoor => Class::Solid,
+                Label::Solid | Label::Outdoor | Label::Void => Class::Solid,
             },
             fill: cell.map(|c| color(c.0)),
             lines: region.borders.clone(),
@@ -416,6 +426,9 @@ impl Sheet {
         if is_there(Class::Beyond) {
             entries.push((Class::Beyond, "pale: floor on another plan"));
         }
+        if is_there(Class::Void) {
+            entries.push((Class::Void, "void: nobody can stand there"));
+        }
         if is_there(Class::Thin) {
             entries.push((Class::Thin, "too thin to draw"));
         }
@@ -496,10 +509,10 @@ fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// The rectangle (x and z) around all indoor cells; around the triangles if there are none.
+/// The rectangle (x and z) around all rooms; around the triangles if there are none.
 fn extent(world: &World) -> (DVec2, DVec2) {
-    let indoor = world.graph.indoor_cells().flat_map(|(_, c)| c.aabb);
-    let mut corners: Vec<[f32; 3]> = indoor.collect();
+    let rooms = world.graph.rooms().flat_map(|(_, c)| c.aabb);
+    let mut corners: Vec<[f32; 3]> = rooms.collect();
     if corners.is_empty() {
         corners.extend(
             world

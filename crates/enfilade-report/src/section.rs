@@ -29,6 +29,8 @@ const NO_CUT: u16 = u16::MAX;
 pub(crate) enum Label {
     Outdoor,
     Solid,
+    /// A space in which nobody can stand.
+    Void,
     /// A cell of another storey, seen from this one: the upper part of a hall.
     Beyond(u32),
     Cell(u32),
@@ -107,7 +109,7 @@ pub(crate) fn cell_of(label: Label) -> Option<(CellId, bool)> {
     match label {
         Label::Cell(id) => Some((CellId(id), true)),
         Label::Beyond(id) => Some((CellId(id), false)),
-        Label::Outdoor | Label::Solid => None,
+        Label::Outdoor | Label::Solid | Label::Void => None,
     }
 }
 
@@ -179,6 +181,7 @@ impl Section {
                     let label = match at(0) {
                         None => Label::Solid,
                         Some(c) if world.graph[c].outdoor => Label::Outdoor,
+                        Some(c) if world.graph[c].is_void => Label::Void,
                         Some(c) => Label::Beyond(c.0),
                     };
                     (label, 0)
@@ -286,6 +289,30 @@ impl Section {
 
     fn at(&self, corner: (i64, i64)) -> DVec2 {
         self.origin + DVec2::new(corner.0 as f64, corner.1 as f64) * self.step
+    }
+
+    /// Returns slanting lines across the voids, at about this distance. [Units: wu]
+    pub(crate) fn hatching(&self, distance: f64) -> Vec<Vec<DVec2>> {
+        let (width, height) = (self.width as i64, self.height as i64);
+        let every = ((distance * std::f64::consts::SQRT_2 / self.step) as usize).max(2);
+        let mut lines = Vec::new();
+        for sum in (0..width + height).step_by(every) {
+            // Down to the left, from square to square; one more ends the last line.
+            let mut begin = None;
+            for row in 0..=height {
+                let is_void = self.label(sum - row, row) == Label::Void;
+                match begin {
+                    None if is_void => begin = Some(row),
+                    Some(from) if !is_void => {
+                        let ends = [from, row].map(|row| self.at((sum - row + 1, row)));
+                        lines.push(ends.to_vec());
+                        begin = None;
+                    }
+                    _ => {}
+                }
+            }
+        }
+        lines
     }
 
     /// Every label except the outdoors, with its region.

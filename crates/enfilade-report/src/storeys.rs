@@ -41,7 +41,7 @@ pub struct Storey {
     pub floor: f64,
     /// Heights of its lowest and highest floor; both are `floor` if most of the area is at that height. [Units: wu]
     pub range: [f64; 2],
-    /// Height of the next storey's floor, or the top of the highest indoor cell. [Units: wu]
+    /// Height of the next storey's floor, or the top of the highest room. [Units: wu]
     pub top: f64,
     /// Area of its floor. [Units: wu²]
     pub area: f64,
@@ -76,7 +76,7 @@ pub(crate) struct Page {
     ground: BTreeMap<(i32, i32), CellId>,
 }
 
-/// Returns the storeys, lowest first; at least one if there is an indoor cell. Every indoor cell is in one of them.
+/// Returns the storeys, lowest first; at least one if there is a room. Every room is in one of them, and no void.
 ///
 /// O(floor area + triangles + levels²) where nothing connects the levels, much less where doorways do.
 #[must_use]
@@ -84,14 +84,14 @@ pub fn find_storeys(world: &World) -> Vec<Storey> {
     find_pages(world).0.into_iter().map(|p| p.storey).collect()
 }
 
-/// Like [`find_storeys`], with the cuts; and the cells without a floor to stand on, ascending.
+/// Like [`find_storeys`], with the cuts; and the rooms without a floor to stand on, ascending.
 pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
     let floors = find_floors(world);
     let groups = grouped(world, &floors);
     let mut pages: Vec<Page> = groups.iter().map(|g| page(world, &floors, g)).collect();
     drop_landings(&mut pages);
     pages.sort_by(|a, b| a.storey.floor.total_cmp(&b.storey.floor));
-    let highest = world.graph.indoor_cells().map(|(_, c)| c.aabb[1][1]);
+    let highest = world.graph.rooms().map(|(_, c)| c.aabb[1][1]);
     let highest = f64::from(highest.fold(f32::NEG_INFINITY, f32::max));
     for k in 0..pages.len() {
         pages[k].storey.name = (k + 1).to_string();

@@ -210,6 +210,37 @@ fn spaces_without_a_floor_stand_beside_rooms_or_on_plans_of_their_own() {
     }
 }
 
+/// A plenum above two rooms, of the headroom of a room, and a duct between them at the height of the cut.
+#[test]
+fn voids_make_no_storey_and_are_hatched_where_a_plan_cuts_them() {
+    let halls = [
+        room([0.0, 0.0, 0.0], [5.0, 2.5, 5.0]),
+        room([6.0, 0.0, 0.0], [11.0, 2.5, 5.0]),
+        room([5.0, 1.0, 2.0], [6.0, 1.6, 3.0]),
+        room([0.0, 2.5, 0.0], [11.0, 4.3, 5.0]),
+    ];
+    let mut world = world(&halls, &[]);
+    assert_eq!(storeys(&world).len(), 2);
+    for cell in [2, 3] {
+        world.graph.cells[cell].is_void = true;
+    }
+    assert_eq!(storeys(&world), [named("1", &[0, 1])]);
+    let plans = Plans::new(&world, &PlanOptions::default());
+    assert_eq!(plans.voids().map(|c| c.0).collect::<Vec<_>>(), [2, 3]);
+    assert!(plans.find("cell-3").is_empty());
+    let svg = plan_svg(&world, &PlanOptions::default());
+    let shown = |id: u32| svg.contains(&format!("data-cell=\"{id}\""));
+    assert_eq!([0, 1, 2, 3].map(shown), [true, true, false, false]);
+    let document = roxmltree::Document::parse(&svg).unwrap();
+    let is_hatching = |n: &roxmltree::Node| n.attribute("class") == Some("hatching");
+    let hatching = document
+        .descendants()
+        .filter(|n| is_hatching(n) && n.has_tag_name("path"));
+    let lines = hatching.filter_map(|n| n.attribute("d")).next().unwrap();
+    // A square meter, each line 0.42 m from the next along its side: about as many as fit on two sides.
+    assert!((3..=6).contains(&lines.matches('M').count()), "{lines}");
+}
+
 #[test]
 fn a_low_room_is_cut_below_its_ceiling() {
     // The lower one of two rooms cut together ends below that cut.

@@ -194,6 +194,7 @@ fn is_harmless_to_rays(error: &GraphError) -> bool {
         error,
         GraphError::DuplicateName { .. }
             | GraphError::TwoOutdoors { .. }
+            | GraphError::OutdoorVoid { .. }
             | GraphError::CellPortals { .. }
             | GraphError::PortalNormal { .. }
             | GraphError::TooFewCorners { .. }

@@ -35,6 +35,8 @@ pub struct CellShape {
     pub volume: f64,
     /// True for the space around the building.
     pub is_outdoor: bool,
+    /// True for a space in which nobody can stand.
+    pub is_void: bool,
 }
 
 /// A portal as left from one of its cells.
@@ -92,6 +94,7 @@ impl Layout {
                 bounds: Aabb::of_points(&cell.aabb.map(point)),
                 volume: f64::from(cell.volume),
                 is_outdoor: cell.outdoor,
+                is_void: cell.is_void,
             })
             .collect();
         let mut first_exit = vec![0];

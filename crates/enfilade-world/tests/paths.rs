@@ -680,3 +680,33 @@ fn a_flat_robot_goes_below_a_table() {
     assert!(found(&gap(0.9)).is_ok());
     assert_eq!(found(&gap(0.65)).unwrap_err(), NoPath::NoWay);
 }
+
+/// W10: a path leads through a void only if it begins or ends in one.
+#[test]
+fn a_path_avoids_voids_unless_an_end_is_in_one() {
+    let mut world = room_grid(&GridParams {
+        size: [3, 1, 1],
+        doors: 1.0,
+        merges: 0.0,
+        ..GridParams::two_rooms()
+    });
+    let middles = [0, 1, 2].map(|c: usize| {
+        let [low, high] = world.graph.cells[c]
+            .aabb
+            .map(|p| DVec3::from_array(p.map(f64::from)));
+        ((low + high) * 0.5).with_y(low.y)
+    });
+    let found = |world: &World, ends: [usize; 2]| {
+        let space = Space::new(world.clone()).unwrap();
+        let map = WalkMap::new(&space, Agent::default());
+        let mut path = Path::default();
+        let ends = at_root(ends.map(|k| middles[k]));
+        let found = PathSearch::new().find(&map, &space, ends, |_, _| true, &mut path);
+        found.map(|()| path.portals.len())
+    };
+    assert_eq!(found(&world, [0, 2]), Ok(2));
+    world.graph.cells[1].is_void = true;
+    assert_eq!(found(&world, [0, 2]), Err(NoPath::NoWay));
+    assert_eq!(found(&world, [0, 1]), Ok(1));
+    assert_eq!(found(&world, [1, 2]), Ok(1));
+}

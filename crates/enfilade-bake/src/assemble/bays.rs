@@ -4,7 +4,7 @@
 //! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay
 //! separate.
 //! Slits, too narrow to climb through, are one portal for each plane between two cells: the gaps between the tops of walls
-//! and a ribbed roof.
+//! and a ribbed roof. So are all openings of a void: the lamps, grilles and missing panels of a ceiling.
 //! **Limit:** panes and slits whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
 //!
 //! Time `O(p log p)` in windows, as long as few lie in one column of one plane.
@@ -99,20 +99,27 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
     out
 }
 
-/// Joins slits of one kind between the same two cells in one plane: each plane has one portal with all its pieces, in
-/// place of its first slit.
+/// Joins slits of one kind, and openings of voids of any kind, between the same two cells in one plane: each plane has one
+/// portal with all its pieces, in place of the first. It has the kind of the larger.
 ///
 /// Time: quadratic in the planes between two cells.
-pub(super) fn join_slits(portals: Vec<Judged>) -> Vec<Judged> {
+pub(super) fn join_slits(portals: Vec<Judged>, is_void: impl Fn(u32) -> bool) -> Vec<Judged> {
     let mut out: Vec<Judged> = Vec::with_capacity(portals.len());
-    let mut slits: BTreeMap<([u32; 2], PortalKind), Vec<usize>> = BTreeMap::new();
+    let mut slits: BTreeMap<([u32; 2], Option<PortalKind>), Vec<usize>> = BTreeMap::new();
     for judged in portals {
-        if judged.portal.width < SLIT && !judged.is_filled {
-            let planes = slits.entry((judged.portal.cells, judged.kind)).or_default();
+        let cells = judged.portal.cells;
+        let leads_to_void = cells.into_iter().any(&is_void);
+        if (judged.portal.width < SLIT || leads_to_void) && !judged.is_filled {
+            // Kinds tell who passes, and nobody passes into a void.
+            let kind = (!leads_to_void).then_some(judged.kind);
+            let planes = slits.entry((cells, kind)).or_default();
             let home = planes
                 .iter()
                 .find(|&&at| is_coplanar(&out[at].portal, &judged.portal));
             if let Some(&at) = home {
+                if judged.portal.area > out[at].portal.area {
+                    out[at].kind = judged.kind;
+                }
                 out[at].take_in(judged.portal);
                 continue;
             }
@@ -175,17 +182,20 @@ mod tests {
 
     /// Returns the number of pieces of each portal once slits are joined.
     fn n_pieces(portals: Vec<Judged>) -> Vec<usize> {
-        let joined = join_slits(portals);
+        let joined = join_slits(portals, |cell| cell == 3);
         joined.iter().map(|j| j.portal.pieces.len()).collect()
     }
 
     #[test]
     fn slits_in_one_plane_are_one_portal() {
-        let joined = join_slits(vec![
-            slit(0.0, [2.0, 2.1]),
-            slit(0.0, [2.5, 2.7]),
-            slit(0.0, [3.0, 3.05]),
-        ]);
+        let joined = join_slits(
+            vec![
+                slit(0.0, [2.0, 2.1]),
+                slit(0.0, [2.5, 2.7]),
+                slit(0.0, [3.0, 3.05]),
+            ],
+            |_| false,
+        );
         let [Judged { portal, .. }] = &joined[..] else {
             panic!("{} portals", joined.len());
         };
@@ -215,7 +225,12 @@ mod tests {
         elsewhere.portal.cells = [1, 3];
         assert_eq!(n_pieces(vec![first(), elsewhere]), [1, 1]);
         // Wide enough to climb through.
-        assert_eq!(n_pieces(vec![first(), slit(0.0, [2.5, 2.9])]), [1, 1]);
+        let wide = || vec![slit(0.0, [2.0, 2.4]), slit(0.0, [2.5, 2.9])];
+        assert_eq!(n_pieces(wide()), [1, 1]);
+        // Nobody climbs into a void.
+        let mut of_void = wide();
+        of_void.iter_mut().for_each(|j| j.portal.cells = [1, 3]);
+        assert_eq!(n_pieces(of_void), [2]);
         // One between two others in another plane does not keep them apart.
         let between = slit(0.2, [2.5, 2.7]);
         assert_eq!(n_pieces(vec![first(), between, second()]), [2, 1]);

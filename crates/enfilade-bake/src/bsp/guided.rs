@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{Aabb, BoxTree, Purse};
 
+use crate::complex::{Label, Vote};
 use crate::config::{Guide, Heuristic};
 use crate::proposal::Proposal;
 use crate::structure::OUTDOORS;
@@ -65,9 +66,10 @@ pub(super) fn separators(bsp: &Bsp<'_>) -> Vec<Separator> {
 pub(super) fn divide(bsp: &Bsp<'_>, guides: &[Separator], proposal: &mut Proposal) {
     let (of_leaf, _) = cells::components(bsp, guides);
     let mut number = BTreeMap::new();
-    for vote in proposal.votes.iter_mut().filter(|v| v.label != OUTDOORS) {
+    let is_indoors = |v: &&mut Vote| v.label != Label::Region(OUTDOORS);
+    for vote in proposal.votes.iter_mut().filter(is_indoors) {
         let part = of_leaf[bsp.tree.leaf_of(vote.point) as usize];
-        let next = OUTDOORS + 1 + number.len() as u32;
+        let next = Label::Region(OUTDOORS + 1 + number.len() as u32);
         vote.label = *number.entry((vote.label, part)).or_insert(next);
     }
 }

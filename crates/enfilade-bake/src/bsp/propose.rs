@@ -7,7 +7,7 @@ use enfilade_geom::{DVec3, Purse, Winding};
 use rayon::prelude::*;
 
 use crate::complex::region::RegionShape;
-use crate::complex::{LabelSettings, Vote};
+use crate::complex::{Label, LabelSettings, Vote};
 use crate::config::{BspConfig, Rooms};
 use crate::proposal::Proposal;
 use crate::rooms::{self, Basins, VoxelAir};
@@ -80,7 +80,9 @@ fn rooms_of(
     proposal.label = label_settings(structure.scene);
     if !bsp.is_open[bsp.outer_leaf() as usize] {
         // The void around a level.
-        proposal.votes.retain(|v| v.label != OUTDOORS);
+        proposal
+            .votes
+            .retain(|v| v.label != Label::Region(OUTDOORS));
     }
     if !guides.is_empty() {
         guided::divide(bsp, &guides, &mut proposal);
@@ -154,7 +156,7 @@ fn votes_of(bsp: &Bsp<'_>, cells: &LeafCells) -> Vec<Vote> {
         let shape = shape.filter(|_| cell != NO_CELL)?;
         Some(Vote {
             point: shape.middle,
-            label: label(cell),
+            label: Label::Region(label(cell)),
             weight: shape.volume as f32,
         })
     };

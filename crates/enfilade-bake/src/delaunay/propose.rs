@@ -6,8 +6,7 @@ use super::decimate::default_stop;
 use super::rooms::find_rooms;
 use super::session::Session;
 use super::space::box_points;
-
-use crate::complex::{LabelSettings, Vote};
+use crate::complex::{Label, LabelSettings, Vote};
 use crate::config::DelaunayConfig;
 use crate::proposal::Proposal;
 use crate::rooms::inside_stairs;
@@ -26,7 +25,7 @@ fn votes_around(inner: &Aabb, outer: &Aabb) -> impl Iterator<Item = Vote> {
     let weight = ((volume - less) / points.len() as f64) as f32;
     points.into_iter().map(move |point| Vote {
         point,
-        label: OUTDOORS,
+        label: Label::Region(OUTDOORS),
         weight,
     })
 }

@@ -9,7 +9,7 @@ use super::cells::OUTDOOR_CELL;
 use super::session::Session;
 use super::space::Space;
 use super::standing::Standing;
-use crate::complex::Vote;
+use crate::complex::{Label, Vote};
 use crate::structure::{Candidate, OUTDOORS, Opening, fit_candidate, is_inside};
 
 /// Tetrahedra this close to the border of two rooms do not vote: a candidate may lie on either side of them.
@@ -95,7 +95,7 @@ pub(super) fn find_rooms(
         .collect();
     let vote = |t: u32| Vote {
         point: space.middles[t as usize],
-        label: label(room_at(t)),
+        label: Label::Region(label(room_at(t))),
         weight: space.volumes[t as usize] as f32,
     };
     let mut votes: Vec<Vote> = Vec::new();

@@ -54,7 +54,7 @@ pub(crate) fn propose(
         &config.merge,
         allowance,
     );
-    let low = join_low(&grid, &basins.labels, &mut regions, allowance);
+    join_low(&grid, &basins.labels, &mut regions, allowance);
     context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;
@@ -99,7 +99,6 @@ pub(crate) fn propose(
     Ok(Proposal {
         candidates,
         voids,
-        low,
         counts,
         notes,
         settings: config.voxel_settings(),

@@ -1,11 +1,11 @@
 //! Low spaces that nobody walks into: above hung ceilings, below raised floors, among rafters.
 //!
 //! Beams, ribs and ducts divide such a space into dozens of regions, and lamps and grilles open it to the rooms below. As it
-//! is one space to whoever crawls there, its regions are joined across everything that is open between them. They are never
-//! joined with a room.
+//! is one space to whoever crawls there, its regions are joined across everything that is open between them, before
+//! candidates are fitted to what lies between. They are never joined with a room.
 //!
 //! A region is low if nobody can stand anywhere in it, and if no doorway leads into it from a region in which somebody can:
-//! an upright opening that begins at the floor of both. A cellar with a low ceiling and a door is a room.
+//! the rule of [`crate::void`], which decides in the end, as far as voxels show it.
 //!
 //! Cost: linear in voxels.
 
@@ -17,24 +17,11 @@ use rayon::prelude::*;
 use super::flooded::Faces;
 use super::regions::Regions;
 use crate::structure::OUTDOORS;
+use crate::void::{DOORWAY, STANDING, STEP, WIDTH};
 use crate::voxel::{Grid, Labels};
 
-/// Least height in which somebody stands: that of a low door. [Units: wu]
-const STANDING: f64 = 2.0;
-/// Least height of a doorway, to be entered bent over. [Units: wu]
-const DOORWAY: f64 = 1.2;
-/// … and least width. [Units: wu]
-const WIDTH: f64 = 0.4;
-/// Greatest step up or down at a doorway. [Units: wu]
-const STEP: f64 = 0.4;
-
-/// Joins the regions of low spaces that touch, in the labels of a flooded volume. Returns those regions.
-pub(super) fn join_low(
-    grid: &Grid,
-    labels: &Labels,
-    regions: &mut Regions,
-    allowance: &Allowance,
-) -> BTreeSet<u32> {
+/// Joins the regions of low spaces that touch, in the labels of a flooded volume.
+pub(super) fn join_low(grid: &Grid, labels: &Labels, regions: &mut Regions, allowance: &Allowance) {
     let low = low_regions(grid, labels, regions, allowance);
     let mut sets = Sets::new(regions.region_of_basin.len());
     for (a, b) in regions.contacts.keys() {
@@ -43,9 +30,7 @@ pub(super) fn join_low(
         }
     }
     let stands_for = sets.into_least();
-    let name = |region: u32| stands_for[region as usize];
-    regions.rename(name);
-    low.into_iter().map(name).collect()
+    regions.rename(|region| stands_for[region as usize]);
 }
 
 /// Returns the regions in which nobody stands and into which no doorway leads.

@@ -4,7 +4,7 @@ use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle};
 use rayon::prelude::*;
 
 use super::regions::Regions;
-use crate::complex::Vote;
+use crate::complex::{Label, Vote};
 use crate::structure::{Frame, bounds_of};
 use crate::voxel::{BitVolume, Grid, Labels, voxelize};
 
@@ -116,7 +116,7 @@ impl Ballots {
             let [x, y, z] = voter_at(at, self.block, usize::from(k));
             votes.push(Vote {
                 point: frame.to_scene(grid.center(x, y, z)),
-                label,
+                label: Label::Region(label),
                 weight,
             });
         }

@@ -35,6 +35,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
                 cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);
             }
             cell.volume += from.volume;
+            cell.is_void &= from.is_void;
             if from.outdoor && !cell.outdoor {
                 cell.name.clone_from(&from.name);
                 cell.outdoor = true;

@@ -12,7 +12,7 @@ const PERSON: [f32; 3] = [0.6, 1.8, 0.6];
 /// Reports the rooms that have only windows and cracks, largest first. Returns `true` if there are any.
 pub(super) fn write_doorless(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<bool> {
     let mut rooms: Vec<&Cell> = graph
-        .indoor_cells()
+        .rooms()
         .map(|(_, c)| c)
         .filter(|c| is_room(c) && !has_doorway(graph, c))
         .collect();

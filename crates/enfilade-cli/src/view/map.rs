@@ -1,7 +1,7 @@
 //! The map in the window: a level cut at the eye's height, from the locator.
 
 use egui::{Align2, Color32, ColorImage, Pos2, Rect, Stroke, TextureHandle, TextureOptions, Vec2};
-use enfilade::cpg::{CellId, World};
+use enfilade::cpg::{Cell, CellId, World};
 use enfilade::geom::DVec3;
 use enfilade_render::{Camera, cell_color};
 
@@ -39,7 +39,7 @@ struct Label {
 /// Cells and portals as seen from above.
 pub(super) struct Map {
     names: Vec<String>,
-    is_outdoor: Vec<bool>,
+    is_room: Vec<bool>,
     /// For each portal: two ends and the height range.
     portals: Vec<([f32; 2], [f32; 2], [f32; 2])>,
     low: [f32; 2],
@@ -84,7 +84,7 @@ impl Map {
         let density = POINTS / size[0].max(size[1]).max(0.1);
         Self {
             names: world.graph.cells.iter().map(|c| c.name.clone()).collect(),
-            is_outdoor: world.graph.cells.iter().map(|c| c.outdoor).collect(),
+            is_room: world.graph.cells.iter().map(Cell::is_room).collect(),
             portals: portals.collect(),
             n: size.map(|s| (s * density).max(1.0) as usize),
             low,
@@ -217,8 +217,8 @@ impl Map {
         // The screen points that one point of the cut covers.
         let cover = scale * scale * size[0] * size[1] / (self.n[0] * self.n[1]) as f32;
         for label in &self.labels {
-            let is_outdoor = self.is_outdoor[label.cell as usize];
-            if is_outdoor || (label.n as f32) * cover < ROOM_FOR_A_NAME {
+            let is_room = self.is_room[label.cell as usize];
+            if !is_room || (label.n as f32) * cover < ROOM_FOR_A_NAME {
                 continue;
             }
             let font = egui::FontId::proportional(11.0);

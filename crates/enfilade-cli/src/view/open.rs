@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::pointed::FAR;
-use enfilade::cpg::{CellId, PortalId, World};
+use enfilade::cpg::{Cell, CellId, PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Sightlines;
 use enfilade::runtime::View;
@@ -76,6 +76,12 @@ pub(super) struct Open {
     pub(super) props: Vec<Prop>,
 }
 
+/// The name of a cell, and what it is unless a room or the outdoors.
+fn titled(cell: &Cell) -> String {
+    let kind = if cell.is_void { " (void)" } else { "" };
+    format!("{}{kind}", cell.name)
+}
+
 /// The name of the cell in the middle of the picture: of the air before the surface there.
 pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> String {
     let [.., forward] = camera.axes();
@@ -84,14 +90,14 @@ pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> 
     let away = (t * FAR - 0.02).max(0.0);
     let p = [0, 1, 2].map(|k| f64::from(camera.eye[k] + forward[k] * away));
     let cell = world.graph.locator.locate(DVec3::from(p));
-    cell.map_or_else(|| "no cell".into(), |c| world.graph[c].name.clone())
+    cell.map_or_else(|| "no cell".into(), |c| titled(&world.graph[c]))
 }
 
 /// The name of the cell of the eye.
 pub(super) fn name_here(world: &World, camera: &Camera) -> String {
     let eye = DVec3::from(camera.eye.map(f64::from));
     let cell = world.graph.locator.locate(eye);
-    cell.map_or_else(|| "no cell".into(), |c| world.graph[c].name.clone())
+    cell.map_or_else(|| "no cell".into(), |c| titled(&world.graph[c]))
 }
 
 impl Open {

@@ -30,6 +30,12 @@ pub enum GraphError {
         /// The later cell.
         second: u32,
     },
+    /// The outdoors is marked as a void.
+    #[error("cell {cell} is both outdoors and a void")]
+    OutdoorVoid {
+        /// The cell.
+        cell: u32,
+    },
     /// A cell's box or volume is not finite, or its box is turned inside out.
     #[error(
         "cell {cell}: box {aabb:?} and volume {volume} must be finite, ordered and not negative"

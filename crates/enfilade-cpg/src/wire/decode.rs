@@ -253,6 +253,7 @@ impl<'a> Reader<'a> {
                 n_detail_triangles: c.detail_triangles,
                 portals: c.portals.iter().copied().map(PortalId).collect(),
                 outdoor: c.outdoor,
+                is_void: c.void,
             })
         });
         let cells = cells.collect::<Result<_, _>>()?;

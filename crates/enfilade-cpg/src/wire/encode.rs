@@ -528,6 +528,7 @@ fn cells(world: &World) -> Vec<json::CellJson> {
         detail_triangles: cell.n_detail_triangles,
         portals: cell.portals.iter().map(|p| p.0).collect(),
         outdoor: cell.outdoor,
+        void: cell.is_void,
     };
     world.graph.cells.iter().enumerate().map(cell).collect()
 }

@@ -254,6 +254,8 @@ pub(super) struct CellJson {
     pub(super) portals: Vec<u32>,
     #[serde(default, skip_serializing_if = "is_false")]
     pub(super) outdoor: bool,
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub(super) void: bool,
 }
 
 #[derive(Serialize, Deserialize)]

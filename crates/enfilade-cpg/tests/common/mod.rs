@@ -48,6 +48,7 @@ pub(crate) fn cell(name: &str, aabb: [[f32; 3]; 2], portals: &[u32]) -> Cell {
         n_detail_triangles: 2,
         portals: portals.iter().copied().map(PortalId).collect(),
         outdoor: name == "outdoors",
+        is_void: false,
     }
 }
 

@@ -48,7 +48,8 @@ impl PathSearch {
 
     /// Finds the path from one point to another, each in the frame of a part, through the portals for which `may_pass` returns
     /// `true`, such as open doors. Leads from part to part through doors that currently lead from floor to floor, such as those of
-    /// a lift that has stopped. Points are at the walker's feet, or any height up to its head. [Units: wu]
+    /// a lift that has stopped, and through [voids](enfilade_cpg::Cell::is_void) only if it begins or ends in one. Points are at
+    /// the walker's feet, or any height up to its head. [Units: wu]
     ///
     /// # Errors
     ///
@@ -64,6 +65,15 @@ impl PathSearch {
         path.clear();
         let start = map.stand(space, from).ok_or(NoPath::NoFloorAtStart)?;
         let goal = map.stand(space, to).ok_or(NoPath::NoFloorAtEnd)?;
+        let is_void = |part, cell| space.layout(part).cell(cell).is_void;
+        let ends = [start, goal];
+        let crawls = ends
+            .iter()
+            .any(|s| is_void(s.part, map.floors(s.part).floor(s.floor).cell));
+        let mut may_pass = |part, portal| {
+            let cells = space.layout(part).opening(portal).cells();
+            may_pass(part, portal) && (crawls || !cells.into_iter().any(|c| is_void(part, c)))
+        };
         let infinite = f64::INFINITY;
         let last = self.spread(map, space, start, (Some(goal), infinite), &mut may_pass);
         self.lay_legs(map, space, last.ok_or(NoPath::NoWay)?, goal, &mut may_pass)?;

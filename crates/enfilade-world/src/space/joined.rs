@@ -226,6 +226,7 @@ impl Joined {
             bounds: Aabb::EMPTY,
             volume: 0.0,
             is_outdoor: false,
+            is_void: false,
         });
         exits.push(Vec::new());
         for (k, (portal, inner)) in ends.into_iter().enumerate() {

@@ -1,0 +1,273 @@
+//! Tells voids from rooms: spaces in which nobody can stand and into which no doorway leads, such as those above hung
+//! ceilings, among rafters, in shafts, ducts and hollow walls.
+//!
+//! Measured on the finished partition, so it is the same for all builders. A cellar with a low ceiling and a door is a room,
+//! a crawl space with a hatch is a void.
+//!
+//! Where nobody can stand in any cell, the scene is not a building on the scale of people (a vessel, a model in another
+//! unit), and none is a void.
+//!
+//! Cost: up to `MAX_COLUMNS`² walks down the locator's tree for each cell.
+
+use enfilade_cpg::{CellId, Locator};
+use enfilade_geom::{Aabb, Allowance, DVec3, Sets};
+use rayon::prelude::*;
+
+use crate::complex::{Label, Partition, PartitionPortal};
+
+/// Least height in which somebody stands: that of a low door. [Units: wu]
+pub(crate) const STANDING: f64 = 2.0;
+/// A space with a smaller share of its floor to stand on is a void: a pocket between beams makes no room of it.
+const LEAST_SHARE: f64 = 0.05;
+/// Least height of a doorway, to be entered bent over. [Units: wu]
+pub(crate) const DOORWAY: f64 = 1.2;
+/// … and least width. [Units: wu]
+pub(crate) const WIDTH: f64 = 0.4;
+/// Greatest step up or down at a doorway. [Units: wu]
+pub(crate) const STEP: f64 = 0.4;
+/// Distance from a doorway's plane, beyond the face of a thick wall, at which its floor is looked for. [Units: wu]
+const BEYOND: f64 = 0.6;
+/// Spacing of the columns in which heights are measured. Somebody stands on two by two: half a meter. [Units: wu]
+const SPACING: f64 = 0.25;
+/// Most columns along a side of a cell; larger cells have wider spacing.
+const MAX_COLUMNS: f64 = 128.0;
+
+/// Cost of a column, in units of [`Allowance`].
+const WORK_A_COLUMN: u64 = 20;
+
+/// Measures of a space that tell what it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Facts {
+    /// Area of its floor. [Units: wu²]
+    floor: f64,
+    /// The part of it on which somebody can stand. [Units: wu²]
+    standing: f64,
+    /// Height of the highest doorway into it from a space that is not a void, 0 without any. [Units: wu]
+    doorway: f64,
+}
+
+impl Facts {
+    /// Returns the measures of two parts of a space together.
+    fn and(self, other: &Self) -> Self {
+        Self {
+            floor: self.floor + other.floor,
+            standing: self.standing + other.standing,
+            doorway: self.doorway.max(other.doorway),
+        }
+    }
+
+    fn is_low(&self) -> bool {
+        self.standing <= LEAST_SHARE * self.floor
+    }
+
+    fn is_void(&self) -> bool {
+        self.is_low() && self.doorway < DOORWAY
+    }
+}
+
+/// Labels the voids of a partition as such. Cells of one region that open to each other are one space, since slits and
+/// hatches divide what is one to a builder.
+pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) {
+    let n = partition.label_of_cell.len();
+    let mut sets = Sets::new(n);
+    for portal in &partition.portals {
+        let [a, b] = portal.cells;
+        if partition.label_of_cell[a as usize] == partition.label_of_cell[b as usize] {
+            sets.join(a, b);
+        }
+    }
+    let space_of = sets.into_least();
+    let measured = (0..n).into_par_iter().map(|c| {
+        let (cell, bounds) = (CellId(c as u32), &partition.aabbs[c]);
+        let is_outside = partition.outside == Some(c as u32);
+        (!is_outside).then(|| facts_of(&partition.locator, cell, bounds, allowance))
+    });
+    let mut facts = vec![Some(Facts::default()); n];
+    for (found, &space) in measured.collect::<Vec<_>>().into_iter().zip(&space_of) {
+        let sum = facts[space as usize].take();
+        facts[space as usize] = sum.zip(found).map(|(sum, found)| sum.and(&found));
+    }
+    if facts.iter().flatten().all(Facts::is_low) {
+        return;
+    }
+    let doorways = partition.portals.iter().filter_map(|p| {
+        let height = doorway_height(p, &partition.locator);
+        (height > 0.0).then_some((p.cells.map(|c| space_of[c as usize] as usize), height))
+    });
+    settle(&mut facts, &doorways.collect::<Vec<_>>(), allowance);
+    for (label, &space) in partition.label_of_cell.iter_mut().zip(&space_of) {
+        if let Some(region) = label.region()
+            && facts[space as usize].is_some_and(|f| f.is_void())
+        {
+            *label = Label::Void(region);
+        }
+    }
+}
+
+/// Enters the doorways between spaces in their facts, over any number of low rooms in a row. Outdoors has no facts.
+fn settle(facts: &mut [Option<Facts>], doorways: &[([usize; 2], f64)], allowance: &Allowance) {
+    let mut is_settled = false;
+    while !is_settled && allowance.spend(1 + doorways.len() as u64 / 16) {
+        is_settled = true;
+        for &([a, b], height) in doorways {
+            for (from, to) in [(a, b), (b, a)] {
+                let leads_from_void = facts[from].is_some_and(|f| f.is_void());
+                if let Some(to) = &mut facts[to]
+                    && !leads_from_void
+                    && to.doorway < height
+                {
+                    to.doorway = height;
+                    is_settled = false;
+                }
+            }
+        }
+    }
+}
+
+/// Measures a cell, all but its doorways.
+fn facts_of(locator: &Locator, cell: CellId, bounds: &Aabb, allowance: &Allowance) -> Facts {
+    let size = bounds.size();
+    let spacing = SPACING.max(size.x.max(size.z) / MAX_COLUMNS);
+    // A little more, since boxes are rounded.
+    let along = |side: f64| ((side / spacing + 0.01) as usize).max(1);
+    let [nx, nz] = [along(size.x), along(size.z)];
+    let first =
+        bounds.center() - DVec3::new(nx as f64 - 1.0, 0.0, nz as f64 - 1.0) * (spacing / 2.0);
+    let mut heights = vec![0.0; nx * nz];
+    for (k, height) in heights.iter_mut().enumerate() {
+        if !allowance.spend(WORK_A_COLUMN) {
+            break;
+        }
+        let p = first + DVec3::new((k % nx) as f64, 0.0, (k / nx) as f64) * spacing;
+        *height = headroom(locator, cell, p, [bounds.min.y, bounds.max.y]);
+    }
+    let is_high = |x: usize, z: usize| heights[x + z * nx] >= STANDING;
+    let mut stands = vec![false; nx * nz];
+    for z in 1..nz {
+        for x in 1..nx {
+            let square = [(x - 1, z - 1), (x, z - 1), (x - 1, z), (x, z)];
+            if square.iter().all(|&(x, z)| is_high(x, z)) {
+                square.iter().for_each(|(x, z)| stands[x + z * nx] = true);
+            }
+        }
+    }
+    let area = |n: usize| n as f64 * spacing * spacing;
+    Facts {
+        floor: area(heights.iter().filter(|h| **h > 0.0).count()),
+        standing: area(stands.iter().filter(|s| **s).count()),
+        doorway: 0.0,
+    }
+}
+
+/// Returns the length of the longest part of a vertical line, through `p` and between two heights, that lies in a cell.
+/// [Units: wu]
+fn headroom(locator: &Locator, cell: CellId, p: DVec3, [low, high]: [f64; 2]) -> f64 {
+    let wanted = Locator::leaf(Some(cell));
+    let (mut longest, mut run) = (0.0_f64, [f64::NEG_INFINITY; 2]);
+    // Parts of the line, the lowest last.
+    let mut stack = vec![(locator.root, low, high)];
+    while let Some((at, low, high)) = stack.pop() {
+        if at < 0 {
+            if at == wanted {
+                let begin = if run[1] == low { run[0] } else { low };
+                run = [begin, high];
+                longest = longest.max(high - begin);
+            }
+            continue;
+        }
+        let node = &locator.nodes[at as usize];
+        let [x, y, z, d] = locator.planes[node.plane as usize];
+        let level = x * p.x + z * p.z + d;
+        let [below, above] = [low, high].map(|h| usize::from(level + y * h < 0.0));
+        if below == above {
+            stack.push((node.children[below], low, high));
+        } else {
+            let cut = (-level / y).clamp(low, high);
+            stack.push((node.children[above], cut, high));
+            stack.push((node.children[below], low, cut));
+        }
+    }
+    longest
+}
+
+/// Returns the height of a doorway: an upright opening, wide enough, that begins at a floor on both sides. 0 for all other
+/// portals. [Units: wu]
+fn doorway_height(portal: &PartitionPortal, locator: &Locator) -> f64 {
+    let along = DVec3::Y.cross(portal.plane.normal);
+    let range = |d: DVec3| {
+        let at = portal.outline.points.iter().map(|q| d.dot(*q));
+        at.fold([f64::MAX, f64::MIN], |[lo, hi], t| [lo.min(t), hi.max(t)])
+    };
+    let ([left, right], [low, high]) = (range(along.normalize_or_zero()), range(DVec3::Y));
+    // Upright: nearer to the vertical than to the horizontal.
+    if along.length() < 0.7 || right - left < WIDTH {
+        return 0.0;
+    }
+    let middle = portal.outline.centroid();
+    let has_floors = |share: f64| {
+        let aside = along.normalize() * ((share - 0.5) * (right - left));
+        let foot = (middle + aside).with_y(low);
+        portal
+            .cells
+            .into_iter()
+            .zip([-BEYOND, BEYOND])
+            .all(|(cell, by)| {
+                let p = foot + along.cross(DVec3::Y).normalize() * by;
+                let cell_at = |h: f64| locator.locate(p + DVec3::Y * h);
+                let cell = Some(CellId(cell));
+                cell_at(STEP) == cell && cell_at(-STEP) != cell
+            })
+    };
+    let is_doorway = [0.25, 0.5, 0.75].into_iter().any(has_floors);
+    if is_doorway { high - low } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Covers V9.
+    #[test]
+    fn a_void_has_nowhere_to_stand_and_no_doorway() {
+        let facts = |floor, standing, doorway| Facts {
+            floor,
+            standing,
+            doorway,
+        };
+        for (what, facts, is_void) in [
+            ("room", facts(20.0, 19.0, 2.1), false),
+            ("closed shaft", facts(4.0, 4.0, 0.0), false),
+            ("attic high at its ridge", facts(40.0, 5.0, 0.8), false),
+            ("cellar with a door", facts(20.0, 0.0, 1.6), false),
+            ("space above a ceiling", facts(200.0, 0.0, 0.0), true),
+            ("the same, with a pocket", facts(200.0, 2.0, 0.0), true),
+            ("crawl space with a hatch", facts(20.0, 0.0, 0.6), true),
+            ("hollow wall", facts(0.5, 0.0, 0.0), true),
+        ] {
+            assert_eq!(facts.is_void(), is_void, "{what}");
+        }
+    }
+
+    #[test]
+    fn a_doorway_makes_a_room_of_a_low_space_only_from_where_somebody_comes() {
+        let low = Facts {
+            floor: 9.0,
+            standing: 0.0,
+            doorway: 0.0,
+        };
+        let high = Facts {
+            standing: 9.0,
+            ..low
+        };
+        // Cells 1 and 2 in a row from room 0, 3 and 4 apart from it, 5 through a hatch.
+        let mut facts = [high, low, low, low, low, low].map(Some);
+        let doorways = [([2, 1], 1.6), ([0, 1], 1.5), ([3, 4], 1.6), ([0, 5], 0.8)];
+        settle(&mut facts, &doorways, &Allowance::default());
+        let voids = facts.map(|f| f.is_some_and(|f| f.is_void()));
+        assert_eq!(voids, [false, false, false, true, true, true]);
+        // The outdoors has no facts, and people.
+        let mut facts = [None, Some(low)];
+        settle(&mut facts, &[([0, 1], 1.3)], &Allowance::default());
+        assert!(facts[1].is_some_and(|f| !f.is_void()));
+    }
+}
