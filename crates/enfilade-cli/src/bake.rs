@@ -323,7 +323,6 @@ pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<(
     for (name, n) in [
         ("triangles", summary.triangles),
         ("cells indoors", summary.cells_indoors),
-        ("  voids", summary.voids),
         ("portals", summary.portals),
         ("  doors", summary.doors),
         ("  windows", summary.windows),
@@ -334,12 +333,13 @@ pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<(
         writeln!(out, "{name:<16} {n:>9}")?;
     }
     // Few worlds have any.
-    if summary.special_portals > 0 {
-        writeln!(
-            out,
-            "{:<16} {:>9}",
-            "special portals", summary.special_portals
-        )?;
+    for (name, n) in [
+        ("voids", summary.voids),
+        ("special portals", summary.special_portals),
+    ] {
+        if n > 0 {
+            writeln!(out, "{name:<16} {n:>9}")?;
+        }
     }
     Ok(())
 }

@@ -56,9 +56,10 @@ fn inspect_prints_the_agreed_json() {
         report["cells"][1],
         json!({"id": 1, "name": "cell-1", "aabb": [[4.0, 0.0, 0.0], [8.0, 3.0, 5.0]],
             "volume": 60.0, "triangles": 2, "detail_triangles": 2, "portals": [0, 1],
-            "outdoor": false})
+            "outdoor": false, "kind": "room"})
     );
     assert_eq!(report["cells"][2]["outdoor"], json!(true));
+    assert_eq!(report["cells"][2]["kind"], json!("outdoors"));
     let seen = report["portals"][0]["visible_volume"].as_f64().unwrap();
     assert!(seen > 0.0);
     assert_eq!(
@@ -156,6 +157,20 @@ fn inspect_prints_a_table_for_people() {
     }
     // The largest cell comes first.
     assert!(table.find("outdoors").unwrap() < table.find("cell-0").unwrap());
+}
+
+#[test]
+fn inspect_tells_voids_from_rooms() {
+    let mut world = two_rooms();
+    world.graph.cells[1].is_void = true;
+    let path = file("void.glb", &encode_glb(&world).unwrap());
+    let done = enfilade(&["inspect", path.to_str().unwrap()], "");
+    let table = text(&done.stdout);
+    assert!(table.contains("1 rooms, 1 voids and outdoors"), "{table}");
+    let done = enfilade(&["inspect", path.to_str().unwrap(), "--json"], "");
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let kinds = [0, 1, 2].map(|c: usize| report["cells"][c]["kind"].clone());
+    assert_eq!(kinds, ["room", "void", "outdoors"]);
 }
 
 // Covers P6.
