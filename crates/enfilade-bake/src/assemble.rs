@@ -72,10 +72,10 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     let plates: Vec<_> = plates.map(fillers::FlatObject::new).collect();
     let in_turn = partition.portals.par_iter();
     let in_turn = in_turn.filter(cut.allowance.each(WORK_A_PORTAL));
-    let judged = in_turn.flat_map_iter(|p| {
-        let is_whole_filled = is_filled(cut, p);
-        let (_, is_on_floor) = kind_of(cut, p, is_whole_filled);
-        let parts = fillers::divided(p, is_on_floor, &plates, cut.allowance);
+    let judged = in_turn.filter_map(storable).flat_map_iter(|p| {
+        let is_whole_filled = is_filled(cut, &p);
+        let (_, is_on_floor) = kind_of(cut, &p, is_whole_filled);
+        let parts = fillers::divided(&p, is_on_floor, &plates, cut.allowance);
         let is_filled = is_whole_filled || parts.len() > 1;
         parts.into_iter().map(move |portal| {
             let (kind, is_on_floor) = kind_of(cut, &portal, is_filled);
@@ -128,6 +128,38 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
 /// Pieces narrower than this vanish when their vertices are rounded to `f32`. [Units: wu]
 const HAIR: f64 = 1e-5;
 
+fn to_f32(w: &Winding) -> Vec<[f32; 3]> {
+    w.points.iter().map(|p| p.as_vec3().to_array()).collect()
+}
+
+fn to_f64(piece: &[[f32; 3]]) -> Winding {
+    let point = |&p: &[f32; 3]| DVec3::from(p.map(f64::from));
+    Winding::new(piece.iter().map(point).collect())
+}
+
+/// Returns `true` if a rounded piece is wider than the rounding.
+fn is_there(piece: &[[f32; 3]], normal: DVec3) -> bool {
+    let w = to_f64(piece);
+    let n = w.points.len();
+    let rim: f64 = (0..n)
+        .map(|i| w.points[i].distance(w.points[(i + 1) % n]))
+        .sum();
+    w.area_normal().dot(normal) > HAIR * rim
+}
+
+/// Returns the part of a portal that a file can hold, which alone decides on its kind; `None` if there is none.
+fn storable(portal: &PartitionPortal) -> Option<PartitionPortal> {
+    let mut p = portal.clone();
+    p.pieces
+        .retain(|w| is_there(&to_f32(w), portal.plane.normal));
+    if p.pieces.len() < portal.pieces.len() {
+        let points = p.pieces.iter().flat_map(|w| w.points.iter().copied());
+        p.outline = Winding::hull_in_plane(&p.plane, &points.collect::<Vec<_>>());
+        p.area = p.pieces.iter().map(Winding::area).sum();
+    }
+    (!p.pieces.is_empty()).then_some(p)
+}
+
 /// Returns the portal in its final form; `None` if no piece is wider than the rounding.
 fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
     let p = &judged.portal;
@@ -147,29 +179,8 @@ pub(crate) fn rounded_portal(
     pieces: &[Winding],
     outward: f64,
 ) -> Option<Portal> {
-    let to_f32 = |w: &Winding| {
-        w.points
-            .iter()
-            .map(|p| p.as_vec3().to_array())
-            .collect::<Vec<_>>()
-    };
-    let rounded = |piece: &Vec<[f32; 3]>| {
-        Winding::new(
-            piece
-                .iter()
-                .map(|&p| DVec3::from(p.map(f64::from)))
-                .collect(),
-        )
-    };
-    let is_there = |piece: &Vec<[f32; 3]>| {
-        let w = rounded(piece);
-        let n = w.points.len();
-        let rim: f64 = (0..n)
-            .map(|i| w.points[i].distance(w.points[(i + 1) % n]))
-            .sum();
-        w.area_normal().dot(plane.normal) > HAIR * rim
-    };
-    let pieces: Vec<Vec<[f32; 3]>> = pieces.iter().map(to_f32).filter(is_there).collect();
+    let mut pieces: Vec<Vec<[f32; 3]>> = pieces.iter().map(to_f32).collect();
+    pieces.retain(|piece| is_there(piece, plane.normal));
     if pieces.is_empty() {
         return None;
     }
@@ -178,10 +189,7 @@ pub(crate) fn rounded_portal(
         kind: PortalKind::Open,
         normal: plane.normal.as_vec3().to_array(),
         outline: to_f32(&grown(outline, plane, outward)),
-        area: pieces
-            .iter()
-            .map(|piece| rounded(piece).area())
-            .sum::<f64>() as f32,
+        area: pieces.iter().map(|piece| to_f64(piece).area()).sum::<f64>() as f32,
         pieces,
         fittings: Vec::new(),
     })
@@ -479,6 +487,34 @@ fn cells_of_object(
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// A slit above a sill, and a hair beside it as high as a door.
+    #[test]
+    fn pieces_that_a_file_cannot_hold_have_no_say() {
+        let plane = Plane::through(DVec3::ZERO, DVec3::X);
+        let piece = |[z0, z1]: [f64; 2], high: f64| {
+            let points = [(0.0, z0), (high, z0), (high, z1), (0.0, z1)];
+            Winding::hull_in_plane(&plane, &points.map(|(y, z)| DVec3::new(0.0, y, z)))
+        };
+        let (slit, hair) = (piece([0.0, 0.01], 0.5), piece([1.0, 1.000_004], 2.0));
+        let both: Vec<DVec3> = slit.points.iter().chain(&hair.points).copied().collect();
+        let portal = |pieces: Vec<Winding>| PartitionPortal {
+            cells: [0, 1],
+            plane,
+            outline: Winding::hull_in_plane(&plane, &both),
+            area: pieces.iter().map(Winding::area).sum(),
+            pieces,
+            candidate: None,
+            width: 0.01,
+            kind: PortalKind::Open,
+            is_leak: false,
+        };
+        let held = storable(&portal(vec![slit.clone(), hair.clone()])).expect("a slit");
+        assert_eq!(held.pieces, [slit]);
+        assert!(held.outline.points.iter().all(|p| p.y <= 0.5));
+        assert!((held.area - 0.005).abs() < 1e-9);
+        assert!(storable(&portal(vec![hair])).is_none());
+    }
 
     proptest! {
         /// Vertices on an arc all lie near the lines between their neighbors.

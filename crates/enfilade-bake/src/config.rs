@@ -118,6 +118,11 @@ impl SmallestHole {
         }
     }
 
+    /// Returns how far apart copies of one vertex are in such a model, at most the width of a gap. [Units: wu]
+    pub(crate) fn reach(self, misfit: f64) -> f64 {
+        (Self::SPREAD * misfit).min(self.resolved(misfit).gap())
+    }
+
     /// Returns the width of the widest gap. [Units: wu]
     #[must_use]
     pub fn gap(self) -> f64 {

@@ -185,37 +185,41 @@ fn triangles_that_share_no_corners_leave_the_rooms_as_they_were() {
             let what = format!("{}, vertices moved by {jitter} m", g.truth.scene);
             let world = world_of(&g, &BakeConfig::default());
             holds_up(&clean, &world, &g, &what);
-            // Gaps as wide as the tolerance for one plane (8 µm here) are the hardest: some of their cracks are left.
-            let is_counted = |p: &&Portal| jitter > 1e-5 || p.kind != PortalKind::Crack;
-            let n = world.graph.portals.iter().filter(is_counted).count();
+            let n = world.graph.portals.len();
             assert!(5 * n <= 6 * clean.portals.len(), "{what}: {n} portals");
-            // Closes slits, not the walls beside them: uncut slivers would cause seals over half of each wall.
+            // Vertices meet again, so that hardly a slit is left to close.
             let share = Seals::of(&world).area / model_area(&world);
-            assert!(
-                share > 0.0 && share < 0.02,
-                "{what}: {share} of the model's area is seals"
-            );
+            assert!(share < 1e-3, "{what}: {share} of the model's area is seals");
         }
     }
 }
 
 #[test]
 fn where_gaps_are_left_open_they_are_cracks_and_part_no_rooms() {
-    let g = furnished_house();
-    let clean = graph_of(&g);
-    let by = Disturbance {
-        jitter: 1e-3,
-        seed: 1,
-        ..Disturbance::default()
-    };
-    let g = disturbed(&g, &by);
+    let clean = furnished_house();
     let config = BakeConfig {
         smallest_hole: SmallestHole::of_width(0.0),
         ..BakeConfig::default()
     };
-    let world = world_of(&g, &config);
-    holds_up(&clean, &world, &g, "gaps left open");
-    assert_eq!(Seals::of(&world).count, 0);
-    let is_crack = |p: &&Portal| p.kind == PortalKind::Crack;
-    assert!(world.graph.portals.iter().filter(is_crack).count() > 0);
+    for jitter in [1e-5, 1e-3] {
+        let by = Disturbance {
+            jitter,
+            seed: 1,
+            ..Disturbance::default()
+        };
+        let g = disturbed(&clean, &by);
+        let world = world_of(&g, &config);
+        holds_up(&graph_of(&clean), &world, &g, "gaps left open");
+        assert_eq!(Seals::of(&world).count, 0);
+        let cracks = world.graph.portals.iter();
+        let mut n_in_plane: BTreeMap<([CellId; 2], [i64; 4]), usize> = BTreeMap::new();
+        for p in cracks.filter(|p| p.kind == PortalKind::Crack) {
+            let normal = DVec3::from(p.normal.map(f64::from));
+            // Within 3 degrees and 5 cm.
+            let plane = [normal.x, normal.y, normal.z, normal.dot(middle(p).0)];
+            let plane = plane.map(|x| (x * 20.0).round() as i64);
+            *n_in_plane.entry((p.cells, plane)).or_default() += 1;
+        }
+        assert_eq!(n_in_plane.values().max(), Some(&1), "moved by {jitter} m");
+    }
 }

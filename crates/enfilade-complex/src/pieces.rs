@@ -457,7 +457,12 @@ fn openings_of(group: &[Piece], rules: &Rules<'_>) -> Vec<Opening> {
     }
     for (members, is_seal) in [(cracks, false), (gaps, true)] {
         if !members.is_empty() {
-            out.push(sheet.opening(&members, is_seal));
+            // Slits beside a door, in its plane, stay cracks.
+            let candidate = None;
+            out.push(Opening {
+                candidate,
+                ..sheet.opening(&members, is_seal)
+            });
         }
     }
     out
@@ -509,6 +514,36 @@ mod tests {
             .collect();
         assert_eq!(found, [(3.6, Some(0)), (6.0, None)]);
     }
+
+    /// A door and slits at its jamb in the same plane, on its candidate.
+    #[test]
+    fn slits_left_open_beside_a_door_are_one_crack() {
+        let rules = Rules {
+            planes: &[Plane {
+                normal: DVec3::Z,
+                d: 0.0,
+            }],
+            hole: 0.01,
+            has_seals: false,
+            n_candidates: 1,
+            purse: Purse::endless(),
+        };
+        let slit = |[x0, y0, x1, y1]: [f64; 4]| Piece {
+            is_gap: true,
+            ..piece(0, [x0, y0, x1, y1])
+        };
+        let pieces = vec![
+            piece(0, [0.0, 0.0, 0.9, 2.0]),
+            slit([1.2, 0.0, 1.201, 2.0]),
+            slit([1.5, 0.0, 1.501, 1.0]),
+        ];
+        let found: Vec<_> = group(pieces, &rules)
+            .iter()
+            .map(|o| (o.pieces.len(), o.candidate, o.is_seal))
+            .collect();
+        assert_eq!(found, [(1, Some(0), false), (2, None, false)]);
+    }
+
     #[test]
     fn a_union_with_a_shallow_notch_is_not_convex() {
         let rectangle = |[x, y, to_x, to_y]: [f64; 4]| {

@@ -127,11 +127,8 @@ fn cut(
     part: &PartitionPortal,
     fillers: &[Filler],
 ) -> Option<[(PartitionPortal, Vec<Filler>); 2]> {
-    let across = |f: &Filler| f.across;
-    let up = |f: &Filler| f.up;
-    let ways: [(DVec3, &dyn Fn(&Filler) -> [f64; 2], bool); 2] =
-        [(opening.across, &across, true), (opening.up, &up, false)];
-    for (direction, range, is_across) in ways {
+    for (is_across, direction) in [(true, opening.across), (false, opening.up)] {
+        let range = |f: &Filler| if is_across { f.across } else { f.up };
         let mut in_order = fillers.to_vec();
         in_order.sort_by(|a, b| {
             let (a, b) = (range(a), range(b));

@@ -5,7 +5,7 @@
 //! | which triangles bound rooms, which are stairs, along which axes | `of`, `stairs`, `frame` |
 //! | surfaces that close openings: door leaves and panes | `blockers` |
 //! | where storeys end | `slabs` |
-//! | how badly triangles fit together | `misfit` |
+//! | how badly triangles fit together, and how to make them fit | `misfit`, `settle`, `weld`, `sheets` |
 //! | where surfaces end, which triangles are missing | `rims` |
 //! | which side of a surface is matter | `backs` |
 //! | where cells are one room | `pinch`, `lattice` |
@@ -22,8 +22,11 @@ mod outline;
 mod picture;
 mod pinch;
 mod rims;
+mod settle;
+mod sheets;
 mod slabs;
 mod stairs;
+mod weld;
 
 pub(crate) use backs::{BACKS, POINTS, count_backs, is_crevice, is_inside, rays_from};
 pub(crate) use blockers::{MAX_THICKNESS, plates, thin_direction};

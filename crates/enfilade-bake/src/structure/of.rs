@@ -7,6 +7,7 @@ use super::blockers::{plates, without_open_leaves};
 use super::frame::Frame;
 use super::misfit::misfit;
 use super::rims::Rims;
+use super::settle::settle;
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
 use crate::{BakeConfig, BakeError, Method, SmallestHole};
@@ -73,8 +74,18 @@ impl<'a> Structure<'a> {
         config: &BakeConfig,
         allowance: &'a Allowance,
     ) -> Result<Self, BakeError> {
-        let (sources, triangles) = structural_triangles(scene);
+        let (mut sources, mut triangles) = structural_triangles(scene);
         allowance.spend(WORK_A_TRIANGLE * triangles.len() as u64);
+        let misfit = misfit(&triangles, &Bvh::build(&triangles), allowance);
+        let reach = config.smallest_hole.reach(misfit);
+        // Brushes are exact.
+        if reach > 0.0 && scene.solids.is_empty() {
+            let closes_gaps = config.smallest_hole.has_seals();
+            settle(&mut triangles, reach, closes_gaps, allowance);
+            (sources, triangles) = std::iter::zip(sources, triangles)
+                .filter(|(_, t)| has_area(t))
+                .unzip();
+        }
         if triangles.is_empty() {
             return Err(BakeError::NothingStructural {
                 n_objects: scene.objects.len(),
@@ -105,7 +116,6 @@ impl<'a> Structure<'a> {
         let walls: Vec<Triangle> = at(&wall_numbers);
         let bvh = Bvh::build(&framed);
         let rims = Rims::of(&walls);
-        let misfit = misfit(&framed, &bvh, allowance);
         Ok(Self {
             missing: rims.missing_triangles(config.min_opening.powi(2)),
             hole: config.smallest_hole.resolved(misfit),
@@ -168,10 +178,12 @@ pub(crate) fn structural_triangles(scene: &Scene) -> (Vec<TriangleSource>, Vec<T
     scene
         .triangle_sources(Role::Structural)
         .map(|s| (s, scene.world_triangle(s)))
-        .filter(|(_, t)| {
-            t.iter().all(|p| p.is_finite()) && triangle_area_normal(t).length_squared() > 0.0
-        })
+        .filter(|(_, t)| t.iter().all(|p| p.is_finite()) && has_area(t))
         .unzip()
+}
+
+fn has_area(t: &Triangle) -> bool {
+    triangle_area_normal(t).length_squared() > 0.0
 }
 
 /// Returns the box around triangles; empty for none.
