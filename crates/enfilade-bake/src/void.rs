@@ -91,8 +91,12 @@ pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) {
         return;
     }
     let doorways = partition.portals.iter().filter_map(|p| {
-        let height = doorway_height(p, &partition.locator);
-        (height > 0.0).then_some((p.cells.map(|c| space_of[c as usize] as usize), height))
+        let (height, stands) = doorway_of(p, &partition.locator)?;
+        Some(Doorway {
+            spaces: p.cells.map(|c| space_of[c as usize] as usize),
+            height,
+            stands,
+        })
     });
     settle(&mut facts, &doorways.collect::<Vec<_>>(), allowance);
     for (label, &space) in partition.label_of_cell.iter_mut().zip(&space_of) {
@@ -104,19 +108,32 @@ pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) {
     }
 }
 
+/// An upright opening that begins at a floor on both sides.
+struct Doorway {
+    spaces: [usize; 2],
+    /// [Units: wu]
+    height: f64,
+    /// `true` for a side on which somebody can stand before it. A hall may reach up beside the space above its neighbors.
+    stands: [bool; 2],
+}
+
 /// Enters the doorways between spaces in their facts, over any number of low rooms in a row. Outdoors has no facts.
-fn settle(facts: &mut [Option<Facts>], doorways: &[([usize; 2], f64)], allowance: &Allowance) {
+fn settle(facts: &mut [Option<Facts>], doorways: &[Doorway], allowance: &Allowance) {
     let mut is_settled = false;
     while !is_settled && allowance.spend(1 + doorways.len() as u64 / 16) {
         is_settled = true;
-        for &([a, b], height) in doorways {
-            for (from, to) in [(a, b), (b, a)] {
-                let leads_from_void = facts[from].is_some_and(|f| f.is_void());
-                if let Some(to) = &mut facts[to]
-                    && !leads_from_void
-                    && to.doorway < height
+        for doorway in doorways {
+            for side in 0..2 {
+                let from = facts[doorway.spaces[side]];
+                let comes = match from {
+                    Some(from) if from.is_low() => !from.is_void(),
+                    _ => doorway.stands[side],
+                };
+                if let Some(to) = &mut facts[doorway.spaces[1 - side]]
+                    && comes
+                    && to.doorway < doorway.height
                 {
-                    to.doorway = height;
+                    to.doorway = doorway.height;
                     is_settled = false;
                 }
             }
@@ -190,9 +207,9 @@ fn headroom(locator: &Locator, cell: CellId, p: DVec3, [low, high]: [f64; 2]) ->
     longest
 }
 
-/// Returns the height of a doorway: an upright opening, wide enough, that begins at a floor on both sides. 0 for all other
-/// portals. [Units: wu]
-fn doorway_height(portal: &PartitionPortal, locator: &Locator) -> f64 {
+/// Returns the height of a doorway, an upright opening, wide enough, that begins at a floor on both sides, and on which of
+/// them somebody can stand; `None` for all other portals. [Units: wu]
+fn doorway_of(portal: &PartitionPortal, locator: &Locator) -> Option<(f64, [bool; 2])> {
     let along = DVec3::Y.cross(portal.plane.normal);
     let range = |d: DVec3| {
         let at = portal.outline.points.iter().map(|q| d.dot(*q));
@@ -201,25 +218,23 @@ fn doorway_height(portal: &PartitionPortal, locator: &Locator) -> f64 {
     let ([left, right], [low, high]) = (range(along.normalize_or_zero()), range(DVec3::Y));
     // Upright: nearer to the vertical than to the horizontal.
     if along.length() < 0.7 || right - left < WIDTH {
-        return 0.0;
+        return None;
     }
-    let middle = portal.outline.centroid();
-    let has_floors = |share: f64| {
+    let ahead = along.cross(DVec3::Y).normalize() * BEYOND;
+    let sides = |share: f64| {
         let aside = along.normalize() * ((share - 0.5) * (right - left));
-        let foot = (middle + aside).with_y(low);
-        portal
-            .cells
-            .into_iter()
-            .zip([-BEYOND, BEYOND])
-            .all(|(cell, by)| {
-                let p = foot + along.cross(DVec3::Y).normalize() * by;
-                let cell_at = |h: f64| locator.locate(p + DVec3::Y * h);
-                let cell = Some(CellId(cell));
-                cell_at(STEP) == cell && cell_at(-STEP) != cell
-            })
+        let foot = (portal.outline.centroid() + aside).with_y(low);
+        [(0, foot - ahead), (1, foot + ahead)].map(|(k, p)| (CellId(portal.cells[k]), p))
     };
-    let is_doorway = [0.25, 0.5, 0.75].into_iter().any(has_floors);
-    if is_doorway { high - low } else { 0.0 }
+    let has_floor = |&(cell, p): &(CellId, DVec3)| {
+        let cell_at = |h: f64| locator.locate(p + DVec3::Y * h);
+        cell_at(STEP) == Some(cell) && cell_at(-STEP) != Some(cell)
+    };
+    let mut at = [0.25, 0.5, 0.75].into_iter().map(sides);
+    let sides = at.find(|sides| sides.iter().all(has_floor))?;
+    let about = [low - STEP, low + STANDING + STEP];
+    let stands = sides.map(|(cell, p)| headroom(locator, cell, p, about) >= STANDING);
+    Some((high - low, stands))
 }
 
 #[cfg(test)]
@@ -261,13 +276,31 @@ mod tests {
         };
         // Cells 1 and 2 in a row from room 0, 3 and 4 apart from it, 5 through a hatch.
         let mut facts = [high, low, low, low, low, low].map(Some);
-        let doorways = [([2, 1], 1.6), ([0, 1], 1.5), ([3, 4], 1.6), ([0, 5], 0.8)];
+        let doorway = |spaces, height| Doorway {
+            spaces,
+            height,
+            stands: [true; 2],
+        };
+        let doorways = [
+            doorway([2, 1], 1.6),
+            doorway([0, 1], 1.5),
+            doorway([3, 4], 1.6),
+            doorway([0, 5], 0.8),
+        ];
+        let voids = |facts: [Option<Facts>; 6]| facts.map(|f| f.is_some_and(|f| f.is_void()));
         settle(&mut facts, &doorways, &Allowance::default());
-        let voids = facts.map(|f| f.is_some_and(|f| f.is_void()));
-        assert_eq!(voids, [false, false, false, true, true, true]);
+        assert_eq!(voids(facts), [false, false, false, true, true, true]);
+        // Nobody stands in the high room where it meets the low ones: it reaches over its neighbors.
+        let mut facts = [high, low, low, low, low, low].map(Some);
+        let reaching = doorways.map(|d| Doorway {
+            stands: [false; 2],
+            ..d
+        });
+        settle(&mut facts, &reaching, &Allowance::default());
+        assert_eq!(voids(facts), [false, true, true, true, true, true]);
         // The outdoors has no facts, and people.
         let mut facts = [None, Some(low)];
-        settle(&mut facts, &[([0, 1], 1.3)], &Allowance::default());
+        settle(&mut facts, &[doorway([0, 1], 1.3)], &Allowance::default());
         assert!(facts[1].is_some_and(|f| !f.is_void()));
     }
 }

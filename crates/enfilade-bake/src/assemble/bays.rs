@@ -100,7 +100,7 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
 }
 
 /// Joins slits of one kind, and openings of voids of any kind, between the same two cells in one plane: each plane has one
-/// portal with all its pieces, in place of the first. It has the kind of the larger.
+/// portal with all its pieces, in place of the first. It has the kind of the widest.
 ///
 /// Time: quadratic in the planes between two cells.
 pub(super) fn join_slits(portals: Vec<Judged>, is_void: impl Fn(u32) -> bool) -> Vec<Judged> {
@@ -117,7 +117,7 @@ pub(super) fn join_slits(portals: Vec<Judged>, is_void: impl Fn(u32) -> bool) ->
                 .iter()
                 .find(|&&at| is_coplanar(&out[at].portal, &judged.portal));
             if let Some(&at) = home {
-                if judged.portal.area > out[at].portal.area {
+                if judged.portal.width > out[at].portal.width {
                     out[at].kind = judged.kind;
                 }
                 out[at].take_in(judged.portal);
@@ -231,6 +231,13 @@ mod tests {
         let mut of_void = wide();
         of_void.iter_mut().for_each(|j| j.portal.cells = [1, 3]);
         assert_eq!(n_pieces(of_void), [2]);
+        // Together with a crack, however long, the opening is one that somebody looks through.
+        let mut crack = slit(0.0, [2.0, 2.02]);
+        let mut lamp = slit(0.0, [2.5, 2.6]);
+        (crack.kind, crack.portal.area) = (PortalKind::Crack, 1.0);
+        [&mut crack, &mut lamp].map(|j| j.portal.cells = [1, 3]);
+        let joined = join_slits(vec![crack, lamp], |cell| cell == 3);
+        assert_eq!((joined.len(), joined[0].kind), (1, PortalKind::Open));
         // One between two others in another plane does not keep them apart.
         let between = slit(0.2, [2.5, 2.7]);
         assert_eq!(n_pieces(vec![first(), between, second()]), [2, 1]);
