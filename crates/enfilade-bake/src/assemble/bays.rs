@@ -235,7 +235,9 @@ mod tests {
         let mut crack = slit(0.0, [2.0, 2.02]);
         let mut lamp = slit(0.0, [2.5, 2.6]);
         (crack.kind, crack.portal.area) = (PortalKind::Crack, 1.0);
-        [&mut crack, &mut lamp].map(|j| j.portal.cells = [1, 3]);
+        for j in [&mut crack, &mut lamp] {
+            j.portal.cells = [1, 3];
+        }
         let joined = join_slits(vec![crack, lamp], |cell| cell == 3);
         assert_eq!((joined.len(), joined[0].kind), (1, PortalKind::Open));
         // One between two others in another plane does not keep them apart.

@@ -8,14 +8,14 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, BoxTree, Purse};
+use enfilade_geom::{Aabb, BoxTree, DVec3, Purse, Sets};
 
 use crate::complex::{Label, Vote};
 use crate::config::{Guide, Heuristic};
 use crate::proposal::Proposal;
 use crate::structure::OUTDOORS;
 
-use super::cells;
+use super::cells::{self, NO_CELL};
 use super::input::BspInput;
 use super::leaves::Bsp;
 use super::separator::{self, Separator};
@@ -62,15 +62,47 @@ pub(super) fn separators(bsp: &Bsp<'_>) -> Vec<Separator> {
     uncrossed(bsp, found.into_iter().filter(is_round).collect())
 }
 
-/// Divides the rooms of a proposal by such separators.
-pub(super) fn divide(bsp: &Bsp<'_>, guides: &[Separator], proposal: &mut Proposal) {
-    let (of_leaf, _) = cells::components(bsp, guides);
+/// Divides the rooms of a proposal by such separators. `walls` are the separators that divided the air before; parts of
+/// one room are joined again, except across the separators of guides.
+pub(super) fn divide(
+    bsp: &Bsp<'_>,
+    guides: &[Separator],
+    walls: Vec<Separator>,
+    proposal: &mut Proposal,
+) {
+    let mut all = walls;
+    all.extend_from_slice(guides);
+    let (part_of_leaf, n_parts) = cells::components(bsp, &all);
+    let part_at = |p: DVec3| part_of_leaf[bsp.tree.leaf_of(p) as usize];
+    // The room that most votes in a part are for.
+    let mut votes: BTreeMap<(u32, Label), u32> = BTreeMap::new();
+    for vote in &proposal.votes {
+        *votes.entry((part_at(vote.point), vote.label)).or_default() += 1;
+    }
+    let mut room_of_part: BTreeMap<u32, (u32, Label)> = BTreeMap::new();
+    for ((part, room), n) in votes {
+        let most = room_of_part.entry(part).or_insert((n, room));
+        *most = (*most).max((n, room));
+    }
+    let mut is_guide = vec![false; bsp.portals.len()];
+    for &p in guides.iter().flat_map(|s| &s.portals) {
+        is_guide[p as usize] = true;
+    }
+    let mut sets = Sets::new(n_parts);
+    for (p, _) in bsp.portals.iter().zip(&is_guide).filter(|(_, is)| !**is) {
+        let [a, b] = p.leaves.map(|l| part_of_leaf[l as usize]);
+        let [of_a, of_b] = [a, b].map(|part| room_of_part.get(&part).map(|r| r.1));
+        if of_a.is_some() && of_a == of_b {
+            sets.join(a, b);
+        }
+    }
     let mut number = BTreeMap::new();
     let is_indoors = |v: &&mut Vote| v.label != Label::Region(OUTDOORS);
     for vote in proposal.votes.iter_mut().filter(is_indoors) {
-        let part = of_leaf[bsp.tree.leaf_of(vote.point) as usize];
+        let part = part_at(vote.point);
+        let set = (part != NO_CELL).then(|| sets.find(part));
         let next = Label::Region(OUTDOORS + 1 + number.len() as u32);
-        vote.label = *number.entry((vote.label, part)).or_insert(next);
+        vote.label = *number.entry((vote.label, set)).or_insert(next);
     }
 }
 

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{DVec3, Purse, Winding};
+use enfilade_geom::{DVec3, Purse, Triangle, Winding};
 use rayon::prelude::*;
 
 use crate::complex::region::RegionShape;
 use crate::complex::{Label, LabelSettings, Vote};
-use crate::config::{BspConfig, Rooms};
+use crate::config::BspConfig;
 use crate::proposal::Proposal;
 use crate::rooms::{self, Basins, VoxelAir};
 use crate::structure::{Candidate, OUTDOORS, Structure, grown};
@@ -34,11 +34,7 @@ pub(crate) fn propose(
     let mut bsp = tree_of(structure, &config.bsp, context.allowance().into());
     let of_tree = bsp.counts();
     context.begin(Stage::Separators)?;
-    let are_rooms_wanted = match config.bsp.rooms {
-        Rooms::Auto => structure.scene.solids.is_empty(),
-        rooms => rooms == Rooms::Always,
-    };
-    let mut proposal = if are_rooms_wanted {
+    let mut proposal = if config.bsp.rooms.are_wanted(structure.scene) {
         rooms_of(structure, &mut bsp, config, context)?
     } else {
         cells_of(structure, &bsp)
@@ -70,9 +66,9 @@ fn rooms_of(
     let (cell_of_leaf, n_cells) = cells::components(bsp, &kept);
     let guides = guided::separators(bsp);
     let air = rooms::prepare(structure, config, context)?;
-    let cell_at = |p| match cell_of_leaf[bsp.tree.leaf_of(p) as usize] {
-        NO_CELL => None,
-        cell => Some(cell),
+    let cell_at = |p| {
+        let leaf = bsp.tree.leaf_of(structure.frame.to_scene(p));
+        Some(cell_of_leaf[leaf as usize]).filter(|&cell| cell != NO_CELL)
     };
     let basins = Basins::of_parts(&air, cell_at, context.allowance());
     let VoxelAir { grid, solid, .. } = air;
@@ -84,14 +80,14 @@ fn rooms_of(
             .votes
             .retain(|v| v.label != Label::Region(OUTDOORS));
     }
-    if !guides.is_empty() {
-        guided::divide(bsp, &guides, &mut proposal);
-        proposal.candidates.extend(candidates_of(bsp, &guides));
-    }
     proposal.counts.extend([
         ("separators", kept.len() as f64),
         ("cells_before", n_cells as f64),
     ]);
+    if !guides.is_empty() {
+        guided::divide(bsp, &guides, kept, &mut proposal);
+        proposal.candidates.extend(candidates_of(bsp, &guides));
+    }
     Ok(proposal)
 }
 
@@ -122,7 +118,10 @@ fn tree_of<'a>(structure: &Structure<'_>, config: &BspConfig, purse: Purse<'a>) 
         .map(|&t| structure.sources[t as usize].object)
         .collect();
     let inside = leak::inside_of(structure.scene);
-    let input = input_of(structure.scene, &structure.walls, &objects, &inside);
+    // In scene coordinates, exact.
+    let numbers = structure.wall_numbers.iter();
+    let walls: Vec<Triangle> = numbers.map(|&t| structure.triangles[t as usize]).collect();
+    let input = input_of(structure.scene, &walls, &objects, &inside);
     guided::build(&input, config.heuristic, &config.guide, purse)
 }
 

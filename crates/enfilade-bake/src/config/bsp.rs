@@ -1,5 +1,6 @@
 //! BSP-only settings.
 
+use enfilade_geom::scene::Scene;
 use enfilade_geom::{Aabb, Plane};
 
 /// BSP-only settings.
@@ -24,6 +25,17 @@ pub enum Rooms {
     Always,
     /// Keeps all separators that cross no other (Lefebvre & Hornus 2003, §2.1 step 2).
     Never,
+}
+
+impl Rooms {
+    /// Returns `true` if shape decides on the rooms of a scene.
+    pub(crate) fn are_wanted(self, scene: &Scene) -> bool {
+        match self {
+            Self::Auto => scene.solids.is_empty(),
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
 }
 
 /// The rule that chooses the plane to cut a region.

@@ -94,6 +94,7 @@ impl<'a> Structure<'a> {
         let frame = match method {
             // Voxels follow the walls, however the building is turned.
             Method::Watershed => Frame::of(&triangles),
+            Method::Bsp if config.bsp.rooms.are_wanted(scene) => Frame::of(&triangles),
             Method::Bsp | Method::Delaunay => Frame::SCENE,
         };
         let framed = frame.triangles_to_grid(&triangles);
