@@ -86,6 +86,8 @@ fn rooms_of(
     ]);
     if !guides.is_empty() {
         guided::divide(bsp, &guides, kept, &mut proposal);
+        // At a curved wall a plane leaves slits, through which the votes of its two sides meet.
+        proposal.joins_unparted = false;
         proposal.candidates.extend(candidates_of(bsp, &guides));
     }
     Ok(proposal)

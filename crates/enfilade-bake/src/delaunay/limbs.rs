@@ -17,8 +17,8 @@ use crate::rooms::{Limb, Plan, THICKER};
 
 /// Cells of a plan across the narrowest opening.
 const ACROSS: f64 = 6.0;
-/// Most cells of a plan.
-const MAX_CELLS: f64 = 4e6;
+/// Most cells of a plan, about: 1,000 m² in decimeters. Larger rooms have larger cells.
+const MAX_CELLS: f64 = 1e5;
 /// Levels at which a room is measured to find its largest, which is its plan.
 const LEVELS: usize = 8;
 /// Edge of the cells in which levels are compared. [Units: cells of the plan]
