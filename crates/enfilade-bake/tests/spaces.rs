@@ -298,11 +298,10 @@ by! {
         the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
-    // Tetrahedra have no headroom, so nothing tells a plenum from rooms.
+    // Tetrahedra have no headroom, so nothing tells a plenum from rooms; and a hole of two thirds of the width is a room's.
     delaunay Delaunay:
         a_niche_open_at_full_height_is_part_of_its_room,
         a_beam_across_a_hall_parts_nothing,
-        a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
 }
