@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 22] = [
+const COMMANDS: [(&str, &[&str]); 23] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -27,6 +27,7 @@ const COMMANDS: [(&str, &[&str]); 22] = [
         "edit world.glb --delete-portal 0 -o e.glb",
         &["file", "cells", "portals", "costs"],
     ),
+    ("export world.glb -o graph.graphml", &["file", "bytes"]),
     ("inspect world.glb", &["cells", "portals", "stats"]),
     ("locate world.glb", &["cells"]),
     ("pack world.glb -o w.enf", &["file", "packed", "pieces"]),
