@@ -255,7 +255,7 @@ fn files_that_nobody_named_are_not_written_over() {
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         (done.status.code(), said)
     };
-    let n_pages = if cfg!(feature = "view") { 23 } else { 22 };
+    let n_pages = if cfg!(feature = "view") { 24 } else { 23 };
     for (line, file, n_files) in [
         ("demo -o d", "house.glb", 3),
         ("demo -o d", "world.glb", 3),
