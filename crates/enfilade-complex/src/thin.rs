@@ -33,13 +33,6 @@ const MAX_CUTS: usize = 256;
 /// at a half, seals have two fifths more area; at a tenth, there are a seventh more leaves.
 const ALIKE: f64 = 0.25;
 
-/// Level layers of air thinner than this are cut where the faces of walls are that end above the floor or below the
-/// ceiling, at edges of at least `LONG`. [Units: wu] Floors are 50 to 80 mm thick where a model omits them.
-const LAYER: f64 = 0.1;
-const LONG: f64 = 1.0;
-/// Vertical part of the normal above which a layer is level.
-const LEVEL: f64 = 0.9;
-
 /// An edge where a facet turns from closed to open, seen from one of its leaves.
 struct Edge {
     leaf: u32,
@@ -231,18 +224,12 @@ impl LeafCutter<'_> {
             .edges_of(leaf..leaf + 1)
             .iter()
             .filter_map(|e| {
-                let length = e.from.distance(e.to);
-                let is_wall_foot = e.inward.y.abs() > LEVEL && length >= LONG;
-                let thin = if is_wall_foot {
-                    self.gap.max(LAYER)
-                } else {
-                    self.gap
-                };
-                let depth = e.inward * thin;
+                let depth = e.inward * self.gap;
                 let quad = [e.from, e.to, e.to + depth, e.from + depth];
                 let points = region.clip(&quad, self.tolerance.cut)?;
+                let length = e.from.distance(e.to);
                 // A whole strip means a thick leaf; smaller ones are parts near the ends of leaves.
-                let is_thin = poly::area(&points) < 0.99 * length * thin;
+                let is_thin = poly::area(&points) < 0.99 * length * self.gap;
                 let normal = (e.to - e.from).cross(e.inward).try_normalize()?;
                 let is_there = poly::width(&points) > 2.0 * self.tolerance.cut;
                 // Skip strips along a side of the leaf.
@@ -322,7 +309,7 @@ impl CutBox {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ComplexInput, Label, LabelSettings, Vote, build_complex};
+    use super::super::{ComplexInput, build_complex};
     use super::*;
 
     /// A wall whose triangles miss each other by a millimeter: a sliver between two of them is cut once at the edge
@@ -359,55 +346,5 @@ mod tests {
         // 17 leaves per triangle; 25 if both copies were cut.
         let n = complex.n_leaves();
         assert!(n < 20 * triangles.len(), "{n}");
-    }
-
-    /// Four rooms of 4 m by 4 m, askew; the walls between them end 60 mm above the floor.
-    #[test]
-    fn the_air_below_walls_that_end_above_the_floor_belongs_to_the_rooms_above_it() {
-        let block = |lo: [f64; 3], hi: [f64; 3]| Aabb::new(lo.into(), hi.into()).triangles();
-        let askew = |p: DVec3| {
-            let (sin, cos) = 0.4_f64.sin_cos();
-            DVec3::new(p.x * cos + p.z * sin, p.y, p.z * cos - p.x * sin)
-        };
-        let hall = block([0.0, 0.0, 0.0], [8.1, 2.5, 8.1]);
-        let shell = block([-0.3, -0.3, -0.3], [8.4, 2.8, 8.4]);
-        let along = block([4.0, 0.06, -0.1], [4.1, 2.6, 8.2]);
-        let across = [[-0.1, 4.0], [4.1, 8.2]]
-            .map(|[x0, x1]| block([x0, 0.06, 4.0], [x1, 2.6, 4.1]))
-            .concat();
-        let hall = hall.into_iter().map(|[a, b, c]| [a, c, b]);
-        let all = hall.chain(shell).chain(along).chain(across);
-        let triangles: Vec<_> = all
-            .map(|t| t.map(|p| askew(p).as_vec3().as_dvec3()))
-            .collect();
-        let complex = build_complex(&ComplexInput {
-            triangles: &triangles,
-            candidates: &[],
-            missing: &[],
-            bounds: Aabb::new(DVec3::splat(-5.0), DVec3::splat(13.0)),
-            gap: 0.01,
-            has_seals: true,
-        });
-        let rooms = [[2.0, 2.0], [6.0, 2.0], [2.0, 6.0], [6.0, 6.0]];
-        let at = |[x, z]: [f64; 2], y: f64| askew(DVec3::new(x, y, z));
-        let votes: Vec<Vote> = (2..)
-            .zip(rooms)
-            .map(|(label, room)| Vote {
-                point: at(room, 1.0),
-                label: Label::Region(label),
-                weight: 40.0,
-            })
-            .collect();
-        let partition = complex.partition(&votes, &LabelSettings::default());
-        let cells = |y: f64| rooms.map(|room| partition.locator.locate(at(room, y)));
-        let mut found = cells(1.0).map(Option::unwrap);
-        assert_eq!(cells(0.03), found.map(Some));
-        found.sort_unstable();
-        assert!(found.is_sorted_by(|a, b| a < b), "{found:?}");
-        let level = partition
-            .portals
-            .iter()
-            .filter(|p| p.plane.normal.y.abs() > 0.5);
-        assert_eq!(level.count(), 0);
     }
 }
