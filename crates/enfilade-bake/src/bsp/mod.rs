@@ -14,7 +14,7 @@
 //! | 3: cells, crossing separators | `cells` |
 //! | separators that the arrangement would have shown (§3.0.2) | `arrange` |
 //! | cells of a guide where there are no walls | `guided` |
-//! | separators that may part rooms, in buildings | `lattice`, then [`crate::rooms`] |
+//! | separators that may part rooms, in buildings | `lattice`, then `rooms` |
 //! | matter, where surfaces are triangles | `inside` |
 //! | 4: cells above the bound | [`crate::bound`] |
 //! | leaks, as a path | `leak` |

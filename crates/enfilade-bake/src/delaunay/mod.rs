@@ -11,7 +11,7 @@
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | merging of parts of the air between which nothing narrows | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches`; `labels`: the result | ours, after Matheron 1975 |
-//! | corridors that leave a room without a pinch | `limbs`, by the rule of [`crate::rooms`] | ours |
+//! | corridors that leave a room without a pinch | `limbs`, by the rule of `rooms` | ours |
 //! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
 //! | remaining rooms, and matter | `standing` | ours |
 //! | candidates and votes | `rooms` | ours |

@@ -2,7 +2,7 @@
 //!
 //! After Haumont, Debeir & Sillion, "Volumetric Cell-and-Portal Generation" (2003), with three
 //! departures: distances are exact instead of chamfered, merging cures over-segmentation
-//! ([`crate::rooms`]), and the results are not portals but candidates in the real opening, which the cell
+//! (`rooms`), and the results are not portals but candidates in the real opening, which the cell
 //! complex then realizes exactly.
 
 mod propose;
