@@ -88,7 +88,8 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         })
     });
     let bays = bays::join_bays(judged.collect());
-    let portals: Vec<Portal> = bays::join_slits(bays, |c| cells[c as usize].is_void)
+    let is_void = |c: u32| cells[c as usize].is_void;
+    let portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| kind_of(cut, p, false).0)
         .iter()
         .filter_map(|j| portal(cut, j))
         .collect();

@@ -100,10 +100,15 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
 }
 
 /// Joins slits of one kind, and openings of voids of any kind, between the same two cells in one plane: each plane has one
-/// portal with all its pieces, in place of the first. It has the kind of the widest.
+/// portal with all its pieces, in place of the first. It is a crack if the widest is one, otherwise `kind_of` judges it
+/// as a whole.
 ///
 /// Time: quadratic in the planes between two cells.
-pub(super) fn join_slits(portals: Vec<Judged>, is_void: impl Fn(u32) -> bool) -> Vec<Judged> {
+pub(super) fn join_slits(
+    portals: Vec<Judged>,
+    is_void: impl Fn(u32) -> bool,
+    kind_of: impl Fn(&PartitionPortal) -> PortalKind,
+) -> Vec<Judged> {
     let mut out: Vec<Judged> = Vec::with_capacity(portals.len());
     let mut slits: BTreeMap<([u32; 2], Option<PortalKind>), Vec<usize>> = BTreeMap::new();
     for judged in portals {
@@ -117,10 +122,12 @@ pub(super) fn join_slits(portals: Vec<Judged>, is_void: impl Fn(u32) -> bool) ->
                 .iter()
                 .find(|&&at| is_coplanar(&out[at].portal, &judged.portal));
             if let Some(&at) = home {
-                if judged.portal.width > out[at].portal.width {
-                    out[at].kind = judged.kind;
+                let whole = &mut out[at];
+                if judged.portal.width > whole.portal.width {
+                    whole.portal.kind = judged.portal.kind;
                 }
-                out[at].take_in(judged.portal);
+                whole.take_in(judged.portal);
+                whole.kind = kind_of(&whole.portal);
                 continue;
             }
             planes.push(out.len());
@@ -182,7 +189,7 @@ mod tests {
 
     /// Returns the number of pieces of each portal once slits are joined.
     fn n_pieces(portals: Vec<Judged>) -> Vec<usize> {
-        let joined = join_slits(portals, |cell| cell == 3);
+        let joined = join_slits(portals, |cell| cell == 3, |p| p.kind);
         joined.iter().map(|j| j.portal.pieces.len()).collect()
     }
 
@@ -195,6 +202,7 @@ mod tests {
                 slit(0.0, [3.0, 3.05]),
             ],
             |_| false,
+            |p| p.kind,
         );
         let [Judged { portal, .. }] = &joined[..] else {
             panic!("{} portals", joined.len());
@@ -235,11 +243,17 @@ mod tests {
         let mut crack = slit(0.0, [2.0, 2.02]);
         let mut lamp = slit(0.0, [2.5, 2.6]);
         (crack.kind, crack.portal.area) = (PortalKind::Crack, 1.0);
+        crack.portal.kind = PortalKind::Crack;
         for j in [&mut crack, &mut lamp] {
             j.portal.cells = [1, 3];
         }
-        let joined = join_slits(vec![crack, lamp], |cell| cell == 3);
-        assert_eq!((joined.len(), joined[0].kind), (1, PortalKind::Open));
+        // A judge of the whole may find a sill that its pieces do not have.
+        let judge = |p: &PartitionPortal| match p.kind {
+            PortalKind::Open if p.pieces.len() == 2 => PortalKind::Window,
+            kind => kind,
+        };
+        let joined = join_slits(vec![crack, lamp], |cell| cell == 3, judge);
+        assert_eq!((joined.len(), joined[0].kind), (1, PortalKind::Window));
         // One between two others in another plane does not keep them apart.
         let between = slit(0.2, [2.5, 2.7]);
         assert_eq!(n_pieces(vec![first(), between, second()]), [2, 1]);
