@@ -27,7 +27,7 @@ pub struct EnfWorld {
     crossed: Vec<u32>,
 }
 
-/// What the last view saw, as plain numbers.
+/// Answers of the last view, as plain numbers.
 #[derive(Default)]
 struct SeenBuffers {
     cells: Vec<u32>,

@@ -12,7 +12,7 @@ pub const ENF_DEFECT: i32 = -4;
 /// Stands for the absence of an id in structs.
 pub const ENF_NO_ID: u32 = u32::MAX;
 
-/// Counts of [`enf_count`](crate::ffi::enf_count): cells.
+/// Counts of `enf_count`: cells.
 pub const ENF_CELLS: u32 = 0;
 /// Counts: portals.
 pub const ENF_PORTALS: u32 = 1;
