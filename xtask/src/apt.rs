@@ -8,10 +8,10 @@ use crate::run_to_end;
 
 /// A system requirement, and the packages that provide it.
 pub(crate) struct Need {
-    what: &'static str,
-    why: &'static str,
-    packages: &'static [&'static str],
-    is_there: fn() -> bool,
+    pub(crate) what: &'static str,
+    pub(crate) why: &'static str,
+    pub(crate) packages: &'static [&'static str],
+    pub(crate) is_there: fn() -> bool,
 }
 
 /// Software that draws the pictures of the tests, and the display on which windows open. Only Linux has these;
@@ -70,7 +70,8 @@ fn has_driver() -> bool {
     .any(|e| e.file_name().to_string_lossy().contains("lvp"))
 }
 
-fn has_tool(name: &str) -> bool {
+/// Returns `true` if a program is on the path.
+pub(crate) fn has_tool(name: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path).any(|dir| dir.join(name).is_file())
 }

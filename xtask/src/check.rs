@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 
+use crate::steps::Steps;
 use crate::{
-    GATE, add_scene_files, apt, cargo, dependencies, features, output_of, root, run_to_end, scenes,
-    target_dir, tidy,
+    GATE, add_scene_files, apt, cargo, dependencies, engines, features, name_of, output_of, root,
+    run_to_end, scenes, target_dir, tidy, world_of,
 };
 
 /// Segments and rays tested on each scene; the full 10⁷ are run by hand.
@@ -17,11 +18,23 @@ const RAYS: &str = "200000";
 /// Views of each scene in which the run-time's answer, details included, is compared with what rays hit.
 const SIGHT_VIEWS: &str = "200";
 
+/// Extent of a test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Checks {
+    /// Every step.
+    All,
+    /// The integrations with engines, on the demo and on the worlds that were baked last.
+    Engines,
+}
+
 /// Runs all steps, stops at the first failure, and prints `N passed, N failed` last.
-pub(crate) fn run() -> anyhow::Result<()> {
+pub(crate) fn run(what: Checks) -> anyhow::Result<()> {
     let start = Instant::now();
-    let mut steps = Steps { passed: 0 };
-    let result = run_steps(&mut steps);
+    let mut steps = Steps::default();
+    let result = match what {
+        Checks::All => run_steps(&mut steps).and_then(|()| engines::run_steps(&mut steps)),
+        Checks::Engines => run_engines(&mut steps),
+    };
     println!("all of it took {:.0} s", start.elapsed().as_secs_f64());
     if let Err(error) = &result {
         println!("{error:#}");
@@ -86,23 +99,14 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     Ok(())
 }
 
-struct Steps {
-    passed: usize,
-}
-
-impl Steps {
-    fn step(
-        &mut self,
-        name: &str,
-        work: impl FnOnce() -> anyhow::Result<()>,
-    ) -> anyhow::Result<()> {
-        println!("== {name}");
-        let start = Instant::now();
-        work().with_context(|| format!("step '{name}' failed"))?;
-        println!("== {name}: {:.1} s", start.elapsed().as_secs_f64());
-        self.passed += 1;
-        Ok(())
-    }
+/// Runs the steps of the integrations, and before them those that they cannot do without.
+fn run_engines(steps: &mut Steps) -> anyhow::Result<()> {
+    steps.step("tools", tools)?;
+    steps.step("build", || {
+        run_to_end(&mut GATE.cargo("build", &["-p", "enfilade-cli"]))
+    })?;
+    steps.step("demo", demo)?;
+    engines::run_steps(steps)
 }
 
 fn tools_dir() -> PathBuf {
@@ -209,16 +213,6 @@ fn demo() -> anyhow::Result<()> {
     let world = dir.join("world.glb");
     validate(&world)?;
     verify(&world, None)
-}
-
-fn name_of(scene: &Path) -> String {
-    let name = scene.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
-}
-
-/// Returns the path of the world baked from the scene `name`.
-fn world_of(name: &str) -> PathBuf {
-    target_dir().join("scenes").join(name).with_extension("glb")
 }
 
 fn check_scene(scene: &Path, name: &str) -> anyhow::Result<()> {

@@ -5,10 +5,12 @@
 mod apt;
 mod check;
 mod dependencies;
+mod engines;
 mod features;
 mod lengths;
 mod mutual;
 mod names;
+mod steps;
 mod tidy;
 mod words;
 
@@ -17,14 +19,18 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
 
+use crate::check::Checks;
+
 const USAGE: &str = "\
-usage: cargo xtask test
+usage: cargo xtask test [--engines]
        cargo xtask tidy
        cargo xtask score [OPTION...] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench NAME [--json] [OPTION...]
+       cargo xtask bench engines [--json]
 
-  test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes
+  test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes; tests the integrations with
+          engines; with --engines, these only
   tidy    the checks of these that need no build: dependencies between crates, lengths, wording, links,
           licenses and versions of dependencies, features that tests name
   score   rooms and doors found, compared with those that architects modeled; --help tells the options
@@ -40,10 +46,11 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let result = match task {
-        Task::Test => check::run(),
+        Task::Test(checks) => check::run(checks),
         Task::Tidy => tidy::run()
             .and_then(|()| dependencies::run())
             .and_then(|()| features::run()),
+        Task::BenchEngines(args) => engines::bench(&args),
         Task::Bench(args) => return bench(&args),
     };
     match result {
@@ -58,8 +65,10 @@ fn main() -> ExitCode {
 /// A parsed task.
 #[derive(Debug, PartialEq)]
 enum Task {
-    Test,
+    Test(Checks),
     Tidy,
+    /// Arguments after `bench engines`.
+    BenchEngines(Vec<String>),
     /// Arguments of `enfilade-bench`.
     Bench(Vec<String>),
 }
@@ -69,12 +78,14 @@ impl Task {
     fn parse(args: &[String]) -> Option<Self> {
         let (name, rest) = args.split_first()?;
         match (name.as_str(), rest.first().map(String::as_str)) {
-            ("test", None) => Some(Self::Test),
+            ("test", None) => Some(Self::Test(Checks::All)),
+            ("test", Some("--engines")) if rest.len() == 1 => Some(Self::Test(Checks::Engines)),
             ("tidy", None) => Some(Self::Tidy),
             ("score", _) => Some(Self::Bench(args.to_vec())),
             ("bench", None | Some("--write" | "--peers")) => {
                 Some(Self::Bench([&["growth".to_owned()], rest].concat()))
             }
+            ("bench", Some("engines")) => Some(Self::BenchEngines(rest[1..].to_vec())),
             ("bench", _) => Some(Self::Bench(rest.to_vec())),
             _ => None,
         }
@@ -178,6 +189,17 @@ fn scenes() -> Vec<PathBuf> {
     found
 }
 
+/// Returns the name of a scene, that of its folder.
+fn name_of(scene: &Path) -> String {
+    let name = scene.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Returns the path of the world baked from the scene `name`.
+fn world_of(name: &str) -> PathBuf {
+    target_dir().join("scenes").join(name).with_extension("glb")
+}
+
 /// Returns a cargo command in the root.
 fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -239,7 +261,11 @@ mod tests {
             let args = expected.split(' ').map(str::to_owned).collect();
             assert_eq!(parse(line), Some(Task::Bench(args)), "{line}");
         }
-        assert_eq!(parse("test"), Some(Task::Test));
+        assert_eq!(parse("test"), Some(Task::Test(Checks::All)));
+        assert_eq!(parse("test --engines"), Some(Task::Test(Checks::Engines)));
+        assert_eq!(parse("test --engines abi"), None);
+        let engines = Task::BenchEngines(vec!["--json".to_owned()]);
+        assert_eq!(parse("bench engines --json"), Some(engines));
         assert_eq!(parse("test --json"), None);
         assert_eq!(parse("nothing"), None);
     }

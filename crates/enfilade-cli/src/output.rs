@@ -249,6 +249,21 @@ pub(crate) fn make_folder(option: &str, path: &Path) -> anyhow::Result<()> {
     })
 }
 
+/// Refuses to replace a folder of something else: one that has files, but not `mark`.
+pub(crate) fn check_folder(path: &Path, mark: &str) -> anyhow::Result<()> {
+    if path.is_file() {
+        bail!("{} is a file; give -o a folder", path.display());
+    }
+    let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    if path.exists() && !path.join(mark).is_file() && !is_empty() {
+        bail!(
+            "{} is a folder with other contents; choose another name with -o",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
 /// Refuses standard output for anything but a single file.
 pub(crate) fn refuse_stream(option: &str, path: &Path, what: &str) -> anyhow::Result<()> {
     if is_stream(path) {

@@ -1,16 +1,15 @@
 //! `enfilade pack` and `enfilade unpack`: a world in pieces, for loading what comes into view.
 
-use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use enfilade::geom::shown;
 use enfilade::stream::{HEAD, PackedPlace, PackedWorld};
 use enfilade::whole;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Written, write_whole};
+use crate::output::{Outputs, Written, check_folder, write_whole};
 use crate::screen::print_json;
 use enfilade_cli::input::{name_of, read};
 
@@ -61,7 +60,7 @@ pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
         outputs.write("-o", Format::Packed, &args.output)?;
     } else {
         Format::Packed.check("-o", &args.output)?;
-        check_folder(&args.output)?;
+        check_folder(&args.output, HEAD)?;
     }
     let glb = read(&args.input)?;
     let packed = PackedWorld::pack(&glb).with_context(|| name_of(&args.input))?;
@@ -105,24 +104,6 @@ pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
         mb(report.largest_piece)
     )?;
     writeln!(out, "wrote {}", shown(&report.file))?;
-    Ok(())
-}
-
-/// Refuses to replace a folder of something else.
-fn check_folder(path: &Path) -> anyhow::Result<()> {
-    if path.is_file() {
-        bail!(
-            "{} is a file; give -o a folder, or use --one-file",
-            path.display()
-        );
-    }
-    let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-    if path.exists() && !path.join(HEAD).is_file() && !is_empty() {
-        bail!(
-            "{} is a folder with other contents; choose another name with -o",
-            path.display()
-        );
-    }
     Ok(())
 }
 

@@ -34,6 +34,7 @@ pub use graph::{
 pub use holes::{Hole, HoleReason};
 pub use ids::{CellId, PortalId};
 pub use locator::{Locator, LocatorNode};
+pub use look::used_textures;
 pub use parts::{PartNumbers, VisibleParts, VisibleVolumes};
 pub use pvs::Pvs;
 pub use seals::Seals;

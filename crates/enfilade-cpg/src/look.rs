@@ -186,6 +186,18 @@ fn object(text: &str) -> Result<Map<String, Value>, String> {
     }
 }
 
+/// Returns the textures that a material, a JSON object, refers to: indices of [`World::textures`](crate::World::textures).
+#[must_use]
+pub fn used_textures(material: &str) -> Vec<u32> {
+    let mut out = Vec::new();
+    if let Ok(value) = object(material) {
+        each_texture_reference(&Value::Object(value), &mut |index| {
+            out.extend(index.and_then(|i| u32::try_from(i).ok()));
+        });
+    }
+    out
+}
+
 /// Calls `visit` with the index of every texture reference: glTF, its extensions included, keeps them in objects
 /// whose key ends in `Texture`. `None` if the index is not an integer.
 fn each_texture_reference(value: &Value, visit: &mut dyn FnMut(Option<u64>)) {

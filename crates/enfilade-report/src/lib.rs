@@ -32,7 +32,10 @@ mod svg;
 pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
 pub use pdf::{PAPERS, Paper, PaperError, to_pdf};
-pub use plain::{cells_csv, graph_dot, graph_graphml, graph_json, portals_csv, surfaces_obj};
+pub use plain::{
+    SceneFile, SceneFiles, cells_csv, graph_dot, graph_graphml, graph_json, portals_csv,
+    surfaces_obj,
+};
 pub use plan::{PlanOptions, Plans, plan_svg};
 pub use raster::{MAX_PIXELS, RasterError};
 pub use storeys::{Storey, find_storeys};

@@ -1,8 +1,9 @@
 //! Worlds as plain data, for programs that read neither GLB nor our extension: the graph as JSON, GraphML, DOT or tables,
-//! the surfaces as OBJ.
+//! the surfaces as OBJ or as a scene for each set of cells.
 //!
 //! Lengths are in meters, +Y is up, right-handed, as in the world. Special portals, materials and light are left out.
 
+mod files;
 mod json;
 mod obj;
 mod tables;
@@ -10,6 +11,7 @@ mod text_graphs;
 
 use enfilade_cpg::{Cell, CellId, CellPortalGraph, PortalKind};
 
+pub use files::{SceneFile, SceneFiles};
 pub use json::graph_json;
 pub use obj::surfaces_obj;
 pub use tables::{cells_csv, portals_csv};

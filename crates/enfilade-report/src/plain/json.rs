@@ -3,6 +3,7 @@
 use enfilade_cpg::{CellId, Locator, Portal, World};
 use serde::Serialize;
 
+use super::files::SceneFile;
 use super::{cell_kind, neighbors, portal_kind};
 
 /// The version of the layout. Members are added without a new version.
@@ -18,6 +19,9 @@ struct PlainGraph<'a> {
     /// For each cell, those visible from it, itself included.
     #[serde(skip_serializing_if = "Option::is_none")]
     visible: Option<Vec<Vec<u32>>>,
+    /// Scenes beside this file, each with the cells that show it.
+    #[serde(skip_serializing_if = "<[SceneFile]>::is_empty")]
+    files: &'a [SceneFile],
 }
 
 #[derive(Serialize)]
@@ -89,11 +93,11 @@ impl<'a> PlainLocator<'a> {
     }
 }
 
-/// Returns the graph of a world as JSON. `docs/your-engine.md` describes its members.
+/// Returns the graph of a world as JSON, with the `files` that divide its surfaces, if any. `docs/your-engine.md` describes its members.
 ///
 /// # Errors
 /// Never in practice: all members have a form in JSON.
-pub fn graph_json(world: &World) -> Result<String, serde_json::Error> {
+pub fn graph_json(world: &World, files: &[SceneFile]) -> Result<String, serde_json::Error> {
     let graph = &world.graph;
     let ids = |cells: &[CellId]| cells.iter().map(|c| c.0).collect::<Vec<u32>>();
     let cells = graph.cells.iter().enumerate().map(|(id, cell)| PlainCell {
@@ -119,5 +123,6 @@ pub fn graph_json(world: &World) -> Result<String, serde_json::Error> {
         portals: portals.map(|(id, p)| PlainPortal::of(id, p)).collect(),
         locator: PlainLocator::of(&graph.locator),
         visible,
+        files,
     })
 }

@@ -92,7 +92,7 @@ fn world() -> World {
 #[test]
 fn json_has_the_graph_and_a_locator_that_another_program_can_walk() {
     let world = world();
-    let json: serde_json::Value = serde_json::from_str(&graph_json(&world).unwrap()).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&graph_json(&world, &[]).unwrap()).unwrap();
     assert_eq!(json["format"], "enfilade graph");
     let cells = json["cells"].as_array().unwrap();
     assert_eq!(cells[0]["name"], "Tom & \"Ann\" <1>, east");

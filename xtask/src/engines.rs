@@ -1,0 +1,156 @@
+//! Integrations with engines, which are workspaces and packages of their own: their tests, and their figures.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Context;
+
+use crate::apt::{self, Need, has_tool};
+use crate::steps::Steps;
+use crate::{
+    GATE, Profile, RELEASE, cargo, name_of, output_of, root, run_to_end, scenes, target_dir,
+    world_of,
+};
+
+/// Compilers and engines that run the readers.
+const NEEDS: [Need; 4] = [
+    Need {
+        what: "a C# compiler",
+        why: "builds the reader for Unity",
+        packages: &["mono-mcs", "mono-runtime"],
+        is_there: || has_tool("mcs") && has_tool("mono"),
+    },
+    Need {
+        what: "Newtonsoft.Json",
+        why: "reads JSON for the reader for Unity",
+        packages: &["libnewtonsoft-json5.0-cil"],
+        is_there: || Path::new("/usr/lib/cli/Newtonsoft.Json-5.0").is_dir(),
+    },
+    Need {
+        what: "nlohmann/json",
+        why: "reads JSON for the reader in C++",
+        packages: &["nlohmann-json3-dev"],
+        is_there: || Path::new("/usr/include/nlohmann/json.hpp").is_file(),
+    },
+    Need {
+        what: "Godot's server",
+        why: "runs the reader for Godot",
+        packages: &["godot3-server"],
+        is_there: || has_tool("godot3-server"),
+    },
+];
+
+/// Scenes of which the integrations are tried, beside the demo: enough for a real one in each row, few enough for the
+/// gate.
+const N_SCENES: usize = 3;
+
+/// Runs the tests of all integrations, on the demo and on worlds that are baked already.
+pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
+    steps.step("tools of engines", tools)?;
+    let worlds = worlds();
+    steps.step("readers", || run_to_end(&mut readers(GATE, &worlds)))?;
+    steps.step("abi", || abi(&worlds))
+}
+
+/// Prints the figures of all integrations, as JSON lines or as a table.
+pub(crate) fn bench(args: &[String]) -> anyhow::Result<()> {
+    if !matches!(args, [] | [_]) || args.iter().any(|a| a != "--json") {
+        anyhow::bail!("usage: cargo xtask bench engines [--json]");
+    }
+    if cfg!(target_os = "linux") {
+        tools()?;
+    }
+    run_to_end(RELEASE.cargo("build", &["-p", "enfilade-cli"]).arg("-q"))?;
+    let worlds = fresh_worlds()?;
+    let said = output_of(&mut readers(RELEASE, &worlds))?;
+    for line in said.lines() {
+        print_row(line, args.is_empty())?;
+    }
+    Ok(())
+}
+
+fn print_row(line: &str, is_table: bool) -> anyhow::Result<()> {
+    if !is_table {
+        println!("{line}");
+        return Ok(());
+    }
+    let row: serde_json::Value =
+        serde_json::from_str(line).with_context(|| format!("'{line}' is not JSON"))?;
+    let text = |name: &str| row[name].to_string().replace('"', "");
+    let ok = if row["ok"] == true { "" } else { "  short" };
+    println!(
+        "{:<28} {:<20} {:>12} of {}{ok}",
+        text("row"),
+        text("scene"),
+        text("value"),
+        text("bar")
+    );
+    Ok(())
+}
+
+/// Installs what the integrations need.
+fn tools() -> anyhow::Result<()> {
+    if cfg!(target_os = "linux") {
+        apt::install(&NEEDS, apt::apt_get)?;
+    }
+    Ok(())
+}
+
+fn folder(name: &str) -> PathBuf {
+    root().join("integrations").join(name)
+}
+
+fn demo_world() -> PathBuf {
+    target_dir().join("demo").join("world.glb")
+}
+
+/// Returns the demo's world, and those of the first scenes.
+fn worlds() -> Vec<PathBuf> {
+    let baked = scenes().into_iter().map(|scene| world_of(&name_of(&scene)));
+    std::iter::once(demo_world())
+        .chain(baked.filter(|world| world.is_file()).take(N_SCENES))
+        .collect()
+}
+
+/// Bakes the worlds anew.
+fn fresh_worlds() -> anyhow::Result<Vec<PathBuf>> {
+    let mut demo = Command::new(RELEASE.binary("enfilade"));
+    let dir = target_dir().join("demo");
+    let _ = std::fs::remove_dir_all(&dir);
+    output_of(demo.arg("demo").arg("-o").arg(&dir))?;
+    std::fs::create_dir_all(target_dir().join("scenes"))?;
+    for scene in scenes().iter().take(N_SCENES) {
+        output_of(&mut RELEASE.bake_command(scene, &world_of(&name_of(scene))))?;
+    }
+    Ok(worlds())
+}
+
+/// Compares readers in other languages with the command.
+fn readers(profile: Profile, worlds: &[PathBuf]) -> Command {
+    let mut node = Command::new("node");
+    node.arg(folder("readers").join("check.mjs"));
+    node.arg(profile.binary("enfilade")).args(worlds);
+    node
+}
+
+/// Tests the C library on the worlds, its header, and programs in C.
+fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
+    let worlds = std::env::join_paths(worlds)?;
+    for (command, more) in [
+        ("clippy", &["--all-targets", "--", "-D", "warnings"][..]),
+        ("test", &[]),
+    ] {
+        let mut cargo = in_workspace("abi", &[command]);
+        run_to_end(cargo.args(more).env("ENFILADE_WORLDS", &worlds))?;
+    }
+    Ok(())
+}
+
+/// Returns a cargo command in the workspace of an integration. All share a folder of builds, and with it what they have
+/// in common.
+fn in_workspace(name: &str, args: &[&str]) -> Command {
+    let mut command = cargo(args);
+    command.current_dir(folder(name));
+    command.env("CARGO_TARGET_DIR", target_dir().join("engines"));
+    command
+}
