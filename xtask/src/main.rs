@@ -19,8 +19,6 @@ use std::process::{Command, ExitCode};
 
 use anyhow::{Context, bail};
 
-use crate::check::Checks;
-
 const USAGE: &str = "\
 usage: cargo xtask test [--engines]
        cargo xtask tidy
@@ -65,7 +63,7 @@ fn main() -> ExitCode {
 /// A parsed task.
 #[derive(Debug, PartialEq)]
 enum Task {
-    Test(Checks),
+    Test(check::Checks),
     Tidy,
     /// Arguments after `bench engines`.
     BenchEngines(Vec<String>),
@@ -78,8 +76,10 @@ impl Task {
     fn parse(args: &[String]) -> Option<Self> {
         let (name, rest) = args.split_first()?;
         match (name.as_str(), rest.first().map(String::as_str)) {
-            ("test", None) => Some(Self::Test(Checks::All)),
-            ("test", Some("--engines")) if rest.len() == 1 => Some(Self::Test(Checks::Engines)),
+            ("test", None) => Some(Self::Test(check::Checks::All)),
+            ("test", Some("--engines")) if rest.len() == 1 => {
+                Some(Self::Test(check::Checks::Engines))
+            }
             ("tidy", None) => Some(Self::Tidy),
             ("score", _) => Some(Self::Bench(args.to_vec())),
             ("bench", None | Some("--write" | "--peers")) => {
@@ -261,8 +261,11 @@ mod tests {
             let args = expected.split(' ').map(str::to_owned).collect();
             assert_eq!(parse(line), Some(Task::Bench(args)), "{line}");
         }
-        assert_eq!(parse("test"), Some(Task::Test(Checks::All)));
-        assert_eq!(parse("test --engines"), Some(Task::Test(Checks::Engines)));
+        assert_eq!(parse("test"), Some(Task::Test(check::Checks::All)));
+        assert_eq!(
+            parse("test --engines"),
+            Some(Task::Test(check::Checks::Engines))
+        );
         assert_eq!(parse("test --engines abi"), None);
         let engines = Task::BenchEngines(vec!["--json".to_owned()]);
         assert_eq!(parse("bench engines --json"), Some(engines));
