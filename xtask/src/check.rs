@@ -8,8 +8,8 @@ use anyhow::bail;
 
 use crate::steps::Steps;
 use crate::{
-    GATE, add_scene_files, apt, cargo, dependencies, engines, features, name_of, output_of, root,
-    run_to_end, scenes, target_dir, tidy, world_of,
+    GATE, add_scene_files, apt, cargo, dependencies, engines, features, name_of, node_path,
+    output_of, root, run_to_end, scenes, suites, target_dir, tidy, tools_dir, world_of,
 };
 
 /// Segments and rays tested on each scene; the full 10⁷ are run by hand.
@@ -56,15 +56,7 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
         let args = ["--workspace", "--all-targets", "--", "-D", "warnings"];
         run_to_end(&mut GATE.cargo("clippy", &args))
     })?;
-    steps.step("tests", || {
-        let mut tests = GATE.cargo("test", &["--workspace"]);
-        // The window's test skips itself without a display, but not here.
-        run_to_end(
-            tests
-                .env("NODE_PATH", node_path())
-                .env("ENFILADE_NEEDS_WINDOW", "1"),
-        )
-    })?;
+    steps.step("tests", suites::run)?;
     steps.step("docs", || {
         run_to_end(
             GATE.cargo("doc", &["--workspace", "--no-deps"])
@@ -107,15 +99,6 @@ fn run_engines(steps: &mut Steps) -> anyhow::Result<()> {
     })?;
     steps.step("demo", demo)?;
     engines::run_steps(steps)
-}
-
-fn tools_dir() -> PathBuf {
-    target_dir().join("tools")
-}
-
-/// Returns the folder of node packages that tests need.
-pub(crate) fn node_path() -> PathBuf {
-    tools_dir().join("node_modules")
 }
 
 /// Reports missing tools, a line each, and installs those it can: the Khronos glTF validator, a node package, below the

@@ -11,6 +11,7 @@ mod lengths;
 mod mutual;
 mod names;
 mod steps;
+mod suites;
 mod tidy;
 mod words;
 
@@ -131,6 +132,16 @@ fn root() -> PathBuf {
 /// Returns the folder of builds. A relative `CARGO_TARGET_DIR` starts at the root, where cargo runs.
 fn target_dir() -> PathBuf {
     root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// Returns the folder of packages of node.
+fn tools_dir() -> PathBuf {
+    target_dir().join("tools")
+}
+
+/// Returns the folder of node packages that tests need.
+fn node_path() -> PathBuf {
+    tools_dir().join("node_modules")
 }
 
 /// A profile of `Cargo.toml` with which commands are built.
