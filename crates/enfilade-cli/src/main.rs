@@ -38,6 +38,7 @@ mod verify;
 #[cfg(feature = "view")]
 mod view;
 mod walk;
+mod walk_page;
 
 use std::io::Write;
 use std::process::ExitCode;

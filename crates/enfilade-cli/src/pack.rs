@@ -7,10 +7,12 @@ use anyhow::Context;
 use enfilade::geom::shown;
 use enfilade::stream::{HEAD, PackedPlace, PackedWorld};
 use enfilade::whole;
+use enfilade_report::walk_html;
 
 use crate::formats::Format;
 use crate::output::{Outputs, Written, check_folder, write_whole};
 use crate::screen::print_json;
+use crate::walk_page;
 use enfilade_cli::input::{name_of, read};
 
 /// Cuts a world into pieces, so that a program loads only what comes into view: a small head, one piece per set of cells, per
@@ -25,6 +27,10 @@ pub(crate) struct Pack {
     /// Write one file instead of a folder, for servers of ranges.
     #[arg(long)]
     one_file: bool,
+    /// Also write a first-person walk for the browser, which loads what comes into view: index.html in the folder, or
+    /// NAME-walk.html beside the file. Any server of files will do, such as `enfilade serve`.
+    #[arg(long)]
+    walk: bool,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
@@ -58,21 +64,34 @@ pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
     let mut outputs = Outputs::reading([&args.input])?;
     if args.one_file {
         outputs.write("-o", Format::Packed, &args.output)?;
+        if args.walk {
+            let page = walk_page::beside(&args.output)?;
+            outputs.write("--walk", Format::Page, &page)?;
+        }
     } else {
         Format::Packed.check("-o", &args.output)?;
         check_folder(&args.output, HEAD)?;
     }
     let glb = read(&args.input)?;
     let packed = PackedWorld::pack(&glb).with_context(|| name_of(&args.input))?;
+    // The page is in the folder of its world.
+    let index = args
+        .walk
+        .then(|| ("index.html", walk_html("./").into_bytes()));
     if args.one_file {
         write_whole(&args.output, &packed.one_file()?)?;
+        if args.walk {
+            walk_page::write(&walk_page::beside(&args.output)?, &args.output)?;
+        }
     } else {
-        whole::write_folder(&args.output, packed.files()?).with_context(|| {
-            format!(
-                "cannot write {}; choose another place, or free space there",
-                args.output.display()
-            )
-        })?;
+        whole::write_folder(&args.output, packed.files()?.into_iter().chain(index)).with_context(
+            || {
+                format!(
+                    "cannot write {}; choose another place, or free space there",
+                    args.output.display()
+                )
+            },
+        )?;
     }
     let head = packed.head.encode()?.len() as u64;
     let sizes = packed.head.catalog.pieces();

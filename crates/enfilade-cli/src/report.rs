@@ -20,6 +20,7 @@ use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
 use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
 use crate::screen::{Warned, print_json};
+use crate::walk_page;
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
@@ -40,6 +41,10 @@ pub(crate) struct Report {
     /// Leave out pictures: no adapter is needed.
     #[arg(long)]
     no_pictures: bool,
+    /// Also write a first-person walk for the browser beside the page, NAME-walk.html, and link it. It opens the world
+    /// where it is now, from any server of files, such as `enfilade serve`.
+    #[arg(long)]
+    walk: bool,
     /// Print a report on the page as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
@@ -67,6 +72,13 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     args.limits.begin()?;
     let mut outputs = Outputs::reading([&args.world])?;
     outputs.write("-o", Format::Page, &args.output)?;
+    let walk = match args.walk {
+        true => Some(walk_page::beside(&args.output)?),
+        false => None,
+    };
+    if let Some(walk) = &walk {
+        outputs.write("--walk", Format::Page, walk)?;
+    }
     let world = read_world(&args.world)?;
     let name = if is_stream(&args.world) {
         "world".into()
@@ -75,6 +87,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     };
     let mut parts = ReportParts {
         title: name.into_owned(),
+        walk: walk.as_deref().map(walk_page::address_of_page),
         ..ReportParts::default()
     };
     parts.visible = visible(&world, &mut parts.notes)?;
@@ -97,6 +110,9 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         }
     }
     let page = report_html(&world, &parts);
+    if let Some(walk) = &walk {
+        walk_page::write(walk, &args.world)?;
+    }
     write_whole(&args.output, page.as_bytes())?;
     if args.json {
         let report = PageReport {

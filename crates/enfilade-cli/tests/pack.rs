@@ -66,6 +66,44 @@ fn a_packed_world_unpacks_to_the_same_bytes() {
 }
 
 #[test]
+fn a_walk_opens_the_world_beside_its_page() {
+    let dir = folder("walk");
+    let world_of = |page: &str| {
+        let page = fs::read_to_string(dir.join(page)).unwrap();
+        let start = page.find("data-world=\"").unwrap() + "data-world=\"".len();
+        page[start..].split('"').next().unwrap().to_owned()
+    };
+    for (line, page, world) in [
+        ("pack w.glb -o w.enf --walk", "w.enf/index.html", "./"),
+        (
+            "pack w.glb -o one.enf --one-file --walk",
+            "one-walk.html",
+            "one.enf",
+        ),
+        (
+            "report w.glb -o r.html --walk --no-pictures",
+            "r-walk.html",
+            "w.glb",
+        ),
+    ] {
+        let (is_done, _, err) = run(&dir, line);
+        assert!(is_done, "{line}: {err}");
+        assert_eq!(world_of(page), world, "{line}");
+    }
+    assert!(
+        fs::read_to_string(dir.join("r.html"))
+            .unwrap()
+            .contains("href=\"r-walk.html\"")
+    );
+    // The page is no part of the world.
+    let (is_done, _, err) = run(&dir, "unpack w.enf -o back.glb");
+    assert!(is_done, "{err}");
+    assert!(fs::read(dir.join("back.glb")).unwrap() == fs::read(dir.join("w.glb")).unwrap());
+    let (is_done, _, err) = run(&dir, "report w.glb -o - --walk --no-pictures");
+    assert!(!is_done && err.contains("--walk"), "{err}");
+}
+
+#[test]
 fn what_is_no_packed_world_is_neither_replaced_nor_read() {
     let dir = folder("refused");
     fs::create_dir_all(dir.join("other")).unwrap();

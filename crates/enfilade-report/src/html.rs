@@ -43,6 +43,8 @@ pub struct ReportParts {
     pub title: String,
     /// The cells visible from each cell, as computed by `enfilade pvs`.
     pub visible: Pvs,
+    /// Address of the page of a walk, if there is one.
+    pub walk: Option<String>,
     /// Tables of measurements.
     pub tables: Vec<Table>,
     /// Pictures.
@@ -71,6 +73,14 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         voids.join(" "),
         escaped(&summary(world, &storeys, voids.len()))
     );
+    if let Some(walk) = &parts.walk {
+        let _ = writeln!(
+            out,
+            "<p><a href=\"{}\">Walk through it</a> (from a server, such as <code>enfilade serve</code>: browsers let \
+             no page read files beside it)</p>",
+            escaped(walk)
+        );
+    }
     for note in &parts.notes {
         let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(note));
     }

@@ -28,6 +28,7 @@ mod section;
 mod shafts;
 mod storeys;
 mod svg;
+mod walk;
 
 pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
@@ -39,3 +40,4 @@ pub use plain::{
 pub use plan::{PlanOptions, Plans, plan_svg};
 pub use raster::{MAX_PIXELS, RasterError};
 pub use storeys::{Storey, find_storeys};
+pub use walk::walk_html;
