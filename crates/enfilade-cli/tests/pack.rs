@@ -95,7 +95,7 @@ fn a_walk_opens_the_world_beside_its_page() {
             .unwrap()
             .contains("href=\"r-walk.html\"")
     );
-    // The page is no part of the world.
+    // The page is not a part of the world.
     let (is_done, _, err) = run(&dir, "unpack w.enf -o back.glb");
     assert!(is_done, "{err}");
     assert!(fs::read(dir.join("back.glb")).unwrap() == fs::read(dir.join("w.glb")).unwrap());
