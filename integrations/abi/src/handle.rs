@@ -180,6 +180,7 @@ impl EnfWorld {
             n_leaves: self.sight.leaves(id).len() as u32,
             normal: p.normal,
             area: p.area,
+            leaf_depth: self.sight.depth_of_leaves(id),
         })
     }
 

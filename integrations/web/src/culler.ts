@@ -1,6 +1,18 @@
 /** Shows, of the objects of a three.js scene, what a camera may see; turns doors; picks. */
-import { Matrix4, Object3D, Vector3, type Camera, type Light } from 'three';
-import type { Hit, Seen, World } from './world.js';
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DoubleSide,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  Object3D,
+  Vector3,
+  type Camera,
+  type Light,
+  type Material,
+} from 'three';
+import type { Hit, Portal, Seen, World } from './world.js';
 
 /** The objects of a scene that show the parts of a world. */
 export interface Parts {
@@ -80,6 +92,8 @@ export class PortalCuller {
   private readonly lightAt = new Vector3();
   /** Pose of each moved detail in the file, relative to the root. */
   private readonly rest = new Map<number, Matrix4>();
+  /** Panels in the gaps around shut leaves, through which the hidden rooms would be missing. */
+  private readonly plugs = new Map<number, Mesh>();
   /** Openness that doors turn to. */
   private readonly goals = new Map<number, number>();
 
@@ -157,6 +171,7 @@ export class PortalCuller {
   private reaches(light: Light, seen: Seen): boolean {
     const distance = (light as Light & { distance?: number }).distance ?? 0;
     if (distance === 0) return true;
+    light.updateWorldMatrix(true, false);
     const at = this.lightAt.setFromMatrixPosition(light.matrixWorld).applyMatrix4(this.inverse);
     const reach = distance * this.inverse.getMaxScaleOnAxis() + MARGIN;
     for (let i = 0; i < seen.cellCount; i++) {
@@ -173,7 +188,34 @@ export class PortalCuller {
   /** Moves the leaves of a portal at once, from 0 for shut to 1 for open. */
   setOpenness(portal: number, share: number): void {
     this.world.setOpenness(portal, share);
-    for (const leaf of this.world.portals[portal]?.leaves ?? []) this.turn(leaf.detail);
+    for (const leaf of this.world.portals[portal]?.leaves ?? []) {
+      this.turn(leaf.detail);
+      for (const other of this.world.portalsOfDetail(leaf.detail)) this.plug(other);
+    }
+    this.plug(portal);
+  }
+
+  /** Puts a panel into a portal that is shut, where its leaves are, and takes it out when it opens. */
+  private plug(id: number): void {
+    const isShut = !this.world.isOpen(id);
+    let plug = this.plugs.get(id);
+    if (!plug && isShut) {
+      const portal = this.world.portals[id]!;
+      plug = new Mesh(panelOf(portal), this.leafMaterial(portal));
+      this.plugs.set(id, plug);
+      this.parts.root.add(plug);
+    }
+    if (plug) plug.visible = isShut;
+  }
+
+  private leafMaterial(portal: Portal): Material {
+    let found: Material | undefined;
+    for (const { detail } of portal.leaves) {
+      this.parts.details[detail]?.traverse((object) => {
+        if (object instanceof Mesh) found ??= Array.isArray(object.material) ? object.material[0] : object.material;
+      });
+    }
+    return found ?? SHUT;
   }
 
   /** Starts to open a door that is shut, or to shut it; `animate` moves it. */
@@ -235,6 +277,23 @@ export class PortalCuller {
     root.updateWorldMatrix(true, false);
     return this.world.locate(point.clone().applyMatrix4(this.inverse.copy(root.matrixWorld).invert()).toArray());
   }
+}
+
+/** Material of a portal that is closed without a leaf. */
+const SHUT = new MeshBasicMaterial({ color: 0x222222, side: DoubleSide });
+
+/** Makes the panel that fills a portal's outline at the depth of its leaves. */
+function panelOf({ outline, normal, leafDepth }: Portal): BufferGeometry {
+  const n = outline.length / 3;
+  const positions = outline.map((v, i) => v + leafDepth * normal[i % 3]!);
+  const normals = outline.map((_, i) => normal[i % 3]!);
+  const indices = Array.from({ length: n - 2 }, (_, i) => [0, i + 1, i + 2]).flat();
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(positions, 3));
+  geometry.setAttribute('normal', new BufferAttribute(normals, 3));
+  geometry.setAttribute('uv', new BufferAttribute(new Float32Array(2 * n), 2));
+  geometry.setIndex(indices);
+  return geometry;
 }
 
 const EYE = new Float32Array(3);

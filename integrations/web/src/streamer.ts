@@ -13,7 +13,7 @@ export interface StreamOptions {
   maxRequest?: number;
   /** Distance on foot, in meters, within which what may be seen is fetched before it is in view; 0 for none. 12. */
   ahead?: number;
-  /** Milliseconds a frame for unpacking; one piece at least. 4. */
+  /** Milliseconds a frame for unpacking, the most needed first; one piece at least. 4. */
   unpackTime?: number;
 }
 
@@ -61,6 +61,8 @@ export class Streamer {
   private inView = 0;
   private readonly requests = new Set<Request>();
   private arrived: { piece: number; packed: Uint8Array }[] = [];
+  /** Packed bytes that have arrived and wait to be unpacked. */
+  private waiting = 0;
   private plannedAt = -Infinity;
   private plannedCell = -2;
   /** Time before which nothing is asked for, after a failure. */
@@ -180,7 +182,12 @@ export class Streamer {
   private integrate(): void {
     const begin = performance.now();
     while (this.arrived.length > 0) {
-      const { piece, packed } = this.arrived.shift()!;
+      let first = 0;
+      for (let i = 1; i < this.arrived.length; i++) {
+        if (this.rank[this.arrived[i]!.piece]! < this.rank[this.arrived[first]!.piece]!) first = i;
+      }
+      const [{ piece, packed }] = this.arrived.splice(first, 1) as [{ piece: number; packed: Uint8Array }];
+      this.waiting -= packed.length;
       this.state[piece] = ABSENT;
       const size = this.place.head.pieces[piece]![2];
       if (!this.makeRoom(size, this.rank[piece]!)) continue;
@@ -214,7 +221,8 @@ export class Streamer {
     for (const request of this.requests) {
       if (request.pieces.every((piece) => this.rank[piece] === n)) request.stop.abort();
     }
-    if (now < this.pauseUntil) return;
+    // What has come is put to use before more is asked for.
+    if (now < this.pauseUntil || this.waiting > 16 * this.options.maxRequest) return;
     for (const piece of this.order) {
       if (this.requests.size >= this.options.maxInFlight) return;
       if (this.state[piece] === ABSENT) this.request(piece);
@@ -249,6 +257,7 @@ export class Streamer {
         own.forEach((i, k) => {
           this.state[i] = ARRIVED;
           this.arrived.push({ piece: i, packed: parts[k]! });
+          this.waiting += parts[k]!.length;
         });
       },
       () => {

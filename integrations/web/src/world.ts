@@ -47,6 +47,8 @@ export interface Portal {
   readonly normal: Float32Array;
   /** In square meters. */
   readonly area: number;
+  /** Distance of the middle of its shut leaves from its plane, along the normal, in meters. */
+  readonly leafDepth: number;
   readonly leaves: readonly Leaf[];
 }
 
@@ -206,6 +208,7 @@ export class World {
       kind: PORTAL_KINDS[u32[at + 4]!]!,
       normal: this.copyOf(at + 8, 3),
       area: f32[at + 11]!,
+      leafDepth: f32[at + 12]!,
     };
     return { ...found, leaves: Array.from({ length: leaves }, (_, i) => this.readLeaf(portal, i)) };
   }

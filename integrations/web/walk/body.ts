@@ -1,5 +1,5 @@
 // The walker: stays out of walls by rooms and doorways, so that it needs no triangles.
-import type { World } from '../src/world.js';
+import type { Cell, World } from '../src/world.js';
 
 /** Height of the eye, in meters. */
 export const EYE = 1.6;
@@ -15,9 +15,12 @@ export class Walker {
     readonly eye: [number, number, number],
   ) {}
 
-  /** Places a walker in the middle of the largest room. */
-  static inLargestRoom(world: World): Walker {
-    const rooms = world.cells.filter((cell) => cell.kind === 'room').sort((a, b) => b.volume - a.volume);
+  /** Places a walker in the middle of the room with the most ways out. */
+  static inMiddle(world: World): Walker {
+    const ways = (cell: Cell): number =>
+      cell.portals.filter((id) => ['door', 'open'].includes(world.portals[id]!.kind)).length;
+    const rooms = world.cells.filter((cell) => cell.kind === 'room');
+    rooms.sort((a, b) => ways(b) - ways(a) || b.volume - a.volume);
     const cell = rooms[0] ?? world.cells[0]!;
     const { aabb } = cell;
     let best: [number, number, number] = [0, 1, 2].map((k) => (aabb[k]! + aabb[k + 3]!) / 2) as [number, number, number];

@@ -75,7 +75,7 @@ async function main(): Promise<void> {
   addEventListener('resize', resize);
   resize();
 
-  const walker = Walker.inLargestRoom(world);
+  const walker = Walker.inMiddle(world);
   const controls = new Controls(renderer.domElement);
   const map = new RoomMap(element('map') as HTMLCanvasElement, world);
   element('help').textContent = controls.isTouch
