@@ -3,6 +3,7 @@ import {
   BufferAttribute,
   BufferGeometry,
   Mesh,
+  MeshStandardMaterial,
   Texture,
   type Camera,
   type Group,
@@ -21,6 +22,9 @@ import { World } from './world.js';
 
 export { PackedPlace, decodeHead, decodePiece, type Head, type Piece } from './packed.js';
 export { Streamer, type StreamCounts, type StreamOptions } from './streamer.js';
+
+/** Material of primitives without one, as glTF defines it. */
+const DEFAULT = new MeshStandardMaterial({ color: 0xffffff, metalness: 1, roughness: 1 });
 
 /** Names of attributes in three.js. */
 const ATTRIBUTES: Record<string, string> = {
@@ -136,7 +140,7 @@ export class StreamedWorld implements Receiver {
 
   private mesh(piece: Piece, primitive: NonNullable<PieceJson['primitives']>[number]): Mesh {
     const mesh = new Mesh(geometryOf(piece, primitive));
-    if (primitive.material !== undefined) mesh.material = this.materials[primitive.material]!;
+    mesh.material = primitive.material === undefined ? DEFAULT : this.materials[primitive.material]!;
     // Chooses the variant of the material for the attributes that there are, as for whole files.
     this.gltf.parser.assignFinalMaterial(mesh);
     drawBothSides(mesh);

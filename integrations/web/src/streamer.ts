@@ -59,6 +59,8 @@ export class Streamer {
   private readonly rank: Uint32Array;
   private order: number[] = [];
   private inView = 0;
+  /** Number of pieces at the beginning of `order` that the eye's own cell needs. */
+  private ownRoom = 0;
   private readonly requests = new Set<Request>();
   private arrived: { piece: number; packed: Uint8Array }[] = [];
   /** Packed bytes that have arrived and wait to be unpacked. */
@@ -134,7 +136,11 @@ export class Streamer {
     };
     const shares = Array.from({ length: seen.cellCount }, (_, i) => ({ cell: seen.cells[i]!, share: seen.shares[i]! }));
     shares.sort((a, b) => Number(b.cell === seen.eyeCell) - Number(a.cell === seen.eyeCell) || b.share - a.share);
-    for (const { cell } of shares) want(cell);
+    this.ownRoom = 0;
+    for (const { cell } of shares) {
+      want(cell);
+      if (cell === seen.eyeCell) this.ownRoom = order.length;
+    }
     this.inView = order.length;
     if (seen.eyeCell >= 0 && this.options.ahead > 0) for (const cell of this.soon(seen.eyeCell)) want(cell);
     this.order = order;
@@ -223,10 +229,21 @@ export class Streamer {
     }
     // What has come is put to use before more is asked for.
     if (now < this.pauseUntil || this.waiting > 16 * this.options.maxRequest) return;
-    for (const piece of this.order) {
+    // What is on its way shares the link: the own room comes alone, then the view, then what may be seen soon.
+    let isWaiting = false;
+    for (let i = 0; i < this.order.length; i++) {
+      if (isWaiting && (i === this.ownRoom || i === this.inView)) return;
       if (this.requests.size >= this.options.maxInFlight) return;
+      const piece = this.order[i]!;
       if (this.state[piece] === ABSENT) this.request(piece);
+      isWaiting ||= this.state[piece] === ASKED;
     }
+  }
+
+  /** Returns 0 for pieces of the own room, 1 for the rest of the view, 2 for what may be seen soon. */
+  private tier(piece: number): number {
+    const rank = this.rank[piece]!;
+    return rank < this.ownRoom ? 0 : rank < this.inView ? 1 : 2;
   }
 
   /** Asks for a piece together with those beside it that are wanted too. */
@@ -235,10 +252,10 @@ export class Streamer {
     const isWanted = (i: number): boolean => i >= 0 && i < pieces.length && this.state[i] === ABSENT && this.rank[i]! < pieces.length;
     const isBeside = (a: number, b: number): boolean => pieces[a]![0] + pieces[a]![1] === pieces[b]![0];
     let [first, last, bytes] = [piece, piece, pieces[piece]![1]];
-    // What is in view does not wait for what is not.
-    const isInView = this.rank[piece]! < this.inView;
+    // What is needed sooner does not wait for what is needed later.
+    const tier = this.tier(piece);
     const fits = (i: number): boolean =>
-      isWanted(i) && this.rank[i]! < this.inView === isInView && bytes + pieces[i]![1] <= this.options.maxRequest;
+      isWanted(i) && this.tier(i) === tier && bytes + pieces[i]![1] <= this.options.maxRequest;
     while (fits(last + 1) && isBeside(last, last + 1)) bytes += pieces[++last]![1];
     while (fits(first - 1) && isBeside(first - 1, first)) bytes += pieces[--first]![1];
     const own = Array.from({ length: last - first + 1 }, (_, i) => first + i);

@@ -1,7 +1,7 @@
 // Headless Chromium with software WebGL, and bundles of the test pages.
 import { build } from 'esbuild';
 import { chromium } from 'playwright-core';
-import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 
 export const at = (path) => fileURLToPath(new URL(`../${path}`, import.meta.url));
@@ -15,11 +15,19 @@ export async function browser() {
   return chromium.launch({ executablePath, args });
 }
 
-/** Bundles test/pages/NAME.mjs into a page beside it; returns its path below /web/. */
+/** Bundles test/pages/NAME.mjs into a page; returns its path below /web/. */
 export async function page(name) {
+  return bundle(name, readFileSync(at(`test/pages/${name}.mjs`), 'utf8'));
+}
+
+/** Bundles code into a page. */
+export async function bundle(name, contents) {
   mkdirSync(at('dist/test'), { recursive: true });
+  const alias = Object.fromEntries(['three', 'stream', 'fiber'].map((own) => [`enfilade/${own}`, at(`dist/${own}.js`)]));
   await build({
-    entryPoints: [at(`test/pages/${name}.mjs`)],
+    stdin: { contents, resolveDir: at('test/pages'), sourcefile: `${name}.mjs` },
+    alias,
+    define: { 'process.env.NODE_ENV': '"production"' },
     bundle: true,
     format: 'esm',
     outfile: at(`dist/test/${name}.js`),
@@ -30,13 +38,14 @@ export async function page(name) {
   return `web/dist/test/${name}.html`;
 }
 
-/** Opens a page, waits until it says that it is ready, and returns it; failures of the page fail the test. */
-export async function visit(own, address) {
+/** Opens a page and, unless `isReady` is false, waits until it says that it is ready; returns it with its errors. */
+export async function visit(own, address, isReady = true) {
   const tab = await own.newPage();
   const errors = [];
   tab.on('pageerror', (error) => errors.push(error.message));
   tab.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
   await tab.goto(address);
+  if (!isReady) return { tab, errors };
   await tab.waitForFunction(() => globalThis.ready || globalThis.failed, undefined, { timeout: 120_000 }).catch((error) => {
     throw new Error(`${address}: ${errors.join('; ') || error.message}`);
   });

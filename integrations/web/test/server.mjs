@@ -1,6 +1,7 @@
 // A static server for tests: files of named folders, ranges, and a limited pace.
 import { createServer } from 'node:http';
 import { existsSync, readFileSync, statSync } from 'node:fs';
+import { gzipSync } from 'node:zlib';
 import { extname, join, normalize } from 'node:path';
 
 const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
@@ -25,6 +26,11 @@ export async function serve(folders, { pace = Infinity, latency = 0 } = {}) {
       const [from, to] = [Number(range[1]), Math.min(Number(range[2]), body.length - 1)];
       headers['Content-Range'] = `bytes ${from}-${to}/${body.length}`;
       body = body.subarray(from, to + 1);
+    }
+    // As static hosts do for code.
+    if (/\.(js|html|wasm)$/.test(path) && /gzip/.test(request.headers['accept-encoding'] ?? '')) {
+      headers['Content-Encoding'] = 'gzip';
+      body = gzipSync(body, { level: 9 });
     }
     headers['Content-Length'] = body.length;
     counts.requests++;

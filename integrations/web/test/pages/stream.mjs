@@ -119,6 +119,13 @@ globalThis.same = async (packed, whole, of) => {
   const streamed = await StreamedWorld.open(packed, { wasm: WASM });
   const scenes = [stage(gltf.scene), stage(streamed.scene)];
   const places = stands(culler.world);
+  // Where two surfaces touch, the one drawn last shows: both scenes draw in the order of the file.
+  const order = new Map();
+  const number = ({ parts }) => {
+    parts.batches.forEach((object, i) => object && order.set(object, i));
+    parts.details.forEach((object, i) => object?.traverse((own) => order.set(own, parts.batches.length + i)));
+  };
+  renderer.setOpaqueSort((a, b) => (order.get(a.object) ?? 0) - (order.get(b.object) ?? 0));
   const out = { views: 0, differing: 0, colors: 0 };
   for (let i = 0; i < of; i++) {
     stand(places[Math.floor((i * places.length) / of)]);
@@ -129,12 +136,29 @@ globalThis.same = async (packed, whole, of) => {
     // Pictures are decoded beside the frames.
     await new Promise((done) => setTimeout(done, 60));
     culler.update(camera);
+    [culler, streamed.culler].forEach(number);
     const [a, b] = scenes.map((scene) => picture(scene, camera));
     out.views++;
-    for (let k = 0; k < a.length; k++) out.differing += a[k] !== b[k];
+    let differing = 0;
+    for (let k = 0; k < a.length; k++) differing += a[k] !== b[k];
+    out.differing += differing;
+    if (differing > 0) {
+      out.pictures = scenes.map((scene) => (picture(scene, camera), renderer.domElement.toDataURL()));
+      out.where = { differing, cell: culler.counts.cell, own: { ...culler.counts }, streamed: { ...streamed.culler.counts } };
+    }
     out.colors += new Set(a).size;
   }
   return out;
 };
 
+
+
+/** Loads the whole file, and returns the time until it could be drawn. */
+globalThis.whole = async (address) => {
+  const begin = performance.now();
+  const gltf = await new GLTFLoader().register(enfilade({ wasm: WASM })).loadAsync(address);
+  cullerOf(gltf);
+  const { transferSize, encodedBodySize } = performance.getEntriesByType('resource').find(({ name }) => name.endsWith('.glb'));
+  return { seconds: (performance.now() - begin) / 1000, bytes: encodedBodySize || transferSize };
+};
 globalThis.ready = true;
