@@ -55,6 +55,9 @@ pub struct EnfPortal {
     pub normal: [f32; 3],
     /// Area of the opening. [Units: m²]
     pub area: f32,
+    /// Distance of the middle of its shut leaves from its plane, along the normal: a panel there that fills the outline is
+    /// hidden by them. 0 without leaves. [Units: m]
+    pub leaf_depth: f32,
 }
 
 /// A leaf of a door and its motion, measured from its pose in the file.

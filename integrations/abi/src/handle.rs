@@ -90,7 +90,15 @@ impl EnfWorld {
     }
 
     fn of(world: World, sight: Sight) -> Self {
+        // As large as they may become, so that they stay where they are.
         let seen = SeenBuffers {
+            cells: Vec::with_capacity(sight.n_cells()),
+            shares: Vec::with_capacity(sight.n_cells()),
+            portals: Vec::with_capacity(sight.n_portals()),
+            chunks: Vec::with_capacity(sight.chunks().len()),
+            batches: Vec::with_capacity(sight.n_batches()),
+            details: Vec::with_capacity(world.details.len()),
+            specials: Vec::with_capacity(sight.n_specials()),
             place: vec![0; sight.n_cells()],
             stamps: vec![0; sight.n_batches()],
             ..SeenBuffers::default()
@@ -172,6 +180,7 @@ impl EnfWorld {
             n_leaves: self.sight.leaves(id).len() as u32,
             normal: p.normal,
             area: p.area,
+            leaf_depth: self.sight.depth_of_leaves(id),
         })
     }
 

@@ -64,11 +64,13 @@ pub struct Failure {
 
 impl Failure {
     /// Makes the failure of an argument.
+    #[expect(clippy::needless_pass_by_value, reason = "for map_err")]
     pub fn argument(why: impl ToString) -> Self {
         Self::of(ENF_BAD_ARGUMENT, &why)
     }
 
     /// Makes the failure of a file or a skeleton.
+    #[expect(clippy::needless_pass_by_value, reason = "for map_err")]
     pub fn world(why: impl ToString) -> Self {
         Self::of(ENF_BAD_WORLD, &why)
     }

@@ -136,10 +136,8 @@ fn ids_that_do_not_exist_and_numbers_that_are_none_are_errors() {
     };
     assert_eq!(statuses, [ENF_BAD_ARGUMENT; 21]);
     // SAFETY: as above.
-    assert_eq!(
-        unsafe { enf_pvs_row(w, 0, MaybeUninit::uninit().as_mut_ptr()) },
-        ENF_NONE
-    );
+    let without_sets = unsafe { enf_pvs_row(w, 0, MaybeUninit::uninit().as_mut_ptr()) };
+    assert_eq!(without_sets, ENF_NONE);
 }
 
 #[test]

@@ -1,0 +1,70 @@
+// Covers W1, W2 and W6 in the browser: a packed world over HTTP, piece by piece.
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { folder, worlds } from '../scripts/worlds.mjs';
+import { at, browser, page, visit } from './browser.mjs';
+import { serve } from './server.mjs';
+
+const names = worlds();
+let [server, own, tab] = [];
+
+before(async () => {
+  server = await serve({ web: at(''), worlds: folder });
+  own = await browser();
+  ({ tab } = await visit(own, `${server.address}/${await page('stream')}`));
+});
+
+after(async () => {
+  await own?.close();
+  server?.close();
+});
+
+for (const name of names.includes('institute') ? ['demo', 'furnished'] : ['demo']) {
+  test(`${name}: a streamed view that is complete is the picture of the whole file`, async () => {
+    const out = await tab.evaluate(([name]) => globalThis.same(`/worlds/${name}.enf`, `/worlds/${name}.glb`, 10), [name]);
+    assert.equal(out.views, 10);
+    assert.equal(out.differing, 0);
+    assert.ok(out.colors > 300);
+  });
+}
+
+// From one room of the demo house one sees most of it through the windows.
+const [world, budget] = names.includes('institute') ? ['furnished', 0.25] : ['demo', 0.95];
+
+test(`${world}: within ${budget} of the memory, every view of a walk is complete, and the budget is kept`, async () => {
+  const out = await tab.evaluate(([world, budget]) => globalThis.walk(`/worlds/${world}.enf`, budget, 20), [world, budget]);
+  assert.equal(out.stuck, 0);
+  assert.ok(out.share > 0 && out.share <= budget, JSON.stringify(out));
+});
+
+test('the walk opens the packed world and the whole one beside it, walks, and opens a door', async () => {
+  for (const name of ['demo.enf', 'demo.glb']) {
+    const walk = await own.newPage({ viewport: { width: 640, height: 400 } });
+    const errors = [];
+    walk.on('pageerror', (error) => errors.push(error.message));
+    await walk.goto(`${server.address}/web/dist/walk.html?world=/worlds/${name}`);
+    await walk.waitForFunction(() => globalThis.walk?.culler.counts.cells > 0, undefined, { timeout: 60_000 });
+    const at = () => walk.evaluate(() => [...globalThis.walk.walker.eye]);
+    const begin = await at();
+    await walk.keyboard.down('KeyW');
+    await walk.waitForTimeout(700);
+    await walk.keyboard.up('KeyW');
+    const end = await at();
+    assert.ok(Math.hypot(...end.map((v, k) => v - begin[k])) > 0.05, `from ${begin} to ${end}`);
+    await walk.evaluate(async () => {
+      const { world, walker, controls } = globalThis.walk;
+      const door = world.portals.find(({ leaves, normal }) => leaves.length > 0 && Math.abs(normal[1]) < 0.1);
+      const middle = [0, 1, 2].map((k) => door.outline.filter((_, i) => i % 3 === k).reduce((a, b) => a + b) / (door.outline.length / 3));
+      middle.forEach((v, k) => (walker.eye[k] = v - 1.2 * door.normal[k]));
+      walker.flies = true;
+      controls.yaw = Math.atan2(-door.normal[0], -door.normal[2]);
+      globalThis.door = { id: door.id, was: world.openness(door.id) };
+      await new Promise((done) => setTimeout(done, 400));
+      globalThis.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyE' }));
+    });
+    const hasMoved = () => Math.abs(globalThis.walk.world.openness(globalThis.door.id) - globalThis.door.was) > 0.5;
+    await walk.waitForFunction(hasMoved, undefined, { timeout: 30_000 });
+    assert.deepEqual(errors, []);
+    await walk.close();
+  }
+});
