@@ -201,6 +201,11 @@ typedef struct EnfPortal {
    Area of the opening. [Units: m²]
    */
   float area;
+  /*
+   Distance of the middle of its shut leaves from its plane, along the normal: a panel there that fills the outline is
+   hidden by them. 0 without leaves. [Units: m]
+   */
+  float leaf_depth;
 } EnfPortal;
 
 /*
