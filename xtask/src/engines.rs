@@ -1,7 +1,7 @@
 //! Integrations with engines, which are workspaces and packages of their own: their tests, and their figures.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use anyhow::Context;
 
@@ -12,8 +12,8 @@ use crate::{
     world_of,
 };
 
-/// Compilers and engines that run the readers.
-const NEEDS: [Need; 4] = [
+/// Compilers, engines and browsers.
+const NEEDS: [Need; 8] = [
     Need {
         what: "a C# compiler",
         why: "builds the reader for Unity",
@@ -38,6 +38,30 @@ const NEEDS: [Need; 4] = [
         packages: &["godot3-server"],
         is_there: || has_tool("godot3-server"),
     },
+    Need {
+        what: "a compiler for WebAssembly with its standard library",
+        why: "builds the run-time for browsers",
+        packages: &["rustc-web", "rust-web-src"],
+        is_there: || Path::new("/usr/lib/rustlib/src").is_dir(),
+    },
+    Need {
+        what: "wasm-ld",
+        why: "links the run-time for browsers",
+        packages: &["lld-19"],
+        is_there: || has_tool("wasm-ld-19"),
+    },
+    Need {
+        what: "wasm-opt",
+        why: "shrinks the run-time for browsers",
+        packages: &["binaryen"],
+        is_there: || has_tool("wasm-opt"),
+    },
+    Need {
+        what: "Chromium",
+        why: "runs the tests of the package for browsers",
+        packages: &["chromium"],
+        is_there: || has_tool("chromium"),
+    },
 ];
 
 /// Scenes of which the integrations are tried, beside the demo: enough for a real one in each row, few enough for the
@@ -49,7 +73,11 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("tools of engines", tools)?;
     let worlds = worlds();
     steps.step("readers", || run_to_end(&mut readers(GATE, &worlds)))?;
-    steps.step("abi", || abi(&worlds))
+    steps.step("abi", || abi(&worlds))?;
+    steps.step("web", || {
+        build_web()?;
+        run_to_end(&mut web("npm", GATE, &["test"]))
+    })
 }
 
 /// Prints the figures of all integrations, as JSON lines or as a table.
@@ -62,9 +90,17 @@ pub(crate) fn bench(args: &[String]) -> anyhow::Result<()> {
     }
     run_to_end(RELEASE.cargo("build", &["-p", "enfilade-cli"]).arg("-q"))?;
     let worlds = fresh_worlds()?;
-    let said = output_of(&mut readers(RELEASE, &worlds))?;
-    for line in said.lines() {
-        print_row(line, args.is_empty())?;
+    build_web()?;
+    let measured = [
+        readers(RELEASE, &worlds),
+        web("node", RELEASE, &["measure.mjs"]),
+    ];
+    for mut command in measured {
+        // Short rows end with a status, but are rows.
+        let said = command.stderr(Stdio::inherit()).output()?;
+        for line in String::from_utf8_lossy(&said.stdout).lines() {
+            print_row(line, args.is_empty())?;
+        }
     }
     Ok(())
 }
@@ -138,7 +174,8 @@ fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
     let worlds = std::env::join_paths(worlds)?;
     for (command, more) in [
         ("clippy", &["--all-targets", "--", "-D", "warnings"][..]),
-        ("test", &[]),
+        // With the optimization of the library that others link: the same build makes the oracle of the browser's tests.
+        ("test", &["--release"]),
     ] {
         let mut cargo = in_workspace("abi", &[command]);
         run_to_end(cargo.args(more).env("ENFILADE_WORLDS", &worlds))?;
@@ -146,11 +183,38 @@ fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Returns a cargo command in the workspace of an integration. All share a folder of builds, and with it what they have
-/// in common.
+/// Installs the packages of the browser's package, and builds it anew: module, code, walk.
+fn build_web() -> anyhow::Result<()> {
+    // Worlds of an earlier build.
+    let _ = std::fs::remove_dir_all(folder("web").join("dist"));
+    for args in [
+        &["ci", "--silent"][..],
+        &["run", "-s", "wasm"],
+        &["run", "-s", "build"],
+    ] {
+        run_to_end(&mut web("npm", GATE, args))?;
+    }
+    Ok(())
+}
+
+/// Returns a command in the folder of the browser's package, which takes worlds from the command of a profile.
+fn web(program: &str, profile: Profile, args: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command.current_dir(folder("web")).args(args);
+    command.env("ENFILADE", profile.binary("enfilade"));
+    command.env("CARGO_TARGET_DIR", builds());
+    command
+}
+
+/// Returns the folder of builds of all integrations, which have much in common.
+fn builds() -> PathBuf {
+    target_dir().join("engines")
+}
+
+/// Returns a cargo command in the workspace of an integration.
 fn in_workspace(name: &str, args: &[&str]) -> Command {
     let mut command = cargo(args);
     command.current_dir(folder(name));
-    command.env("CARGO_TARGET_DIR", target_dir().join("engines"));
+    command.env("CARGO_TARGET_DIR", builds());
     command
 }
