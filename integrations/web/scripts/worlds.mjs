@@ -7,7 +7,8 @@ import { fileURLToPath } from 'node:url';
 
 const here = fileURLToPath(new URL('..', import.meta.url));
 const top = join(here, '../..');
-const command = process.env.ENFILADE ?? join(top, 'target/release/enfilade');
+/** The command. */
+export const command = process.env.ENFILADE ?? join(top, 'target/release/enfilade');
 const scenes = process.env.ENFILADE_SCENES ?? join(top, '../shared/scenes');
 const target = process.env.CARGO_TARGET_DIR ?? join(top, 'target/abi');
 

@@ -90,12 +90,15 @@ export class PackedPlace {
   readonly head: Head;
   readonly json: GltfJson;
   /** The body, where a server gives no ranges. */
-  private whole: Promise<Uint8Array> | undefined;
+  private whole: Uint8Array | undefined;
+  /** The first request of a piece, until it is known whether the server gives ranges. */
+  private probe: Promise<unknown> | undefined;
 
   private constructor(
     head: Head,
     private readonly address: string,
     private readonly begin: number,
+    private givesRanges: boolean,
   ) {
     this.head = head;
     this.received = head.bytes;
@@ -114,12 +117,15 @@ export class PackedPlace {
     const answer = await fetch(file('head.enfp'));
     if (answer.ok) {
       const head = decodeHead(new Uint8Array(await answer.arrayBuffer()));
-      return new PackedPlace(head, file('pieces.enfp'), 0);
+      return new PackedPlace(head, file('pieces.enfp'), 0, answer.headers.get('Accept-Ranges') === 'bytes');
     }
     const first = await ranged(String(url), 0, 1 << 16);
     const n = headSize(first.bytes);
     const bytes = first.bytes.length >= n ? first.bytes : (await ranged(String(url), 0, n)).bytes;
-    return new PackedPlace(decodeHead(bytes.subarray(0, n)), String(url), n);
+    const place = new PackedPlace(decodeHead(bytes.subarray(0, n)), String(url), n, !first.isWhole);
+    if (first.isWhole) place.whole = first.bytes;
+    place.received = first.bytes.length;
+    return place;
   }
 
   /** Fetches pieces that lie side by side, from the first of them to the last; returns their bytes, piece by piece. */
@@ -137,12 +143,21 @@ export class PackedPlace {
   }
 
   private async bytes(from: number, n: number, signal?: AbortSignal): Promise<Uint8Array> {
-    if (this.whole) return (await this.whole).subarray(from, from + n);
-    const answer = await ranged(this.address, from, n, signal);
-    this.received += answer.bytes.length;
-    if (!answer.isWhole) return answer.bytes;
-    this.whole = Promise.resolve(answer.bytes);
-    return answer.bytes.subarray(from, from + n);
+    // Each request to a server without ranges would bring the whole file: the first answer tells.
+    while (!this.whole && !this.givesRanges && this.probe) await this.probe.catch(() => undefined);
+    if (this.whole) return this.whole.subarray(from, from + n);
+    const request = ranged(this.address, from, n, signal);
+    if (!this.givesRanges) this.probe = request;
+    try {
+      const { bytes, isWhole } = await request;
+      this.received += bytes.length;
+      this.givesRanges ||= !isWhole;
+      if (!isWhole) return bytes;
+      this.whole = bytes;
+      return bytes.subarray(from, from + n);
+    } finally {
+      if (this.probe === request) this.probe = undefined;
+    }
   }
 }
 

@@ -52,13 +52,18 @@ export class Runtime {
     this.f32 = new Float32Array(exports.memory.buffer);
   }
 
-  private static shared: Promise<Runtime> | undefined;
+  private static readonly shared = new Map<string, Promise<Runtime>>();
 
-  /** Loads the module once; all worlds without a runtime of their own share it. */
+  /** Loads the module, once from each address; its worlds share the instance. */
   static load(source?: WasmSource): Promise<Runtime> {
-    if (source !== undefined) return Runtime.start(source);
-    Runtime.shared ??= Runtime.start(new URL('./enfilade.wasm', import.meta.url));
-    return Runtime.shared;
+    const from = source ?? new URL('./enfilade.wasm', import.meta.url);
+    if (typeof from !== 'string' && !(from instanceof URL)) return Runtime.start(from);
+    const address = String(from);
+    const known = Runtime.shared.get(address) ?? Runtime.start(address);
+    Runtime.shared.set(address, known);
+    // An address that failed is tried again by the next who asks.
+    known.catch(() => Runtime.shared.delete(address));
+    return known;
   }
 
   private static async start(source: WasmSource): Promise<Runtime> {

@@ -2,9 +2,6 @@
 import { extensionOf, takeApart, withoutPictures } from './glb.js';
 import { Runtime, bytesOf, type WasmSource } from './wasm.js';
 
-/** Three numbers: a point or a direction, in meters, y up. */
-export type Vec3 = readonly [number, number, number] | Float32Array | number[];
-
 /** Kind of a cell. */
 export type CellKind = 'room' | 'outdoors' | 'void';
 /** Kind of a portal. */

@@ -6,8 +6,8 @@ import { extname, join, normalize } from 'node:path';
 
 const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
 
-/** Serves `folders` (by first name of the path); `pace` is in bytes a second, `latency` in milliseconds. */
-export async function serve(folders, { pace = Infinity, latency = 0 } = {}) {
+/** Serves `folders` (by first name of the path); `pace` is in bytes a second, `latency` in milliseconds; with or without ranges. */
+export async function serve(folders, { pace = Infinity, latency = 0, ranges = true } = {}) {
   let busyUntil = 0;
   const wait = (ms) => new Promise((done) => setTimeout(done, ms));
   const counts = { bytes: 0, requests: 0 };
@@ -21,7 +21,8 @@ export async function serve(folders, { pace = Infinity, latency = 0 } = {}) {
     let body = readFileSync(path);
     headers['Content-Type'] = TYPES[extname(path)] ?? 'application/octet-stream';
     headers['Cache-Control'] = 'no-store';
-    const range = /bytes=(\d+)-(\d+)/.exec(request.headers.range ?? '');
+    if (ranges) headers['Accept-Ranges'] = 'bytes';
+    const range = ranges && /bytes=(\d+)-(\d+)/.exec(request.headers.range ?? '');
     if (range) {
       const [from, to] = [Number(range[1]), Math.min(Number(range[2]), body.length - 1)];
       headers['Content-Range'] = `bytes ${from}-${to}/${body.length}`;

@@ -68,3 +68,38 @@ test('the walk opens the packed world and the whole one beside it, walks, and op
     await walk.close();
   }
 });
+
+test('two thumbs walk and look, and a tap opens a door', async () => {
+  const phone = await own.newContext({ viewport: { width: 400, height: 640 }, hasTouch: true, isMobile: true });
+  const walk = await phone.newPage();
+  await walk.goto(`${server.address}/web/dist/walk.html?world=/worlds/demo.glb`);
+  await walk.waitForFunction(() => globalThis.walk?.culler.counts.cells > 0, undefined, { timeout: 60_000 });
+  const link = await phone.newCDPSession(walk);
+  const touch = (type, x, y) => link.send('Input.dispatchTouchEvent', { type, touchPoints: type === 'touchEnd' ? [] : [{ x, y }] });
+  const state = () => walk.evaluate(() => ({ eye: [...globalThis.walk.walker.eye], yaw: globalThis.walk.controls.yaw }));
+  const drag = async (x, dx, dy) => {
+    await touch('touchStart', x, 400);
+    await touch('touchMove', x + dx, 400 + dy);
+    await walk.waitForTimeout(900);
+    await touch('touchEnd');
+  };
+  const begin = await state();
+  await drag(100, 0, -60);
+  const walked = await state();
+  assert.ok(Math.hypot(...walked.eye.map((v, k) => v - begin.eye[k])) > 0.05, 'the left thumb does not walk');
+  await drag(300, 60, 0);
+  assert.ok(Math.abs((await state()).yaw - walked.yaw) > 0.1, 'the right thumb does not look');
+  await walk.evaluate(() => {
+    const { walker, controls, world } = globalThis.walk;
+    walker.flies = true;
+    [5.2, 4.5, 4].forEach((v, k) => (walker.eye[k] = v));
+    [controls.yaw, controls.pitch] = [0, 0];
+    globalThis.before = world.portals.map(({ id }) => world.openness(id));
+  });
+  await walk.waitForTimeout(400);
+  // Not one after the other: a slow frame between them would make a long press of the tap.
+  await Promise.all([touch('touchStart', 200, 320), touch('touchEnd')]);
+  const hasMoved = () => globalThis.before.some((was, id) => Math.abs(globalThis.walk.world.openness(id) - was) > 0.5);
+  await walk.waitForFunction(hasMoved, undefined, { timeout: 30_000 });
+  await phone.close();
+});

@@ -44,7 +44,7 @@ export class Controls {
     if (event.pointerType === 'mouse') return;
     const walks = event.clientX < innerWidth / 2;
     const { clientX: x, clientY: y } = event;
-    this.touches.set(event.pointerId, { x, y, dx: 0, dy: 0, since: performance.now(), walks });
+    this.touches.set(event.pointerId, { x, y, dx: 0, dy: 0, since: event.timeStamp, walks });
   }
 
   private drag(event: PointerEvent): void {
@@ -64,7 +64,7 @@ export class Controls {
   private end(event: PointerEvent): void {
     const touch = this.touches.get(event.pointerId);
     this.touches.delete(event.pointerId);
-    if (!touch || Math.hypot(touch.dx, touch.dy) > 12 || performance.now() - touch.since > 400) return;
+    if (!touch || Math.hypot(touch.dx, touch.dy) > 12 || event.timeStamp - touch.since > 400) return;
     this.onTap((2 * event.clientX) / innerWidth - 1, 1 - (2 * event.clientY) / innerHeight);
   }
 

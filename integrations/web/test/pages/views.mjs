@@ -64,6 +64,16 @@ function place({ world, camera }, next) {
   }
 }
 
+/** Places the camera at a shut door, 0.8 m before one of its sides, as high as its middle; false if that is in a wall. */
+function placeAt({ world, camera }, { outline, normal }, side) {
+  const middle = [0, 1, 2].map((k) => outline.filter((_, i) => i % 3 === k).reduce((a, b) => a + b) / (outline.length / 3));
+  const p = middle.map((v, k) => v + 0.8 * side * normal[k]);
+  if (world.locate(p) < 0 || isAtSurface(world, p)) return false;
+  camera.position.set(...p);
+  camera.lookAt(...middle);
+  return true;
+}
+
 function picture({ renderer, scene, camera }) {
   renderer.render(scene, camera);
   const gl = renderer.getContext();
@@ -95,6 +105,20 @@ function drawn(root) {
   return out;
 }
 
+/** Moves doors and places the camera for view `i`: one in three at a door, all doors shut, where gaps around leaves show. */
+function arrange(stage, doors, i, next) {
+  const { culler } = stage;
+  place(stage, next);
+  if (doors.length === 0) return;
+  if (i % 3 > 0) {
+    culler.setOpenness(doors[Math.floor(next() * doors.length)].id, [0, 0.4, 1][Math.floor(next() * 3)]);
+    return;
+  }
+  for (const { id } of doors) culler.setOpenness(id, 0);
+  const door = doors[Math.floor(i / 3) % doors.length];
+  void (placeAt(stage, door, 1) || placeAt(stage, door, -1));
+}
+
 /** Draws `n` views with and without culling; counts the views and pixels that differ, and what was drawn. */
 globalThis.compare = async (address, n, seed) => {
   const stage = await open(address);
@@ -103,8 +127,7 @@ globalThis.compare = async (address, n, seed) => {
   const out = { views: 0, differing: 0, pixels: 0, edges: 0, lost: 0, colors: 0, callsOn: 0, callsOff: 0, hiddenLights: 0, worst: [] };
   const doors = world.portals.filter((portal) => portal.leaves.length > 0);
   for (let i = 0; i < n; i++) {
-    place(stage, next);
-    if (doors.length > 0 && next() < 0.3) culler.setOpenness(doors[Math.floor(next() * doors.length)].id, [0, 0.4, 1][i % 3]);
+    arrange(stage, doors, i, next);
     culler.enabled = true;
     culler.update(stage.camera);
     const on = picture(stage);
@@ -189,8 +212,7 @@ globalThis.pictures = async (address, view, seed) => {
   const { culler, renderer, world } = stage;
   const doors = world.portals.filter((portal) => portal.leaves.length > 0);
   for (let i = 0; i <= view; i++) {
-    place(stage, next);
-    if (doors.length > 0 && next() < 0.3) culler.setOpenness(doors[Math.floor(next() * doors.length)].id, [0, 0.4, 1][i % 3]);
+    arrange(stage, doors, i, next);
   }
   const out = [];
   for (const isOn of [true, false]) {
