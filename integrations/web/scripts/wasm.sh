@@ -6,10 +6,12 @@ here=$(cd "$(dirname "$0")/.." && pwd)
 target=${CARGO_TARGET_DIR:-$here/../../target/web}
 cd "$here/../abi"
 export CARGO_TARGET_DIR="$target"
+# Cargo optimizes across crates only where no rlib is made.
+build="rustc --lib --crate-type cdylib --locked --profile web"
 # No function is exported but ours; floats stay exact.
 flags="-C link-arg=-zstack-size=262144"
 if [ -d "$(rustc --print sysroot)/lib/rustlib/wasm32-unknown-unknown/lib" ]; then
-  RUSTFLAGS="$flags" cargo build --lib --locked --profile web --target wasm32-unknown-unknown
+  RUSTFLAGS="$flags" cargo $build --target wasm32-unknown-unknown
 else
   rustc=${WASM_RUSTC:-/usr/bin/rustc}
   # A panic traps at once: no texts of places in the source, no formatting of what nobody reads.
@@ -19,7 +21,7 @@ else
     if [ -z "$linker" ]; then linker=$(command -v $name || true); fi
   done
   export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$linker"
-  RUSTC="$rustc" RUSTC_BOOTSTRAP=1 RUSTFLAGS="$flags $small" cargo build --lib --locked --profile web \
+  RUSTC="$rustc" RUSTC_BOOTSTRAP=1 RUSTFLAGS="$flags $small" cargo $build \
     --target wasm32-unknown-unknown -Z build-std=std,panic_abort -Z build-std-features=optimize_for_size
 fi
 # The features that the compiler uses by default, which browsers have had for years; no newer ones.
