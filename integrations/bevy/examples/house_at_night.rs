@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::input::mouse::AccumulatedMouseMotion;
+use bevy::light::PointLightShadowMap;
 use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, save_to_disk};
 use bevy_enfilade::PortalOverlay;
@@ -17,7 +18,7 @@ const EYES: f32 = 1.6;
 /// Farthest door that one can open. [Units: m]
 const REACH: f32 = 2.0;
 /// Frames until the picture: the house is loaded, and the door is open.
-const FRAMES: u32 = 90;
+const FRAMES: u32 = 12;
 
 /// The lamp of a room, and the room.
 #[derive(Component)]
@@ -52,6 +53,7 @@ fn main() {
         ..default()
     })
     .insert_resource(ClearColor(Color::srgb(0.01, 0.012, 0.03)))
+    .insert_resource(PointLightShadowMap { size: 512 })
     .add_systems(Startup, set_up)
     .add_systems(Update, (hang_lamps, look, walk, use_door, use_lamp).chain())
     .add_observer(tell_room);

@@ -190,7 +190,9 @@ fn furnished(path: &Path, n_triangles: u64) -> PathBuf {
         let mesh = ball(at, radius, &mut rng);
         let n_own = mesh.primitives[0].indices.len() / 3;
         let mut transform = [0.0; 16];
-        [0, 5, 10, 15].map(|k| transform[k] = 1.0);
+        for k in [0, 5, 10, 15] {
+            transform[k] = 1.0;
+        }
         world.details.push(DetailObject {
             name: format!("piece {n_placed}"),
             mesh: world.detail_meshes.len() as u32,

@@ -22,6 +22,9 @@ use bevy_enfilade::prelude::*;
 /// Distance of the camera's near plane. [Units: m]
 const NEAR: f32 = 0.05;
 
+/// Frames of a view before its picture.
+const SETTLING: u32 = 5;
+
 /// Longest wait for a world to be loaded, or for a picture, in frames.
 const MOST_FRAMES: u32 = 20_000;
 
@@ -226,8 +229,10 @@ impl Stage {
     /// Draws, and returns the picture as rows of RGBA.
     pub(crate) fn picture(&mut self) -> Vec<u8> {
         self.app.world_mut().resource_mut::<Picture>().0 = None;
-        // The engine's caches of the frame before, such as the lists of shadows, settle within one.
-        self.frame();
+        // The engine sizes its lists of lights by those of the frames before, and drops what does not fit.
+        for _ in 0..SETTLING {
+            self.frame();
+        }
         let readback = Readback::texture(self.image.clone());
         let readback = self.app.world_mut().spawn(readback).id();
         let keep = |done: On<ReadbackComplete>, mut picture: ResMut<Picture>| {
