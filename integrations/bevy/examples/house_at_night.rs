@@ -110,7 +110,7 @@ fn hang_lamps(
             let [low, high] = room.aabb.map(Vec3::from);
             let at = low.midpoint(high).with_y(high.y - 0.35);
             // Every third is off.
-            let is_on = cell.0 % 3 != 2;
+            let is_on = cell.0 % 3 != 1;
             commands.spawn((
                 Lamp(cell),
                 PointLight {
