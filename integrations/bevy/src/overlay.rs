@@ -1,0 +1,106 @@
+//! Figures of the culling on the screen, switched by a key.
+
+use bevy::color::palettes::css;
+use bevy::prelude::*;
+
+use crate::culling::PortalView;
+use crate::gizmos::PortalGizmos;
+use crate::queries::PortalWorlds;
+
+/// Adds an overlay of the current cell, the visible cells, and the entities drawn, and switches it by a key. With it, the gizmos of
+/// cells, portals and views come and go. Needs Bevy's feature `bevy_gizmos_render`, and no text or user interface.
+pub struct PortalOverlayPlugin {
+    /// The key.
+    pub key: KeyCode,
+}
+
+impl Default for PortalOverlayPlugin {
+    fn default() -> Self {
+        Self { key: KeyCode::F3 }
+    }
+}
+
+/// State of the overlay.
+#[derive(Resource, Clone, Copy, Debug)]
+pub struct PortalOverlay {
+    /// True if it is shown.
+    pub is_shown: bool,
+    key: KeyCode,
+}
+
+/// Group of the overlay's letters.
+#[derive(Default, Reflect, GizmoConfigGroup)]
+struct Letters;
+
+impl Plugin for PortalOverlayPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(PortalOverlay {
+            is_shown: false,
+            key: self.key,
+        })
+        .init_gizmo_group::<Letters>()
+        .add_systems(Startup, |mut store: ResMut<GizmoConfigStore>| {
+            store.config_mut::<Letters>().0.depth_bias = -1.0;
+        })
+        .add_systems(Update, (switch, write).chain());
+    }
+}
+
+fn switch(
+    keys: Option<Res<ButtonInput<KeyCode>>>,
+    mut overlay: ResMut<PortalOverlay>,
+    mut gizmos: ResMut<PortalGizmos>,
+) {
+    if keys.is_some_and(|k| k.just_pressed(overlay.key)) {
+        overlay.is_shown = !overlay.is_shown;
+        let is_shown = overlay.is_shown;
+        *gizmos = PortalGizmos {
+            cells: is_shown,
+            portals: is_shown,
+            views: is_shown,
+        };
+    }
+}
+
+/// Writes in front of each camera, a bit beyond its near plane.
+fn write(
+    overlay: Res<PortalOverlay>,
+    views: Query<(&PortalView, &Camera, &GlobalTransform)>,
+    worlds: PortalWorlds,
+    mut gizmos: Gizmos<Letters>,
+) {
+    const DEPTH: f32 = 1.0;
+    for (view, camera, place) in views.iter().filter(|_| overlay.is_shown) {
+        let out = camera.clip_from_view().inverse();
+        let edge = out.project_point3(Vec3::new(-1.0, 1.0, 0.5));
+        let top_left = edge * (DEPTH / -edge.z);
+        let size = 0.045 * top_left.y;
+        for (i, line) in (0..).zip(lines(view, &worlds)) {
+            let at = top_left + Vec3::new(0.6 * size, -(i as f32 + 0.6) * 1.6 * size, 0.0);
+            let at = place.to_isometry() * Isometry3d::from_translation(at);
+            gizmos.text(at, &line, size, Vec2::new(-0.5, 0.5), css::WHITE);
+        }
+    }
+}
+
+/// Returns the lines of the overlay.
+fn lines(view: &PortalView, worlds: &PortalWorlds) -> Vec<String> {
+    let mut lines: Vec<String> = view
+        .worlds()
+        .iter()
+        .map(|own| {
+            let name = own.cell.and_then(|c| worlds.name(own.root, c));
+            let n_all = worlds
+                .world(own.root)
+                .map_or(0, |w| w.world.graph.cells.len());
+            let name = name.unwrap_or("in a wall");
+            format!("{name}: {} of {n_all} cells", own.cells.len())
+        })
+        .collect();
+    lines.push(format!("{} of {} entities", view.n_after, view.n_before));
+    lines.push(format!(
+        "{} of {} lights",
+        view.n_lights_after, view.n_lights_before
+    ));
+    lines
+}
