@@ -98,7 +98,8 @@ fn run_engines(steps: &mut Steps) -> anyhow::Result<()> {
         run_to_end(&mut GATE.cargo("build", &["-p", "enfilade-cli"]))
     })?;
     steps.step("demo", demo)?;
-    engines::run_steps(steps)
+    engines::run_steps(steps)?;
+    engines::run_bevy(steps)
 }
 
 /// Reports missing tools, a line each, and installs those it can: the Khronos glTF validator, a node package, below the

@@ -68,7 +68,7 @@ const NEEDS: [Need; 8] = [
 /// gate.
 const N_SCENES: usize = 3;
 
-/// Runs the tests of all integrations, on the demo and on worlds that are baked already.
+/// Runs the tests of the integrations that build in minutes, on the demo and on worlds that are baked already.
 pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("tools of engines", tools)?;
     let worlds = worlds();
@@ -77,6 +77,27 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("web", || {
         build_web()?;
         run_to_end(&mut web("npm", GATE, &["test"]))
+    })
+}
+
+/// Runs the tests of the plugin for Bevy. Building the engine takes longer than all other steps of the gate together, so
+/// only `test --engines` does it.
+pub(crate) fn run_bevy(steps: &mut Steps) -> anyhow::Result<()> {
+    steps.step("bevy", || {
+        for args in [
+            &[
+                "clippy",
+                "--locked",
+                "--all-targets",
+                "--",
+                "-D",
+                "warnings",
+            ][..],
+            &["test", "--locked"],
+        ] {
+            run_to_end(&mut in_workspace("bevy", args))?;
+        }
+        Ok(())
     })
 }
 
@@ -94,6 +115,7 @@ pub(crate) fn bench(args: &[String]) -> anyhow::Result<()> {
     let measured = [
         readers(RELEASE, &worlds),
         web("node", RELEASE, &["measure.mjs"]),
+        bevy_figures(&worlds),
     ];
     for mut command in measured {
         // Short rows end with a status, but are rows.
@@ -181,6 +203,13 @@ fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
         run_to_end(cargo.args(more).env("ENFILADE_WORLDS", &worlds))?;
     }
     Ok(())
+}
+
+/// Measures pictures and gain of culling in Bevy.
+fn bevy_figures(worlds: &[PathBuf]) -> Command {
+    let mut command = in_workspace("bevy", &["run", "--release", "--features", "bake"]);
+    command.args(["--example", "measure", "--"]).args(worlds);
+    command
 }
 
 /// Installs the packages of the browser's package, and builds it anew: module, code, walk.
