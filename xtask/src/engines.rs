@@ -83,21 +83,18 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
 /// Runs the tests of the plugin for Bevy. Building the engine takes longer than all other steps of the gate together, so
 /// only `test --engines` does it.
 pub(crate) fn run_bevy(steps: &mut Steps) -> anyhow::Result<()> {
+    // Always these features: with others, the engine is built once more.
+    let features = ["--locked", "--features", "bake", "--all-targets"];
+    let clippy = ["--", "-D", "warnings"];
+    // One test at a time: each draws with all cores.
+    let test = ["--", "--test-threads", "1"];
     steps.step("bevy", || {
-        for args in [
-            &[
-                "clippy",
-                "--locked",
-                "--all-targets",
-                "--",
-                "-D",
-                "warnings",
-            ][..],
-            &["test", "--locked"],
-        ] {
-            run_to_end(&mut in_workspace("bevy", args))?;
-        }
-        Ok(())
+        run_to_end(
+            in_workspace("bevy", &["clippy"])
+                .args(features)
+                .args(clippy),
+        )?;
+        run_to_end(in_workspace("bevy", &["test"]).args(features).args(test))
     })
 }
 
@@ -207,7 +204,7 @@ fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
 
 /// Measures pictures and gain of culling in Bevy.
 fn bevy_figures(worlds: &[PathBuf]) -> Command {
-    let mut command = in_workspace("bevy", &["run", "--release", "--features", "bake"]);
+    let mut command = in_workspace("bevy", &["run", "--features", "bake"]);
     command.args(["--example", "measure", "--"]).args(worlds);
     command
 }
