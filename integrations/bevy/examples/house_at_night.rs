@@ -115,7 +115,7 @@ fn hang_lamps(
                 Lamp(cell),
                 PointLight {
                     color: Color::srgb(1.0, 0.8, 0.55),
-                    intensity: 30_000.0,
+                    intensity: 100_000.0,
                     range: 7.0,
                     shadow_maps_enabled: true,
                     ..default()

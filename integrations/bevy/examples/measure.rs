@@ -1,4 +1,5 @@
-//! Figures of the plugin, one JSON line each: `measure [--views N] [--furnish TRIANGLES] [--size WxH] WORLD.glb…`.
+//! Figures of the plugin, one JSON line each: `measure [--views N] [--furnish TRIANGLES] [--size WxH] [--no-sun]
+//! WORLD.glb…`.
 //!
 //! | row | value | bar |
 //! | --- | --- | --- |
@@ -6,7 +7,8 @@
 //! | bevy entities | entities that cameras hand to the renderer, without culling ÷ with | ≥ 10, furnished institute |
 //! | bevy frame time | median time of a frame, without culling ÷ with, by turns | ≥ 3, furnished institute |
 //!
-//! With `--furnish`, each room gets objects of its own until the world has so many triangles.
+//! Without `--no-sun`, a sun casts shadows of all there is: the engine draws them apart from what cameras see. With
+//! `--furnish`, each room gets objects of its own until the world has so many triangles.
 
 #[path = "../tests/bevy/support.rs"]
 mod support;
@@ -28,6 +30,7 @@ struct Options {
     n_views: usize,
     furnish: u64,
     size: UVec2,
+    has_sun: bool,
     worlds: Vec<PathBuf>,
 }
 
@@ -50,6 +53,7 @@ fn options(mut arguments: impl Iterator<Item = String>) -> Options {
         n_views: 20,
         furnish: 0,
         size: UVec2::new(320, 200),
+        has_sun: true,
         worlds: Vec::new(),
     };
     while let Some(argument) = arguments.next() {
@@ -67,6 +71,7 @@ fn options(mut arguments: impl Iterator<Item = String>) -> Options {
                 let side = |s: &str| s.parse().expect("a number of pixels");
                 options.size = UVec2::new(side(width), side(height));
             }
+            "--no-sun" => options.has_sun = false,
             _ => options.worlds.push(argument.into()),
         }
     }
@@ -78,7 +83,7 @@ fn measure(path: &Path, scene: &str, options: &Options) {
     let lamps = Lamps {
         range: 5.0,
         with_shadows: WITH_SHADOWS,
-        sun: true,
+        sun: options.has_sun,
     };
     let mut stage = Stage::new(path, options.size, lamps);
     let stands = stands(stage.world(), options.n_views, 7);
