@@ -64,9 +64,11 @@ const NEEDS: [Need; 8] = [
     },
 ];
 
-/// Scenes of which the integrations are tried, beside the demo: enough for a real one in each row, few enough for the
-/// gate.
+/// Number of baked scenes on which the gate tries the integrations, beside the demo.
 const N_SCENES: usize = 3;
+
+/// Scenes on which they are measured, those of `docs/benchmarks/engines.md`.
+const MEASURED: [&str; 3] = ["duplex", "fzk-haus", "institute"];
 
 /// Runs the tests of the integrations that build in minutes, on the demo and on worlds that are baked already.
 pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
@@ -109,10 +111,13 @@ pub(crate) fn bench(args: &[String]) -> anyhow::Result<()> {
     run_to_end(RELEASE.cargo("build", &["-p", "enfilade-cli"]).arg("-q"))?;
     let worlds = fresh_worlds()?;
     build_web()?;
+    // The institute, by the order of names.
+    let last = &worlds[worlds.len() - 1..];
     let measured = [
         readers(RELEASE, &worlds),
         web("node", RELEASE, &["measure.mjs"]),
-        bevy_figures(&worlds),
+        bevy_figures(&["--views", "25"], &worlds),
+        bevy_figures(&["--views", "5", "--no-sun", "--furnish", "820000"], last),
     ];
     for mut command in measured {
         // Short rows end with a status, but are rows.
@@ -167,17 +172,22 @@ fn worlds() -> Vec<PathBuf> {
         .collect()
 }
 
-/// Bakes the worlds anew.
+/// Makes the demo and bakes the measured scenes, those that are there; returns their worlds.
 fn fresh_worlds() -> anyhow::Result<Vec<PathBuf>> {
     let mut demo = Command::new(RELEASE.binary("enfilade"));
     let dir = target_dir().join("demo");
     let _ = std::fs::remove_dir_all(&dir);
     output_of(demo.arg("demo").arg("-o").arg(&dir))?;
     std::fs::create_dir_all(target_dir().join("scenes"))?;
-    for scene in scenes().iter().take(N_SCENES) {
-        output_of(&mut RELEASE.bake_command(scene, &world_of(&name_of(scene))))?;
+    let mut worlds = vec![demo_world()];
+    for scene in scenes() {
+        let name = name_of(&scene);
+        if MEASURED.contains(&name.as_str()) {
+            output_of(&mut RELEASE.bake_command(&scene, &world_of(&name)))?;
+            worlds.push(world_of(&name));
+        }
     }
-    Ok(worlds())
+    Ok(worlds)
 }
 
 /// Compares readers in other languages with the command.
@@ -202,10 +212,11 @@ fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Measures pictures and gain of culling in Bevy.
-fn bevy_figures(worlds: &[PathBuf]) -> Command {
-    let mut command = in_workspace("bevy", &["run", "--features", "bake"]);
-    command.args(["--example", "measure", "--"]).args(worlds);
+/// Measures culling in Bevy: pictures of the worlds, and the gain in those that are furnished first.
+fn bevy_figures(args: &[&str], worlds: &[PathBuf]) -> Command {
+    let mut command = in_workspace("bevy", &["run", "--locked", "--features", "bake"]);
+    command.args(["--example", "measure", "--"]);
+    command.args(["--size", "160x100"]).args(args).args(worlds);
     command
 }
 
