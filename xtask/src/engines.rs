@@ -229,7 +229,8 @@ fn build_web() -> anyhow::Result<()> {
         &["run", "-s", "wasm"],
         &["run", "-s", "build"],
     ] {
-        run_to_end(&mut web("npm", GATE, args))?;
+        // Rows alone go to standard output.
+        run_to_end(web("npm", GATE, args).stdout(std::io::stderr()))?;
     }
     Ok(())
 }
