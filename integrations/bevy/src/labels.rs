@@ -47,3 +47,14 @@ pub struct WorldDetail {
     /// Its transform in the file.
     pub rest: Transform,
 }
+
+/// Label of the node of a cell. Meshes of structure that no other cell sees are its children.
+#[derive(Component, Reflect, Clone, Copy, Debug)]
+#[reflect(Component)]
+pub struct WorldCell {
+    /// The entity with the [`PortalRoot`].
+    #[entities]
+    pub root: Entity,
+    /// Index of the cell.
+    pub cell: u32,
+}

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod arrivals;
 #[cfg(feature = "bake")]
 mod bake;
 mod cells;
@@ -9,11 +10,15 @@ mod gizmos;
 mod labels;
 mod loader;
 mod overlay;
+mod packed;
+mod pieces;
 mod queries;
 mod reach;
 mod set_up;
+mod site;
 mod space;
 mod state;
+mod stream;
 mod world;
 
 use bevy::camera::CameraUpdateSystems;
@@ -22,6 +27,7 @@ use bevy::gltf::extensions::GltfExtensionHandlers;
 use bevy::light::SimulationLightSystems;
 use bevy::prelude::*;
 
+pub use arrivals::{CellLoaded, CellUnloaded, PieceFailed};
 #[cfg(feature = "bake")]
 pub use bake::{BakeBackend, BakeDone, BakeFailed, BakeMesh, BakeRole, PortalBake};
 pub use cells::{CellEntered, CellLeft, CurrentCell};
@@ -29,20 +35,22 @@ pub use culling::{PortalCulling, PortalView, WorldView};
 pub use doors::Door;
 pub use enfilade;
 pub use gizmos::{PortalGizmoGroup, PortalGizmos};
-pub use labels::{PartKind, PortalRoot, WorldDetail, WorldPart};
+pub use labels::{PartKind, PortalRoot, WorldCell, WorldDetail, WorldPart};
 pub use loader::EXTENSION;
 pub use overlay::{PortalOverlay, PortalOverlayPlugin};
+pub use packed::{PACKED_LABEL, PackedRoot, PackedWorld};
 pub use queries::{InCell, Picked, PortalWorlds};
 pub use reach::{Mover, Reach};
 pub use state::PortalState;
+pub use stream::{PortalStream, StreamSettings};
 pub use world::{PortalWorld, WORLD_LABEL};
 
 /// The names that programs use most.
 pub mod prelude {
     pub use crate::{
-        CellEntered, CellLeft, CurrentCell, Door, EnfiladePlugin, Mover, PortalCulling,
-        PortalGizmos, PortalOverlayPlugin, PortalRoot, PortalState, PortalView, PortalWorld,
-        PortalWorlds,
+        CellEntered, CellLeft, CellLoaded, CellUnloaded, CurrentCell, Door, EnfiladePlugin, Mover,
+        PieceFailed, PortalCulling, PortalGizmos, PortalOverlayPlugin, PortalRoot, PortalState,
+        PortalStream, PortalView, PortalWorld, PortalWorlds, StreamSettings,
     };
     pub use enfilade::{CellId, PortalId};
 }
@@ -56,6 +64,8 @@ pub enum EnfiladeSystems {
     Track,
     /// The lists of cameras are culled. After the engine's own check, and before it gives lights their shadow casters.
     Cull,
+    /// Pieces of packed worlds come and go, by what was just seen. They are drawn from the next frame on.
+    Stream,
 }
 
 /// Reads the cells and portals of glTF files, and culls by them. Add it after `DefaultPlugins`.
@@ -64,23 +74,34 @@ pub struct EnfiladePlugin;
 impl Plugin for EnfiladePlugin {
     fn build(&self, app: &mut App) {
         app.init_asset::<PortalWorld>()
+            .init_asset::<PackedWorld>()
+            .init_resource::<packed::Loading>()
+            .init_resource::<site::ShownPictures>()
+            .preregister_asset_loader::<packed::PackedLoader>(packed::EXTENSIONS)
             .init_resource::<culling::DroppedLights>()
             .register_type::<PortalRoot>()
             .register_type::<WorldPart>()
             .register_type::<WorldDetail>()
+            .register_type::<WorldCell>()
+            .register_type::<PackedRoot>()
             .register_type::<Door>()
             .register_type::<Mover>()
             .register_type::<PortalCulling>()
             .register_required_components::<PointLight, Reach>()
             .register_required_components::<SpotLight, Reach>()
             .add_message::<CellEntered>()
-            .add_message::<CellLeft>();
+            .add_message::<CellLeft>()
+            .add_message::<CellLoaded>()
+            .add_message::<CellUnloaded>()
+            .add_message::<PieceFailed>()
+            .add_observer(stream::close_stream);
+        let heads = app.world().resource::<packed::Loading>().0.clone();
         let handlers = app
             .world_mut()
             .get_resource_or_init::<GltfExtensionHandlers>();
-        let extension = Box::new(loader::PortalExtension::default());
+        let extension = Box::new(loader::PortalExtension::new(&heads));
         handlers.0.write_blocking().push(extension);
-        use EnfiladeSystems::{Cull, Track, Update};
+        use EnfiladeSystems::{Cull, Stream, Track, Update};
         app.configure_sets(
             PostUpdate,
             (
@@ -92,6 +113,7 @@ impl Plugin for EnfiladePlugin {
                 Cull.after(VisibilitySystems::CheckVisibility)
                     .after(CameraUpdateSystems)
                     .before(SimulationLightSystems::CheckLightVisibility),
+                Stream.after(Cull),
             ),
         )
         .add_systems(
@@ -106,6 +128,11 @@ impl Plugin for EnfiladePlugin {
                     .in_set(Update),
                 (cells::track_cells, reach::find_reaches).in_set(Track),
                 (culling::cull, culling::empty_shadows).chain().in_set(Cull),
+                (stream::open_streams, stream::run_streams)
+                    .chain()
+                    .in_set(Stream)
+                    // Programs without a renderer, such as servers, have no materials.
+                    .run_if(resource_exists::<Assets<StandardMaterial>>),
             ),
         );
         #[cfg(feature = "bake")]
@@ -117,5 +144,12 @@ impl Plugin for EnfiladePlugin {
                 .add_systems(Startup, gizmos::bring_to_front)
                 .add_systems(PostUpdate, gizmos::draw.after(Cull));
         }
+    }
+
+    fn finish(&self, app: &mut App) {
+        // Only now does the program's glTF loader know what the card supports.
+        let heads = app.world().resource::<packed::Loading>().0.clone();
+        let loader = packed::PackedLoader::new(app, &heads);
+        app.register_asset_loader(loader);
     }
 }

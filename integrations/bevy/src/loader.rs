@@ -11,16 +11,28 @@ use bevy::prelude::*;
 use gltf::binary::{Glb, Header};
 use gltf::json::Value;
 
-use crate::labels::{PartKind, PortalRoot, WorldDetail, WorldPart};
+use crate::labels::{PartKind, PortalRoot, WorldCell, WorldDetail, WorldPart};
+use crate::packed::{Heads, PACKED_LABEL, PackedRoot, head_of};
 use crate::world::{PortalWorld, WORLD_LABEL};
 
 /// Name of the extension in a world file.
 pub const EXTENSION: &str = "ENFILADE_cell_portal_graph";
 
 /// Reads the extension while Bevy's own loader reads the rest of the file. Each load works on its own clone.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub(crate) struct PortalExtension {
+    /// Heads of packed worlds that are being loaded.
+    heads: Heads,
     loaded: Option<Arc<Loaded>>,
+}
+
+impl PortalExtension {
+    pub(crate) fn new(heads: &Heads) -> Self {
+        Self {
+            heads: Arc::clone(heads),
+            loaded: None,
+        }
+    }
 }
 
 /// The parts of the file that entities are labelled by.
@@ -30,6 +42,9 @@ struct Loaded {
     batches: HashMap<(usize, usize), u32>,
     /// Detail objects by the indices of their nodes.
     details: HashMap<usize, u32>,
+    /// Cells by the indices of their nodes.
+    cells: HashMap<usize, u32>,
+    is_packed: bool,
 }
 
 /// Returns the array of objects of that name in the extension, each with its position.
@@ -49,8 +64,9 @@ fn batches_of(extension: &Value) -> HashMap<(usize, usize), u32> {
         .collect()
 }
 
-fn details_of(extension: &Value) -> HashMap<usize, u32> {
-    rows(extension, "details")
+/// Returns the rows of that name by the indices of their nodes.
+fn by_node(extension: &Value, name: &str) -> HashMap<usize, u32> {
+    rows(extension, name)
         .filter_map(|(i, row)| Some((index(row, "node")?, i)))
         .collect()
 }
@@ -87,12 +103,19 @@ impl GltfExtensionHandler for PortalExtension {
         let Some(extension) = gltf.extension_value(EXTENSION) else {
             return;
         };
-        match decode(gltf) {
+        let head = head_of(&self.heads, load_context.path());
+        let world = match &head {
+            Some(head) => PortalWorld::hollow(head).map_err(BevyError::from),
+            None => decode(gltf),
+        };
+        match world {
             Ok(world) => {
                 self.loaded = Some(Arc::new(Loaded {
                     world: load_context.add_labeled_asset(WORLD_LABEL, world),
                     batches: batches_of(extension),
-                    details: details_of(extension),
+                    details: by_node(extension, "details"),
+                    cells: by_node(extension, "cells"),
+                    is_packed: head.is_some(),
                 }));
             }
             Err(error) => {
@@ -126,11 +149,14 @@ impl GltfExtensionHandler for PortalExtension {
         node: &gltf::Node,
         entity: &mut EntityWorldMut,
     ) {
-        let detail = self
-            .loaded
-            .as_ref()
-            .and_then(|l| l.details.get(&node.index()));
-        if let Some(&detail) = detail {
+        let Some(loaded) = &self.loaded else {
+            return;
+        };
+        if let Some(&cell) = loaded.cells.get(&node.index()) {
+            let root = Entity::PLACEHOLDER;
+            entity.insert(WorldCell { root, cell });
+        }
+        if let Some(&detail) = loaded.details.get(&node.index()) {
             let rest = entity.get::<Transform>().copied().unwrap_or_default();
             entity.insert(WorldDetail {
                 root: Entity::PLACEHOLDER,
@@ -142,7 +168,7 @@ impl GltfExtensionHandler for PortalExtension {
 
     fn on_scene_completed(
         &mut self,
-        _: &mut LoadContext<'_>,
+        load_context: &mut LoadContext<'_>,
         _: &gltf::Scene,
         root: Entity,
         scene: &mut World,
@@ -153,6 +179,12 @@ impl GltfExtensionHandler for PortalExtension {
         scene.entity_mut(root).insert(PortalRoot {
             world: loaded.world.clone(),
         });
+        if loaded.is_packed {
+            let packed = load_context.get_label_handle(PACKED_LABEL);
+            scene.entity_mut(root).insert(PackedRoot { packed });
+        }
+        let mut cells = scene.query::<&mut WorldCell>();
+        cells.iter_mut(scene).for_each(|mut cell| cell.root = root);
         let mut details = scene.query::<(&mut WorldDetail, Option<&Children>)>();
         let mut meshes = Vec::new();
         for (mut detail, children) in details.iter_mut(scene) {

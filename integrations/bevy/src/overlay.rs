@@ -6,9 +6,10 @@ use bevy::prelude::*;
 use crate::culling::PortalView;
 use crate::gizmos::PortalGizmos;
 use crate::queries::PortalWorlds;
+use crate::stream::PortalStream;
 
-/// Adds an overlay of the current cell, the visible cells, and the entities drawn, and switches it by a key. With it, the gizmos of
-/// cells, portals and views come and go. Needs Bevy's feature `bevy_gizmos_render`, and no text or user interface.
+/// Adds an overlay of the current cell, the visible cells, the entities drawn, and the pieces of packed worlds, and switches it by a key. With
+/// it, the gizmos of cells, portals and views come and go. Needs Bevy's feature `bevy_gizmos_render`, and no text or user interface.
 pub struct PortalOverlayPlugin {
     /// The key.
     pub key: KeyCode,
@@ -67,6 +68,7 @@ fn write(
     overlay: Res<PortalOverlay>,
     views: Query<(&PortalView, &Camera, &GlobalTransform)>,
     worlds: PortalWorlds,
+    streams: Query<&PortalStream>,
     mut gizmos: Gizmos<Letters>,
 ) {
     const DEPTH: f32 = 1.0;
@@ -75,7 +77,9 @@ fn write(
         let edge = out.project_point3(Vec3::new(-1.0, 1.0, 0.5));
         let top_left = edge * (DEPTH / -edge.z);
         let size = 0.045 * top_left.y;
-        for (i, line) in (0..).zip(lines(view, &worlds)) {
+        let streams = streams.iter().map(stream_line);
+        let lines = lines(view, &worlds).into_iter().chain(streams);
+        for (i, line) in (0..).zip(lines) {
             let at = top_left + Vec3::new(0.6 * size, -(i as f32 + 0.6) * 1.6 * size, 0.0);
             let at = place.to_isometry() * Isometry3d::from_translation(at);
             gizmos.text(at, &line, size, Vec2::new(-0.5, 0.5), css::WHITE);
@@ -103,4 +107,12 @@ fn lines(view: &PortalView, worlds: &PortalWorlds) -> Vec<String> {
         view.n_lights_after, view.n_lights_before
     ));
     lines
+}
+
+fn stream_line(stream: &PortalStream) -> String {
+    let mib = |n: u64| n as f64 / f64::from(1 << 20);
+    let ([n_there, n_all], counts) = (stream.n_pieces(), stream.counts());
+    let (kept, most) = (mib(counts.n_kept), mib(counts.max_kept));
+    let n_late = counts.n_late;
+    format!("{n_there} of {n_all} pieces, {kept:.1} of {most:.0} MiB, {n_late} late")
 }

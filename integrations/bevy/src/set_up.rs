@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use enfilade::{PortalId, SightState};
 
 use crate::doors::Door;
-use crate::labels::{PortalRoot, WorldDetail};
+use crate::labels::{PortalRoot, WorldCell, WorldDetail};
 use crate::state::PortalState;
 use crate::world::PortalWorld;
 
@@ -13,6 +13,7 @@ pub(crate) fn set_up_roots(
     mut commands: Commands,
     roots: Query<(Entity, Ref<PortalRoot>, Has<PortalState>)>,
     details: Query<(Entity, &WorldDetail)>,
+    cells: Query<(Entity, &WorldCell)>,
     doors: Query<(Entity, &Door)>,
     worlds: Res<Assets<PortalWorld>>,
     mut changes: MessageReader<AssetEvent<PortalWorld>>,
@@ -33,16 +34,15 @@ pub(crate) fn set_up_roots(
         if is_ready && !is_stale {
             continue;
         }
-        let mut entities = vec![None; world.world.details.len()];
-        for (entity, detail) in details.iter().filter(|(_, d)| d.root == root) {
-            if let Some(slot) = entities.get_mut(detail.detail as usize) {
-                *slot = Some(entity);
-            }
-        }
+        let own = details.iter().filter(|(_, d)| d.root == root);
+        let details = entities(world.world.details.len(), own.map(|(e, d)| (e, d.detail)));
+        let own = cells.iter().filter(|(_, c)| c.root == root);
+        let cells = entities(world.world.graph.cells.len(), own.map(|(e, c)| (e, c.cell)));
         *revision += 1;
         let state = PortalState {
             doors: SightState::new(&world.sight),
-            details: entities,
+            details,
+            cells,
             revision: *revision,
         };
         for (door, _) in doors.iter().filter(|(_, d)| d.root == root) {
@@ -53,6 +53,17 @@ pub(crate) fn set_up_roots(
         }
         commands.entity(root).insert(state);
     }
+}
+
+/// Lists `n` entities by their numbers.
+fn entities(n: usize, numbered: impl Iterator<Item = (Entity, u32)>) -> Vec<Option<Entity>> {
+    let mut out = vec![None; n];
+    for (entity, i) in numbered {
+        if let Some(slot) = out.get_mut(i as usize) {
+            *slot = Some(entity);
+        }
+    }
+    out
 }
 
 /// Spawns the [`Door`] of a portal that has leaves.

@@ -9,6 +9,7 @@ mod movers;
 mod pictures;
 mod readme;
 mod reload;
+mod streaming;
 mod support;
 
 /// Lamps of most tests.

@@ -94,6 +94,11 @@ fn new_app(folder: PathBuf) -> App {
 impl Stage {
     /// Loads a world and lights it. The camera culls.
     pub(crate) fn new(world: &Path, size: UVec2, lamps: Lamps) -> Self {
+        Self::with(world, size, lamps, ())
+    }
+
+    /// As [`Stage::new`], with components beside the world's `WorldAssetRoot`.
+    pub(crate) fn with(world: &Path, size: UVec2, lamps: Lamps, beside: impl Bundle) -> Self {
         let world = std::path::absolute(world).expect("a path");
         let folder = world.parent().expect("a folder").to_owned();
         let file = world.file_name().expect("a file name").to_string_lossy();
@@ -101,7 +106,7 @@ impl Stage {
         let scene = GltfAssetLabel::Scene(0).from_asset(file.into_owned());
         let scene = stage.app.world().resource::<AssetServer>().load(scene);
         let world = WorldAssetRoot(scene.clone());
-        stage.app.world_mut().spawn(world);
+        stage.app.world_mut().spawn((world, beside));
         stage.root = wait_for_root(&mut stage.app, scene.id().untyped());
         stage.light(lamps);
         stage.frame();
