@@ -1,5 +1,6 @@
 //! A house at night: walk with W A S D, look with the arrow keys or the mouse, open a door with E, switch the lamp of the room with
-//! F, and look behind the scenes with F3. `assets/world.glb` is the house of `enfilade demo -o assets`.
+//! F, and look behind the scenes with F3: there, an arrow points to where a radio is heard from. `assets/world.glb` is the house of
+//! `enfilade demo -o assets`.
 //!
 //! With `--shot FILE.png`, opens a door, waits, saves a picture and ends; `--behind` shows the overlay in it.
 
@@ -17,6 +18,8 @@ use bevy_enfilade::prelude::*;
 const EYES: f32 = 1.6;
 /// Farthest door that one can open. [Units: m]
 const REACH: f32 = 2.0;
+/// Place of the radio, in a room beside that of the player. [Units: m]
+const RADIO: Vec3 = Vec3::new(7.0, 1.0, 2.0);
 /// Frames until the picture: the house is loaded, and the door is open.
 const FRAMES: u32 = 12;
 
@@ -69,7 +72,7 @@ fn main() {
             PostStartup,
             |mut overlay: ResMut<PortalOverlay>, mut gizmos: ResMut<PortalGizmos>| {
                 overlay.is_shown = true;
-                (gizmos.portals, gizmos.views) = (true, true);
+                (gizmos.portals, gizmos.views, gizmos.sounds) = (true, true, true);
             },
         );
     }
@@ -93,7 +96,10 @@ fn set_up(mut commands: Commands, assets: Res<AssetServer>) {
         },
         PortalCulling::default(),
         CurrentCell::default(),
+        Ears,
     ));
+    let radio = Transform::from_translation(RADIO);
+    commands.spawn((Name::new("radio"), Emitter, radio));
 }
 
 /// Hangs a lamp in each room of a house that was just loaded.

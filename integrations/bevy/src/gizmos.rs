@@ -1,11 +1,17 @@
-//! Drawings of cells, portals and narrowed views.
+//! Drawings of cells, portals, narrowed views and sounds.
 
 use bevy::color::palettes::css;
 use bevy::prelude::*;
 
 use crate::culling::{PortalView, WorldView};
+use crate::hearing::{Ears, Emitter, Heard};
 use crate::state::{PortalState, Roots};
 use crate::world::PortalWorld;
+
+/// Start of the arrows of sounds, in the space of the camera. [Units: wu]
+const BEFORE: Vec3 = Vec3::new(0.0, -0.25, -1.0);
+/// Length of the arrows of sounds. [Units: wu]
+const ARROW: f32 = 0.3;
 
 /// Choice of gizmos. Everything is off at first.
 #[derive(Resource, Default, Clone, Copy, Debug)]
@@ -16,6 +22,8 @@ pub struct PortalGizmos {
     pub portals: bool,
     /// The rectangles to which views are narrowed at portals.
     pub views: bool,
+    /// An arrow before the camera with [`Ears`] for each sound, to where it seems to come from.
+    pub sounds: bool,
 }
 
 /// Group of these gizmos, to set their line widths and depth.
@@ -32,8 +40,16 @@ pub(crate) fn draw(
     roots: Query<Roots>,
     worlds: Res<Assets<PortalWorld>>,
     views: Query<&PortalView>,
+    ears: Query<&GlobalTransform, With<Ears>>,
+    emitters: Query<&Heard, With<Emitter>>,
     mut gizmos: Gizmos<PortalGizmoGroup>,
 ) {
+    if let Some(ears) = ears.iter().next().filter(|_| settings.sounds) {
+        for heard in emitters.iter().filter(|h| h.gain > 0.0) {
+            let start = ears.transform_point(BEFORE);
+            gizmos.arrow(start, start + heard.direction * ARROW, css::AQUA);
+        }
+    }
     if !(settings.cells || settings.portals || settings.views) {
         return;
     }

@@ -7,6 +7,7 @@ mod cells;
 mod culling;
 mod doors;
 mod gizmos;
+mod hearing;
 mod labels;
 mod loader;
 mod overlay;
@@ -35,6 +36,7 @@ pub use culling::{PortalCulling, PortalView, WorldView};
 pub use doors::Door;
 pub use enfilade;
 pub use gizmos::{PortalGizmoGroup, PortalGizmos};
+pub use hearing::{Ears, Emitter, Heard};
 pub use labels::{PartKind, PortalRoot, WorldCell, WorldDetail, WorldPart};
 pub use loader::EXTENSION;
 pub use overlay::{PortalOverlay, PortalOverlayPlugin};
@@ -48,9 +50,10 @@ pub use world::{PortalWorld, WORLD_LABEL};
 /// The names that programs use most.
 pub mod prelude {
     pub use crate::{
-        CellEntered, CellLeft, CellLoaded, CellUnloaded, CurrentCell, Door, EnfiladePlugin, Mover,
-        PieceFailed, PortalCulling, PortalGizmos, PortalOverlayPlugin, PortalRoot, PortalState,
-        PortalStream, PortalView, PortalWorld, PortalWorlds, StreamSettings,
+        CellEntered, CellLeft, CellLoaded, CellUnloaded, CurrentCell, Door, Ears, Emitter,
+        EnfiladePlugin, Heard, Mover, PieceFailed, PortalCulling, PortalGizmos,
+        PortalOverlayPlugin, PortalRoot, PortalState, PortalStream, PortalView, PortalWorld,
+        PortalWorlds, StreamSettings,
     };
     pub use enfilade::{CellId, PortalId};
 }
@@ -60,7 +63,7 @@ pub mod prelude {
 pub enum EnfiladeSystems {
     /// Worlds that were just spawned are prepared, and doors move. Before transforms are propagated.
     Update,
-    /// [`CurrentCell`] and [`Reach`] are found. After transforms are propagated.
+    /// [`CurrentCell`], [`Reach`] and [`Heard`] are found. After transforms are propagated.
     Track,
     /// The lists of cameras are culled. After the engine's own check, and before it gives lights their shadow casters.
     Cull,
@@ -84,6 +87,9 @@ impl Plugin for EnfiladePlugin {
             .register_type::<WorldDetail>()
             .register_type::<WorldCell>()
             .register_type::<PackedRoot>()
+            .register_type::<Emitter>()
+            .register_type::<Ears>()
+            .register_type::<Heard>()
             .register_type::<Door>()
             .register_type::<Mover>()
             .register_type::<PortalCulling>()
@@ -126,7 +132,7 @@ impl Plugin for EnfiladePlugin {
                 )
                     .chain()
                     .in_set(Update),
-                (cells::track_cells, reach::find_reaches).in_set(Track),
+                (cells::track_cells, reach::find_reaches, hearing::hear).in_set(Track),
                 (culling::cull, culling::empty_shadows).chain().in_set(Cull),
                 (stream::open_streams, stream::run_streams)
                     .chain()

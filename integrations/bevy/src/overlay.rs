@@ -5,11 +5,12 @@ use bevy::prelude::*;
 
 use crate::culling::PortalView;
 use crate::gizmos::PortalGizmos;
+use crate::hearing::{Emitter, Heard};
 use crate::queries::PortalWorlds;
 use crate::stream::PortalStream;
 
-/// Adds an overlay of the current cell, the visible cells, the entities drawn, and the pieces of packed worlds, and switches it by a key. With
-/// it, the gizmos of cells, portals and views come and go. Needs Bevy's feature `bevy_gizmos_render`, and no text or user interface.
+/// Adds an overlay of the current cell, the visible cells, the entities drawn, the pieces of packed worlds, and what is heard, and
+/// switches it by a key. With it, the gizmos of cells, portals, views and sounds come and go. Needs Bevy's feature `bevy_gizmos_render`, and no text or user interface.
 pub struct PortalOverlayPlugin {
     /// The key.
     pub key: KeyCode,
@@ -59,6 +60,7 @@ fn switch(
             cells: is_shown,
             portals: is_shown,
             views: is_shown,
+            sounds: is_shown,
         };
     }
 }
@@ -69,6 +71,7 @@ fn write(
     views: Query<(&PortalView, &Camera, &GlobalTransform)>,
     worlds: PortalWorlds,
     streams: Query<&PortalStream>,
+    emitters: Query<(Option<&Name>, &Heard), With<Emitter>>,
     mut gizmos: Gizmos<Letters>,
 ) {
     const DEPTH: f32 = 1.0;
@@ -78,7 +81,11 @@ fn write(
         let top_left = edge * (DEPTH / -edge.z);
         let size = 0.045 * top_left.y;
         let streams = streams.iter().map(stream_line);
-        let lines = lines(view, &worlds).into_iter().chain(streams);
+        let sounds = emitters.iter().map(|(name, heard)| sound_line(name, heard));
+        let lines = lines(view, &worlds)
+            .into_iter()
+            .chain(streams)
+            .chain(sounds);
         for (i, line) in (0..).zip(lines) {
             let at = top_left + Vec3::new(0.6 * size, -(i as f32 + 0.6) * 1.6 * size, 0.0);
             let at = place.to_isometry() * Isometry3d::from_translation(at);
@@ -115,4 +122,12 @@ fn stream_line(stream: &PortalStream) -> String {
     let (kept, most) = (mib(counts.n_kept), mib(counts.max_kept));
     let n_late = counts.n_late;
     format!("{n_there} of {n_all} pieces, {kept:.1} of {most:.0} MiB, {n_late} late")
+}
+
+fn sound_line(name: Option<&Name>, heard: &Heard) -> String {
+    let name = name.map_or("sound", Name::as_str);
+    match heard.gain > 0.0 {
+        true => format!("{name}: {:.0} dB, {:.1} m", heard.level(), heard.length),
+        false => format!("{name}: silent"),
+    }
 }

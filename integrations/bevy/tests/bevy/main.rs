@@ -5,6 +5,7 @@
 mod bake;
 mod cells;
 mod doors;
+mod hearing;
 mod movers;
 mod pictures;
 mod readme;
