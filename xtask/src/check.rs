@@ -102,8 +102,12 @@ fn run_engines(steps: &mut Steps) -> anyhow::Result<()> {
     engines::run_bevy(steps)
 }
 
-/// Reports missing tools, a line each, and installs those it can: the Khronos glTF validator, a node package, below the
-/// target folder, and the packages of `apt`.
+/// Packages of node that tests run: the Khronos glTF validator, and a reader of IFC.
+const NODE_PACKAGES: [(&str, &str); 2] =
+    [("gltf-validator", "2.0.0-dev.3.10"), ("web-ifc", "0.0.78")];
+
+/// Reports missing tools, a line each, and installs those it can: packages of node, below the target folder, and those of
+/// `apt`.
 fn tools() -> anyhow::Result<()> {
     let has = |name: &str| {
         Command::new(name)
@@ -113,8 +117,12 @@ fn tools() -> anyhow::Result<()> {
     };
     let needed = [
         ("git", "lists the files to check", "apt-get install git"),
-        ("node", "runs the glTF validator", "apt-get install nodejs"),
-        ("npm", "installs the glTF validator", "apt-get install npm"),
+        (
+            "node",
+            "runs the glTF validator and web-ifc",
+            "apt-get install nodejs",
+        ),
+        ("npm", "installs packages of node", "apt-get install npm"),
     ];
     let missing: Vec<String> = needed
         .iter()
@@ -128,18 +136,22 @@ fn tools() -> anyhow::Result<()> {
         apt::install(&apt::NEEDS, apt::apt_get)?;
         apt::try_install(&apt::WANTS, apt::apt_get);
     }
-    if !node_path().join("gltf-validator").is_dir() {
+    let missing = NODE_PACKAGES.iter();
+    let missing: Vec<String> = missing
+        .filter(|(name, _)| !node_path().join(name).is_dir())
+        .map(|(name, version)| format!("{name}@{version}"))
+        .collect();
+    if !missing.is_empty() {
         std::fs::create_dir_all(tools_dir())?;
-        println!("installing gltf-validator into {}", tools_dir().display());
-        let npm = [
-            "install",
-            "--no-audit",
-            "--no-fund",
-            "--prefix",
-            ".",
-            "gltf-validator@2.0.0-dev.3.10",
-        ];
-        run_to_end(Command::new("npm").current_dir(tools_dir()).args(npm))?;
+        let names = missing.join(" ");
+        println!("installing {names} into {}", tools_dir().display());
+        let npm = ["install", "--no-audit", "--no-fund", "--prefix", "."];
+        run_to_end(
+            Command::new("npm")
+                .current_dir(tools_dir())
+                .args(npm)
+                .args(missing),
+        )?;
     }
     Ok(())
 }

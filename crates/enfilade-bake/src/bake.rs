@@ -9,6 +9,7 @@ use crate::bound::keep_costs;
 use crate::budget::n_structural;
 use crate::delaunay::Session;
 use crate::marked::make_marked;
+use crate::names::name_cells;
 use crate::realize::realize;
 use crate::structure::Structure;
 use crate::vessel::is_vessel;
@@ -51,6 +52,7 @@ pub fn bake(
         baked.notes.push(note.to_owned());
     }
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
+    name_cells(&mut baked.world, &scene.rooms);
     make_marked(&mut baked.world, &mut baked.notes, scene);
     Ok(baked)
 }
@@ -72,6 +74,7 @@ pub fn bake_session(
     let proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
     let mut baked = realize(structure, method, proposal, config, context)?;
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
+    name_cells(&mut baked.world, &scene.rooms);
     make_marked(&mut baked.world, &mut baked.notes, scene);
     Ok(baked)
 }

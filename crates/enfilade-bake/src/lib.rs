@@ -29,6 +29,7 @@ mod layout;
 pub mod leak;
 mod marked;
 mod method;
+mod names;
 mod output;
 mod proposal;
 mod realize;

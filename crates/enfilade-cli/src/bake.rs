@@ -37,7 +37,8 @@ use enfilade_cli::memory::held_memory;
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
 pub(crate) struct Bake {
-    /// Scene files: GLB, glTF, OBJ, PLY, STL or Quake MAP. Several become one scene; `-` is standard input.
+    /// Scene files: GLB, glTF, OBJ, PLY, STL, Quake MAP, or IFC, which needs ifcopenshell (`pip install ifcopenshell`) or
+    /// web-ifc (`npm install web-ifc`). Several become one scene; `-` is standard input.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
     /// World to write, one GLB; `-` for standard output.

@@ -30,6 +30,37 @@ pub struct Scene {
     pub about: About,
     /// Objects that are to become mirrors or linked portals.
     pub marks: Vec<Mark>,
+    /// Names of rooms, as in the input.
+    pub rooms: Vec<RoomName>,
+}
+
+/// A name of a room, and where it holds.
+///
+/// The cells in which the points lie take the name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RoomName {
+    /// Name; several rooms may share one.
+    pub name: String,
+    /// Points in the room. [Units: wu]
+    pub points: Vec<DVec3>,
+    /// Volume of the room that each point stands for, or [`RoomName::BY_HAND`]. [Units: wu³]
+    pub volume: f64,
+}
+
+impl RoomName {
+    /// Volume that is larger than that of any room: a point which someone set to name the room around it counts more
+    /// than all volumes. [Units: wu³]
+    pub const BY_HAND: f64 = 1e15;
+
+    /// Returns a name for the room around a point that someone chose.
+    #[must_use]
+    pub fn at(name: impl Into<String>, point: DVec3) -> Self {
+        Self {
+            name: name.into(),
+            points: vec![point],
+            volume: Self::BY_HAND,
+        }
+    }
 }
 
 /// An object, or one of its parts, that the input marks as a special portal.

@@ -40,6 +40,7 @@ mod polygon;
 mod prt;
 mod pvs_text;
 mod report;
+mod rooms;
 mod soup;
 mod stl;
 mod textures;

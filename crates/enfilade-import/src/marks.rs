@@ -55,15 +55,20 @@ fn materials<'s>(
 
 /// Returns the mark that extras ask for; `Some(None)` for a plain object.
 fn of_extras(extras: &str) -> Option<Option<MarkKind>> {
+    let asked = asked(extras)?;
+    if asked.eq_ignore_ascii_case("mirror") {
+        return Some(Some(MarkKind::Mirror));
+    }
+    Some(marked_portal(&asked).map(|name| MarkKind::Portal(name.to_owned())))
+}
+
+/// Returns the value by which extras decide, whatever the names.
+pub(crate) fn asked(extras: &str) -> Option<String> {
     if !extras.contains(KEY) {
         return None;
     }
     let value: Value = serde_json::from_str(extras).ok()?;
-    let asked = value.get(KEY)?.as_str()?.trim();
-    if asked.eq_ignore_ascii_case("mirror") {
-        return Some(Some(MarkKind::Mirror));
-    }
-    Some(marked_portal(asked).map(|name| MarkKind::Portal(name.to_owned())))
+    Some(value.get(KEY)?.as_str()?.trim().to_owned())
 }
 
 /// Returns the mark that a name makes.
@@ -78,7 +83,7 @@ fn of_name(name: &str) -> Option<MarkKind> {
 }
 
 /// Returns a name without the `.001` that modelers append.
-fn without_number(name: &str) -> &str {
+pub(crate) fn without_number(name: &str) -> &str {
     match name.rsplit_once('.') {
         Some((rest, number)) if number.len() >= 3 && number.bytes().all(|b| b.is_ascii_digit()) => {
             rest.trim_end()

@@ -34,7 +34,7 @@ pub struct ImportOptions {
     ///
     /// Without it, a scene from elsewhere cannot bring a file of the reader's disk into the output.
     pub allow_outside: bool,
-    /// Converter for IFC; without one such files are rejected.
+    /// Programs for IFC; without them such files are rejected. [`IfcConverter::installed`] finds them.
     pub ifc: Option<IfcConverter>,
     /// Leaves objects called `mirror` or `portal:NAME` as they are, so that [`Scene::marks`](enfilade_geom::scene::Scene::marks)
     /// stays empty.
@@ -43,11 +43,14 @@ pub struct ImportOptions {
     pub repair: Option<RepairOptions>,
 }
 
-/// The command `IfcConvert` of IfcOpenShell.
+/// Programs that read IFC, and their limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IfcConverter {
-    /// The program, by path or by a name on the `PATH`.
-    pub program: PathBuf,
+    /// Programs to try in turn, by path or by a name on the `PATH`; the first that has its package decides.
+    ///
+    /// One called `python...` needs the package ifcopenshell, one called `node...` web-ifc; any other is taken for IfcConvert of
+    /// IfcOpenShell.
+    pub programs: Vec<PathBuf>,
     /// Folder for a temporary folder, which is removed at the end, or by the next import if this one is killed.
     pub folder: PathBuf,
     /// Longest time it may take.
@@ -57,11 +60,11 @@ pub struct IfcConverter {
 }
 
 impl IfcConverter {
-    /// Returns a converter that may take an hour.
+    /// Returns a converter by one program that may take an hour.
     #[must_use]
     pub fn new(program: impl Into<PathBuf>, folder: impl Into<PathBuf>) -> Self {
         Self {
-            program: program.into(),
+            programs: vec![program.into()],
             folder: folder.into(),
             max_time: Duration::from_secs(3600),
             max_memory: None,

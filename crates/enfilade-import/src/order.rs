@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::mem::take;
 
 use enfilade_geom::scene::{
-    Entity, Fixture, Image, Material, Mesh, Object, Primitive, Scene, SourceNode, Texture,
+    Entity, Fixture, Image, Material, Mesh, Object, Primitive, RoomName, Scene, SourceNode, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3};
 use enfilade_prepare::GridSteps;
@@ -39,6 +39,7 @@ pub(crate) fn sort(scene: &mut Scene, steps: &mut GridSteps) {
     scene.solids.sort_by(solids);
     scene.entities.sort_by(entities);
     scene.fixtures.sort_by(fixtures);
+    scene.rooms.sort_by(rooms);
 }
 
 /// Makes pictures, textures and materials unique, and sorts them.
@@ -385,6 +386,14 @@ fn entities(a: &Entity, b: &Entity) -> Ordering {
     (&a.class, &a.properties, a.object)
         .cmp(&(&b.class, &b.properties, b.object))
         .then_with(|| all(&place(a), &place(b), f64::total_cmp))
+}
+
+fn rooms(a: &RoomName, b: &RoomName) -> Ordering {
+    let numbers = |r: &RoomName| -> Vec<f64> {
+        let points = r.points.iter().flat_map(|p| p.to_array());
+        points.chain([r.volume]).collect()
+    };
+    (a.name.cmp(&b.name)).then_with(|| all(&numbers(a), &numbers(b), f64::total_cmp))
 }
 
 fn fixtures(a: &Fixture, b: &Fixture) -> Ordering {

@@ -34,6 +34,11 @@ impl Origins {
         Some(self.nodes.len() as u32 - 1)
     }
 
+    /// Returns a node by its number.
+    pub(crate) fn node(&self, number: Option<u32>) -> Option<&SourceNode> {
+        self.nodes.get(number? as usize)
+    }
+
     pub(crate) fn add_fixture(&mut self, fixture: Fixture) {
         self.fixtures.push(fixture);
     }

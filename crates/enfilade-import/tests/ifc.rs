@@ -1,4 +1,4 @@
-//! IFC through a converter of this test, which returns a GLB made here. Covers S1.
+//! IFC through programs of this test, which return a GLB made here. Covers S1.
 #![cfg(unix)]
 
 mod common;
@@ -99,7 +99,7 @@ fn a_converter_that_fails_is_quoted_and_leaves_nothing_behind() {
         );
     }
     let (folder, mut converter) = house("ifc-missing", "");
-    converter.program = folder.join("nowhere");
+    converter.programs = vec![folder.join("nowhere")];
     let error = read(&folder, Some(converter)).unwrap_err().to_string();
     assert!(error.contains("cannot be run"), "{error}");
     let error = read(&folder, None).unwrap_err().to_string();

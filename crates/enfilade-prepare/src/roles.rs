@@ -103,10 +103,11 @@ const IFC_DETAIL: [&str; 21] = [
 ];
 
 /// IFC classes without physical matter.
-const IFC_VOID: [&str; 4] = [
+const IFC_VOID: [&str; 5] = [
     "IfcOpeningElement",
     "IfcOpeningStandardCase",
     "IfcSpace",
+    "IfcSpatialZone",
     "IfcVirtualElement",
 ];
 
@@ -468,6 +469,7 @@ mod tests {
             "c-convcolonly",
             "UCX_Wall",
             "IfcSpace/1",
+            "IfcSpatialZone/1",
             "IfcOpeningElement/1",
             "d-noimp",
         ] {

@@ -48,7 +48,8 @@ pub(crate) struct SceneOptions {
     /// scenes from strangers.
     #[arg(long)]
     allow_outside: bool,
-    /// Program IfcConvert of IfcOpenShell, used to read IFC [default: the one on the PATH].
+    /// Program that reads IFC: a Python with the package ifcopenshell, a node with web-ifc, or IfcConvert [default: the
+    /// first of these that is installed].
     #[arg(long, value_name = "PATH")]
     ifc_convert: Option<PathBuf>,
     /// Repair structural triangles: weld vertices along open edges within METERS (0.001 if not given), split
@@ -441,16 +442,13 @@ impl SceneOptions {
         })
     }
 
-    /// The given converter, or the one on the PATH.
-    fn ifc_converter(&self) -> Option<IfcConverter> {
-        let name = format!("IfcConvert{}", std::env::consts::EXE_SUFFIX);
-        let on_path = || {
-            let folders = std::env::var_os("PATH")?;
-            let mut programs = std::env::split_paths(&folders).map(|f| f.join(&name));
-            programs.find(|p| p.is_file())
-        };
-        let program = self.ifc_convert.clone().or_else(on_path)?;
-        Some(IfcConverter::new(program, std::env::temp_dir()))
+    /// The given program for IFC, or those of this machine.
+    fn ifc_converter(&self) -> IfcConverter {
+        let folder = std::env::temp_dir();
+        match &self.ifc_convert {
+            Some(program) => IfcConverter::new(program, folder),
+            None => IfcConverter::installed(folder),
+        }
     }
 
     fn resolve_with(&self, file: &ConfigFile) -> ImportOptions {
@@ -478,7 +476,7 @@ impl SceneOptions {
             ignores_marks: !(self.marks.map(|s| s == Switch::On))
                 .or(file.marks)
                 .unwrap_or(true),
-            ifc: self.ifc_converter(),
+            ifc: Some(self.ifc_converter()),
             repair: self.repair_with(file),
             ..ImportOptions::default()
         }

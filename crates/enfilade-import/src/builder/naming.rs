@@ -1,6 +1,6 @@
 //! Names and extras of the input, counted and checked as they are read.
 
-use enfilade_geom::scene::{Fixture, SourceNode};
+use enfilade_geom::scene::{Fixture, FixtureKind, Primitive, RoomName, SourceNode};
 
 use super::Builder;
 use crate::ImportError;
@@ -22,8 +22,21 @@ impl Builder<'_> {
         Ok(self.origins.add(parent, name, extras))
     }
 
+    /// Adds a light, a camera or a marked place, which may name a room.
+    pub(crate) fn add_fixture(&mut self, place: &str, fixture: Fixture) -> Result<(), ImportError> {
+        if fixture.kind == FixtureKind::Marker
+            && fixture.transform.is_finite()
+            && let Some(name) = self.room_of(&fixture.name, &fixture.extras)
+        {
+            let point = fixture.transform.w_axis.truncate();
+            self.charge_memory(place, 1, (size_of::<RoomName>() + name.len()) as u64)?;
+            self.push_room(RoomName::at(name, point));
+        }
+        self.keep_fixture(place, fixture)
+    }
+
     /// Adds a light, a camera or a marked place.
-    pub(crate) fn add_fixture(
+    pub(crate) fn keep_fixture(
         &mut self,
         place: &str,
         mut fixture: Fixture,
@@ -40,6 +53,15 @@ impl Builder<'_> {
             );
         }
         Ok(())
+    }
+
+    /// Keeps the name of a room.
+    pub(crate) fn push_room(&mut self, room: RoomName) {
+        self.scene.rooms.push(room);
+    }
+
+    pub(crate) fn primitives(&self, mesh: u32) -> &[Primitive] {
+        &self.scene.meshes[mesh as usize].primitives
     }
 
     /// Adds the copyright and extras of the file as a whole.

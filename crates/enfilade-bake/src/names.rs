@@ -1,0 +1,66 @@
+//! Names of cells, from those of the rooms that the scene names ([`Scene::rooms`](enfilade_geom::scene::Scene::rooms)).
+//!
+//! Rooms of a model and cells rarely agree: an open kitchen and a living room are one cell, a hall with a doorway in its middle
+//! is two. A name holds in a cell if half of its room lies there, or if half of the cell lies in its room.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use enfilade_cpg::{CellId, World};
+use enfilade_geom::scene::RoomName;
+
+/// Share of a room in a cell, or of a cell in a room, from which on the room's name holds in the cell.
+const HOLDS: f64 = 0.5;
+/// Least volume of a room that a cell is named after, beside a larger one, as a share of the larger.
+const BESIDE: f64 = 0.1;
+/// Most rooms in the name of one cell.
+const MAX_JOINED: usize = 3;
+
+/// Names the cells in which rooms lie, and returns the number of named cells. Others keep their names.
+///
+/// A cell of several rooms has up to three of their names, the largest first: `Living / Kitchen`. A name that several cells would
+/// have gets numbers: `Hall`, `Hall 2`. Outdoors has no name but one that someone set there.
+pub(crate) fn name_cells(world: &mut World, rooms: &[RoomName]) -> usize {
+    let mut parts: BTreeMap<CellId, BTreeMap<&str, f64>> = BTreeMap::new();
+    for room in rooms.iter().filter(|r| !r.name.trim().is_empty()) {
+        let mut shares: BTreeMap<CellId, f64> = BTreeMap::new();
+        for point in &room.points {
+            if let Some(cell) = world.graph.locator.locate(*point) {
+                *shares.entry(cell).or_default() += room.volume;
+            }
+        }
+        let whole = room.volume * room.points.len() as f64;
+        for (cell, share) in shares {
+            let known = &world.graph[cell];
+            let is_in_cell = !known.outdoor && share >= HOLDS * whole;
+            if is_in_cell || share >= HOLDS * f64::from(known.volume) {
+                *parts
+                    .entry(cell)
+                    .or_default()
+                    .entry(room.name.trim())
+                    .or_default() += share;
+            }
+        }
+    }
+    let mut named: Vec<(f64, CellId, String)> = Vec::new();
+    for (cell, names) in parts {
+        let mut names: Vec<(&str, f64)> = names.into_iter().collect();
+        names.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(b.0)));
+        let largest = names[0].1;
+        names.retain(|n| n.1 >= BESIDE * largest);
+        names.truncate(MAX_JOINED);
+        let joined: Vec<&str> = names.iter().map(|n| n.0).collect();
+        named.push((largest, cell, joined.join(" / ")));
+    }
+    named.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+    let renamed: BTreeSet<CellId> = named.iter().map(|n| n.1).collect();
+    let others = world.graph.cell_ids().filter(|c| !renamed.contains(c));
+    let mut taken: BTreeSet<String> = others.map(|c| world.graph[c].name.clone()).collect();
+    for (_, cell, name) in &named {
+        let numbered = (2..).map(|n| format!("{name} {n}"));
+        let mut free = std::iter::once(name.clone()).chain(numbered);
+        let name = free.find(|n| !taken.contains(n)).unwrap_or_default();
+        taken.insert(name.clone());
+        world.graph.cells[cell.idx()].name = name;
+    }
+    named.len()
+}
