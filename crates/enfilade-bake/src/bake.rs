@@ -52,7 +52,7 @@ pub fn bake(
         baked.notes.push(note.to_owned());
     }
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
-    name_cells(&mut baked.world, &scene.rooms);
+    name_cells(&mut baked.world, &mut baked.notes, &scene.rooms);
     make_marked(&mut baked.world, &mut baked.notes, scene);
     Ok(baked)
 }
@@ -74,7 +74,7 @@ pub fn bake_session(
     let proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
     let mut baked = realize(structure, method, proposal, config, context)?;
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
-    name_cells(&mut baked.world, &scene.rooms);
+    name_cells(&mut baked.world, &mut baked.notes, &scene.rooms);
     make_marked(&mut baked.world, &mut baked.notes, scene);
     Ok(baked)
 }

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_cpg::{CellId, World};
 use enfilade_geom::scene::RoomName;
+use enfilade_geom::shown;
 
 /// Share of a room in a cell, or of a cell in a room, from which on the room's name holds in the cell.
 const HOLDS: f64 = 0.5;
@@ -15,11 +16,12 @@ const BESIDE: f64 = 0.1;
 /// Most rooms in the name of one cell.
 const MAX_JOINED: usize = 3;
 
-/// Names the cells in which rooms lie, and returns the number of named cells. Others keep their names.
+/// Names the cells in which rooms lie, and notes their number and the names left over. Other cells keep their names.
 ///
 /// A cell of several rooms has up to three of their names, the largest first: `Living / Kitchen`. A name that several cells would
 /// have gets numbers: `Hall`, `Hall 2`. Outdoors has no name but one that someone set there.
-pub(crate) fn name_cells(world: &mut World, rooms: &[RoomName]) -> usize {
+pub(crate) fn name_cells(world: &mut World, notes: &mut Vec<String>, rooms: &[RoomName]) {
+    let mut left_over = Vec::new();
     let mut parts: BTreeMap<CellId, BTreeMap<&str, f64>> = BTreeMap::new();
     for room in rooms.iter().filter(|r| !r.name.trim().is_empty()) {
         let mut shares: BTreeMap<CellId, f64> = BTreeMap::new();
@@ -29,16 +31,18 @@ pub(crate) fn name_cells(world: &mut World, rooms: &[RoomName]) -> usize {
             }
         }
         let whole = room.volume * room.points.len() as f64;
+        let mut holds = false;
         for (cell, share) in shares {
             let known = &world.graph[cell];
             let is_in_cell = !known.outdoor && share >= HOLDS * whole;
             if is_in_cell || share >= HOLDS * f64::from(known.volume) {
-                *parts
-                    .entry(cell)
-                    .or_default()
-                    .entry(room.name.trim())
-                    .or_default() += share;
+                let names = parts.entry(cell).or_default();
+                *names.entry(room.name.trim()).or_default() += share;
+                holds = true;
             }
+        }
+        if !holds {
+            left_over.push(room.name.trim());
         }
     }
     let mut named: Vec<(f64, CellId, String)> = Vec::new();
@@ -55,12 +59,36 @@ pub(crate) fn name_cells(world: &mut World, rooms: &[RoomName]) -> usize {
     let renamed: BTreeSet<CellId> = named.iter().map(|n| n.1).collect();
     let others = world.graph.cell_ids().filter(|c| !renamed.contains(c));
     let mut taken: BTreeSet<String> = others.map(|c| world.graph[c].name.clone()).collect();
+    // Equal names continue where the last one ended, so that a thousand rooms of one name take no million tries.
+    let mut next: BTreeMap<&str, usize> = BTreeMap::new();
     for (_, cell, name) in &named {
-        let numbered = (2..).map(|n| format!("{name} {n}"));
-        let mut free = std::iter::once(name.clone()).chain(numbered);
-        let name = free.find(|n| !taken.contains(n)).unwrap_or_default();
-        taken.insert(name.clone());
-        world.graph.cells[cell.idx()].name = name;
+        let from = next.entry(name).or_insert(1);
+        let free = loop {
+            let numbered = match *from {
+                1 => name.clone(),
+                n => format!("{name} {n}"),
+            };
+            *from += 1;
+            if taken.insert(numbered.clone()) {
+                break numbered;
+            }
+        };
+        world.graph.cells[cell.idx()].name = free;
     }
-    named.len()
+    let n_cells = world.graph.cells.len();
+    if !named.is_empty() {
+        let n = named.len();
+        notes.push(format!(
+            "{n} of {n_cells} cells named after rooms of the model"
+        ));
+    }
+    if let Some(first) = left_over.first() {
+        let n = left_over.len();
+        notes.push(format!(
+            "{n} of {} names of rooms left over, where a room and a cell differ too much: {}{}",
+            rooms.len(),
+            shown(first),
+            if n > 1 { " and others" } else { "" }
+        ));
+    }
 }

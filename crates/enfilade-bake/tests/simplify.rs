@@ -98,6 +98,27 @@ fn merged_worlds_keep_their_promises_and_bounds() {
 }
 
 #[test]
+fn a_cell_with_a_name_gives_it_to_the_one_that_it_joins() {
+    let without_outdoors = GridParams {
+        size: [2, 1, 1],
+        doors: 1.0,
+        outdoors: false,
+        ..GridParams::offices(4, 1)
+    };
+    let mut world = room_grid(&without_outdoors);
+    let [one, other] = world.graph.portals[0].cells;
+    for named in [one, other] {
+        for cell in [one, other] {
+            world.graph.cells[cell.idx()].name = cell.to_string();
+        }
+        world.graph.cells[named.idx()].name = "Kitchen".into();
+        let joined = delete_portal(&world, PortalId(0)).unwrap();
+        let cell = joined.cell_of[named.idx()];
+        assert_eq!(joined.world.graph[cell].name, "Kitchen");
+    }
+}
+
+#[test]
 fn a_deleted_portal_makes_one_cell_of_two() {
     let mut rng = Rng::new(7);
     let mut n_deleted = 0;

@@ -291,7 +291,10 @@ fn no_error_repeats_a_name_as_it_is() {
     let extension = format!(r#"{{"asset":{{"version":{json}}},"extensionsRequired":[{json}]}}"#);
     write("v.gltf", &extension);
     write("e.gltf", &extension.replacen(&json, "\"2.0\"", 1));
-    write("i.ifc", "ISO-10303-21;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\n");
+    write(
+        "i.ifc",
+        "ISO-10303-21;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nEND-ISO-10303-21;\n",
+    );
     let converter = dir.join("convert");
     fs::write(
         &converter,

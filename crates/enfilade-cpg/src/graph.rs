@@ -9,7 +9,7 @@ use crate::{CellId, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns, Sp
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cell {
-    /// Name, unique in the graph: `cell-0`, `cell-1`, … or `outdoors`.
+    /// Name, unique in the graph: that of the room in the scene, else `cell-0`, `cell-1`, … or `outdoors`.
     pub name: String,
     /// Minimum and maximum. For outdoors, the scene's padded box. [Units: wu]
     pub aabb: [[f32; 3]; 2],

@@ -36,8 +36,21 @@ pub(crate) fn is_ifc(bytes: &[u8]) -> bool {
     head.trim_start().starts_with("ISO-10303-21") && head.contains("IFC")
 }
 
+/// Returns `true` if the file has the last line of a STEP file, whatever follows within a few kilobytes.
+fn is_whole(bytes: &[u8]) -> bool {
+    const LAST: &[u8] = b"END-ISO-10303-21";
+    let tail = &bytes[bytes.len().saturating_sub(1 << 12)..];
+    tail.windows(LAST.len())
+        .any(|w| w.eq_ignore_ascii_case(LAST))
+}
+
 /// Converts the file and reads the result.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    // The packages read what there is of a cut file, and say nothing.
+    if !is_whole(bytes) {
+        let problem = "the file is cut off: its last line should be END-ISO-10303-21; copy or export it again";
+        return Err(builder.malformed("end", problem));
+    }
     let Some(converter) = &builder.options.ifc else {
         return Err(unsupported(builder, &[]));
     };
@@ -228,5 +241,11 @@ mod tests {
     fn files_of_another_schema_are_no_ifc() {
         assert!(is_ifc(b"ISO-10303-21;HEADER;FILE_SCHEMA(('IFC4'));"));
         assert!(!is_ifc(b"ISO-10303-21; AP214"));
+    }
+
+    #[test]
+    fn a_file_without_its_last_line_is_cut_off() {
+        assert!(is_whole(b"...\nEND-ISO-10303-21;\n\n"));
+        assert!(!is_whole(b"ISO-10303-21;\n") && !is_whole(b""));
     }
 }

@@ -211,6 +211,23 @@ fn without_a_package_the_error_has_the_command_that_installs_one() {
 }
 
 #[test]
+fn half_a_file_is_an_error_whatever_would_read_it() {
+    let folder = folder("ifc-half");
+    let whole = std::fs::read(HOUSE).unwrap();
+    let half = folder.join("half.ifc");
+    std::fs::write(&half, &whole[..whole.len() / 2]).unwrap();
+    let options = ImportOptions {
+        ifc: Some(IfcConverter::new("IfcConvert", folder.join("temporary"))),
+        ..ImportOptions::default()
+    };
+    let error = import(&[half], &[], &options).unwrap_err().to_string();
+    assert!(
+        error.contains("half.ifc") && error.contains("cut off"),
+        "{error}"
+    );
+}
+
+#[test]
 fn bodies_and_empty_nodes_called_rooms_name_them_and_are_no_objects() {
     let nodes = r#""nodes":[{"mesh":0,"name":"wall"},{"mesh":0,"name":"room:Hall"},
         {"name":"room:Kitchen","translation":[1,2,3]},{"name":"start","translation":[1,2,3]}]"#;

@@ -10,7 +10,8 @@ use crate::specials::renumbered as renumbered_specials;
 
 /// Returns the world with each cell merged into `into[cell]`, and the new number of each old cell.
 ///
-/// `into` holds the same cell for all cells of a group. Names such as `cell-3` follow the new numbers, others stay.
+/// `into` holds the same cell for all cells of a group. Names such as `cell-3` follow the new numbers; of
+/// others, that of the outdoors stays, else the first of its group.
 /// Linear in the world.
 pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     let old = &world.graph;
@@ -36,10 +37,11 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
             }
             cell.volume += from.volume;
             cell.is_void &= from.is_void;
-            if from.outdoor && !cell.outdoor {
+            let is_first_name = is_numbered(&cell.name) && !is_numbered(&from.name);
+            if from.outdoor && !cell.outdoor || is_first_name && !cell.outdoor {
                 cell.name.clone_from(&from.name);
-                cell.outdoor = true;
             }
+            cell.outdoor |= from.outdoor;
         }
         cell_of.push(CellId(*slot));
     }
