@@ -388,7 +388,7 @@ impl<'a> Builder<'a> {
         let source = source.unwrap_or_default();
         if let Some(room) = self.room_of(placement.names[0], &source.extras) {
             self.check_triangles(placement.place, n_placed.saturating_mul(n_triangles as u64))?;
-            return self.place_room(&room, placement, source);
+            return self.place_room(&room, placement, &source);
         }
         let mesh = &self.scene.meshes[placement.mesh as usize];
         let (verdict, is_mixed) = self.judge(placement, mesh);

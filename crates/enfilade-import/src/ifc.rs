@@ -18,7 +18,7 @@ use crate::options::IfcConverter;
 use crate::{ImportError, files, gltf};
 pub(crate) use classes::is_guid;
 use folder::Folder;
-use programs::Kind;
+use programs::IfcProgram;
 
 /// Most of the program's output that goes into an error. [Units: bytes]
 const SAID_BYTES: u64 = 2000;
@@ -59,7 +59,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         reason,
     })?;
     for program in &converter.programs {
-        let kind = Kind::of(program);
+        let kind = IfcProgram::of(program);
         let run = Run {
             program,
             kind,
@@ -77,7 +77,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         for note in said.lines().filter_map(|line| line.strip_prefix(NOTE)) {
             builder.note(kind.package(), note);
         }
-        if kind == Kind::IfcConvert {
+        if kind == IfcProgram::IfcConvert {
             let classes = classes::classes(bytes);
             gltf::read_renamed(&glb, builder, &|name| classes::renamed(name, &classes))?;
         } else {
@@ -91,10 +91,10 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
 
 /// Returns the error where no program has what it needs.
 fn unsupported(builder: &Builder<'_>, programs: &[PathBuf]) -> ImportError {
-    let has = |kind| programs.iter().any(|p| Kind::of(p) == kind);
-    let install = if has(Kind::Python) {
+    let has = |kind| programs.iter().any(|p| IfcProgram::of(p) == kind);
+    let install = if has(IfcProgram::Python) {
         "run `pip install ifcopenshell`"
-    } else if has(Kind::Node) {
+    } else if has(IfcProgram::Node) {
         "run `npm install web-ifc`"
     } else {
         "install Python and run `pip install ifcopenshell`, or node and `npm install web-ifc`"
@@ -111,7 +111,7 @@ fn unsupported(builder: &Builder<'_>, programs: &[PathBuf]) -> ImportError {
 /// A run of one program.
 struct Run<'c> {
     program: &'c Path,
-    kind: Kind,
+    kind: IfcProgram,
     converter: &'c IfcConverter,
     folder: &'c Path,
     /// Largest size of the GLB. [Units: bytes]
@@ -160,7 +160,7 @@ impl Run<'_> {
                 return Err(why);
             }
         };
-        if self.kind != Kind::IfcConvert && status.code() == Some(programs::NOT_INSTALLED) {
+        if self.kind != IfcProgram::IfcConvert && status.code() == Some(programs::NOT_INSTALLED) {
             return Ok(Ran::Lacks);
         }
         // A link could name any file of the disk.

@@ -390,7 +390,7 @@ fn entities(a: &Entity, b: &Entity) -> Ordering {
 
 fn rooms(a: &RoomName, b: &RoomName) -> Ordering {
     let numbers = |r: &RoomName| -> Vec<f64> {
-        let points = r.points.iter().flat_map(|p| p.to_array());
+        let points = r.points.iter().flat_map(DVec3::to_array);
         points.chain([r.volume]).collect()
     };
     (a.name.cmp(&b.name)).then_with(|| all(&numbers(a), &numbers(b), f64::total_cmp))

@@ -1,7 +1,7 @@
 //! Names of rooms: the spaces of an IFC model, and nodes called `room:NAME`.
 //!
-//! A body with such a name is no object. Points inside it name the rooms around them, each for its share of the body's volume. An
-//! empty node names the room in which it stands.
+//! A body with such a name does not become an object. Points inside it name the rooms around them, each for its share of
+//! the body's volume. An empty node names the room in which it stands.
 
 use std::cmp::Ordering;
 
@@ -36,7 +36,7 @@ pub(crate) fn name_of(name: &str, extras: &str) -> Option<String> {
     of_mark(name).or_else(|| of_space(name, extras))
 }
 
-/// Returns the name of an `IfcSpace/...`: its short and its long name, or what is behind the slash if that is no global id.
+/// Returns the name of an `IfcSpace/...`: its short and its long name, or what is behind the slash if that is not a global id.
 fn of_space(name: &str, extras: &str) -> Option<String> {
     let own = name.strip_prefix("IfcSpace/")?.trim();
     let extras: Value = serde_json::from_str(extras).unwrap_or_default();
@@ -75,7 +75,7 @@ impl Builder<'_> {
         &mut self,
         name: &str,
         placement: &Placement<'_>,
-        source: SourceNode,
+        source: &SourceNode,
     ) -> Result<(), ImportError> {
         for &transform in placement.transforms {
             let primitives = self.primitives(placement.mesh).iter();

@@ -38,7 +38,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
             cell.volume += from.volume;
             cell.is_void &= from.is_void;
             let is_first_name = is_numbered(&cell.name) && !is_numbered(&from.name);
-            if from.outdoor && !cell.outdoor || is_first_name && !cell.outdoor {
+            if (from.outdoor || is_first_name) && !cell.outdoor {
                 cell.name.clone_from(&from.name);
             }
             cell.outdoor |= from.outdoor;

@@ -13,7 +13,7 @@ const NODE_SCRIPT: &str = include_str!("read_ifc.mjs");
 
 /// Kind of a program, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum IfcProgram {
     /// Python, with the package ifcopenshell.
     Python,
     /// node, with the package web-ifc.
@@ -22,7 +22,7 @@ pub(super) enum Kind {
     IfcConvert,
 }
 
-impl Kind {
+impl IfcProgram {
     pub(super) fn of(program: &Path) -> Self {
         let name = program.file_name().unwrap_or_default();
         let name = name.to_string_lossy().to_ascii_lowercase();
@@ -106,15 +106,15 @@ mod tests {
     #[test]
     fn the_name_of_a_program_tells_its_kind() {
         for (name, kind) in [
-            ("python3.12", Kind::Python),
-            ("/opt/venv/bin/python", Kind::Python),
-            ("Python.exe", Kind::Python),
-            ("/usr/bin/node", Kind::Node),
-            ("nodejs", Kind::Node),
-            ("IfcConvert", Kind::IfcConvert),
-            ("/python/convert.sh", Kind::IfcConvert),
+            ("python3.12", IfcProgram::Python),
+            ("/opt/venv/bin/python", IfcProgram::Python),
+            ("Python.exe", IfcProgram::Python),
+            ("/usr/bin/node", IfcProgram::Node),
+            ("nodejs", IfcProgram::Node),
+            ("IfcConvert", IfcProgram::IfcConvert),
+            ("/python/convert.sh", IfcProgram::IfcConvert),
         ] {
-            assert_eq!(Kind::of(Path::new(name)), kind, "{name}");
+            assert_eq!(IfcProgram::of(Path::new(name)), kind, "{name}");
         }
     }
 
@@ -123,14 +123,14 @@ mod tests {
     fn the_active_environment_comes_first_and_the_current_folder_is_not_searched() {
         let variable = |name: &str| {
             let value = match name {
-                "VIRTUAL_ENV" => "/home/me/venv",
-                "PATH" => ":/home/me/venv/bin:/usr/bin:/opt",
+                "VIRTUAL_ENV" => "/opt/venv",
+                "PATH" => ":/opt/venv/bin:/usr/bin:/opt",
                 _ => return None,
             };
             Some(OsString::from(value))
         };
         let disk = [
-            "/home/me/venv/bin/python",
+            "/opt/venv/bin/python",
             "/usr/bin/python3",
             "/opt/python3",
             "/opt/IfcConvert",
