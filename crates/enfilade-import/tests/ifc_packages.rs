@@ -1,5 +1,6 @@
 //! IFC through scripts that drive ifcopenshell and web-ifc, where these are installed, and through stand-ins. Covers S1.
 #![cfg(unix)]
+#![allow(clippy::print_stdout, reason = "skips itself aloud")]
 
 mod common;
 
@@ -141,7 +142,7 @@ fn both_packages_read_the_same_house() {
             Err(ImportError::Unsupported { .. }) => println!("skipped: {package} is not installed"),
             // A machine without the program at all.
             Err(error) if error.to_string().contains("cannot be run") => {
-                println!("skipped: {error}")
+                println!("skipped: {error}");
             }
             Err(error) => panic!("{error}"),
         }
