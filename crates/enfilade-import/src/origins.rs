@@ -163,6 +163,7 @@ mod tests {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: String::new(),
+            filling: None,
             node,
         }
     }

@@ -15,15 +15,13 @@ use enfilade_cpg::PortalKind;
 use enfilade_geom::{DVec3, Sets, Winding};
 
 use super::Judged;
+use super::kinds::SLIT;
 use crate::complex::PartitionPortal;
 
 /// Greatest height of a transom, and greatest offset between the sides of two panes of one bay. [Units: wu]
 const BAR: f64 = 0.15;
 /// Greatest distance between the planes of two windows that count as coplanar. [Units: wu]
 const ONE_PLANE: f64 = 1e-6;
-
-/// Least width of an opening that anybody climbs through. [Units: wu]
-const SLIT: f64 = 0.3;
 
 /// Where a window lies in its facade. [Units: wu]
 struct Extent {
