@@ -44,6 +44,8 @@ struct Judged {
     is_on_floor: bool,
     /// A leaf or pane fills it.
     is_filled: bool,
+    /// It may be one pane of several.
+    is_pane: bool,
 }
 
 pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
@@ -83,6 +85,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
             kind: judge.kind(&portal, is_filled),
             is_on_floor: judge.is_on_floor(&portal),
             is_filled,
+            is_pane: judge.is_pane(&portal),
             portal,
         })
     });

@@ -2,7 +2,7 @@
 //!
 //! In a glazed wall, vertical mullions separate the bays, and horizontal transoms divide each bay into panes. Panes
 //! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay
-//! separate.
+//! separate, and so does what is a window by itself: by its name, or as high as a person from the floor on.
 //! Slits, too narrow to climb through, are one portal for each plane between two cells: the gaps between the tops of walls
 //! and a ribbed roof. So are all openings of a void: the lamps, grilles and missing panels of a ceiling.
 //! **Limit:** panes and slits whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
@@ -62,7 +62,7 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
     let mut facades: BTreeMap<[u32; 2], Vec<(usize, Extent)>> = BTreeMap::new();
     for (i, judged) in portals.iter().enumerate() {
         let p = &judged.portal;
-        if judged.kind == PortalKind::Window && p.plane.normal.y.abs() < 0.5 {
+        if judged.kind == PortalKind::Window && judged.is_pane && p.plane.normal.y.abs() < 0.5 {
             facades.entry(p.cells).or_default().push((i, Extent::of(p)));
         }
     }
@@ -182,6 +182,7 @@ mod tests {
             kind: PortalKind::Open,
             is_on_floor: false,
             is_filled: false,
+            is_pane: true,
         }
     }
 

@@ -74,6 +74,12 @@ impl<'a> Judge<'a> {
         p.kind != PortalKind::Crack && is_upright(p) && self.sill(p) <= PARAPET
     }
 
+    /// Returns `true` if a window may be one pane of several: it does not say that it is a window, and is not as high as a person
+    /// from the floor on.
+    pub(super) fn is_pane(&self, p: &PartitionPortal) -> bool {
+        self.filling(p).is_none() && !(height(p) >= LEAST_DOOR && self.is_on_floor(p))
+    }
+
     /// Returns the kind of a portal.
     pub(super) fn kind(&self, p: &PartitionPortal, is_filled: bool) -> PortalKind {
         if p.kind == PortalKind::Crack {
