@@ -131,22 +131,23 @@ impl<'a> Judge<'a> {
             .filter(|s| s.aabb.overlaps(&reach))
             .collect();
         let of = |filling: Filling| near.iter().filter(move |s| s.filling == filling);
-        // What reaches beyond the opening, as a row of windows does, counts with the part before it.
-        let covered = |filling: Filling| {
-            let triangles = of(filling).flat_map(|s| &s.triangles);
-            let flat = triangles.filter(|t| {
-                let b = opening.bounds(&[**t]);
-                b.min.z >= limits.min.z && b.max.z <= limits.max.z
-            });
-            opening.mask(flat.copied()).share()
-        };
+        let bounds = |s: &NamedShell| opening.bounds(&s.triangles);
+        // A leaf belongs to one opening; a row of windows counts with the part before this one.
+        let leaves = of(Filling::Door).filter(|s| is_in(&bounds(s)));
+        let leaves = leaves.flat_map(|s| s.triangles.iter().copied());
+        let panes = of(Filling::Window).flat_map(|s| s.triangles.iter().copied());
+        let panes = panes.filter(|t| {
+            let b = opening.bounds(&[*t]);
+            b.min.z >= limits.min.z && b.max.z <= limits.max.z
+        });
         // A window may lack its panes, but a door without a leaf is none.
-        let frames = of(Filling::Window).map(|s| opening.bounds(&s.triangles));
-        let frames = frames.filter(is_in).fold(Aabb::EMPTY, Aabb::union);
+        let frames = of(Filling::Window).map(|s| bounds(s)).filter(is_in);
+        let frames = frames.fold(Aabb::EMPTY, Aabb::union);
         let size = opening.size();
         let common = frames.max.min(opening.high) - frames.min.max(opening.low);
         let framed = common.x.max(0.0) * common.y.max(0.0) / (size.x * size.y);
-        let (door, window) = (covered(Filling::Door), covered(Filling::Window).max(framed));
+        let door = opening.mask(leaves).share();
+        let window = opening.mask(panes).share().max(framed);
         if door.max(window) < FILLS {
             None
         } else if window > door {
