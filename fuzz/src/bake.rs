@@ -95,6 +95,7 @@ fn scene(numbers: &mut Numbers<'_>, is_any: bool) -> Scene {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: String::new(),
+            filling: None,
             node: None,
         }],
         ..Scene::default()

@@ -6,6 +6,7 @@
 mod bays;
 mod fillers;
 mod fittings;
+mod kinds;
 mod seals;
 
 use std::collections::{BTreeMap, HashMap};
@@ -15,7 +16,7 @@ use enfilade_cpg::{
     Provenance, SourceRuns, Statistics, World,
 };
 use enfilade_geom::scene::{Mesh, Primitive, Role, Scene};
-use enfilade_geom::{Aabb, Allowance, DMat3, DVec3, Plane, Ray, Winding};
+use enfilade_geom::{Aabb, Allowance, DMat3, DVec3, Plane, Winding};
 use rayon::prelude::*;
 
 use crate::complex::{Label, Partition, PartitionPortal};
@@ -43,6 +44,8 @@ struct Judged {
     is_on_floor: bool,
     /// A leaf or pane fills it.
     is_filled: bool,
+    /// It may be one pane of several.
+    is_pane: bool,
 }
 
 pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
@@ -72,24 +75,23 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
     let plates: Vec<_> = plates.map(fillers::FlatObject::new).collect();
     let in_turn = partition.portals.par_iter();
     let in_turn = in_turn.filter(cut.allowance.each(WORK_A_PORTAL));
+    let judge = kinds::Judge::new(cut);
+    let judge = &judge;
     let judged = in_turn.filter_map(storable).flat_map_iter(|p| {
-        let is_whole_filled = is_filled(cut, &p);
-        let (_, is_on_floor) = kind_of(cut, &p, is_whole_filled);
-        let parts = fillers::divided(&p, is_on_floor, &plates, cut.allowance);
+        let is_whole_filled = judge.is_filled(&p);
+        let parts = fillers::divided(&p, judge.is_on_floor(&p), &plates, cut.allowance);
         let is_filled = is_whole_filled || parts.len() > 1;
-        parts.into_iter().map(move |portal| {
-            let (kind, is_on_floor) = kind_of(cut, &portal, is_filled);
-            Judged {
-                portal,
-                kind,
-                is_on_floor,
-                is_filled,
-            }
+        parts.into_iter().map(move |portal| Judged {
+            kind: judge.kind(&portal, is_filled),
+            is_on_floor: judge.is_on_floor(&portal),
+            is_filled,
+            is_pane: judge.is_pane(&portal),
+            portal,
         })
     });
     let bays = bays::join_bays(judged.collect());
     let is_void = |c: u32| cells[c as usize].is_void;
-    let portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| kind_of(cut, p, false).0)
+    let portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| judge.kind(p, false))
         .iter()
         .filter_map(|j| portal(cut, j))
         .collect();
@@ -280,55 +282,6 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
 /// Costs of judging a portal and of finding the cells of a triangle, in units of [`Allowance`].
 const WORK_A_PORTAL: u64 = 50;
 const WORK_A_TRIANGLE: u64 = 10;
-
-/// Least height of a parapet that makes an opening a window. [Units: wu]
-const PARAPET: f64 = 0.4;
-
-/// Returns `true` if a leaf or pane fills an opening.
-fn is_filled(cut: &Cut<'_>, p: &PartitionPortal) -> bool {
-    let closed = |c: u32| cut.candidates[c as usize].closed;
-    p.candidate.map_or(0.0, closed) >= cut.closed_share
-}
-
-/// Returns the kind of a portal, and `true` if its lower edge is at a floor.
-fn kind_of(cut: &Cut<'_>, p: &PartitionPortal, is_filled: bool) -> (PortalKind, bool) {
-    if p.kind == PortalKind::Crack {
-        return (PortalKind::Crack, false);
-    }
-    let is_upright = p.plane.normal.y.abs() < 0.5;
-    let up = p.outline.points.iter().map(|q| q.y);
-    let bottom = up.clone().fold(f64::MAX, f64::min);
-    let height = up.fold(f64::MIN, f64::max) - bottom;
-    let has_sill = is_upright && sill(cut, p, bottom) > PARAPET;
-    let kind = match (is_filled, is_upright) {
-        (_, true) if has_sill => PortalKind::Window,
-        (true, true) if height >= fittings::LEAST_DOOR => PortalKind::Door,
-        (true, _) => PortalKind::Window,
-        (false, _) => PortalKind::Open,
-    };
-    (kind, is_upright && !has_sill)
-}
-
-/// Returns the height of an upright opening's lower edge over the ground half a meter away, on the higher side.
-/// [Units: wu]
-fn sill(cut: &Cut<'_>, p: &PartitionPortal, bottom: f64) -> f64 {
-    let n = p.plane.normal;
-    let center = p.outline.centroid();
-    let drop = |side: f64| {
-        let foot = DVec3::new(center.x, bottom + 0.05, center.z)
-            + DVec3::new(n.x, 0.0, n.z).normalize_or_zero() * (0.5 * side);
-        let ray = Ray {
-            origin: foot,
-            direction: -DVec3::Y,
-            t_max: 100.0,
-        };
-        cut.structure
-            .bvh
-            .closest_hit(&ray, |_| false)
-            .map_or(f64::INFINITY, |h| h.t - 0.05)
-    };
-    drop(1.0).min(drop(-1.0))
-}
 
 #[derive(Default)]
 struct BatchBuilder {

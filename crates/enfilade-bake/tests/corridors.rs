@@ -16,6 +16,7 @@ fn graph_of(method: Method, mesh: Mesh) -> CellPortalGraph {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: String::new(),
+            filling: None,
             node: None,
         }],
         ..Scene::default()

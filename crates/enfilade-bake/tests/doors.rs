@@ -120,6 +120,7 @@ fn add_boxes(scene: &mut Scene, name: &str, role: Role, boxes: &[([f64; 3], [f64
         transform: DMat4::IDENTITY,
         role,
         reason: String::new(),
+        filling: None,
         node: None,
     });
 }

@@ -26,6 +26,7 @@ fn add(scene: &mut Scene, name: &str, role: Role, polygons: &[&[[f32; 3]]]) -> u
         transform: DMat4::IDENTITY,
         role,
         reason: String::new(),
+        filling: None,
         node: None,
     });
     scene.objects.len() as u32 - 1

@@ -19,6 +19,7 @@ fn add(scene: &mut Scene, role: Role, build: impl FnOnce(&mut MeshBuilder)) {
         transform: enfilade_geom::DMat4::IDENTITY,
         role,
         reason: String::new(),
+        filling: None,
         node: None,
     });
 }

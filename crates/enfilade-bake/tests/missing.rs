@@ -20,6 +20,7 @@ fn three_rooms() -> Scene {
         transform: DMat4::IDENTITY,
         role: Role::Structural,
         reason: String::new(),
+        filling: None,
         node: None,
     };
     Scene {

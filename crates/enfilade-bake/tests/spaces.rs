@@ -34,6 +34,7 @@ fn baked(method: Method, air: &[Block], things: Vec<Mesh>) -> CellPortalGraph {
         transform: DMat4::IDENTITY,
         role: Role::Structural,
         reason: String::new(),
+        filling: None,
         node: None,
     };
     let scene = Scene {

@@ -78,6 +78,8 @@ pub(crate) struct Score {
     pub(crate) figures: [Option<f64>; 6],
     seconds: f64,
     pub(crate) failed: Vec<String>,
+    /// Openings of the truth with the portals that match them.
+    pub(crate) matches: Vec<Match>,
 }
 
 /// Scores `dirs`, or all real scenes if that is empty; prints the table and the misses in each scene, and writes the
@@ -269,6 +271,7 @@ pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Re
         ],
         seconds: f64::NAN,
         failed,
+        matches: found.matches,
     })
 }
 
@@ -354,6 +357,7 @@ impl Samples {
 /// A portal of the world.
 struct Portal {
     id: u64,
+    kind: String,
     center: V3,
     area: f64,
     normal: V3,
@@ -366,6 +370,7 @@ fn portals_of(graph: &Value) -> Vec<Portal> {
         let (center, area) = center_and_area(&outline);
         Some(Portal {
             id: p["id"].as_u64()?,
+            kind: text(&p["kind"]),
             center,
             area,
             normal: unit(vec3(&p["normal"])?),
@@ -417,6 +422,16 @@ struct FoundOpenings {
     hits: BTreeMap<String, usize>,
     tried: BTreeMap<String, usize>,
     used: BTreeSet<u64>,
+    matches: Vec<Match>,
+}
+
+/// An opening of the truth and the portal that matches it.
+pub(crate) struct Match {
+    /// Kind and name of the opening in the truth.
+    pub(crate) kind: String,
+    pub(crate) name: String,
+    pub(crate) portal: u64,
+    pub(crate) portal_kind: String,
 }
 
 impl FoundOpenings {
@@ -451,14 +466,25 @@ fn find_openings(
     for (k, (o, place)) in usable.iter().zip(&places).enumerate() {
         let want: BTreeSet<String> = sides[2 * k..2 * k + 2].iter().cloned().collect();
         let sizes = 0.5 * place.area..=2.0 * place.area;
-        let mut hit = false;
+        let mut hit: Option<&Portal> = None;
         for portal in portals.iter().filter(|p| place.holds(p)) {
             found.used.insert(portal.id);
-            hit |= sizes.contains(&portal.area) && portal.cells == want && want.len() == 2;
+            let fits = sizes.contains(&portal.area) && portal.cells == want && want.len() == 2;
+            // Of several, the one most like it in size.
+            let off = |p: &Portal| (p.area / place.area).ln().abs();
+            if fits && hit.is_none_or(|h| off(portal) < off(h)) {
+                hit = Some(portal);
+            }
         }
         let kind = text(&o["kind"]);
         *found.tried.entry(kind.clone()).or_default() += 1;
-        if hit {
+        if let Some(portal) = hit {
+            found.matches.push(Match {
+                kind: kind.clone(),
+                name: text(&o["name"]),
+                portal: portal.id,
+                portal_kind: portal.kind.clone(),
+            });
             *found.hits.entry(kind).or_default() += 1;
         } else if kind == "door" || kind == "window" {
             failed.push(format!("{kind} {} missed", text(&o["name"])));

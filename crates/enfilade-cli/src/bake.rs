@@ -4,6 +4,7 @@ mod cracks;
 pub(crate) mod delaunay;
 mod doorless;
 mod found;
+mod gaps;
 mod leak_path;
 pub(crate) mod settings;
 mod values;
@@ -240,31 +241,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             )?;
         }
     }
-    if !baked.leaks.is_empty() {
-        let mut leaks = baked.leaks.clone();
-        leaks.sort_by(|a, b| b.area.total_cmp(&a.area));
-        writeln!(
-            err,
-            "{} gaps in the model let light through; they became portals:",
-            leaks.len()
-        )?;
-        for l in leaks.iter().take(LEAKS_SHOWN) {
-            writeln!(
-                err,
-                "  at {:.2} {:.2} {:.2}: {:.0} mm wide, {:.3} m², between cells {} and {}",
-                l.position.x,
-                l.position.y,
-                l.position.z,
-                l.width * 1000.0,
-                l.area,
-                l.cells[0],
-                l.cells[1]
-            )?;
-        }
-        if leaks.len() > LEAKS_SHOWN {
-            writeln!(err, "  and {} more", leaks.len() - LEAKS_SHOWN)?;
-        }
-    }
+    gaps::write_gaps(&mut err, baked, LEAKS_SHOWN)?;
     cracks::write_cracks(&mut Warned, baked)?;
     let graph = &baked.world.graph;
     for special in graph.special_ids() {

@@ -62,9 +62,9 @@ pub enum PortalKind {
     Open,
     /// An opening with a door leaf.
     Door,
-    /// An opening with glass, or above a parapet.
+    /// An opening with a window in it, or above a parapet.
     Window,
-    /// A gap of the model that is too narrow to be intended. Light passes it, so it is a portal.
+    /// A gap of the model: nothing fills it, and nobody fits through. Light passes it, so it is a portal.
     Crack,
 }
 

@@ -8,6 +8,8 @@ use enfilade_geom::DVec3;
 
 /// Least width of a window. [Units: wu]
 const NARROW: f32 = 0.3;
+/// Narrower gaps are those between surfaces that should touch, not holes in one. [Units: wu]
+const GAP: f32 = 0.05;
 /// Least share of its bounding rectangle that a rectangle, arch or circle (0.785) fills, even behind a cross.
 const REGULAR: f32 = 0.6;
 /// Openings with a larger vertical part of the normal (the sine of 45 degrees) count as in a floor or ceiling.
@@ -48,7 +50,7 @@ pub struct Hole {
 impl CellPortalGraph {
     /// Returns openings to outdoors that may be holes of the model, the largest first.
     ///
-    /// Leaves out cracks, which have a kind of their own, and openings to an outdoors that sees no triangle, where
+    /// Leaves out cracks up to 0.05 m wide, which are gaps between surfaces, and openings to an outdoors that sees no triangle, where
     /// the air around the scene was divided from the air beyond: those are not in a wall. O(n log n) for n portal
     /// vertices.
     #[must_use]
@@ -77,10 +79,15 @@ impl CellPortalGraph {
 }
 
 fn reason(p: &Portal) -> Option<HoleReason> {
-    if matches!(p.kind, PortalKind::Door | PortalKind::Crack) {
-        return None;
-    }
     let [width, height] = p.size();
+    match p.kind {
+        PortalKind::Door => return None,
+        PortalKind::Crack => {
+            let is_wide = width.min(height) > GAP;
+            return is_wide.then_some(HoleReason::Narrow);
+        }
+        PortalKind::Open | PortalKind::Window => {}
+    }
     if p.kind == PortalKind::Open && p.normal[1].abs() > LEVEL {
         Some(HoleReason::Overhead)
     } else if width.min(height) < NARROW {
@@ -215,6 +222,7 @@ mod tests {
     fn holes_are_told_worst_first_with_what_is_wrong() {
         let triangle = upright(&[[0.0, 1.0], [1.0, 1.0], [0.5, 2.0]]);
         let slot = upright(&[[0.0, 0.5], [0.1, 0.5], [0.1, 2.0], [0.0, 2.0]]);
+        let hair = upright(&[[0.0, 0.5], [0.03, 0.5], [0.03, 2.0], [0.0, 2.0]]);
         let roof: Vec<[f32; 3]> = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
             .map(|[x, z]| [x, 3.0, z])
             .to_vec();
@@ -223,17 +231,19 @@ mod tests {
             (PortalKind::Window, X, slot.clone()),
             (PortalKind::Open, X, triangle.clone()),
             (PortalKind::Open, up, roof.clone()),
-            // A skylight has a pane; a crack is known as one; a door has a leaf.
+            // A skylight has a pane; a gap between surfaces is known as one; a door has a leaf.
             (PortalKind::Window, up, roof),
-            (PortalKind::Crack, X, slot),
+            (PortalKind::Crack, X, hair),
             (PortalKind::Door, X, triangle),
+            (PortalKind::Crack, X, slot),
         ]);
         assert_eq!(
             reasons(&g),
             [
                 (2, HoleReason::Overhead),
                 (1, HoleReason::Irregular),
-                (0, HoleReason::Narrow)
+                (0, HoleReason::Narrow),
+                (6, HoleReason::Narrow)
             ]
         );
         assert_eq!(g.suspected_holes()[0].position, [1.0, 3.0, 1.0]);

@@ -207,6 +207,8 @@ pub struct Object {
     pub role: Role,
     /// Reason for the role, as shown to the user.
     pub reason: String,
+    /// The opening that it fills, according to its class or name; `None` if these do not tell.
+    pub filling: Option<Filling>,
     /// The input node that it comes from, as an index into [`Scene::nodes`]; several objects may share one.
     pub node: Option<u32>,
 }
@@ -218,6 +220,15 @@ pub enum Role {
     Structural,
     /// Stands in rooms: furniture, plants, door leaves. Left out of the decomposition.
     Detail,
+}
+
+/// What an object says it is, in an opening.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Filling {
+    /// A door: its leaf, its frame, or both.
+    Door,
+    /// A window.
+    Window,
 }
 
 /// The appearance of a surface, carried through as read.

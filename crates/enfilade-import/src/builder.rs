@@ -7,7 +7,7 @@ use crate::order::sort;
 use crate::origins::Origins;
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
-    Entity, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
+    Entity, Filling, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
 use enfilade_prepare::{GridSteps, RoleFacts, RoleVerdict, weld_quantized};
@@ -163,6 +163,14 @@ impl<'a> Builder<'a> {
         self.check_triangles(name, self.n_triangles)?;
         let n_bytes = OBJECT_BYTES + (name.len() + reason.len()) as u64;
         self.charge_memory(name, 1, n_bytes)?;
+        let facts = RoleFacts {
+            names: [name, ""],
+            ancestors: &[],
+            materials: &[],
+            is_see_through: false,
+            moves: None,
+            is_detail_file: false,
+        };
         self.charge_memory(name, n_triangles as u64, TRIANGLE_BYTES)?;
         self.scene.objects.push(Object {
             name: name.to_owned(),
@@ -170,6 +178,7 @@ impl<'a> Builder<'a> {
             transform,
             role,
             reason: reason.to_owned(),
+            filling: facts.filling(),
             node: None,
         });
         if let Some(file) = self.report.files.last_mut() {
@@ -391,7 +400,7 @@ impl<'a> Builder<'a> {
             return self.place_room(&room, placement, &source);
         }
         let mesh = &self.scene.meshes[placement.mesh as usize];
-        let (verdict, is_mixed) = self.judge(placement, mesh);
+        let (verdict, filling, is_mixed) = self.judge(placement, mesh);
         let (role, reason) = match verdict {
             RoleVerdict::Ignore(reason) => {
                 self.note(placement.place, format!("left out: {reason}"));
@@ -435,6 +444,7 @@ impl<'a> Builder<'a> {
                     transform,
                     role,
                     reason: format!("{why}{reason}"),
+                    filling,
                     node: placement.source,
                 });
             }
@@ -450,8 +460,13 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Returns the verdict on a placed mesh, and `true` if it has both opaque and see-through parts.
-    fn judge(&self, placement: &Placement<'_>, mesh: &Mesh) -> (RoleVerdict, bool) {
+    /// Returns the verdict on a placed mesh, the opening that it says it fills, and `true` if it has both opaque and
+    /// see-through parts.
+    fn judge(
+        &self,
+        placement: &Placement<'_>,
+        mesh: &Mesh,
+    ) -> (RoleVerdict, Option<Filling>, bool) {
         let drawn = || mesh.primitives.iter().filter(|p| !p.indices.is_empty());
         let is_clear: Vec<bool> = drawn().map(|p| self.is_see_through(p)).collect();
         let is_mixed = is_clear.contains(&true) && is_clear.contains(&false);
@@ -459,15 +474,16 @@ impl<'a> Builder<'a> {
         let materials: Vec<&str> = drawn()
             .map(|p| material(p).map_or("", |m| &m.name))
             .collect();
-        let verdict = self.options.roles.judge(&RoleFacts {
+        let facts = RoleFacts {
             names: placement.names,
             ancestors: placement.ancestors,
             materials: &materials,
             is_see_through: is_clear.iter().all(|&c| c),
             moves: placement.moves,
             is_detail_file: self.is_detail_file,
-        });
-        (verdict, is_mixed)
+        };
+        let verdict = self.options.roles.judge(&facts);
+        (verdict, facts.filling(), is_mixed)
     }
 
     /// Returns the transform with a positive determinant, and `true` if it needs the mirrored mesh.

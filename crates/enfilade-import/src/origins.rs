@@ -168,6 +168,7 @@ mod tests {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: String::new(),
+            filling: None,
             node,
         }
     }

@@ -5,6 +5,7 @@ mod auto_roles;
 mod clean;
 mod crossing;
 mod error;
+mod filling;
 mod finding;
 mod glob;
 mod repair;

@@ -241,6 +241,11 @@ pub fn marked_portal(name: &str) -> Option<&str> {
         .then_some(name.trim())
 }
 
+/// Returns `true` for a word for things that fill an opening.
+pub(crate) fn is_opening_word(word: &str) -> bool {
+    has_word(&OPENING_WORDS, word)
+}
+
 fn judge_ifc(name: &str) -> Option<RoleVerdict> {
     let class = ifc_class(name)?;
     let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
@@ -254,7 +259,7 @@ fn judge_ifc(name: &str) -> Option<RoleVerdict> {
 }
 
 /// Returns `IfcWall` for `IfcWall/0aBc$`. Comes before the endings, as an IFC id may end in anything.
-fn ifc_class(name: &str) -> Option<&str> {
+pub(crate) fn ifc_class(name: &str) -> Option<&str> {
     let n = name.bytes().take_while(u8::is_ascii_alphabetic).count();
     let class = &name[..n];
     let tail = class.strip_prefix("Ifc")?;
@@ -295,7 +300,7 @@ fn suffix(name: &str) -> Option<(&'static str, &'static Suffix)> {
 
 /// Decides between furniture and structure: the last word of either kind names the thing (a floor lamp is a lamp, the
 /// plant room's wall a wall).
-fn judge_words(name: &str) -> Option<(Role, String)> {
+pub(crate) fn judge_words(name: &str) -> Option<(Role, String)> {
     let words = words(name);
     let mut opening = None;
     let mut found = None;
@@ -321,7 +326,7 @@ fn group_word(name: &str) -> Option<String> {
     if all { words.into_iter().next() } else { None }
 }
 
-fn has_word(list: &[&str], word: &str) -> bool {
+pub(crate) fn has_word(list: &[&str], word: &str) -> bool {
     list.contains(&word)
         || word
             .strip_suffix('s')

@@ -232,6 +232,7 @@ fn scene_of(solids: Vec<ConvexSolid>, n_storeys: usize) -> Scene {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: "map: brushes of worldspawn".into(),
+            filling: None,
             node: None,
         }],
         solids,

@@ -60,6 +60,7 @@ pub fn disturb(scene: &Scene, by: &Disturbance) -> Scene {
                     name: called.clone(),
                     role: Role::Structural,
                     reason: "default".into(),
+                    filling: None,
                     ..object.clone()
                 }
             } else {

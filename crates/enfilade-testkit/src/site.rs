@@ -196,6 +196,7 @@ impl Site {
             transform,
             role,
             reason,
+            filling: None,
             node: None,
         });
     }

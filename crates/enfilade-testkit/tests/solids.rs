@@ -17,6 +17,7 @@ fn triangles(b: MeshBuilder) -> Vec<Triangle> {
         transform: DMat4::IDENTITY,
         role: Role::Structural,
         reason: String::new(),
+        filling: None,
         node: None,
     };
     let scene = Scene {

@@ -1,22 +1,24 @@
 //! Kinds of portals, as far as a file determines them.
 //!
-//! In every world, a crack is narrow and a door stands upright. In a bake of this version, sill and height also
-//! determine which portals are windows, doors or openings, unless portals were cut since. `fittings` judges the kinds
-//! that leaves determine.
+//! In every world, a crack is narrow and a door stands upright. In a bake of this version, sill and height, unless the name
+//! of what fills them speaks for another kind, also determine which portals are windows, doors or openings, unless portals were cut
+//! since. `fittings` judges the kinds that leaves determine.
 //!
 //! Sills are measured anew from the triangles of the file; values within rounding of another kind are not judged.
 
-use enfilade_cpg::{Portal, PortalKind, World};
+use enfilade_cpg::{DetailObject, Portal, PortalKind, World};
 use enfilade_geom::{Bvh, DVec3, Plane, Ray, Triangle, Winding};
 
 use crate::subject::to_dvec;
 
-/// Largest width of every piece of a crack. [Units: wu]
-const CRACK_WIDTH: f64 = 0.05;
+/// Largest width of every piece of a crack: nobody climbs through. [Units: wu]
+const CRACK_WIDTH: f64 = 0.3;
 /// Largest rise of the normal of an upright opening.
 const UPRIGHT: f64 = 0.5;
 /// Least height of a sill over the ground. [Units: wu]
 const SILL: f64 = 0.4;
+/// Least height of a window's sill over the ground, to the outdoors. [Units: wu]
+const CURB: f64 = 0.07;
 /// Least height of a door. [Units: wu]
 const LEAST_DOOR: f64 = 1.5;
 /// More than the growth of outlines: closer to a bound, nothing is judged. [Units: wu]
@@ -32,7 +34,14 @@ pub(crate) fn check(world: &World, own: &[Triangle]) -> Vec<String> {
     portals
         .filter_map(|(i, p)| {
             let of_shape = shape_problem(p);
-            let what = of_shape.or_else(|| stance_problem(p, ground.as_ref()?))?;
+            let what = of_shape.or_else(|| {
+                let ground = ground.as_ref()?;
+                match said(world, p) {
+                    Said::Kind(kind) if kind == p.kind => None,
+                    Said::Nothing | Said::Kind(_) => stance_problem(world, p, ground),
+                    Said::Other => None,
+                }
+            })?;
             Some(format!(
                 "portal {i} is of kind {}, but {what}",
                 word(p.kind)
@@ -75,8 +84,93 @@ fn shape_problem(p: &Portal) -> Option<String> {
     }
 }
 
+/// What the names of all fittings of a portal say.
+#[derive(Clone, Copy, PartialEq)]
+enum Said {
+    Nothing,
+    /// One kind, in plain words.
+    Kind(PortalKind),
+    /// Something that only the bake's rules can read.
+    Other,
+}
+
+/// Words for doors and windows, and for parts of both.
+const WORDS: [(&str, Option<PortalKind>); 7] = [
+    ("door", Some(PortalKind::Door)),
+    ("window", Some(PortalKind::Window)),
+    ("frame", None),
+    ("leaf", None),
+    ("glass", None),
+    ("pane", None),
+    ("sash", None),
+];
+
+fn said(world: &World, p: &Portal) -> Said {
+    let mut all = Said::Nothing;
+    for f in &p.fittings {
+        let detail = &world.details[f.detail as usize];
+        all = match (all, said_by(&detail.name)) {
+            (Said::Nothing, Said::Nothing) if is_told_elsewhere(world, detail) => Said::Other,
+            (a, Said::Nothing) => a,
+            (Said::Nothing, b) => b,
+            (a, b) if a == b => a,
+            _ => Said::Other,
+        };
+    }
+    all
+}
+
+/// Returns what a name says: an IFC class, or words that are all known.
+fn said_by(name: &str) -> Said {
+    for (class, kind) in [
+        ("IfcDoor", PortalKind::Door),
+        ("IfcWindow", PortalKind::Window),
+    ] {
+        if name.starts_with(class) {
+            return Said::Kind(kind);
+        }
+    }
+    let name = name.to_lowercase();
+    let words = name.split(|c: char| !c.is_alphabetic());
+    let mut kinds = Vec::new();
+    let mut is_plain = true;
+    for word in words.filter(|w| !w.is_empty()) {
+        match WORDS.iter().find(|w| w.0 == word) {
+            Some((_, kind)) => kinds.extend(*kind),
+            None => is_plain = false,
+        }
+    }
+    match kinds[..] {
+        [kind] if is_plain => Said::Kind(kind),
+        [] if !tells(&name) => Said::Nothing,
+        _ => Said::Other,
+    }
+}
+
+/// Returns `true` if a name in small letters may say which opening its object fills.
+fn tells(name: &str) -> bool {
+    ["door", "gate", "window", "skylight"]
+        .into_iter()
+        .any(|word| name.contains(word))
+}
+
+/// Returns `true` if the names of a detail's mesh, groups or materials may say which opening it fills.
+fn is_told_elsewhere(world: &World, detail: &DetailObject) -> bool {
+    let mesh = world.detail_meshes.get(detail.mesh as usize);
+    let primitives = mesh.iter().flat_map(|m| &m.primitives);
+    let materials = primitives.filter_map(|q| world.materials.get(q.material? as usize));
+    let mut node = detail.source;
+    let groups = std::iter::from_fn(|| {
+        let own = world.sources.get(node? as usize)?;
+        node = own.parent;
+        Some(&own.name)
+    });
+    let names = materials.map(|m| &m.name).chain(mesh.map(|m| &m.name));
+    names.chain(groups).any(|name| tells(&name.to_lowercase()))
+}
+
 /// Returns a contradiction between kind, height and sill of an upright portal.
-fn stance_problem(p: &Portal, ground: &Bvh) -> Option<String> {
+fn stance_problem(world: &World, p: &Portal, ground: &Bvh) -> Option<String> {
     if p.kind == PortalKind::Crack || !is_upright(p) {
         return None;
     }
@@ -91,17 +185,28 @@ fn stance_problem(p: &Portal, ground: &Bvh) -> Option<String> {
     let [least, most] = sills(normal, opening.centroid().with_y(low), ground);
     match p.kind {
         PortalKind::Door if height < LEAST_DOOR - ROOM => Some(format!("is {height:.2} m high")),
+        PortalKind::Door if leads_outdoors(world, p) && least > CURB + ROOM => Some(format!(
+            "stands {least:.2} m over the ground, to the outdoors"
+        )),
         PortalKind::Door | PortalKind::Open if least > SILL + ROOM => {
             Some(format!("stands {least:.2} m over the ground"))
         }
         // A piece among several may be a bay, joined from panes that are lower.
         PortalKind::Window
-            if p.pieces.len() == 1 && height > LEAST_DOOR + ROOM && most < SILL - ROOM =>
+            if p.pieces.len() == 1
+                && height > LEAST_DOOR + ROOM
+                && most < if leads_outdoors(world, p) { CURB } else { SILL } - ROOM =>
         {
             Some(format!("is {height:.2} m high and stands on the ground"))
         }
         _ => None,
     }
+}
+
+fn leads_outdoors(world: &World, p: &Portal) -> bool {
+    let cells = p.cells.iter();
+    let mut cells = cells.filter_map(|c| world.graph.cells.get(c.0 as usize));
+    cells.any(|c| c.outdoor)
 }
 
 fn is_upright(p: &Portal) -> bool {

@@ -151,6 +151,7 @@ fn scene_of(meshes: &[BakeMesh]) -> Scene {
                 Role::Structural
             },
             reason: "as the program has it".to_owned(),
+            filling: None,
             node: None,
         });
         scene.meshes.push(SceneMesh {

@@ -2,7 +2,7 @@
 //!
 //! In a glazed wall, vertical mullions separate the bays, and horizontal transoms divide each bay into panes. Panes
 //! above each other, the lowest on the floor, become one portal with several pieces. Windows above a sill stay
-//! separate.
+//! separate, and so does what is a window by itself: by its name, or as high as a person from the floor on.
 //! Slits, too narrow to climb through, are one portal for each plane between two cells: the gaps between the tops of walls
 //! and a ribbed roof. So are all openings of a void: the lamps, grilles and missing panels of a ceiling.
 //! **Limit:** panes and slits whose planes differ by more than `ONE_PLANE` stay separate, as in models with moved vertices.
@@ -15,15 +15,13 @@ use enfilade_cpg::PortalKind;
 use enfilade_geom::{DVec3, Sets, Winding};
 
 use super::Judged;
+use super::kinds::SLIT;
 use crate::complex::PartitionPortal;
 
 /// Greatest height of a transom, and greatest offset between the sides of two panes of one bay. [Units: wu]
 const BAR: f64 = 0.15;
 /// Greatest distance between the planes of two windows that count as coplanar. [Units: wu]
 const ONE_PLANE: f64 = 1e-6;
-
-/// Least width of an opening that anybody climbs through. [Units: wu]
-const SLIT: f64 = 0.3;
 
 /// Where a window lies in its facade. [Units: wu]
 struct Extent {
@@ -64,7 +62,7 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
     let mut facades: BTreeMap<[u32; 2], Vec<(usize, Extent)>> = BTreeMap::new();
     for (i, judged) in portals.iter().enumerate() {
         let p = &judged.portal;
-        if judged.kind == PortalKind::Window && p.plane.normal.y.abs() < 0.5 {
+        if judged.kind == PortalKind::Window && judged.is_pane && p.plane.normal.y.abs() < 0.5 {
             facades.entry(p.cells).or_default().push((i, Extent::of(p)));
         }
     }
@@ -184,6 +182,7 @@ mod tests {
             kind: PortalKind::Open,
             is_on_floor: false,
             is_filled: false,
+            is_pane: true,
         }
     }
 

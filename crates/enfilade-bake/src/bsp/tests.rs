@@ -315,6 +315,7 @@ fn scene_of(solids: &[ConvexSolid], inside: &[DVec3]) -> Scene {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: "map: brushes of worldspawn".into(),
+            filling: None,
             node: None,
         }],
         solids: solids.to_vec(),

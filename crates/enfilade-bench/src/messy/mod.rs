@@ -404,7 +404,7 @@ fn name_of(dir: &Path) -> String {
 }
 
 /// Runs the test kit's `generate`.
-fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
+pub(crate) fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
     let example = binary("examples/generate");
     output_of(Command::new(example).args(args).arg("-o").arg(to), None).map(drop)
 }

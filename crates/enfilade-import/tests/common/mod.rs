@@ -107,6 +107,7 @@ pub(crate) fn scene_of(primitive: Primitive, transforms: &[DMat4]) -> Scene {
                 transform,
                 role: Role::Structural,
                 reason: String::new(),
+                filling: None,
                 node: None,
             })
             .collect(),

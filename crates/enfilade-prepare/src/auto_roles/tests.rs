@@ -40,6 +40,7 @@ impl Build {
             transform: DMat4::IDENTITY,
             role: Role::Structural,
             reason: DEFAULT.into(),
+            filling: None,
             node: None,
         });
         self.0.meshes.push(Mesh {

@@ -136,6 +136,7 @@ fn object(name: &str, mesh: u32, transform: DMat4) -> Object {
         transform,
         role: Role::Detail,
         reason: String::new(),
+        filling: None,
         node: None,
     }
 }

@@ -103,10 +103,11 @@ impl Aperture {
         })
     }
 
-    /// Returns `true` if a door fits into it.
+    /// Returns `true` if a door fits into it, or is in it: hatches and gates are lower, and say that they are doors.
     fn takes_door(&self) -> bool {
         let size = self.around.size();
-        size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR
+        let is_sized = size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR;
+        is_sized || self.kind == PortalKind::Door
     }
 
     /// Returns the box that contains its leaves, frames and panes.
