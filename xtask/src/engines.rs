@@ -70,7 +70,7 @@ const N_SCENES: usize = 3;
 /// Scenes on which they are measured, those of `docs/benchmarks/engines.md`.
 const MEASURED: [&str; 3] = ["duplex", "fzk-haus", "institute"];
 
-/// Runs the tests of the integrations that build in minutes, on the demo and on worlds that are baked already.
+/// Runs the tests of the integrations, on the demo and on worlds that are baked already.
 pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("tools of engines", tools)?;
     let worlds = worlds();
@@ -79,25 +79,29 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("web", || {
         build_web()?;
         run_to_end(&mut web("npm", GATE, &["test"]))
+    })?;
+    steps.step("bevy", || {
+        let test = ["--all-targets", "--", "--test-threads", "2"];
+        run_to_end(bevy("test").args(test))
     })
 }
 
-/// Runs the tests of the plugin for Bevy. Building the engine takes longer than all other steps of the gate together, so
-/// only `test --engines` does it.
-pub(crate) fn run_bevy(steps: &mut Steps) -> anyhow::Result<()> {
-    // Always these features: with others, the engine is built once more.
-    let features = ["--locked", "--features", "bake", "--all-targets"];
-    let clippy = ["--", "-D", "warnings"];
-    // One test at a time: each draws with all cores.
-    let test = ["--", "--test-threads", "1"];
-    steps.step("bevy", || {
+/// Runs the checks of the plugin for Bevy that build all of the engine once more: lints and documentation.
+pub(crate) fn check_bevy(steps: &mut Steps) -> anyhow::Result<()> {
+    steps.step("lints and docs of bevy", || {
+        let clippy = ["--all-targets", "--", "-D", "warnings"];
+        run_to_end(bevy("clippy").args(clippy))?;
         run_to_end(
-            in_workspace("bevy", &["clippy"])
-                .args(features)
-                .args(clippy),
-        )?;
-        run_to_end(in_workspace("bevy", &["test"]).args(features).args(test))
+            bevy("doc")
+                .arg("--no-deps")
+                .env("RUSTDOCFLAGS", "-D warnings"),
+        )
     })
+}
+
+/// Returns a cargo command for the plugin, always with the same features: with others, the engine is built once more.
+fn bevy(command: &str) -> Command {
+    in_workspace("bevy", &[command, "--locked", "--features", "bake"])
 }
 
 /// Prints the figures of all integrations, as JSON lines or as a table.
@@ -214,7 +218,7 @@ fn abi(worlds: &[PathBuf]) -> anyhow::Result<()> {
 
 /// Measures culling in Bevy: pictures of the worlds, and the gain in those that are furnished first.
 fn bevy_figures(args: &[&str], worlds: &[PathBuf]) -> Command {
-    let mut command = in_workspace("bevy", &["run", "--locked", "--features", "bake"]);
+    let mut command = bevy("run");
     command.args(["--example", "measure", "--"]);
     command.args(["--size", "160x100"]).args(args).args(worlds);
     command

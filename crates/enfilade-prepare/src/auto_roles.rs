@@ -6,14 +6,16 @@
 //! room. So everything that stands between two things stays: the piece of a wall between floor and ceiling, the
 //! lintel between two jambs, the tile between its neighbors.
 
-use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::scene::{Role, Scene, TriangleSource};
+use enfilade_geom::{Aabb, Bvh, DVec3, Triangle, is_flight, shells, triangle_area_normal};
 use fillers::Surroundings;
+use std::borrow::Cow;
 use std::ops::Range;
 use units::{Unit, key};
 
 mod fillers;
 mod furniture;
+mod merged;
 mod units;
 
 /// Reason of objects that match no rule.
@@ -58,11 +60,13 @@ const MOST_OBJECTS: usize = 50_000;
 /// Passes over the objects that are left: a stack of this many boxes is furniture.
 const ROUNDS: usize = 4;
 
-/// Measures of one structural object.
+/// Measures of one structural object, or of a part of a merged one.
 struct Shape {
     object: usize,
+    /// Part of a merged object.
+    is_part: bool,
     /// Its triangles in the list of all.
-    triangles: Range<usize>,
+    triangles: Vec<Range<usize>>,
     bounds: Aabb,
     /// Area of its surface, one side. [Units: wu²]
     area: f64,
@@ -72,95 +76,161 @@ struct Shape {
     is_open: bool,
 }
 
-/// Decides by size and occlusion the role of objects that no rule decides, and records the reason.
+impl Shape {
+    /// Returns its triangles.
+    fn of<'t>(&self, all: &'t [Triangle]) -> Cow<'t, [Triangle]> {
+        if let [range] = &*self.triangles {
+            return Cow::Borrowed(&all[range.clone()]);
+        }
+        let own = self.triangles.iter().cloned();
+        Cow::Owned(own.flat_map(|range| all[range].iter().copied()).collect())
+    }
+
+    /// Takes in another part of the same merged object.
+    fn take(&mut self, other: Self) {
+        self.triangles.extend(other.triangles);
+        self.bounds = self.bounds.union(other.bounds);
+        self.area += other.area;
+        self.shadow += other.shadow;
+    }
+}
+
+/// The structure of a scene.
+struct Structure {
+    shapes: Vec<Shape>,
+    triangles: Vec<Triangle>,
+    /// The origin of each triangle.
+    sources: Vec<TriangleSource>,
+}
+
+/// Decides by size and occlusion the role of objects that no rule decides, and records the reason. Parts of merged objects
+/// become objects.
 ///
-/// Leaves scenes of fewer than three structural objects unchanged: there is nothing to compare with. O(t log t)
+/// Leaves scenes of fewer than three structural things unchanged: there is nothing to compare with. O(t log t)
 /// for t structural triangles, and O(log t) per small object.
 pub fn judge(scene: &mut Scene) {
-    let n_open = scene.objects.iter().filter(|o| is_open(o)).count();
-    let n_structural = scene
-        .objects
-        .iter()
-        .filter(|o| o.role == Role::Structural)
-        .count();
+    let Structure {
+        shapes,
+        triangles,
+        sources,
+    } = structure_of(scene);
+    let shapes = merged::join_bars(shapes);
+    let n_open = shapes.iter().filter(|s| s.is_open).count();
+    let n_structural = shapes.len();
     if n_open == 0 || n_structural < 3 {
         return;
     }
-    let (shapes, triangles, owners) = shapes_of(scene);
     let bvh = if n_open <= MOST_OBJECTS {
         Some(Bvh::build(&triangles))
     } else {
         None
     };
+    let mut reasons: Vec<Option<String>> = vec![None; n_structural];
     if let Some(bvh) = &bvh {
-        judge_fillers(scene, &shapes, &triangles, bvh);
+        reasons = filler_reasons(&shapes, &triangles, bvh);
     }
-    let is_gone: Vec<bool> = scene
-        .objects
-        .iter()
-        .map(|o| o.role == Role::Detail)
-        .collect();
-    let shapes: Vec<Shape> = shapes.into_iter().filter(|s| !is_gone[s.object]).collect();
+    let (mut found, mut left) = (Vec::new(), Vec::new());
+    for (shape, reason) in shapes.into_iter().zip(reasons) {
+        match reason {
+            Some(reason) => found.push((shape, reason)),
+            None => left.push(shape),
+        }
+    }
+    let left = merged::join_small(left);
+    match furniture_of(left, &triangles, bvh.as_ref(), n_structural) {
+        Ok(more) => found.extend(more),
+        Err(kept) => {
+            for (shape, reason) in kept.iter().filter(|(shape, _)| !shape.is_part) {
+                scene.objects[shape.object].reason =
+                    format!("default: {reason}, but so is too much of the scene");
+            }
+        }
+    }
+    found.sort_by_key(|(shape, _)| shape.object);
+    for own in found.chunk_by(|a, b| a.0.object == b.0.object) {
+        let (shape, reason) = &own[0];
+        if shape.is_part {
+            merged::split(scene, shape.object, own, &sources);
+        } else {
+            let object = &mut scene.objects[shape.object];
+            object.role = Role::Detail;
+            object.reason.clone_from(reason);
+        }
+    }
+}
+
+/// Returns the shapes that are furniture, each with the reason; or as an error those that would be, if they are too much of
+/// the scene.
+fn furniture_of(
+    shapes: Vec<Shape>,
+    triangles: &[Triangle],
+    bvh: Option<&Bvh>,
+    n_structural: usize,
+) -> Result<Vec<(Shape, String)>, Vec<(Shape, String)>> {
     let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
+    let mut owners = vec![FILLER; triangles.len()];
+    for (i, shape) in (0..).zip(&shapes) {
+        for range in &shape.triangles {
+            owners[range.clone()].fill(i);
+        }
+    }
     let mut judge = Judge {
-        triangles: &triangles,
+        triangles,
         owners: &owners,
-        bvh: bvh.as_ref(),
+        bvh,
         diagonal: bounds.size().length(),
-        is_gone,
+        is_gone: vec![false; shapes.len()],
     };
     let mut found: Vec<(usize, String)> = Vec::new();
     let mut detail_area = 0.0;
     // Objects on or below furniture become free once it is gone.
     for _ in 0..ROUNDS {
         let before = found.len();
-        for shape in shapes
-            .iter()
-            .filter(|s| s.is_open && !judge.is_gone[s.object])
-        {
-            if let Some(reason) = judge.reason(shape) {
+        for (i, shape) in shapes.iter().enumerate() {
+            if !shape.is_open || judge.is_gone[i] {
+                continue;
+            }
+            if let Some(reason) = judge.reason(i, shape) {
                 // The leaves of a plant have more area than they hide.
                 detail_area += shape.area.min(shape.bounds.surface_area());
-                found.push((shape.object, reason));
+                found.push((i, reason));
             }
         }
-        for (object, _) in &found[before..] {
-            judge.is_gone[*object] = true;
+        for (i, _) in &found[before..] {
+            judge.is_gone[*i] = true;
         }
         if found.len() == before {
             break;
         }
     }
     let structural_area: f64 = shapes.iter().map(|s| s.area).sum();
-    if detail_area > MOST * structural_area || found.len() == n_structural {
-        for (object, reason) in found {
-            scene.objects[object].reason =
-                format!("default: {reason}, but so is too much of the scene");
-        }
-        return;
-    }
-    for (object, reason) in found {
-        let object = &mut scene.objects[object];
-        object.role = Role::Detail;
-        object.reason = reason;
-    }
+    let is_too_much = detail_area > MOST * structural_area || found.len() == n_structural;
+    let mut shapes: Vec<Option<Shape>> = shapes.into_iter().map(Some).collect();
+    let found = found.into_iter();
+    let found = found.filter_map(|(i, reason)| Some((shapes[i].take()?, reason)));
+    let found = found.collect();
+    if is_too_much { Err(found) } else { Ok(found) }
 }
+
+/// Owner of triangles of fillers.
+const FILLER: u32 = u32::MAX;
 
 /// Tests of each object that is not a filler.
 struct Judge<'a> {
     triangles: &'a [Triangle],
+    /// The shape of each triangle.
     owners: &'a [u32],
     bvh: Option<&'a Bvh>,
     /// Diagonal of the structure's box. [Units: wu]
     diagonal: f64,
-    /// Objects known to be detail.
+    /// Shapes known to be furniture.
     is_gone: Vec<bool>,
 }
 
 impl Judge<'_> {
-    /// Returns the reason why an object is detail; `None` if it is structural.
-    fn reason(&self, shape: &Shape) -> Option<String> {
-        let own = &self.triangles[shape.triangles.clone()];
+    /// Returns the reason why a shape is detail; `None` if it is structural.
+    fn reason(&self, index: usize, shape: &Shape) -> Option<String> {
+        let own = &*shape.of(self.triangles);
         let size = shape.bounds.size();
         let reach = SMALL_SHARE * self.diagonal;
         if size.max_element() > SMALL.min(reach) && is_rail(shape, own) {
@@ -170,7 +240,7 @@ impl Judge<'_> {
             ));
         }
         let bvh = self.bvh?;
-        let is_own = |t: u32| self.owners[t as usize] == shape.object as u32;
+        let is_own = |t: u32| self.owners[t as usize] == index as u32;
         let touches = |b: &Aabb| {
             let mut is_touched = false;
             bvh.for_each_in_box(b, |t| is_touched |= !is_own(t));
@@ -181,16 +251,20 @@ impl Judge<'_> {
             reason = seen_around(&shape.bounds, &touches);
         }
         if reason.is_none() && size.y <= SMALL {
-            let meets = |a, b| {
-                bvh.any_hit(a, b, |t| {
-                    is_own(t) || self.is_gone[self.owners[t as usize] as usize]
-                })
-            };
-            let upright = units::upright(shape.object as u32, own);
+            let meets = |a, b| bvh.any_hit(a, b, |t| is_own(t) || self.is_gone(t));
+            let upright = units::upright(index as u32, own);
             reason = furniture::reason(&upright, &shape.bounds, self.diagonal, &meets, &touches);
         }
         // The rim comes last, as it costs most.
-        reason.filter(|_| !goes_on_at_its_rim(own, &shape.bounds, &touches))
+        reason.filter(|_| !is_flight(own) && !goes_on_at_its_rim(own, &shape.bounds, &touches))
+    }
+}
+
+impl Judge<'_> {
+    /// Returns `true` for triangles of fillers and furniture.
+    fn is_gone(&self, triangle: u32) -> bool {
+        let owner = self.owners[triangle as usize];
+        owner == FILLER || self.is_gone[owner as usize]
     }
 }
 
@@ -206,13 +280,22 @@ fn is_rail(shape: &Shape, own: &[Triangle]) -> bool {
     })
 }
 
-/// Makes detail of objects whose units all fill openings.
-fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) {
-    let units: Vec<Unit> = shapes
-        .iter()
-        .flat_map(|s| {
-            let own = &triangles[s.triangles.clone()];
-            units::units_of(s.object as u32, s.triangles.start as u32, own)
+/// Returns for each shape the reason why it fills an opening, or belongs to one that does.
+fn filler_reasons(shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) -> Vec<Option<String>> {
+    let units: Vec<Unit> = (0..)
+        .zip(shapes)
+        .flat_map(|(i, s)| {
+            let own = s.of(triangles);
+            if s.is_part {
+                let all = s.triangles.iter().cloned().flatten();
+                let triangles = all.map(|t| t as u32).collect();
+                vec![Unit {
+                    triangles,
+                    ..units::whole(i, &own)
+                }]
+            } else {
+                units::units_of(i, s.triangles[0].start as u32, &own)
+            }
         })
         .collect();
     let mut unit_of = vec![0; triangles.len()];
@@ -226,63 +309,87 @@ fn judge_fillers(scene: &mut Scene, shapes: &[Shape], triangles: &[Triangle], bv
         triangles,
         unit_of: &unit_of,
     };
-    let is_open = |unit: &Unit| is_open(&scene.objects[unit.object as usize]);
+    let is_open = |unit: &Unit| shapes[unit.object as usize].is_open;
     let found = fillers::fillers(&units, &is_open, &around);
-    // An object has one role, so each of its units must fill an opening or belong to one that does.
     let mut reasons = vec![None; units.len()];
     for (unit, reason) in found {
         reasons[unit as usize] = Some(reason);
     }
-    let of_object = |a: &(&Unit, _), b: &(&Unit, _)| a.0.object == b.0.object;
+    let mut of_shapes = vec![None; shapes.len()];
+    // A shape has one role, so each of its units must fill an opening or belong to one that does.
+    let of_shape = |a: &(&Unit, _), b: &(&Unit, _)| a.0.object == b.0.object;
     let all: Vec<(&Unit, Option<String>)> = units.iter().zip(reasons).collect();
-    for own in all.chunk_by(of_object) {
+    for own in all.chunk_by(of_shape) {
         let mut filling = own.iter().filter(|u| u.1.is_some());
         let belongs = |unit: &Unit| filling.clone().any(|(filler, _)| filler.has_beside(unit));
         if own.iter().all(|u| u.1.is_some() || belongs(u.0))
-            && let Some((unit, Some(reason))) = filling.next()
+            && let Some((unit, reason)) = filling.next()
         {
-            let object = &mut scene.objects[unit.object as usize];
-            object.role = Role::Detail;
-            object.reason.clone_from(reason);
+            of_shapes[unit.object as usize].clone_from(reason);
         }
     }
+    // Handles and panes of merged objects are units of their own.
+    let filling: Vec<&(&Unit, Option<String>)> = all.iter().filter(|u| u.1.is_some()).collect();
+    for (unit, reason) in &all {
+        let shape = &shapes[unit.object as usize];
+        if shape.is_part
+            && shape.is_open
+            && reason.is_none()
+            && filling.iter().any(|(filler, _)| filler.has_before(unit))
+        {
+            of_shapes[unit.object as usize] =
+                Some("lies in an opening, before a filler".to_owned());
+        }
+    }
+    of_shapes
 }
 
 fn is_open(object: &enfilade_geom::scene::Object) -> bool {
     object.role == Role::Structural && object.reason == DEFAULT
 }
 
-/// Returns the shape of each structural object, the triangles of all, and the object of each triangle.
-fn shapes_of(scene: &Scene) -> (Vec<Shape>, Vec<Triangle>, Vec<u32>) {
-    let mut shapes: Vec<Shape> = Vec::new();
-    let mut triangles = Vec::new();
-    let mut owners = Vec::new();
-    for source in scene.triangle_sources(Role::Structural) {
-        let t = scene.world_triangle(source);
-        if shapes
-            .last()
-            .is_none_or(|s| s.object != source.object as usize)
-        {
-            shapes.push(Shape {
-                object: source.object as usize,
-                triangles: triangles.len()..triangles.len(),
-                bounds: Aabb::EMPTY,
-                area: 0.0,
-                shadow: DVec3::ZERO,
-                is_open: is_open(&scene.objects[source.object as usize]),
+/// Returns the shapes of structural objects, and of the parts of merged ones.
+fn structure_of(scene: &Scene) -> Structure {
+    let mut all = Structure {
+        shapes: Vec::new(),
+        triangles: Vec::new(),
+        sources: Vec::new(),
+    };
+    let sources: Vec<TriangleSource> = scene.triangle_sources(Role::Structural).collect();
+    for own in sources.chunk_by(|a, b| a.object == b.object) {
+        let object = own[0].object as usize;
+        let triangles: Vec<Triangle> = own.iter().map(|&s| scene.world_triangle(s)).collect();
+        let bounds = Aabb::of_points(triangles.as_flattened());
+        let (shell_of, n) = if merged::may_be_merged(&scene.objects[object], &bounds) {
+            shells(&triangles)
+        } else {
+            (Vec::new(), 1)
+        };
+        let is_part = n > 1 && n + all.shapes.len() <= MOST_OBJECTS;
+        let mut order: Vec<usize> = (0..triangles.len()).collect();
+        if is_part {
+            order.sort_by_key(|&t| (shell_of[t], t));
+        }
+        let is_open = is_part || is_open(&scene.objects[object]);
+        for part in order.chunk_by(|&a, &b| !is_part || shell_of[a] == shell_of[b]) {
+            let first = all.triangles.len();
+            all.triangles.extend(part.iter().map(|&t| triangles[t]));
+            all.sources.extend(part.iter().map(|&t| own[t]));
+            let range = first..all.triangles.len();
+            let area_normal = |t: &Triangle| 0.5 * triangle_area_normal(t);
+            let normals = all.triangles[range.clone()].iter().map(area_normal);
+            all.shapes.push(Shape {
+                object,
+                is_part,
+                bounds: Aabb::of_points(all.triangles[range.clone()].as_flattened()),
+                area: normals.clone().map(DVec3::length).sum(),
+                shadow: normals.map(DVec3::abs).sum(),
+                triangles: vec![range],
+                is_open,
             });
         }
-        let normal = 0.5 * triangle_area_normal(&t);
-        if let Some(shape) = shapes.last_mut() {
-            shape.triangles.end += 1;
-            shape.bounds = shape.bounds.union(Aabb::of_points(&t));
-            shape.area += normal.length();
-            shape.shadow += normal.abs();
-        }
-        triangles.push(t);
-        owners.push(source.object);
     }
-    (shapes, triangles, owners)
+    all
 }
 
 /// Returns the largest projected area along an axis, as a share of the box's largest side. Both sides of a
@@ -419,5 +526,7 @@ fn n_goes_on(bounds: &Aabb, axis: usize, high: bool, touches: &dyn Fn(&Aabb) -> 
 mod filler_tests;
 #[cfg(test)]
 mod furniture_tests;
+#[cfg(test)]
+mod merged_tests;
 #[cfg(test)]
 mod tests;

@@ -7,9 +7,9 @@
 //! `O(portals · plates)` comparisons of boxes; each cut is exact, so both parts together are the opening.
 
 use enfilade_cpg::PortalKind;
-use enfilade_geom::{Aabb, Allowance, DVec3, Plane, Triangle, Winding, poly};
+use enfilade_geom::{Aabb, Allowance, DVec3, Plane, Triangle, Winding, poly, shells};
 
-use super::fittings::{DEEP, FULL, LEAST_DOOR, Rectangle, WIDEST_TURN, shells};
+use super::fittings::{DEEP, FULL, LEAST_DOOR, Rectangle, WIDEST_TURN};
 use crate::complex::PartitionPortal;
 use crate::structure::MAX_THICKNESS;
 

@@ -8,7 +8,6 @@
 
 mod opening;
 mod parts;
-mod shells;
 mod split;
 mod swing;
 
@@ -16,12 +15,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, PortalKind, World};
 use enfilade_geom::scene::Mesh;
-use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Triangle};
+use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Triangle, shells};
 use rayon::prelude::*;
 
 pub(super) use opening::Rectangle;
 pub(super) use parts::{DEEP, FULL, LEAST_DOOR};
-pub(super) use shells::shells;
 pub(super) use swing::WIDEST_TURN;
 
 use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
@@ -29,6 +27,8 @@ use swing::Around;
 
 /// Least distance from an open leaf to other objects. [Units: wu]
 const ROOM: f64 = 0.06;
+/// An object with more triangles is one shell: doors have fewer.
+const MAX_TRIANGLES: usize = 50_000;
 
 /// A detail object near an opening.
 struct Object {
@@ -158,7 +158,11 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
 impl Object {
     fn of(world: &World, detail: u32) -> Self {
         let triangles = triangles_of(world, &world.details[detail as usize]);
-        let (shells, n_shells) = shells(&triangles);
+        let (shells, n_shells) = if triangles.len() > MAX_TRIANGLES {
+            (vec![0; triangles.len()], 1)
+        } else {
+            shells(&triangles)
+        };
         let mut bounds = vec![Aabb::EMPTY; n_shells];
         for (t, &shell) in triangles.iter().zip(&shells) {
             let own = &mut bounds[shell as usize];

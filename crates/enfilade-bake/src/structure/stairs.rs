@@ -4,32 +4,9 @@
 //! risers fence off the space below them, and a winding flight pinches its room. So the flood ignores
 //! stairs (Haumont et al. 2003, §6.1 leave out furniture for the same reason). Everything exact, above all
 //! the cell complex, still includes them.
-//!
-//! A group of triangles is a flight if it contains a chain of level surfaces, each a riser above the
-//! previous one and a step aside. Shelves and louvers are not: they lie straight above each other.
-
-use std::collections::HashMap;
 
 use enfilade_geom::scene::TriangleSource;
-use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
-
-/// Rise from one step to the next: of stairs to climb up to that of space-saving stairs and tiers of seats. [Units: wu]
-const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.40;
-/// Horizontal distance between the middles of one step and the next. [Units: wu]
-const GOING: std::ops::RangeInclusive<f64> = 0.12..=1.2;
-/// Area of a step. [Units: wu²]
-const STEP_AREA: std::ops::RangeInclusive<f64> = 0.03..=4.0;
-/// Cosine of the largest tilt of a tread.
-const LEVEL: f64 = 0.99;
-/// Least share of treads in the area that faces up.
-const MIN_LEVEL_SHARE: f64 = 0.5;
-/// … and in the whole area. In a narrow flight that is massive down to the ground, an eighth is treads;
-/// in a wall whose arched top runs in level strips, a thirtieth.
-const MIN_TREAD_SHARE: f64 = 0.1;
-/// Least number of steps in a row.
-const MIN_STEPS: usize = 4;
-/// Objects with a larger plan are examined shell by shell: a whole building may be one object. [Units: wu²]
-const MAX_PLAN: f64 = 40.0;
+use enfilade_geom::{Aabb, MOST_FLIGHT_PLAN, Triangle, are_treads, is_flight, shells};
 
 /// Returns `true` for each triangle that belongs to stairs.
 #[must_use]
@@ -45,13 +22,23 @@ pub(crate) fn find_stairs(sources: &[TriangleSource], triangles: &[Triangle]) ->
         let members: Vec<usize> = (start..start + len).collect();
         start += len;
         let size = bounds(triangles, &members).size();
-        let groups = if size.x * size.z <= MAX_PLAN {
-            vec![members]
-        } else {
-            shells(triangles, &members)
-        };
-        for group in groups {
-            if is_flight(triangles, &group) {
+        // A whole building may be one object.
+        let mut groups = vec![members];
+        if size.x * size.z > MOST_FLIGHT_PLAN {
+            let own: Vec<Triangle> = groups[0].iter().map(|&t| triangles[t]).collect();
+            let (shell_of, n) = shells(&own);
+            let all = std::mem::replace(&mut groups, vec![Vec::new(); n]);
+            for (t, shell) in all.into_iter().flatten().zip(shell_of) {
+                groups[shell as usize].push(t);
+            }
+        }
+        let parts: Vec<Vec<Triangle>> = groups
+            .iter()
+            .map(|group| group.iter().map(|&t| triangles[t]).collect())
+            .collect();
+        let are_treads = are_treads(&parts);
+        for ((group, part), is_tread) in groups.iter().zip(&parts).zip(are_treads) {
+            if is_tread || is_flight(part) {
                 group.iter().for_each(|&t| is_stair[t] = true);
             }
         }
@@ -63,119 +50,10 @@ fn bounds(triangles: &[Triangle], members: &[usize]) -> Aabb {
     Aabb::of_points(members.iter().flat_map(|&t| &triangles[t]))
 }
 
-/// Returns groups of triangles connected by equal vertices, in order of their first triangle.
-fn shells(triangles: &[Triangle], members: &[usize]) -> Vec<Vec<usize>> {
-    let mut sets = Sets::new(members.len());
-    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
-    for (i, &t) in members.iter().enumerate() {
-        for p in triangles[t] {
-            // Adding zero makes -0 and 0 one key.
-            let key = (p + DVec3::ZERO).to_array().map(f64::to_bits);
-            let other = *first_at.entry(key).or_insert(i as u32);
-            sets.join(i as u32, other);
-        }
-    }
-    let mut index: HashMap<u32, usize> = HashMap::new();
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (i, &t) in members.iter().enumerate() {
-        let r = sets.find(i as u32);
-        let at = *index.entry(r).or_insert_with(|| {
-            groups.push(Vec::new());
-            groups.len() - 1
-        });
-        groups[at].push(t);
-    }
-    groups
-}
-
-fn is_flight(triangles: &[Triangle], members: &[usize]) -> bool {
-    if members.len() < 2 * MIN_STEPS {
-        return false;
-    }
-    let size = bounds(triangles, members).size();
-    if size.x * size.z > MAX_PLAN {
-        return false;
-    }
-    // Treads face up, or down in a model turned inside out.
-    [1.0, -1.0]
-        .iter()
-        .any(|&side| longest_flight(&levels(triangles, members, side)) >= MIN_STEPS)
-}
-
-/// A level surface: its middle and area. Triangles at one height and close in plan form one.
-struct Level {
-    middle: DVec3,
-    area: f64,
-}
-
-fn levels(triangles: &[Triangle], members: &[usize], side: f64) -> Vec<Level> {
-    let (mut upward, mut total) = (0.0, 0.0);
-    let mut flat: Vec<(f64, DVec3, f64)> = members
-        .iter()
-        .filter_map(|&t| {
-            let n = triangle_area_normal(&triangles[t]);
-            let area = n.length() * 0.5;
-            let slope = n.y * side;
-            total += area;
-            if slope > 0.5 * n.length() {
-                upward += area;
-            }
-            (slope > LEVEL * n.length() && area > 1e-6).then(|| {
-                let middle = (triangles[t][0] + triangles[t][1] + triangles[t][2]) / 3.0;
-                (middle.y, middle, area)
-            })
-        })
-        .collect();
-    // Anything round has level spots at all heights; of stairs, treads are most of the area that faces up.
-    let level = flat.iter().map(|f| f.2).sum::<f64>();
-    if level < MIN_LEVEL_SHARE * upward || level < MIN_TREAD_SHARE * total {
-        return Vec::new();
-    }
-    flat.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut out: Vec<Level> = Vec::new();
-    for (y, middle, area) in flat {
-        // A step is small: a surface further off at the same height is a step of another flight.
-        let home = out
-            .iter_mut()
-            .rev()
-            .take_while(|l| y - l.middle.y < 0.02)
-            .find(|l| {
-                let d = l.middle - middle;
-                DVec3::new(d.x, 0.0, d.z).length() < 1.2
-            });
-        match home {
-            Some(l) => {
-                l.middle = (l.middle * l.area + middle * area) / (l.area + area);
-                l.area += area;
-            }
-            None => out.push(Level { middle, area }),
-        }
-    }
-    out.retain(|l| STEP_AREA.contains(&l.area));
-    out
-}
-
-/// Returns the length of the longest chain in which each step is a rise above and a going aside from the previous.
-fn longest_flight(levels: &[Level]) -> usize {
-    // Levels ascend, so that a chain only looks back.
-    let mut longest = vec![1_usize; levels.len()];
-    for i in 0..levels.len() {
-        for j in (0..i).rev() {
-            let d = levels[i].middle - levels[j].middle;
-            if d.y > *RISE.end() + 0.05 {
-                break;
-            }
-            let going = DVec3::new(d.x, 0.0, d.z).length();
-            if RISE.contains(&d.y) && GOING.contains(&going) {
-                longest[i] = longest[i].max(longest[j] + 1);
-            }
-        }
-    }
-    longest.into_iter().max().unwrap_or(0)
-}
-
 #[cfg(test)]
 mod tests {
+    use enfilade_geom::DVec3;
+
     use super::*;
 
     fn quad(out: &mut Vec<Triangle>, a: DVec3, u: DVec3, v: DVec3) {
@@ -215,6 +93,38 @@ mod tests {
         assert!(!find_stairs(&sources(16), &shelf).iter().any(|&s| s));
         let two_steps = treads(3, 0.28);
         assert!(!find_stairs(&sources(6), &two_steps).iter().any(|&s| s));
+    }
+
+    /// Boards without anything between them, and a floor of 10 m.
+    fn loose_treads(n: usize) -> Vec<Triangle> {
+        let mut out = Vec::new();
+        for i in 0..n {
+            let low = DVec3::new(i as f64 * 0.28, i as f64 * 0.18, 0.0);
+            let high = low + DVec3::Y * 0.04;
+            let (x, z, up) = (DVec3::X * 0.28, DVec3::Z, high - low);
+            quad(&mut out, high, z, x);
+            quad(&mut out, low, x, z);
+            for (at, along) in [(low, x), (low + z, x), (low, z), (low + x, z)] {
+                quad(&mut out, at, along, up);
+            }
+        }
+        let floor = DVec3::new(0.0, -1.0, 0.0);
+        quad(&mut out, floor, DVec3::Z * 10.0, DVec3::X * 10.0);
+        out
+    }
+
+    #[test]
+    fn treads_without_stringers_in_one_large_mesh_are_a_flight() {
+        let building = loose_treads(8);
+        let found = find_stairs(&sources(98), &building);
+        assert!(found[..96].iter().all(|&s| s));
+        assert_eq!(found[96..], [false, false]);
+        let two_steps = find_stairs(&sources(38), &loose_treads(3));
+        assert!(!two_steps.contains(&true));
+        // Level triangles of terrain.
+        let mut hill = treads(8, 0.5);
+        hill.extend(&building[96..]);
+        assert!(!find_stairs(&sources(18), &hill).contains(&true));
     }
 
     #[test]

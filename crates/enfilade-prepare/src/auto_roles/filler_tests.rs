@@ -4,7 +4,7 @@ use super::tests::Build;
 
 /// Six slabs around 6 x 2.6 x 6 m, and a wall of 24 cm across the space, at z 3 to 3.24: one mesh with a hole
 /// for a door (x 1 to 2, up to 2.1) and one for a window (x 3.5 to 5, y 0.9 to 2.1).
-fn two_rooms() -> Build {
+pub(super) fn two_rooms() -> Build {
     let mut b = shell();
     b.blocks(
         "wall",

@@ -25,7 +25,7 @@ const SIDES: usize = 3;
 const THIN: f64 = 0.5;
 /// nor another wall if thinner than this: the thinnest partitions, set between columns and under beams, are
 /// thicker, and leaves are 4 to 6 cm. [Units: wu]
-const LEAF: f64 = 0.07;
+pub(super) const LEAF: f64 = 0.07;
 /// Rays along each edge of the thing's face.
 const GRID: usize = 5;
 /// Depth of the air before and behind it: a thing that hangs on a wall has none behind it. [Units: wu]

@@ -9,11 +9,11 @@ use super::{GOES_ON, INTO, NEAR, SMALL, n_goes_on};
 use enfilade_geom::{Aabb, DVec3};
 
 /// Longest furniture; a longer object is not a worktop or a sofa but a parapet or a stage. [Units: wu]
-const LONG: f64 = 5.0;
+pub(super) const LONG: f64 = 5.0;
 /// The same as a share of the scene's diagonal: a bed may be as long as its room is wide.
 const ROOM_SHARE: f64 = 0.5;
 /// An object with two thinner edges is a skirting, a sill or a mullion. [Units: wu]
-const BAR: f64 = 0.2;
+pub(super) const BAR: f64 = 0.2;
 /// Height of the air above it: an object that reaches the ceiling may carry it. [Units: wu]
 const HEAD: f64 = 0.3;
 /// A side is free or backed if this share of it is.

@@ -66,6 +66,28 @@ impl Build {
         b
     }
 
+    /// Merges all objects into one mesh, with one reason for its role, or none.
+    pub(super) fn merged(self, reason: &str) -> Self {
+        let mut all = Primitive::default();
+        for own in self.0.meshes.iter().flat_map(|m| &m.primitives) {
+            let first = all.positions.len() as u32;
+            all.positions.extend(&own.positions);
+            all.indices.extend(own.indices.iter().map(|i| first + i));
+        }
+        let mut out = Self::default();
+        out.blocks("", &[]);
+        out.0.meshes[0].primitives = vec![all];
+        if !reason.is_empty() {
+            out.0.objects[0].reason = reason.into();
+        }
+        out
+    }
+
+    pub(super) fn judged(mut self) -> Scene {
+        judge(&mut self.0);
+        self.0
+    }
+
     pub(super) fn details(mut self) -> Vec<String> {
         judge(&mut self.0);
         let is_detail = |o: &&Object| o.role == Role::Detail;

@@ -44,7 +44,16 @@ impl Unit {
     /// Returns `true` if the other is a casing, a sill or a handle of this one: before its face, in the same
     /// wall.
     pub(super) fn has_beside(&self, other: &Self) -> bool {
-        let reach = self.half + BESIDE;
+        self.has_within(other, BESIDE)
+    }
+
+    /// Returns `true` if the other is a handle, a bar or a pane in the same hole.
+    pub(super) fn has_before(&self, other: &Self) -> bool {
+        self.has_within(other, DVec3::new(BESIDE.x, TOGETHER, TOGETHER))
+    }
+
+    fn has_within(&self, other: &Self, beyond: DVec3) -> bool {
+        let reach = self.half + beyond;
         (0..8).all(|corner| {
             let sign = |k: usize| if corner >> k & 1 == 1 { 1.0 } else { -1.0 };
             let p = (0..3).fold(other.center, |p, k| {
@@ -134,6 +143,13 @@ pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
 
 /// Joins boxes that nearly touch.
 fn join_near(boxes: &[Aabb], sets: &mut Sets) {
+    for_near(boxes, |a, b| {
+        sets.join(a, b);
+    });
+}
+
+/// Calls `on_pair` for boxes that nearly touch. Time: O(n log n + pairs that overlap along x).
+pub(super) fn for_near(boxes: &[Aabb], mut on_pair: impl FnMut(u32, u32)) {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     order.sort_by(|&a, &b| boxes[a as usize].min.x.total_cmp(&boxes[b as usize].min.x));
     for (k, &a) in order.iter().enumerate() {
@@ -143,7 +159,7 @@ fn join_near(boxes: &[Aabb], sets: &mut Sets) {
             .take_while(|&&b| boxes[b as usize].min.x <= near.max.x)
         {
             if near.overlaps(&boxes[b as usize]) {
-                sets.join(a, b);
+                on_pair(a, b);
             }
         }
     }

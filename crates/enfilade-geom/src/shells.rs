@@ -1,10 +1,10 @@
-//! Divides an object into its separate surfaces: leaf, frame and handles of a door modeled in one piece.
+//! Shells: an object's separate surfaces, such as leaf, frame and handles of a door modeled in one piece.
 
 use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-use enfilade_geom::{DVec3, Sets, Triangle};
+use crate::{DVec3, Sets, Triangle};
 
 /// Distances within which vertices are welded: the first that pairs nearly all edges is used, else the last. Models
 /// with moved vertices need a larger one. [Units: wu]
@@ -14,18 +14,14 @@ const PAIRED: f64 = 0.9;
 /// Angle, per unit of weld, within which faces at an edge coincide: the turn of a 5 cm face when its vertices move by
 /// the weld. [Units: rad/wu]
 const COINCIDE: f64 = 20.0;
-/// An object with more triangles is not divided: doors have fewer. [Units: triangles]
-const MAX_TRIANGLES: usize = 50_000;
 
 /// Returns the shell number of each triangle, from 0 in order of first triangles, and the number of shells.
 ///
 /// Two triangles belong to one shell if a path across edges joins them. Where solids touch along an edge, more than two
-/// triangles meet; there the path goes around the solid between them, so that a leaf that touches its frame stays
-/// separate. `O(n log n)`, as long as few vertices lie in one place.
-pub(crate) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
-    if triangles.len() > MAX_TRIANGLES {
-        return (vec![0; triangles.len()], 1);
-    }
+/// triangles meet; there those that another path joins belong together, and for the others the path goes around the solid
+/// between them, so that a leaf that touches its frame stays separate. `O(n log n)`, as long as few vertices lie in one place.
+#[must_use]
+pub fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
     let tries = WELDS.map(|weld| (weld, OnceCell::new()));
     let sides_of = |k: usize| {
         tries[k]
@@ -35,14 +31,14 @@ pub(crate) fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
     let fits = (0..WELDS.len() - 1).find(|&k| sides_of(k).paired_share() >= PAIRED);
     let welded = sides_of(fits.unwrap_or(WELDS.len() - 1));
     let mut sets = Sets::new(triangles.len());
-    for at_edge in welded.sides.chunk_by(|a, b| a.edge == b.edge) {
-        match at_edge {
-            [_] => {}
-            [a, b] => {
-                sets.join(a.triangle, b.triangle);
-            }
-            many => welded.join_around(many, &mut sets),
+    let edges = || welded.sides.chunk_by(|a, b| a.edge == b.edge);
+    for at_edge in edges() {
+        if let [a, b] = at_edge {
+            sets.join(a.triangle, b.triangle);
         }
+    }
+    for many in edges().filter(|at_edge| at_edge.len() > 2) {
+        welded.join_around(many, &mut sets);
     }
     let least = sets.into_least();
     let mut shell_of_least: HashMap<u32, u32> = HashMap::new();
@@ -105,8 +101,22 @@ impl Welded {
         1.0 - n_alone as f64 / self.sides.len().max(1) as f64
     }
 
-    /// Joins triangles that bound the same solid at an edge where more than two meet.
+    /// Joins triangles that bound the same solid at an edge where more than two meet, unless others there are joined to them.
     fn join_around(&self, sides: &[HalfEdge], sets: &mut Sets) {
+        let set_of = |s: &HalfEdge, sets: &mut Sets| sets.find(s.triangle);
+        let mut taken: Vec<u32> = sides.iter().map(|s| set_of(s, sets)).collect();
+        taken.sort_unstable();
+        let is_single = |set: u32| {
+            let first = taken.partition_point(|&t| t < set);
+            taken.get(first + 1) != Some(&set)
+        };
+        let single: Vec<&HalfEdge> = sides
+            .iter()
+            .filter(|s| is_single(set_of(s, sets)))
+            .collect();
+        if single.len() < 2 {
+            return;
+        }
         let [a, b] = sides[0].edge.map(|i| self.points[i as usize]);
         let along = (b - a).normalize_or_zero();
         let x = along.any_orthonormal_vector();
@@ -115,7 +125,7 @@ impl Welded {
             let d = self.points[s.apex as usize] - a;
             d.dot(y).atan2(d.dot(x))
         };
-        let mut around: Vec<(f64, &HalfEdge)> = sides.iter().map(|s| (angle(s), s)).collect();
+        let mut around: Vec<(f64, &HalfEdge)> = single.iter().map(|s| (angle(s), *s)).collect();
         around.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.triangle.cmp(&q.1.triangle)));
         // Begin at the widest gap, so that no place is at both ends.
         let n = around.len();
@@ -134,11 +144,20 @@ impl Welded {
             ordered.push((place, !side.is_forward, side.triangle));
         }
         ordered.sort_unstable();
-        for (i, &(_, begins, triangle)) in ordered.iter().enumerate() {
-            let (_, next_begins, next) = ordered[(i + 1) % n];
-            if begins && !next_begins {
-                sets.join(triangle, next);
+        let mut is_left = vec![true; n];
+        for i in 0..n {
+            let next = (i + 1) % n;
+            if ordered[i].1 && !ordered[next].1 {
+                sets.join(ordered[i].2, ordered[next].2);
+                (is_left[i], is_left[next]) = (false, false);
             }
+        }
+        // Surfaces that end here without a partner, as flipped triangles do, are rather one than several.
+        let mut left = ordered.iter().zip(&is_left).filter(|o| *o.1);
+        if let Some(((.., first), _)) = left.next() {
+            left.for_each(|((.., other), _)| {
+                sets.join(*first, *other);
+            });
         }
     }
 }
@@ -184,7 +203,7 @@ fn welded_corners(triangles: &[Triangle], weld: f64) -> (Vec<[u32; 3]>, Vec<DVec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade_geom::Aabb;
+    use crate::{Aabb, DMat4};
 
     fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<Triangle> {
         Aabb::new(low.into(), high.into()).triangles()
@@ -241,7 +260,7 @@ mod tests {
     fn a_leaf_flush_with_its_frame_is_a_shell_of_its_own() {
         let all = framed_leaf();
         for degrees in [0.0, 30.0, 90.0, 211.0_f64] {
-            let turn = enfilade_geom::DMat4::from_rotation_y(degrees.to_radians());
+            let turn = DMat4::from_rotation_y(degrees.to_radians());
             let turned: Vec<Triangle> = (all.iter())
                 .map(|t| t.map(|p| turn.transform_point3(p).as_vec3().as_dvec3()))
                 .collect();
@@ -257,11 +276,18 @@ mod tests {
     #[test]
     fn corners_that_were_moved_make_no_difference() {
         let all = framed_leaf();
-        let turn = enfilade_geom::DMat4::from_rotation_y(0.7);
-        let mut rng = enfilade_testkit::Rng::new(8);
+        let turn = DMat4::from_rotation_y(0.7);
+        let mut random = 8_u64;
+        let mut unit = move || {
+            // Knuth's linear congruential generator.
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (random >> 32) as f64 / f64::from(u32::MAX) * 2.0 - 1.0
+        };
         for by in [1e-6, 1e-5, 1e-4, 1e-3] {
             for _ in 0..20 {
-                let mut moved = |p: DVec3| p + DVec3::from([0, 1, 2].map(|_| rng.range(-by, by)));
+                let mut moved = |p: DVec3| p + DVec3::from([0, 1, 2].map(|_| by * unit()));
                 let spoilt: Vec<Triangle> = (all.iter())
                     .map(|t| t.map(|p| moved(turn.transform_point3(p))))
                     .collect();
@@ -269,6 +295,36 @@ mod tests {
                 assert_eq!(n, 2, "{by}: {shells:?}");
                 assert!(shells[28..].iter().all(|&s| s == 1), "{by}: {shells:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_solid_turned_inside_out_is_joined_to_no_neighbor() {
+        // A block flush with the front of a plate: four triangles at each edge of one face, the others its own.
+        for is_inside_out in [false, true] {
+            let mut block = cuboid([0.0, 0.0, 0.0], [1.0, 2.0, 0.04]);
+            if is_inside_out {
+                block.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            let plate = cuboid([0.0, 0.0, -0.1], [1.0, 2.0, 0.0]);
+            assert_eq!(shells(&[block, plate].concat()).1, 2);
+        }
+    }
+
+    #[test]
+    fn a_flipped_face_stays_with_others() {
+        // Two blocks that share a face; a side of one is flipped.
+        let mut all = cuboid([0.0, 0.0, 0.0], [1.0, 1.0, 1.0]);
+        let is_side = |t: &Triangle| t.iter().all(|p| p.z == 1.0);
+        all.iter_mut()
+            .filter(|t| is_side(t))
+            .for_each(|t| t.swap(1, 2));
+        all.extend(cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]));
+        let (shell_of, _) = shells(&all);
+        for (t, shell) in all.iter().zip(&shell_of).filter(|(t, _)| is_side(t)) {
+            let beyond = all.iter().zip(&shell_of);
+            let mut beyond = beyond.filter(|(other, _)| !is_side(other));
+            assert!(beyond.any(|(_, other)| other == shell), "{t:?}");
         }
     }
 
