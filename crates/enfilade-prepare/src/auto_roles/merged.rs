@@ -12,10 +12,12 @@ use super::units::for_near;
 use super::{SMALL, Shape, is_open};
 use crate::roles::is_by_name;
 
-/// Returns `true` if an object may be several things: it is longer than any furniture, and no user's rule says that all
-/// of it is structure. A name does not: merged meshes keep that of their first part.
+/// Returns `true` if an object may be several things: it is longer than any furniture, as large as a room in all directions,
+/// and no user's rule says that all of it is structure. A name does not: merged meshes keep that of their first part.
 pub(super) fn may_be_merged(object: &Object, bounds: &Aabb) -> bool {
-    (is_open(object) || is_by_name(&object.reason)) && bounds.size().max_element() > LONG
+    let size = bounds.size();
+    let is_large = size.max_element() > LONG && size.min_element() > SMALL;
+    is_large && (is_open(object) || is_by_name(&object.reason))
 }
 
 /// Joins bars of merged objects with the bars and plates that they nearly touch: the frame of a window and its panes.
