@@ -95,6 +95,9 @@ impl Shape {
     }
 }
 
+/// Shapes that are detail, each with the reason.
+type Judged = Vec<(Shape, String)>;
+
 /// The structure of a scene.
 struct Structure {
     shapes: Vec<Shape>,
@@ -166,7 +169,7 @@ fn furniture_of(
     triangles: &[Triangle],
     bvh: Option<&Bvh>,
     n_structural: usize,
-) -> Result<Vec<(Shape, String)>, Vec<(Shape, String)>> {
+) -> Result<Judged, Judged> {
     let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
     let mut owners = vec![FILLER; triangles.len()];
     for (i, shape) in (0..).zip(&shapes) {

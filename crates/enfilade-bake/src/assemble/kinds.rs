@@ -5,11 +5,11 @@
 
 use enfilade_cpg::PortalKind;
 use enfilade_geom::scene::{Filling, Role};
-use enfilade_geom::{Aabb, DVec3, Ray, Triangle};
+use enfilade_geom::{Aabb, DVec3, Ray, Triangle, shells};
 use rayon::prelude::*;
 
 use super::Cut;
-use super::fittings::{DEEP, LEAST_DOOR, Rectangle, shells};
+use super::fittings::{DEEP, LEAST_DOOR, Rectangle};
 use crate::complex::PartitionPortal;
 
 /// Least height of a parapet that makes an opening a window. [Units: wu]
