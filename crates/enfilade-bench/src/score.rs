@@ -470,7 +470,7 @@ fn find_openings(
         for portal in portals.iter().filter(|p| place.holds(p)) {
             found.used.insert(portal.id);
             let fits = sizes.contains(&portal.area) && portal.cells == want && want.len() == 2;
-            // Of several, the one most like it in size.
+            // Among several, the one most like it in size.
             let off = |p: &Portal| (p.area / place.area).ln().abs();
             if fits && hit.is_none_or(|h| off(portal) < off(h)) {
                 hit = Some(portal);

@@ -222,7 +222,7 @@ pub enum Role {
     Detail,
 }
 
-/// What an object says it is, in an opening.
+/// Thing in an opening, as an object's names say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Filling {
     /// A door: its leaf, its frame, or both.

@@ -347,6 +347,11 @@ fn filler_reasons(shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) -> Vec<Op
     of_shapes
 }
 
+/// Returns `true` if an object's or a class's name led to this reason.
+fn is_by_name(reason: &str) -> bool {
+    reason.starts_with("name: ") || reason.starts_with("IFC class ")
+}
+
 fn is_open(object: &enfilade_geom::scene::Object) -> bool {
     object.role == Role::Structural && object.reason == DEFAULT
 }

@@ -1,4 +1,4 @@
-//! What fills an opening, a door or a window, by class and name.
+//! Fillings of openings, doors and windows, by class and name.
 //!
 //! Only the shape tells whether an object fills an opening at all, so a wrong answer here does no harm elsewhere.
 
@@ -89,7 +89,7 @@ mod tests {
         for name in ["IfcWindow/0a$", "Window 12", "skylights"] {
             assert_eq!(of(name), window, "{name}");
         }
-        // Of another class, other things, and nothing at all.
+        // Another class, other things, and nothing at all.
         for name in [
             "IfcPlate/window",
             "window curtain",

@@ -232,11 +232,6 @@ impl RoleRules {
     }
 }
 
-/// Returns `true` if an object's or a class's name led to this reason.
-pub(crate) fn is_by_name(reason: &str) -> bool {
-    reason.starts_with("name: ") || reason.starts_with("IFC class ")
-}
-
 /// Returns NAME of `portal:NAME`, the name of an end of a link.
 #[must_use]
 pub fn marked_portal(name: &str) -> Option<&str> {

@@ -84,7 +84,7 @@ fn shape_problem(p: &Portal) -> Option<String> {
     }
 }
 
-/// What the names of all fittings of a portal say.
+/// Kind that the names of all fittings of a portal say.
 #[derive(Clone, Copy, PartialEq)]
 enum Said {
     Nothing,

@@ -1,7 +1,7 @@
 //! Kinds of portals, compared with the kinds of the openings that they match.
 //!
 //! Row `kinds named` bakes scenes as they are, `kinds unnamed` without names and materials. An unfilled hole is open, and so
-//! is a doorway in a scene without a single leaf. Boundaries without a wall are no openings and do not count.
+//! is a doorway in a scene without a single leaf. Boundaries without a wall do not count.
 //! Row `kinds classes` needs no truth: each object of class `IfcDoor` or `IfcWindow` that fills a portal determines its kind.
 
 use std::path::{Path, PathBuf};

@@ -7,12 +7,12 @@ mod kinds;
 use crate::rows::{Chosen, RowPrinter};
 
 /// Prints the rows whose names begin with the first item.
-type Part = (
+type RowPart = (
     &'static str,
     fn(&Chosen, &mut RowPrinter) -> anyhow::Result<()>,
 );
 
-const PARTS: [Part; 1] = [("kinds", kinds::run)];
+const PARTS: [RowPart; 1] = [("kinds", kinds::run)];
 
 /// Measures the chosen rows; an error if a bar is missed.
 pub(crate) fn bench_stranger(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> {

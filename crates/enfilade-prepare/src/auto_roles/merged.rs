@@ -9,8 +9,7 @@ use enfilade_geom::{Aabb, Sets};
 use super::fillers::LEAF;
 use super::furniture::{BAR, LONG};
 use super::units::for_near;
-use super::{SMALL, Shape, is_open};
-use crate::roles::is_by_name;
+use super::{SMALL, Shape, is_by_name, is_open};
 
 /// Returns `true` if an object may be several things: it is longer than any furniture, as large as a room in all directions,
 /// and no user's rule says that all of it is structure. A name does not: merged meshes keep that of their first part.
