@@ -19,6 +19,7 @@ mod rooms;
 mod rows;
 mod score;
 mod sight;
+mod stranger;
 mod stream;
 mod subject;
 mod table;
@@ -108,6 +109,8 @@ enum What {
         #[arg(long)]
         write: bool,
     },
+    /// Scenes of strangers: a row per figure, with the value that it must reach. Rows: axes, verdict.
+    Stranger(Chosen),
     /// Robustness of rooms and doors against disturbed models: a row per figure, with the value that it must reach.
     /// Rows: moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign.
     Messy(Messy),
@@ -224,6 +227,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
         What::PortalTextures(options) => return bench_portal_textures(options, args.json),
         What::Stream(chosen) => return bench_rows(stream::ROWS, args.json, chosen),
         What::Town { step, scene, dir } => return stream::run_step(*step, scene, dir),
+        What::Stranger(chosen) => return stranger::bench_stranger(chosen, args.json),
         What::Messy(options) => return bench_messy(options, args.json),
         What::Trust(options) => return bench_trust(options, args.json),
         What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),

@@ -11,6 +11,7 @@ mod repair;
 mod roles;
 mod shells;
 mod tjunction;
+mod upward;
 
 pub use auto_roles::judge as judge_undecided;
 pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
@@ -21,3 +22,4 @@ pub use repair::{GridSteps, RepairOptions, RepairReport, repair, weld_quantized}
 pub use roles::{
     RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal, words,
 };
+pub use upward::{Upward, judge_up};
