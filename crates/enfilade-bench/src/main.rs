@@ -109,7 +109,8 @@ enum What {
         #[arg(long)]
         write: bool,
     },
-    /// Scenes of strangers: a row per figure, with the value that it must reach. Rows: kinds.
+    /// Scenes of strangers: a row per figure, with the value that it must reach. Rows:
+    /// axes, kinds, merged, verdict.
     Stranger(Chosen),
     /// Robustness of rooms and doors against disturbed models: a row per figure, with the value that it must reach.
     /// Rows: moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign.

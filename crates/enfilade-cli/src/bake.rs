@@ -29,8 +29,9 @@ use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
 use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
-use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
+use crate::screen::{At, Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
+use crate::verdict::{Verdict, is_empty, why_empty};
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
@@ -51,6 +52,9 @@ pub(crate) struct Bake {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    /// Write the world although it has no room; without this, nothing is written, and the exit code is 1.
+    #[arg(long)]
+    allow_empty: bool,
     #[command(flatten)]
     options: settings::BakeOptions,
 }
@@ -75,6 +79,7 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
     bar.finish();
     outputs.read(&imported.report.references)?;
+    let said = found::doubts(&imported.report)?;
     found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
     let mut config = settings.config_for(scene);
@@ -102,6 +107,20 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         told.insert("repair.weld".into(), repair.weld.to_string());
         told.insert("repair.hole".into(), repair.hole.to_string());
     }
+    if is_empty(&baked.world) {
+        let why = why_empty(&baked.world);
+        if !args.allow_empty {
+            report_bake(&baked, config, options.verbose)?;
+            if let Some(path) = &leak_path {
+                path.write(&mut path.says())?;
+            }
+            bail!(
+                "no room was found, and nothing was written: {why}; --allow-empty writes the world all the same"
+            );
+        }
+        writeln!(Warned, "no room was found: {why}")?;
+    }
+    let verdict = Verdict::of(&baked.world, &said);
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;
     if args.walk {
@@ -130,10 +149,11 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let mut out = outputs.printed();
     let written = Written::new(&args.output, &bytes);
     if args.json {
-        return print_json(out, &BakeReport::new(&baked, written));
+        return print_json(out, &BakeReport::new(&baked, written, verdict));
     }
     print_summary(&mut out, &baked.world)?;
     writeln!(out, "{written}")?;
+    writeln!(out, "{verdict}")?;
     Ok(())
 }
 
@@ -254,7 +274,6 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
     }
     write_seals(&mut err, &baked.world)?;
     write_holes(&mut err, &baked.world.graph, LEAKS_SHOWN)?;
-    doorless::write_roomless(&mut Warned, &baked.world.graph)?;
     doorless::write_doorless(&mut Warned, &baked.world.graph)?;
     Ok(())
 }
@@ -335,10 +354,11 @@ struct BakeReport<'a> {
     gaps: usize,
     /// Seconds of each stage.
     seconds: BTreeMap<&'static str, f64>,
+    verdict: Verdict,
 }
 
 impl<'a> BakeReport<'a> {
-    fn new(baked: &'a BakeOutput, written: Written) -> Self {
+    fn new(baked: &'a BakeOutput, written: Written, verdict: Verdict) -> Self {
         let times = baked.times.iter();
         Self {
             written,
@@ -347,6 +367,7 @@ impl<'a> BakeReport<'a> {
             notes: &baked.notes,
             gaps: baked.leaks.len(),
             seconds: times.map(|(s, t)| (s.name(), t.as_secs_f64())).collect(),
+            verdict,
         }
     }
 }

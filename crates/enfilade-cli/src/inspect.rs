@@ -17,7 +17,8 @@ use serde::Serialize;
 use specials::SpecialReport;
 
 use crate::limits::Limits;
-use crate::screen::{print_json, printed_at_once};
+use crate::screen::{At, print_json, printed_at_once};
+use crate::verdict::cells_in_words;
 use enfilade_cli::world::read_world;
 
 /// Shows the cells, portals and statistics of a world.
@@ -28,6 +29,9 @@ pub(crate) struct Inspect {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    /// Print the scores of portals, too, by which `enfilade simplify` removes them, and all counts of the builder.
+    #[arg(long)]
+    all: bool,
     #[command(flatten)]
     limits: Limits,
     /// Instead, list the objects that this cell sees, given by name or id, with their triangles.
@@ -44,7 +48,7 @@ pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
     } else if args.json {
         print_json(&mut out, &report(&world))?;
     } else {
-        write_tables(&mut out, &world)?;
+        write_tables(&mut out, &world, args.all)?;
     }
     out.flush().context("cannot write to standard output")
 }
@@ -217,8 +221,21 @@ fn kind_name(kind: PortalKind) -> &'static str {
     }
 }
 
-fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
-    let graph = &world.graph;
+fn write_tables(out: &mut impl Write, world: &World, all: bool) -> io::Result<()> {
+    write_cells(out, &world.graph)?;
+    writeln!(out)?;
+    write_portals(out, world, all)?;
+    writeln!(out)?;
+    specials::write(out, &world.graph)?;
+    if write_holes(out, &world.graph, usize::MAX)? {
+        writeln!(out)?;
+    }
+    write_seals(out, world)?;
+    write_totals(out, world, all)
+}
+
+/// The cells, the largest first.
+fn write_cells(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<()> {
     let mut by_volume: Vec<(usize, &Cell)> = graph.cells.iter().enumerate().collect();
     // Ids break ties, so that the table is reproducible.
     by_volume.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
@@ -240,48 +257,70 @@ fn write_tables(out: &mut impl Write, world: &World) -> io::Result<()> {
             c.portals.len()
         )?;
     }
-    writeln!(out)?;
     writeln!(
         out,
-        "{:>12}  {:<8} {:>21} {:>9} {:>9} {:>10} {:>7} {:>10} {:>8} {:>9}  middle in m",
-        "portal",
-        "kind",
-        "cells",
-        "width m",
-        "height m",
-        "area m²",
-        "pieces",
-        "seen m³",
-        "balance",
-        "score"
+        "triangles: of walls, seen without passing a portal; detail: of furniture and other objects in it"
     )?;
-    let scores = portal_scores(world, &CostModel::default());
-    for (id, s) in graph.portal_ids().zip(&scores) {
+    let is_void = graph.cells.iter().any(|c| c.is_void);
+    if is_void {
+        writeln!(
+            out,
+            "void: a space in which nobody can stand, such as a shaft or a hollow wall"
+        )?;
+    }
+    Ok(())
+}
+
+/// The portals, by id.
+fn write_portals(out: &mut impl Write, world: &World, with_scores: bool) -> io::Result<()> {
+    let graph = &world.graph;
+    let scores = match with_scores {
+        true => portal_scores(world, &CostModel::default()),
+        false => Vec::new(),
+    };
+    let titles = match with_scores {
+        true => format!(" {:>10} {:>8} {:>10}", "seen m³", "balance", "score"),
+        false => String::new(),
+    };
+    writeln!(
+        out,
+        "{:>12}  {:<8} {:>21} {:>9} {:>9} {:>10} {:>7}{titles}  middle in m",
+        "portal", "kind", "cells", "width m", "height m", "area m²", "pieces",
+    )?;
+    for id in graph.portal_ids() {
         let p = &graph[id];
         let [width, height] = p.size();
-        let [x, y, z] = p.center();
+        let at = At::of(p.center());
         let [one, other] = p.cells.map(|c| &graph[c].name);
         let cells = format!("{one} – {other}");
+        let scored = scores.get(id.idx()).map_or_else(String::new, |s| {
+            let (seen, balance) = (s.visible_volume, s.balance);
+            format!(" {seen:>10.1} {balance:>8.0} {:>10.0}", s.score())
+        });
         // A string, so that it is padded to the column.
         let id = id.to_string();
         writeln!(
             out,
-            "{id:>12}  {:<8} {cells:>21} {width:>9.2} {height:>9.2} {:>10.3} {:>7} {:>10.1} {:>8.0} {:>9.2e}  {x:.2} {y:.2} {z:.2}",
+            "{id:>12}  {:<8} {cells:>21} {width:>9.2} {height:>9.2} {:>10.3} {:>7}{scored}  {at}",
             kind_name(p.kind),
             p.area,
             p.pieces.len(),
-            s.visible_volume,
-            s.balance,
-            s.score()
         )?;
     }
-    writeln!(out)?;
-    specials::write(out, graph)?;
-    if write_holes(out, graph, usize::MAX)? {
-        writeln!(out)?;
+    if graph.portals.iter().any(|p| p.pieces.len() > 1) {
+        writeln!(
+            out,
+            "pieces: parts of the opening, as between the bars of a frame"
+        )?;
     }
-    write_seals(out, world)?;
-    write_totals(out, world)
+    if with_scores {
+        writeln!(
+            out,
+            "seen m³: air from which the portal is seen; balance: difference between the costs of its cells; score: their \
+             product, and the highest is removed first by `simplify`"
+        )?;
+    }
+    Ok(())
 }
 
 /// Lists openings to the outdoors that may be holes of the model, if any.
@@ -301,7 +340,7 @@ pub(crate) fn write_holes(
     )?;
     for h in holes.iter().take(most) {
         let p = &graph[h.portal];
-        let ([x, y, z], [width, height]) = (h.position, p.size());
+        let (at, [width, height]) = (At::of(h.position), p.size());
         let cell = p
             .cells
             .iter()
@@ -309,7 +348,7 @@ pub(crate) fn write_holes(
             .map_or("-", |&c| &graph[c].name);
         writeln!(
             out,
-            "  at {x:.2} {y:.2} {z:.2}: {width:.2} × {height:.2} m, {} of {cell}, {}",
+            "  at {at}: {width:.2} × {height:.2} m, {} of {cell}, {}",
             h.portal, h.reason
         )?;
     }
@@ -329,30 +368,19 @@ pub(crate) fn write_seals(out: &mut impl Write, world: &World) -> io::Result<()>
     if seals.count == 0 {
         return Ok(());
     }
-    let (area, [x, y, z]) = seals.largest;
+    let (area, at) = (seals.largest.0, At(seals.largest.1));
     writeln!(
         out,
-        "{} gaps in the model were closed by seals, {:.3} m² in all; the largest at {x:.2} {y:.2} {z:.2}: {area:.3} m² \
-         (--smallest-hole)",
+        "{} gaps in the model were closed by seals (polygons across gaps narrower than --smallest-hole), {:.3} m² in all; \
+         the largest at {at}: {area:.3} m²",
         seals.count, seals.area
     )
 }
 
-fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
+fn write_totals(out: &mut impl Write, world: &World, all: bool) -> io::Result<()> {
     let graph = &world.graph;
     let mut row = |name: &str, value: String| writeln!(out, "{name:<22} {value}");
-    let indoor = graph.indoor_cells().count();
-    let outdoors = if indoor < graph.cells.len() {
-        " and outdoors"
-    } else {
-        ""
-    };
-    let n_rooms = graph.rooms().count();
-    let rooms = match indoor - n_rooms {
-        0 => indoor.to_string(),
-        n => format!("{n_rooms} rooms, {n} voids"),
-    };
-    row("cells", format!("{rooms}{outdoors}"))?;
+    row("cells", cells_in_words(graph))?;
     let mut kinds = BTreeMap::new();
     for p in &graph.portals {
         *kinds.entry(p.kind).or_insert(0_usize) += 1;
@@ -415,6 +443,9 @@ fn write_totals(out: &mut impl Write, world: &World) -> io::Result<()> {
         ),
     )?;
     row("input hash", graph.provenance.input_hash.clone())?;
+    if !all {
+        return Ok(());
+    }
     for (name, value) in &graph.statistics.counts {
         if name != "input_triangles" {
             row(&name.replace('_', " "), value.to_string())?;

@@ -34,6 +34,7 @@ mod serve;
 mod simplify;
 mod sound;
 mod specials;
+mod verdict;
 mod verify;
 #[cfg(feature = "view")]
 mod view;

@@ -1,5 +1,6 @@
 //! `enfilade plan`: a floor plan per storey.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -9,7 +10,8 @@ use enfilade_report::{Drawing, PAPERS, Paper, PlanOptions, Plans, Storey, to_pdf
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
-use crate::screen::print_json;
+use crate::screen::{Warned, print_json};
+use crate::verdict::{is_empty, why_empty};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
@@ -91,6 +93,14 @@ pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
         outputs.write("-o", Format::Plan, &args.output)?;
     }
     let world = read(args)?;
+    if is_empty(&world) {
+        writeln!(
+            Warned,
+            "{} has no room, so that the plan shows the ground outdoors at most: {}",
+            name_of(&args.world),
+            why_empty(&world)
+        )?;
+    }
     let options = PlanOptions {
         cut_height: args.height,
     };

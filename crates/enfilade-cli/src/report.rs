@@ -20,6 +20,7 @@ use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
 use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
 use crate::screen::{Warned, print_json};
+use crate::verdict::{Verdict, cells_in_words};
 use crate::walk_page;
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
@@ -90,6 +91,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         walk: walk.as_deref().map(walk_page::address_of_page),
         ..ReportParts::default()
     };
+    parts.notes.push(Verdict::of(&world, &[]).sentence());
     parts.visible = visible(&world, &mut parts.notes)?;
     let sight = Sight::build(&world).with_context(|| name_of(&args.world))?;
     let steps = measured(&world, &sight, args.views as usize);
@@ -205,7 +207,7 @@ fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
         rows: vec![
             row(&["", "all", "mean of a room", "most of a room"]),
             row(&[
-                "cells (outdoors and voids included)",
+                &format!("cells: {}", cells_in_words(graph)),
                 &n_cells.to_string(),
                 "",
                 "",

@@ -57,6 +57,24 @@ pub(crate) fn is_broken_pipe(error: &anyhow::Error) -> bool {
         .any(|e| e.kind() == io::ErrorKind::BrokenPipe)
 }
 
+/// A place for people: three coordinates in centimeters, never minus zero. [Units: wu]
+pub(crate) struct At(pub(crate) [f64; 3]);
+
+impl At {
+    /// Makes a place of a file's numbers.
+    pub(crate) fn of(place: [f32; 3]) -> Self {
+        Self(place.map(f64::from))
+    }
+}
+
+impl fmt::Display for At {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Adding zero makes 0 of -0.
+        let [x, y, z] = self.0.map(|v| (v * 100.0).round() / 100.0 + 0.0);
+        write!(f, "{x:.2} {y:.2} {z:.2}")
+    }
+}
+
 /// A writer of text for people: each call of `writeln!` makes one line.
 pub(crate) struct Screen<W>(W);
 

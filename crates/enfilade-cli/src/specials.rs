@@ -3,6 +3,8 @@
 use enfilade::cpg::{CellPortalGraph, SpecialId, SpecialShape, Way};
 use enfilade::geom::{Aabb, DVec3, shown};
 
+use crate::screen::At;
+
 /// Says what a special portal is, in words.
 pub(crate) fn described(graph: &CellPortalGraph, special: SpecialId) -> String {
     let side = &graph.specials[special.idx()];
@@ -28,8 +30,8 @@ pub(crate) fn described(graph: &CellPortalGraph, special: SpecialId) -> String {
                 }
             }
             Way::Monitor(camera) => {
-                let [x, y, z] = camera.eye;
-                format!("monitor of a camera at {x:.2} {y:.2} {z:.2}")
+                let at = At(camera.eye.map(f64::from));
+                format!("monitor of a camera at {at}")
             }
         };
         let [r, g, b, _] = pass.tint;
@@ -47,12 +49,10 @@ pub(crate) fn described(graph: &CellPortalGraph, special: SpecialId) -> String {
     };
     let at = middle(graph, special);
     let text = format!(
-        "{} of {place} in {}, at {:.2} {:.2} {:.2}",
+        "{} of {place} in {}, at {}",
         passes.join(" + "),
         graph[side.cell].name,
-        at.x,
-        at.y,
-        at.z
+        At(at.to_array())
     );
     shown(text).to_string()
 }

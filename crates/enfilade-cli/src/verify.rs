@@ -11,7 +11,7 @@ use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
     SourceDetail, VerifyOptions, ViewOptions, ViewReport, compare_details, compare_scene,
-    verify_evidence, verify_views, verify_world_with_progress,
+    other_scene, verify_evidence, verify_views, verify_world_with_progress,
 };
 
 use crate::bake::settings::{SceneOptions, bound_converter};
@@ -105,6 +105,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
         tolerance: args.tolerance,
         max_listed: args.list,
     };
+    refuse_other(args, &world, structure.as_deref(), &options)?;
     let bar = StageBar::new();
     bar.start("shooting rays", args.rays.saturating_mul(2));
     let mut report =
@@ -177,6 +178,23 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             "{} is not drawn whole: {} pixels differ from pictures without culling",
             name_of(&args.world),
             exact.differing
+        );
+    }
+    Ok(())
+}
+
+/// Ends if the source is another scene: nothing that differs from it is then worth a number.
+fn refuse_other(
+    args: &Verify,
+    world: &World,
+    structure: Option<&[Triangle]>,
+    options: &VerifyOptions,
+) -> anyhow::Result<()> {
+    let problem = structure.and_then(|structure| other_scene(world, structure, options));
+    if let Some(problem) = problem {
+        bail!(
+            "{} was not compared: {problem}; give the scene of its bake, with the same --unit, --up, --detail-name and so on",
+            name_of(&args.world)
         );
     }
     Ok(())

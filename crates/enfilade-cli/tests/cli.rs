@@ -146,7 +146,7 @@ fn inspect_prints_a_table_for_people() {
     for part in [
         "outdoors",
         "window",
-        "2 and outdoors",
+        "2 rooms and outdoors",
         "2 (1 open, 1 window)",
         "4.00 × 3.00 × 5.00",
         "portal-0",
@@ -166,7 +166,7 @@ fn inspect_tells_voids_from_rooms() {
     let path = file("void.glb", &encode_glb(&world).unwrap());
     let done = enfilade(&["inspect", path.to_str().unwrap()], "");
     let table = text(&done.stdout);
-    assert!(table.contains("1 rooms, 1 voids and outdoors"), "{table}");
+    assert!(table.contains("1 room, 1 void and outdoors"), "{table}");
     let done = enfilade(&["inspect", path.to_str().unwrap(), "--json"], "");
     let report: Value = serde_json::from_slice(&done.stdout).unwrap();
     let kinds = [0, 1, 2].map(|c: usize| report["cells"][c]["kind"].clone());

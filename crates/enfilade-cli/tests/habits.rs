@@ -165,13 +165,13 @@ fn quiet_leaves_errors_and_warnings() {
     let done = run(&dir, "inspect -q none.glb");
     assert!(text(&done.stderr).contains("none.glb"));
     fs::write(dir.join("flat.obj"), "v 0 0 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\n").unwrap();
-    let done = run(&dir, "bake flat.obj -o flat.glb");
+    let done = run(&dir, "bake flat.obj -o flat.glb --allow-empty");
     let all = text(&done.stderr);
     assert!(
         all.contains("no room was found") && all.contains("method "),
         "{all}"
     );
-    let done = run(&dir, "--quiet bake flat.obj -o flat.glb");
+    let done = run(&dir, "--quiet bake flat.obj -o flat.glb --allow-empty");
     let left = text(&done.stderr);
     assert!(left.starts_with("no room was found"), "{left}");
     assert!(

@@ -142,6 +142,10 @@ fn no_bake_without_rooms_is_silent() {
             let input = obj.write(&format!("{name}_{method}.obj"));
             let done = bake(&input, &["--method", method]);
             let text = said(&done);
+            assert_eq!(done.status.code(), Some(1), "{name} by {method}: {text}");
+            assert!(text.contains("nothing was written"), "{text}");
+            let done = bake(&input, &["--method", method, "--allow-empty"]);
+            let text = said(&done);
             assert!(done.status.success(), "{name} by {method}: {text}");
             assert_eq!(row(&done, "cells indoors"), 0, "{name} by {method}");
             for words in ["no room was found", way] {

@@ -7,6 +7,7 @@
 
 mod access;
 mod cell_set;
+mod doubts;
 mod fitting;
 mod graph;
 mod holes;
@@ -27,6 +28,7 @@ pub mod wire;
 
 pub use access::Exit;
 pub use cell_set::CellSet;
+pub use doubts::Doubt;
 pub use fitting::{Fitting, FittingPart, Motion, MotionKind};
 pub use graph::{
     Batch, Cell, CellPortalGraph, DetailObject, Portal, PortalKind, Provenance, Statistics, World,

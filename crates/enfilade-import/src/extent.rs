@@ -1,9 +1,11 @@
 //! Checks of a scene's size for a wrong unit.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, triangle_area_normal};
+use enfilade_prepare::{Upward, judge_up};
 
-use crate::{FileReport, ImportError, ImportOptions, ImportReport};
+use crate::report::UpDoubt;
+use crate::{FileReport, ImportError, ImportOptions, ImportReport, Up};
 
 /// Returns the files of a report, comma separated.
 pub(crate) fn paths_of(report: &ImportReport) -> String {
@@ -11,7 +13,8 @@ pub(crate) fn paths_of(report: &ImportReport) -> String {
     report.files.iter().map(path).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns an error for scenes far larger or smaller than any building, or far off the origin.
+/// Returns an error for scenes far larger or smaller than any building, or far off the origin. Its advice is whole: the
+/// axis is named with the unit, and the unit before the place, so that no second error waits behind the first.
 pub(crate) fn check(
     scene: &Scene,
     report: &ImportReport,
@@ -29,6 +32,9 @@ pub(crate) fn check(
     let bounds = counted.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i]));
     let size = bounds.size();
     let unit = options.unit.unwrap_or(1.0);
+    let up = report.up_doubt.as_ref().filter(|doubt| doubt.is_clear);
+    let up = up.and_then(|doubt| doubt.up);
+    let and_up = up.map_or(String::new(), |up| format!(" {}", up.option()));
     let error = |bound: String, offender, advice| {
         Err(ImportError::Extent {
             paths: paths_of(report),
@@ -49,12 +55,14 @@ pub(crate) fn check(
         } else {
             String::new()
         };
+        let units = plausible_units(scene, size, report);
         let factor = if longest * 0.01 > limit { 0.001 } else { 0.01 };
         let factor = if longest * 0.001 > 1.0 { 0.001 } else { factor };
-        let advice = format!(
-            "{advice}give the unit of its numbers, e.g. --unit {}",
-            significant(unit * factor)
-        );
+        let named = match units[..] {
+            [only] if options.unit.is_none() => given(&[only]),
+            _ => format!("e.g. --unit {}", significant(unit * factor)),
+        };
+        let advice = format!("{advice}give the unit of its numbers, {named}{and_up}");
         return error(format!("larger than {limit} m"), offender, advice);
     }
     if longest < limits.min_extent {
@@ -71,7 +79,7 @@ pub(crate) fn check(
             1000.0
         };
         let advice = format!(
-            "give the unit of its numbers, e.g. --unit {}",
+            "give the unit of its numbers, e.g. --unit {}{and_up}",
             significant(unit * factor)
         );
         return error(
@@ -82,11 +90,9 @@ pub(crate) fn check(
     }
     let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
     if reach > limits.max_coordinate {
-        let center = bounds.center().round();
-        let advice = format!(
-            "move the scene to its origin, e.g. --origin {},{},{}",
-            center.x, center.y, center.z
-        );
+        let doubt = report.unit_doubt.as_ref();
+        let units = doubt.map_or_else(Vec::new, |_| plausible_units(scene, size, report));
+        let advice = nearer(bounds, &units, up, limits.max_coordinate);
         return error(
             format!(
                 "and {reach:.0} m off its origin, where 32-bit numbers are too coarse \
@@ -107,6 +113,27 @@ pub(crate) fn check(
         );
     }
     Ok(())
+}
+
+/// Returns how to bring a scene near its origin: by its unit, if that is in doubt, and by moving it.
+fn nearer(bounds: Aabb, units: &[(&str, f64)], up: Option<Up>, most: f64) -> String {
+    let meters = units.first().map_or(1.0, |unit| unit.1);
+    let reach = meters * bounds.extent();
+    let mut options = up.map_or(String::new(), |up| format!(" {}", up.option()));
+    let DVec3 { x, y, z } = (bounds.center() * meters).round();
+    // The middle, once the scene is turned.
+    let [x, y, z] = match up {
+        None => [x, y, z],
+        Some(Up::Z) => [x, z, -y],
+        Some(Up::Y) => [x, -z, y],
+    };
+    if units.is_empty() {
+        return format!("move the scene to its origin, e.g. --origin {x},{y},{z}{options}");
+    }
+    if reach > most {
+        options += &format!(" --origin {x},{y},{z}");
+    }
+    format!("give the unit of its numbers: {}{options}", given(units))
 }
 
 /// Rounds to six digits: short to type, and free of the residue of binary fractions.
@@ -141,16 +168,69 @@ const TALL: f64 = 60.0;
 /// Units that the numbers may be in, in meters.
 const UNITS: [(&str, f64); 3] = [("mm", 0.001), ("cm", 0.01), ("in", 0.0254)];
 
-/// Returns a warning, before hours pass, that the unit may be wrong: only if none was given and the format has none.
+/// Height of walls that is least wrong: from 1.9 to 4.8 m, so that no two units fit the same walls. [Units: wu]
+const WALL: f64 = 3.0;
+const WALL_FACTOR: f64 = 1.6;
+
+/// Returns the units in which a scene of this size is a building: only one, if its walls show it.
+fn plausible_units(scene: &Scene, size: DVec3, report: &ImportReport) -> Vec<(&'static str, f64)> {
+    let (least, longest) = (size.min_element(), size.max_element());
+    // At least a storey high, and not so high as to be doubtful itself.
+    let fits = |&(_, meters): &(&str, f64)| {
+        least * meters >= 2.0 && least * meters <= TALL && longest * meters >= 3.0
+    };
+    let mut units: Vec<(&str, f64)> = UNITS.into_iter().filter(fits).collect();
+    if units.len() > 1 {
+        let up = report.up_doubt.as_ref().filter(|doubt| doubt.is_clear);
+        let height = wall_height(scene, up.map_or(1, |doubt| doubt.axis));
+        let misfit = |u: &(&str, f64)| (height * u.1 / WALL).ln().abs();
+        units.sort_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+        if misfit(&units[0]) <= WALL_FACTOR.ln() {
+            units.truncate(1);
+        }
+    }
+    units
+}
+
+/// Share of the area of walls that is in lower triangles. Pieces beside openings and sills are low.
+const LOWER: f64 = 0.9;
+
+/// Returns the height of the upright structural triangles, but the few highest; 0 if there are none.
+fn wall_height(scene: &Scene, up: usize) -> f64 {
+    let sources = scene.triangle_sources(Role::Structural);
+    let triangles = sources.map(|s| scene.world_triangle(s));
+    let mut heights: Vec<[f64; 2]> = triangles
+        .map(|t| (triangle_area_normal(&t), Aabb::of_points(&t).size()[up]))
+        .filter(|(normal, _)| normal[up].abs() < 0.05 * normal.length())
+        .map(|(normal, height)| [height, normal.length()])
+        .collect();
+    heights.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut left = LOWER * heights.iter().map(|h| h[1]).sum::<f64>();
+    for [height, area] in heights {
+        left -= area;
+        if left <= 0.0 {
+            return height;
+        }
+    }
+    0.0
+}
+
+/// Returns the options that give one of these units.
+fn given(units: &[(&str, f64)]) -> String {
+    let names: Vec<&str> = units.iter().map(|u| u.0).collect();
+    format!("--unit {}", names.join(" or --unit "))
+}
+
+/// Returns the reason to doubt that the numbers are meters, before hours pass: only if no unit was given and the
+/// format does not have one that all its writers know.
 ///
-/// A landscape may be as large; so nothing is rejected or changed.
+/// A landscape may be as large; so nothing is changed.
 pub(crate) fn unit_doubt(
     scene: &Scene,
     report: &ImportReport,
     options: &ImportOptions,
 ) -> Option<String> {
-    let has_no_unit = |f: &FileReport| matches!(f.format, "OBJ" | "PLY" | "STL");
-    if options.unit.is_some() || !report.files.iter().all(has_no_unit) {
+    if options.unit.is_some() || report.files.iter().any(|f| f.format == MAP) {
         return None;
     }
     let structural = |i: &usize| scene.objects[*i].role == Role::Structural;
@@ -158,21 +238,63 @@ pub(crate) fn unit_doubt(
     let size = boxes
         .fold(Aabb::EMPTY, |b, i| b.union(scene.object_aabb(i)))
         .size();
-    let (least, longest) = (size.min_element(), size.max_element());
-    // At least a storey high, and not so high as to be doubtful itself.
-    let fits =
-        |meters: f64| least * meters >= 2.0 && least * meters <= TALL && longest * meters >= 3.0;
-    let names: Vec<&str> = UNITS.iter().filter(|u| fits(u.1)).map(|u| u.0).collect();
-    if least <= TALL || names.is_empty() {
+    let units = plausible_units(scene, size, report);
+    if size.min_element() <= TALL || units.is_empty() {
         return None;
     }
     Some(format!(
         "{}: the scene is {:.0} x {:.0} x {:.0} m if its numbers are meters, far more than a building; if it is one, give the \
-         unit of its numbers: --unit {}",
+         unit of its numbers: {}",
         paths_of(report),
         size.x,
         size.y,
         size.z,
-        names.join(" or --unit ")
+        given(&units)
     ))
+}
+
+/// Format whose unit is known, and whose z axis points up.
+const MAP: &str = "Quake map";
+
+/// Returns the reason to doubt that the axis which was taken to point up does so; only if none was given.
+pub(crate) fn up_doubt(
+    scene: &Scene,
+    report: &ImportReport,
+    options: &ImportOptions,
+) -> Option<UpDoubt> {
+    if options.up.is_some() {
+        return None;
+    }
+    let (axis, is_clear) = match judge_up(scene) {
+        Upward::Clear(axis) => (axis, true),
+        Upward::Likely(axis) => (axis, false),
+        Upward::Unknown => return None,
+    };
+    // Maps are read with z up, so that across z here is across y there.
+    let (other, turned) = match report.files.iter().any(|f| f.format == MAP) {
+        false => ("z", Up::Z),
+        true => ("y", Up::Y),
+    };
+    let (name, up) = match axis {
+        0 => ("x", None),
+        1 => return None,
+        _ => (other, Some(turned)),
+    };
+    let advice = up.map_or("turn the scene where it was made".into(), |up| {
+        format!("give {}", up.option())
+    });
+    let paths = paths_of(report);
+    let text = if is_clear {
+        format!("{paths}: {name} points up, to judge by its floors and ceilings: {advice}")
+    } else {
+        format!(
+            "{paths}: which way is up is not clear from its floors; if the plan cuts through all storeys, {advice}"
+        )
+    };
+    Some(UpDoubt {
+        text,
+        axis,
+        up,
+        is_clear,
+    })
 }

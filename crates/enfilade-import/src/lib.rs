@@ -55,7 +55,7 @@ pub use options::{IfcConverter, ImportOptions, Limits, Up};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
-pub use report::{FileReport, ImportReport, Note, cleaning_report};
+pub use report::{FileReport, ImportReport, Note, UpDoubt, cleaning_report};
 
 use builder::Builder;
 use enfilade_geom::scene::Scene;
@@ -286,8 +286,9 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
             advice,
         });
     }
-    extent::check(&scene, &report, options)?;
+    report.up_doubt = extent::up_doubt(&scene, &report, options);
     report.unit_doubt = extent::unit_doubt(&scene, &report, options);
+    extent::check(&scene, &report, options)?;
     if options.roles.is_automatic && !options.roles.is_manual {
         enfilade_prepare::judge_undecided(&mut scene);
     }

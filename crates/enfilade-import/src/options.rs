@@ -14,6 +14,17 @@ pub enum Up {
     Z,
 }
 
+impl Up {
+    /// Returns the option of the command, as typed.
+    #[must_use]
+    pub fn option(self) -> &'static str {
+        match self {
+            Self::Y => "--up y",
+            Self::Z => "--up z",
+        }
+    }
+}
+
 /// Settings of an import.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {

@@ -6,6 +6,8 @@ use enfilade_prepare::{BadOption, CleaningOptions, CleaningReport, Finding, Repa
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::Up;
+
 /// Most distinct notes kept; further ones are only counted.
 const MAX_NOTES: usize = 500;
 
@@ -35,8 +37,24 @@ pub struct ImportReport {
     pub references: Vec<PathBuf>,
     /// The reason why the numbers are probably not meters, and the remedy; `None` without evidence.
     pub unit_doubt: Option<String>,
+    /// The reason why the axis taken for up probably is not, and the remedy; `None` without evidence, and if the options
+    /// give an axis.
+    pub up_doubt: Option<UpDoubt>,
     /// Changes of the repair, if one was requested.
     pub repair: Option<RepairReport>,
+}
+
+/// Evidence that another axis points up than the one that was taken to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UpDoubt {
+    /// The reason and the remedy.
+    pub text: String,
+    /// The axis that seems to point up, as the scene was read: 0 is x.
+    pub axis: usize,
+    /// The axis to give in the options, if one turns the scene.
+    pub up: Option<Up>,
+    /// The evidence is strong.
+    pub is_clear: bool,
 }
 
 /// One input file.
@@ -66,6 +84,13 @@ pub struct Note {
 }
 
 impl ImportReport {
+    /// Returns `true` if all files are in formats that state neither a unit nor an axis that points up.
+    #[must_use]
+    pub fn is_bare(&self) -> bool {
+        let is_bare = |f: &FileReport| matches!(f.format, "OBJ" | "PLY" | "STL");
+        self.files.iter().all(is_bare)
+    }
+
     pub(crate) fn note(&mut self, path: &Path, place: impl Into<String>, text: impl Into<String>) {
         let text = text.into();
         if let Some(note) = self

@@ -12,6 +12,7 @@ mod repair;
 mod roles;
 mod shells;
 mod tjunction;
+mod upward;
 
 pub use auto_roles::judge as judge_undecided;
 pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
@@ -22,3 +23,4 @@ pub use repair::{GridSteps, RepairOptions, RepairReport, repair, weld_quantized}
 pub use roles::{
     RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal, words,
 };
+pub use upward::{Upward, judge_up};

@@ -175,10 +175,11 @@ fn summary(world: &World, storeys: &[&Storey], n_voids: usize) -> String {
     let volume: f32 = indoors.clone().map(|c| c.volume).sum();
     let voids = match n_voids {
         0 => String::new(),
-        n => format!(" and {n} voids"),
+        1 => ", 1 void".into(),
+        n => format!(", {n} voids"),
     };
     format!(
-        "{} rooms in {} storeys{voids}, {volume:.0} m³ of air; {} doors, {} windows, {} open passages, {} cracks; {} objects",
+        "{} rooms{voids} in {} storeys, {volume:.0} m³ of air; {} doors, {} windows, {} open passages, {} cracks; {} objects",
         indoors.count() - n_voids,
         storeys.iter().filter(|s| !s.is_between).count(),
         n(PortalKind::Door),

@@ -69,7 +69,7 @@ pub use carried::compare_scene;
 pub use evidence::{EvidenceError, EvidenceReport, verify_evidence};
 pub use options::VerifyOptions;
 pub use report::{CompleteCounts, Failure, FailureKind, SealedCounts, VerifyReport, VisibleCounts};
-pub use source::{SourceDetail, compare_details};
+pub use source::{SourceDetail, compare_details, other_scene};
 pub use subject::{structural_triangles, tolerance};
 pub use views::{Missed, Seer, ViewAnswer, ViewOptions, ViewQuery, ViewReport, verify_views};
 
@@ -126,7 +126,7 @@ pub fn verify_world_with_progress(
     let visible = Visible::new(world, subject.eps);
     problems.extend(visible.iter().flat_map(Visible::check));
     if let Some(source) = source {
-        problems.extend(source::problem(&own, source, 4.0 * subject.eps));
+        problems.extend(source::problem(&own, source, source::REACH * subject.eps));
     }
 
     let n_chunks = options.rays.div_ceil(CHUNK);

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use enfilade_cpg::World;
 use enfilade_geom::{Aabb, Bvh, Triangle};
 
-use crate::details;
+use crate::{VerifyOptions, details, structural_triangles, tolerance};
 
 /// Most triangles of each side that are searched on the other's surface.
 const ASKED: usize = 2000;
@@ -14,6 +14,26 @@ const ASKED: usize = 2000;
 const SAME: usize = 50;
 /// Least percentage of triangles on the other's surface if fewer are equal: a world may have cut all of them.
 const ON_SURFACE: usize = 95;
+
+/// Returns the problem if `source` is another scene than the one that a world was baked from: nothing else is then worth
+/// counting. `None` for a world that is broken, too.
+///
+/// O(n log n) for n triangles; no ray is cast.
+#[must_use]
+pub fn other_scene(world: &World, source: &[Triangle], options: &VerifyOptions) -> Option<String> {
+    world.validate().ok()?;
+    let own = structural_triangles(world).into_iter();
+    let own = own.filter(|t| !world.batches[t.1 as usize].is_seal);
+    let own: Vec<Triangle> = own.map(|t| t.0).collect();
+    let bounds = own
+        .iter()
+        .fold(Aabb::EMPTY, |b, t| b.union(Aabb::of_points(t)));
+    let eps = options.tolerance.unwrap_or_else(|| tolerance(&bounds));
+    problem(&own, source, REACH * eps)
+}
+
+/// Distance at which a triangle lies on a surface, in tolerances.
+pub(crate) const REACH: f64 = 4.0;
 
 /// Returns the problem if the source is another scene's. `reach` allows for rounding.
 pub(crate) fn problem(own: &[Triangle], source: &[Triangle], reach: f64) -> Option<String> {

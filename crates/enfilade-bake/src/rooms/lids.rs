@@ -65,11 +65,11 @@ impl Lids {
         let note = |what: &str, ends: &str, voxels: &BitVolume| {
             let area = voxels.count() as f64 * grid.voxel * grid.voxel;
             format!(
-                "{what} of {area:.0} m² added as open portals, where walls end at {ends} with nothing {}",
+                "{what} of {area:.0} m² are missing, where walls end at {ends} with nothing {}: open portals stand in for them",
                 if ends == "the top" { "above" } else { "below" }
             )
         };
-        let lids = self.lids.as_ref().map(|v| note("lids", "the top", v));
+        let lids = self.lids.as_ref().map(|v| note("ceilings", "the top", v));
         let floors = self.floors.as_ref().map(|v| note("floors", "the foot", v));
         lids.into_iter().chain(floors).collect()
     }

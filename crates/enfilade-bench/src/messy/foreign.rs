@@ -25,7 +25,7 @@ pub(super) fn run(bench: &mut Bench<'_>) -> anyhow::Result<()> {
     };
     let scenes: [(&str, &[&str], Judge); 3] = [
         ("hotel-room.glb", &["--unit", "mm"], hotel_room),
-        ("nav_test.obj", &[], boxes),
+        ("nav_test.obj", &["--allow-empty"], boxes),
         ("sports-hall.glb", &[], hall),
     ];
     for (file, settings, judge) in scenes {

@@ -2,17 +2,26 @@
 //!
 //! One file for each kind of row.
 
+mod axes;
+mod baked;
 mod kinds;
+mod merged;
+mod verdict;
 
 use crate::rows::{Chosen, RowPrinter};
 
 /// Prints the rows whose names begin with the first item.
-type RowPart = (
+type RowKind = (
     &'static str,
     fn(&Chosen, &mut RowPrinter) -> anyhow::Result<()>,
 );
 
-const PARTS: [RowPart; 1] = [("kinds", kinds::run)];
+const PARTS: [RowKind; 4] = [
+    ("axes", axes::run),
+    ("kinds", kinds::run),
+    ("merged", merged::run),
+    ("verdict", verdict::run),
+];
 
 /// Measures the chosen rows; an error if a bar is missed.
 pub(crate) fn bench_stranger(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> {

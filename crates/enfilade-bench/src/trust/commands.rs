@@ -51,7 +51,8 @@ pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
         for (name, bytes) in more {
             std::fs::write(rows.path(name), bytes)?;
         }
-        let bake = ["bake", "w.obj", "-o", "w.glb", "--max-time", "60"];
+        let bake = "bake w.obj -o w.glb --max-time 60 --allow-empty --up y --unit m";
+        let bake: Vec<&str> = bake.split(' ').collect();
         if rows.enfilade(&bake, 200)?.code != Some(0) {
             // There is no world to query.
             rows.print("commands", &scene, None, "a world", None);

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::Write;
 
+use anyhow::bail;
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::shown;
 use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
 
-use crate::screen::{Told, Warned, write_lines};
+use crate::screen::{At, Told, Warned, write_lines};
 
 /// Reports what was read; with `verbose`, also the roles of the objects and all notes of the import.
 pub(super) fn report_import(
@@ -20,9 +21,6 @@ pub(super) fn report_import(
     if verbose {
         write_lines(&mut err, report)?;
         write_lines(&mut err, &roles(scene))?;
-    }
-    if let Some(doubt) = &report.unit_doubt {
-        writeln!(Warned, "{doubt}")?;
     }
     let title = if let Some(repair) = &report.repair {
         writeln!(
@@ -40,14 +38,41 @@ pub(super) fn report_import(
         write_lines(&mut err, &cleaning)?;
     }
     if let Some(hole) = cleaning.holes.examples.first() {
-        let (n, p) = (cleaning.holes.n, hole.position);
+        let (n, at) = (cleaning.holes.n, At(hole.position.to_array()));
         writeln!(
             Warned,
-            "triangles are missing in {n} places, most at {:.2} {:.2} {:.2} in '{}': --repair-holes 10 fills holes of up to 10 m",
-            p.x, p.y, p.z, hole.name
+            "triangles are missing in {n} places, most at {at} in '{}': --repair-holes 10 fills holes of up to 10 m",
+            hole.name
         )?;
     }
     Ok(())
+}
+
+/// Returns the doubts about unit and axis, for the verdict. They are reported; the bake ends if the files state neither,
+/// as their numbers alone then speak.
+pub(super) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<String>> {
+    let up = report.up_doubt.as_ref();
+    let clear = up.filter(|doubt| doubt.is_clear);
+    let said: Vec<String> = [report.unit_doubt.clone(), clear.map(|d| d.text.clone())]
+        .into_iter()
+        .flatten()
+        .collect();
+    if report.is_bare() && !said.is_empty() {
+        let unit = report.unit_doubt.as_ref().map(|_| "--unit m");
+        let as_is: Vec<&str> = unit.into_iter().chain(clear.map(|_| "--up y")).collect();
+        bail!(
+            "{}; if it is right as it is, {}",
+            said.join("; and "),
+            as_is.join(" ")
+        );
+    }
+    for text in &said {
+        writeln!(Warned, "{text}")?;
+    }
+    if let Some(doubt) = up.filter(|doubt| !doubt.is_clear) {
+        writeln!(Warned, "{}", doubt.text)?;
+    }
+    Ok(said)
 }
 
 /// Most names listed for one reason.

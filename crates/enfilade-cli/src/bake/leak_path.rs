@@ -9,7 +9,7 @@ use enfilade::geom::scene::Scene;
 use enfilade_cli::memory::held_memory;
 
 use crate::progress::StageBar;
-use crate::screen::{Told, Warned};
+use crate::screen::{At, Told, Warned};
 
 /// A way out, or the reason why there is none to show.
 pub(super) struct LeakPath {
@@ -96,7 +96,7 @@ impl LeakPath {
             Ok(trail) => trail,
             Err(why) => return writeln!(out, "no way out can be shown: {why}"),
         };
-        let at = |p: DVec3| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z);
+        let at = |p: DVec3| At(p.to_array()).to_string();
         writeln!(
             out,
             "the widest way out, {:.1} m long: from {}, narrowest at {} (a ball of {:.2} m passes), out at {}",

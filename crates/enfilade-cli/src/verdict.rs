@@ -1,0 +1,239 @@
+//! A verdict on a world in plain words: how far to trust it, and the option to try if not.
+
+use std::fmt::Write as _;
+
+use enfilade::cpg::{CellPortalGraph, Doubt, World};
+use serde::Serialize;
+
+/// A foot. [Units: wu]
+const FOOT: f32 = 0.3048;
+/// Usual heights of doors. [Units: wu]
+const DOOR: [f32; 2] = [1.8, 2.5];
+
+/// How far to trust a world, by what was found in it.
+#[derive(Serialize)]
+pub(crate) struct Verdict {
+    trust: Trust,
+    /// A sentence about what was found.
+    summary: String,
+    reasons: Vec<Reason>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Trust {
+    /// Nothing speaks against it.
+    Good,
+    /// Parts of it may be wrong.
+    Fair,
+    /// It is probably not the building that was meant.
+    Low,
+    /// There is no room.
+    None,
+}
+
+/// A reason for less trust.
+#[derive(Serialize)]
+struct Reason {
+    /// The sign, and the usual cause.
+    text: String,
+    /// Options to try.
+    options: Vec<&'static str>,
+}
+
+impl Verdict {
+    /// Judges a world. `said` are doubts about its input that were reported before the bake.
+    pub(crate) fn of(world: &World, said: &[String]) -> Self {
+        let doubts = world.doubts();
+        let is_grave = |doubt: &Doubt| {
+            !matches!(
+                doubt,
+                Doubt::NoDoorway(..) | Doubt::OpenToSky(..) | Doubt::MoreCracks { .. }
+            )
+        };
+        let trust = if is_empty(world) {
+            Trust::None
+        } else if !said.is_empty() || doubts.iter().any(is_grave) {
+            Trust::Low
+        } else if doubts.is_empty() {
+            Trust::Good
+        } else {
+            Trust::Fair
+        };
+        let of_input = said.iter().map(|text| Reason {
+            text: text.clone(),
+            options: Vec::new(),
+        });
+        Self {
+            trust,
+            summary: found(world),
+            reasons: of_input.chain(doubts.iter().map(reason)).collect(),
+        }
+    }
+}
+
+impl Verdict {
+    /// The verdict as a sentence of a page.
+    pub(crate) fn sentence(&self) -> String {
+        let text = self.to_string();
+        let mut letters = text.chars();
+        let first = letters.next().map(|c| c.to_ascii_uppercase());
+        format!("{}{}.", first.unwrap_or_default(), letters.as_str())
+    }
+}
+
+/// Returns `true` if no cell is indoors.
+pub(crate) fn is_empty(world: &World) -> bool {
+    world.graph.indoor_cells().next().is_none()
+}
+
+/// Returns the reasons why a world has no room, with the options to try.
+pub(crate) fn why_empty(world: &World) -> String {
+    Reason::all(&Verdict::of(world, &[]).reasons)
+}
+
+impl Reason {
+    fn all(reasons: &[Self]) -> String {
+        let texts = reasons.iter().map(|reason| {
+            let mut text = reason.text.clone();
+            if !reason.options.is_empty() {
+                let _ = write!(text, " (try {})", reason.options.join(" or "));
+            }
+            text
+        });
+        texts.collect::<Vec<_>>().join("; ")
+    }
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let trust = match self.trust {
+            Trust::Good => "good",
+            Trust::Fair => "fair",
+            Trust::Low => "low",
+            Trust::None => "none",
+        };
+        write!(f, "trust: {trust}: {}", self.summary)?;
+        if !self.reasons.is_empty() {
+            write!(f, "; {}", Reason::all(&self.reasons))?;
+        }
+        Ok(())
+    }
+}
+
+/// The cells of a graph by kind, always in this order: rooms, voids, outdoors.
+pub(crate) fn cells_in_words(graph: &CellPortalGraph) -> String {
+    let rooms = graph.rooms().count();
+    let indoors = graph.indoor_cells().count();
+    let voids = match indoors - rooms {
+        0 => String::new(),
+        n => format!(", {}", count(n, "void")),
+    };
+    let outdoors = match graph.cells.len() - indoors {
+        0 => "",
+        _ => " and outdoors",
+    };
+    format!("{}{voids}{outdoors}", count(rooms, "room"))
+}
+
+/// Number of things, with the noun.
+fn count(n: usize, noun: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {noun}{plural}")
+}
+
+fn found(world: &World) -> String {
+    let graph = &world.graph;
+    let rooms = graph.rooms().count();
+    if rooms == 0 {
+        return "no rooms".into();
+    }
+    let rooms = count(rooms, "room");
+    if world.doubts().is_empty() {
+        let has_doorways = !graph.portals.is_empty();
+        return match has_doorways {
+            true => format!("{rooms}, with floors and doorways for people"),
+            false => format!("{rooms}, closed on all sides"),
+        };
+    }
+    rooms
+}
+
+fn reason(doubt: &Doubt) -> Reason {
+    let (text, options): (String, &[&str]) = match *doubt {
+        Doubt::NoRooms => (
+            "all air is open to the outdoors: a roof, a wall or a floor is missing, walls were taken for furniture, or openings \
+             are as wide as rooms"
+                .into(),
+            &[
+                "--leak-path",
+                "--structural-name 'PATTERN'",
+                "--unit UNIT",
+                "--up z",
+            ],
+        ),
+        Doubt::OnlyVoids(n) => (
+            format!("{} in which nobody can stand", count(n, "space")),
+            &["--unit UNIT", "--up z"],
+        ),
+        Doubt::FlatDoorways(flat, all) => (
+            format!("{flat} of {all} doorways lie in floors and ceilings, as if it lay on its side"),
+            &["--up z"],
+        ),
+        Doubt::NoFloors(n, of) => (
+            format!("{n} of {} have no floor", count(of, "room")),
+            &["--up z", "--structural-name 'PATTERN'"],
+        ),
+        Doubt::DoorHeight(height) => {
+            let feet = height * FOOT;
+            let options: &[&str] = if feet >= DOOR[0] && feet <= DOOR[1] {
+                &["--unit ft"]
+            } else {
+                &["--unit UNIT"]
+            };
+            (format!("doors are {height:.1} m high"), options)
+        }
+        Doubt::MoreVoids { voids, rooms } => (
+            format!(
+                "{} too low or narrow to stand in, more than the {}: hollow walls and ceilings, or a wrong unit",
+                count(voids, "space"),
+                count(rooms, "room")
+            ),
+            &["--unit UNIT"],
+        ),
+        Doubt::NoDoorways { openings, .. } => (
+            format!(
+                "no doorway among {}: door leaves were taken for walls, or the input has no doors",
+                count(openings, "opening")
+            ),
+            &["--detail-name 'PATTERN'"],
+        ),
+        Doubt::ManyOpenings { openings, cells } => (
+            format!(
+                "{} for {}: furniture was taken for walls",
+                count(openings, "opening"),
+                count(cells, "space")
+            ),
+            &["--detail-name 'PATTERN'"],
+        ),
+        Doubt::OpenToSky(n, of) => (
+            format!("{n} of {} open to the sky", count(of, "room")),
+            &[],
+        ),
+        Doubt::MoreCracks { cracks, others } => (
+            format!(
+                "{}, but {others} doorways and windows: surfaces that should meet do not",
+                count(cracks, "crack")
+            ),
+            &["--smallest-hole WIDTH", "--repair"],
+        ),
+        Doubt::NoDoorway(n, of) => (
+            format!("{n} of {} without a doorway", count(of, "room")),
+            &["--detail-name 'PATTERN'"],
+        ),
+    };
+    Reason {
+        text,
+        options: options.to_vec(),
+    }
+}

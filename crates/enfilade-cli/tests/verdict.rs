@@ -1,0 +1,131 @@
+//! The last line of a bake, refusals of worlds without rooms, and of scenes that lie on their side.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use enfilade_testkit::mixed;
+
+fn folder(name: &str) -> PathBuf {
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("verdict")
+        .join(name);
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(&dir).unwrap();
+    dir
+}
+
+fn run(dir: &Path, line: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+    command.current_dir(dir).args(line.split_whitespace());
+    command.output().unwrap()
+}
+
+fn said(done: &Output) -> String {
+    String::from_utf8_lossy(&done.stderr).into_owned()
+}
+
+fn printed(done: &Output) -> String {
+    String::from_utf8_lossy(&done.stdout).into_owned()
+}
+
+/// Two rooms with furniture as OBJ, each vertex mapped.
+fn rooms(map: impl Fn([f64; 3]) -> [f64; 3]) -> String {
+    let scene = mixed::two_rooms().scene;
+    let (mut text, mut first) = (String::new(), 1);
+    for object in &scene.objects {
+        writeln!(text, "o {}", object.name).unwrap();
+        for part in &scene.meshes[object.mesh as usize].primitives {
+            for t in part.placed_triangles(object.transform) {
+                for p in t {
+                    let [x, y, z] = map(p.to_array());
+                    writeln!(text, "v {x:.4} {y:.4} {z:.4}").unwrap();
+                }
+                writeln!(text, "f {first} {} {}", first + 1, first + 2).unwrap();
+                first += 3;
+            }
+        }
+    }
+    text
+}
+
+#[test]
+fn the_last_line_says_how_far_to_trust_the_world() {
+    let dir = folder("trust");
+    fs::write(dir.join("a.obj"), rooms(|p| p)).unwrap();
+    let done = run(&dir, "bake a.obj -o a.glb");
+    let text = printed(&done);
+    let last = text.lines().last().unwrap();
+    assert!(last.starts_with("trust: good: 2 rooms"), "{text}");
+    let done = run(&dir, "bake a.obj -o a.glb --json");
+    let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(report["verdict"]["trust"], "good");
+}
+
+#[test]
+fn a_scene_on_its_side_is_refused_with_all_options_in_one_message() {
+    let dir = folder("side");
+    let z_up = |factor: f64| move |[x, y, z]: [f64; 3]| [x, -z, y].map(|v| v * factor);
+    fs::write(dir.join("m.obj"), rooms(z_up(1.0))).unwrap();
+    let done = run(&dir, "bake m.obj -o m.glb");
+    assert_eq!(done.status.code(), Some(1));
+    assert!(said(&done).contains("--up z"), "{}", said(&done));
+    assert!(!dir.join("m.glb").exists());
+    let done = run(&dir, "bake m.obj -o m.glb --up z");
+    assert!(
+        printed(&done).contains("trust: good: 2 rooms"),
+        "{}",
+        said(&done)
+    );
+    fs::write(dir.join("mm.obj"), rooms(z_up(1000.0))).unwrap();
+    let done = run(&dir, "bake mm.obj -o mm.glb");
+    assert!(said(&done).contains("--unit mm --up z"), "{}", said(&done));
+    let done = run(&dir, "bake mm.obj -o mm.glb --unit mm --up z");
+    assert!(
+        printed(&done).contains("trust: good: 2 rooms"),
+        "{}",
+        said(&done)
+    );
+    // Whoever says that y is up means it.
+    let done = run(&dir, "bake m.obj -o y.glb --up y --allow-empty");
+    assert!(done.status.success(), "{}", said(&done));
+}
+
+#[test]
+fn feet_are_seen_by_the_height_of_the_doors() {
+    let dir = folder("feet");
+    let feet = |p: [f64; 3]| p.map(|v| v / 0.3048);
+    fs::write(dir.join("a.obj"), rooms(feet)).unwrap();
+    let done = run(&dir, "bake a.obj -o a.glb --allow-empty");
+    assert!(printed(&done).contains("--unit ft"), "{}", printed(&done));
+}
+
+#[test]
+fn a_world_without_rooms_is_written_only_if_asked_for() {
+    let dir = folder("empty");
+    fs::write(dir.join("flat.obj"), "v 0 0 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\n").unwrap();
+    let done = run(&dir, "bake flat.obj -o flat.glb");
+    assert_eq!(done.status.code(), Some(1));
+    assert!(said(&done).contains("no room was found, and nothing was written"));
+    assert!(!dir.join("flat.glb").exists());
+    let done = run(&dir, "bake flat.obj -o flat.glb --allow-empty");
+    assert!(done.status.success());
+    assert!(printed(&done).contains("trust: none: no rooms"));
+    let done = run(&dir, "plan flat.glb -o flat.svg");
+    assert!(said(&done).contains("has no room"), "{}", said(&done));
+}
+
+#[test]
+fn another_scene_is_told_before_anything_is_counted() {
+    let dir = folder("other");
+    fs::write(dir.join("a.obj"), rooms(|p| p)).unwrap();
+    fs::write(dir.join("b.obj"), rooms(|[x, y, z]| [x * 1.3, y, z * 0.9])).unwrap();
+    assert!(run(&dir, "bake a.obj -o a.glb").status.success());
+    let done = run(&dir, "verify a.glb --source b.obj --rays 1000 --sight 0");
+    assert_eq!(done.status.code(), Some(1));
+    assert!(said(&done).contains("another scene"), "{}", said(&done));
+    assert!(!said(&done).contains("breaks a promise"), "{}", said(&done));
+    let done = run(&dir, "verify a.glb --source a.obj --rays 1000 --sight 0");
+    assert!(done.status.success(), "{}", said(&done));
+}
