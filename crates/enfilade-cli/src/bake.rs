@@ -29,7 +29,7 @@ use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
 use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
-use crate::screen::{At, Told, Warned, is_watched, print_json, write_lines};
+use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
 use crate::verdict::{Verdict, is_empty, why_empty};
 use crate::walk::{self, Walks, WorldFile};
@@ -52,7 +52,8 @@ pub(crate) struct Bake {
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
-    /// Write the world although it has no room; without this, nothing is written, and the exit code is 1.
+    /// Write the world although it has no room, as `--leak-path` does, too; otherwise, nothing is written then, and the
+    /// exit code is 1.
     #[arg(long)]
     allow_empty: bool,
     #[command(flatten)]
@@ -109,7 +110,8 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     }
     if is_empty(&baked.world) {
         let why = why_empty(&baked.world);
-        if !args.allow_empty {
+        // Whoever asks for the way out wants to see it.
+        if !args.allow_empty && options.leak_path.is_none() {
             report_bake(&baked, config, options.verbose)?;
             if let Some(path) = &leak_path {
                 path.write(&mut path.says())?;

@@ -186,7 +186,7 @@ fn reason(doubt: &Doubt) -> Reason {
         ),
         Doubt::DoorHeight(height) => {
             let feet = height * FOOT;
-            let options: &[&str] = if feet >= DOOR[0] && feet <= DOOR[1] {
+            let options: &[&str] = if (DOOR[0]..=DOOR[1]).contains(&feet) {
                 &["--unit ft"]
             } else {
                 &["--unit UNIT"]

@@ -160,7 +160,7 @@ fn door_height(graph: &CellPortalGraph) -> Option<Doubt> {
     let mut heights: Vec<f32> = doors.map(|p| p.size()[1]).collect();
     heights.sort_by(f32::total_cmp);
     let height = *heights.get(heights.len() / 2)?;
-    let is_usual = height >= DOOR[0] && height <= DOOR[1];
+    let is_usual = (DOOR[0]..=DOOR[1]).contains(&height);
     (!is_usual).then_some(Doubt::DoorHeight(height))
 }
 
