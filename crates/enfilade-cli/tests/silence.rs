@@ -219,7 +219,7 @@ fn a_leak_path_is_a_line_of_the_world_and_nothing_else() {
         "2000",
     ]);
     // Read as a scene, it has the same triangles, and lines are not objects.
-    let again = bake(&world, &["-v"]);
+    let again = bake(&world, &["-v", "--allow-empty"]);
     assert_eq!(row(&again, "triangles"), row(&done, "triangles"));
     assert_eq!(row(&again, "detail objects"), 0);
     let text = said(&again);

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use enfilade_geom::scene::Scene;
 use enfilade_testkit::mixed;
 
 fn folder(name: &str) -> PathBuf {
@@ -30,9 +31,12 @@ fn printed(done: &Output) -> String {
     String::from_utf8_lossy(&done.stdout).into_owned()
 }
 
-/// Two rooms with furniture as OBJ, each vertex mapped.
+/// Two rooms as OBJ, each vertex mapped.
 fn rooms(map: impl Fn([f64; 3]) -> [f64; 3]) -> String {
-    let scene = mixed::two_rooms().scene;
+    obj(&mixed::two_rooms().scene, map)
+}
+
+fn obj(scene: &Scene, map: impl Fn([f64; 3]) -> [f64; 3]) -> String {
     let (mut text, mut first) = (String::new(), 1);
     for object in &scene.objects {
         writeln!(text, "o {}", object.name).unwrap();
@@ -96,7 +100,8 @@ fn a_scene_on_its_side_is_refused_with_all_options_in_one_message() {
 fn feet_are_seen_by_the_height_of_the_doors() {
     let dir = folder("feet");
     let feet = |p: [f64; 3]| p.map(|v| v / 0.3048);
-    fs::write(dir.join("a.obj"), rooms(feet)).unwrap();
+    let scene = mixed::double_door_corridor().scene;
+    fs::write(dir.join("a.obj"), obj(&scene, feet)).unwrap();
     let done = run(&dir, "bake a.obj -o a.glb --allow-empty");
     assert!(printed(&done).contains("--unit ft"), "{}", printed(&done));
 }

@@ -15,6 +15,10 @@ const PART: f32 = 0.25;
 /// Least and largest usual height of a door. The leaves of halls and of cupboards are others; so the middle one
 /// counts. [Units: wu]
 const DOOR: [f32; 2] = [1.4, 3.5];
+/// Largest usual height of doorways without leaves: those of levels are about 4 m high. [Units: wu]
+const GATE: f32 = 5.0;
+/// Doors are at least so many times as high as wide.
+const SLIM: f32 = 1.5;
 /// Smaller graphs show nothing by their shares.
 const FEW: usize = 3;
 /// Rooms of levels and halls have fewer openings each than this; furniture taken for walls makes more.
@@ -154,13 +158,25 @@ fn flat_doorways(graph: &CellPortalGraph) -> Option<Doubt> {
     (all >= FEW && 2 * flat > all).then_some(Doubt::FlatDoorways(flat, all))
 }
 
+/// Judges the middle height of the doors; without any, of open doorways between rooms as slim as doors.
 fn door_height(graph: &CellPortalGraph) -> Option<Doubt> {
-    let upright = |p: &&Portal| p.kind == PortalKind::Door && !p.is_flat();
-    let doors = graph.portals.iter().filter(upright);
+    let upright = || graph.portals.iter().filter(|p| !p.is_flat());
+    let doors = upright().filter(|p| p.kind == PortalKind::Door);
     let mut heights: Vec<f32> = doors.map(|p| p.size()[1]).collect();
+    let mut usual = DOOR;
+    if heights.is_empty() {
+        let is_inside = |p: &&Portal| p.cells.iter().all(|c| !graph[*c].outdoor);
+        let open = upright().filter(|p| p.kind == PortalKind::Open);
+        let sizes = open.filter(is_inside).map(Portal::size);
+        heights.extend(sizes.filter(|[w, h]| *h > SLIM * w).map(|s| s[1]));
+        if heights.len() < FEW {
+            return None;
+        }
+        usual = [0.0, GATE];
+    }
     heights.sort_by(f32::total_cmp);
     let height = *heights.get(heights.len() / 2)?;
-    let is_usual = (DOOR[0]..=DOOR[1]).contains(&height);
+    let is_usual = (usual[0]..=usual[1]).contains(&height);
     (!is_usual).then_some(Doubt::DoorHeight(height))
 }
 
@@ -306,6 +322,13 @@ mod tests {
         // The last leads outdoors.
         assert_eq!(world.doubts()[0], Doubt::FlatDoorways(3, 3));
         assert_eq!(with_doors(4, 6.6).doubts(), [Doubt::DoorHeight(6.6)]);
+        let mut world = with_doors(4, 6.6);
+        world
+            .graph
+            .portals
+            .iter_mut()
+            .for_each(|p| p.kind = PortalKind::Open);
+        assert_eq!(world.doubts(), [Doubt::DoorHeight(6.6)]);
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub(super) fn run(chosen: &Chosen, out: &mut RowPrinter) -> anyhow::Result<()> {
     measure("nothing", &[write_text("nothing.obj", "")?], &[], refused)?;
     let slab = boxes("slab.obj", &[("slab", [-4.0, -0.2, -3.0], [4.0, 0.0, 3.0])])?;
     measure("slab", &[slab], &[], refused)?;
-    let room = boxes("box.obj", &[("box", [0.0; 3], [5.0, 3.0, 4.0])])?;
+    let room = boxes("box.obj", &[("walls", [0.0; 3], [5.0, 3.0, 4.0])])?;
     measure("box", &[room], &[], good)?;
     let standing: Vec<(&str, [f64; 3], [f64; 3])> = (0..27)
         .map(|i| {
