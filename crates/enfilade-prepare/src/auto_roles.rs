@@ -367,8 +367,7 @@ fn structure_of(scene: &Scene) -> Structure {
     for own in sources.chunk_by(|a, b| a.object == b.object) {
         let object = own[0].object as usize;
         let triangles: Vec<Triangle> = own.iter().map(|&s| scene.world_triangle(s)).collect();
-        let bounds = Aabb::of_points(triangles.as_flattened());
-        let (shell_of, n) = if merged::may_be_merged(&scene.objects[object], &bounds) {
+        let (shell_of, n) = if merged::may_be_merged(&scene.objects[object], &triangles) {
             shells(&triangles)
         } else {
             (Vec::new(), 1)

@@ -4,19 +4,22 @@
 //! objects of their own; the rest stays together.
 
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Sets};
+use enfilade_geom::{Aabb, Sets, Triangle};
 
 use super::fillers::LEAF;
 use super::furniture::{BAR, LONG};
 use super::units::for_near;
 use super::{SMALL, Shape, is_by_name, is_open};
 
+/// An object of more triangles is one thing: telling the shells of a scan apart would take a gigabyte.
+const MOST_TRIANGLES: usize = 2_000_000;
+
 /// Returns `true` if an object may be several things: it is longer than any furniture, as large as a room in all directions,
 /// and no user's rule says that all of it is structure. A name does not: merged meshes keep that of their first part.
-pub(super) fn may_be_merged(object: &Object, bounds: &Aabb) -> bool {
-    let size = bounds.size();
+pub(super) fn may_be_merged(object: &Object, triangles: &[Triangle]) -> bool {
+    let size = Aabb::of_points(triangles.as_flattened()).size();
     let is_large = size.max_element() > LONG && size.min_element() > SMALL;
-    is_large && (is_open(object) || is_by_name(&object.reason))
+    is_large && triangles.len() <= MOST_TRIANGLES && (is_open(object) || is_by_name(&object.reason))
 }
 
 /// Joins bars of merged objects with the bars and plates that they nearly touch: the frame of a window and its panes.
