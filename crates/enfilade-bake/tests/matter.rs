@@ -300,7 +300,7 @@ fn walls_alone_enclose_rooms_and_what_was_supplied_is_said() {
     let scene = walls_alone();
     let baked = baked(&scene);
     assert_eq!(n_indoors(&baked), 7);
-    for (what, ends) in [("lids", "top"), ("floors", "foot")] {
+    for (what, ends) in [("ceilings", "top"), ("floors", "foot")] {
         let is_said = |n: &String| n.starts_with(what) && n.contains(ends);
         assert!(baked.notes.iter().any(is_said), "{:?}", baked.notes);
     }

@@ -500,7 +500,7 @@ fn settings_out_of_range_are_wrong_usage() {
     folder.refused(2, &["in.glb"], &["--output"]);
     folder.refused(2, &["-o", "out.glb"], &["<IN>"]);
     // The widest allowed voxel finds nothing, and does no harm.
-    let done = folder.bake(&["in.glb", "-o", "out.glb", "--voxel", "10"]);
+    let done = folder.bake(&["in.glb", "-o", "out.glb", "--voxel", "10", "--allow-empty"]);
     assert_eq!(done.status.code(), Some(0), "{done:?}");
 }
 
@@ -722,7 +722,7 @@ fn the_house_of_the_tests_is_no_bad_input() {
     folder.write("in.obj", obj_cube(&[]));
     folder.write("in.glb", tetrahedron(4.0).glb());
     for name in ["in.obj", "in.glb"] {
-        let done = folder.bake(&[name, "-o", "out.glb"]);
+        let done = folder.bake(&[name, "-o", "out.glb", "--allow-empty"]);
         assert_eq!(done.status.code(), Some(0), "{name}: {done:?}");
         assert!(Path::new(&folder.0.join("out.glb")).is_file());
     }

@@ -362,7 +362,7 @@ mod tests {
         }
         // Without a floor of its own, a room is listed with the voids.
         let page = report_html(&world, &ReportParts::default());
-        assert!(page.contains("0 rooms in 0 storeys and 2 voids"), "{page}");
+        assert!(page.contains("0 rooms, 2 voids in 0 storeys"), "{page}");
         let [_, tables] = [
             page.split("<h2>Rooms").next(),
             page.split("<h2>Rooms").nth(1),
