@@ -124,7 +124,7 @@ fn what_a_scene_refers_to_is_an_input() {
     fs::write(dir.join("a.gltf"), scene).unwrap();
     let bake = |output: &str| {
         Command::new(env!("CARGO_BIN_EXE_enfilade"))
-            .args(["bake", "a.gltf", "-o", output])
+            .args(["bake", "a.gltf", "--allow-empty", "-o", output])
             .current_dir(&dir)
             .output()
             .unwrap()
