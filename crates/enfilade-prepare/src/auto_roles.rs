@@ -112,6 +112,7 @@ struct Structure {
 /// Leaves scenes of fewer than three structural things unchanged: there is nothing to compare with. O(t log t)
 /// for t structural triangles, and O(log t) per small object.
 pub fn judge(scene: &mut Scene) {
+    merged::forget_misleading_names(scene);
     let Structure {
         shapes,
         triangles,

@@ -48,7 +48,7 @@ test('graph: each cell knows its portals, each portal its cells and leaves; a pv
     assert.ok(world.pvs(cell.id).includes(cell.id));
   }
   const doors = world.portals.filter((portal) => portal.kind === 'door');
-  assert.equal(doors.length, 10);
+  assert.equal(doors.length, 9);
   for (const { id, leaves } of doors) for (const { detail } of leaves) assert.ok(world.portalsOfDetail(detail).includes(id));
   world.close();
 });

@@ -9,7 +9,7 @@ use enfilade_geom::{Aabb, Sets, Triangle};
 use super::fillers::LEAF;
 use super::furniture::{BAR, LONG};
 use super::units::for_near;
-use super::{SMALL, Shape, is_by_name, is_open};
+use super::{DEFAULT, SMALL, Shape, is_by_name, is_open};
 
 /// An object of more triangles is one thing: telling the shells of a scan apart would take a gigabyte.
 const MOST_TRIANGLES: usize = 2_000_000;
@@ -17,9 +17,29 @@ const MOST_TRIANGLES: usize = 2_000_000;
 /// Returns `true` if an object may be several things: it is longer than any furniture, as large as a room in all directions,
 /// and no user's rule says that all of it is structure. A name does not: merged meshes keep that of their first part.
 pub(super) fn may_be_merged(object: &Object, triangles: &[Triangle]) -> bool {
-    let size = Aabb::of_points(triangles.as_flattened()).size();
-    let is_large = size.max_element() > LONG && size.min_element() > SMALL;
-    is_large && triangles.len() <= MOST_TRIANGLES && (is_open(object) || is_by_name(&object.reason))
+    is_large(Aabb::of_points(triangles.as_flattened()))
+        && triangles.len() <= MOST_TRIANGLES
+        && (is_open(object) || is_by_name(&object.reason))
+}
+
+fn is_large(bounds: Aabb) -> bool {
+    let size = bounds.size();
+    size.max_element() > LONG && size.min_element() > SMALL
+}
+
+/// Forgets names by which all objects are detail, for those that may be merged: the first part of one was a door.
+pub(super) fn forget_misleading_names(scene: &mut Scene) {
+    if scene.objects.iter().any(|o| o.role == Role::Structural) {
+        return;
+    }
+    for i in 0..scene.objects.len() {
+        if is_by_name(&scene.objects[i].reason) && is_large(scene.object_aabb(i)) {
+            let object = &mut scene.objects[i];
+            object.role = Role::Structural;
+            object.reason = DEFAULT.to_owned();
+            object.filling = None;
+        }
+    }
 }
 
 /// Joins bars of merged objects with the bars and plates that they nearly touch: the frame of a window and its panes.

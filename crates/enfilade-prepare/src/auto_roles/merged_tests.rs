@@ -61,3 +61,27 @@ fn the_name_of_the_first_part_does_not_hide_the_others_but_a_rule_does() {
     assert_eq!(n_triangles(&by_rule, Role::Detail), 0);
     assert_eq!(by_rule.objects.len(), 1);
 }
+
+#[test]
+fn the_name_of_a_door_makes_no_detail_of_a_whole_house() {
+    let named = |reason: &str| {
+        let mut scene = house().merged(reason).judged();
+        scene.objects.truncate(1);
+        scene.objects[0].role = Role::Detail;
+        super::judge(&mut scene);
+        scene
+    };
+    let by_class = named("IFC class IfcDoor");
+    assert_eq!(n_triangles(&by_class, Role::Structural), 12 * 12);
+    assert_eq!(by_class.objects[0].reason, "default");
+    let by_rule = named("rule: detail 'House'");
+    assert_eq!(n_triangles(&by_rule, Role::Structural), 0);
+    // Beside structure, it is what it says.
+    let mut scene = house().merged("IFC class IfcDoor").judged();
+    scene.objects.truncate(1);
+    let walls = scene.objects[0].clone();
+    scene.objects[0].role = Role::Detail;
+    scene.objects.push(walls);
+    super::judge(&mut scene);
+    assert_eq!(scene.objects[0].role, Role::Detail);
+}
