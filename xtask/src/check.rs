@@ -99,7 +99,7 @@ fn run_engines(steps: &mut Steps) -> anyhow::Result<()> {
     })?;
     steps.step("demo", demo)?;
     engines::run_steps(steps)?;
-    engines::check_bevy(steps)
+    engines::test_bevy(steps)
 }
 
 /// Packages of node that tests run: the Khronos glTF validator, and a reader of IFC.

@@ -29,7 +29,7 @@ usage: cargo xtask test [--engines]
        cargo xtask bench engines [--json]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes; tests the integrations with
-          engines; with --engines, these only
+          engines, of which Bevy is compiled only; with --engines, the integrations only, and all of Bevy's tests
   tidy    the checks of these that need no build: dependencies between crates, lengths, wording, links,
           licenses and versions of dependencies, features that tests name
   score   rooms and doors found, compared with those that architects modeled; --help tells the options

@@ -155,7 +155,8 @@ impl PortalStream {
         [n_there, self.cells_of.len()]
     }
 
-    /// Returns `true` if all is in the scene that is in view, fits, and is not damaged.
+    /// Returns `true` if all is in the scene that was in view in the frame before, fits, and is not damaged; `false` before any
+    /// camera has seen the world.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         let in_view = self.in_view.iter();
@@ -165,7 +166,7 @@ impl PortalStream {
             Some(_) => false,
             None => !self.streamer.view_settled() && !self.failures.contains_key(p),
         };
-        !pieces.any(is_waited_for)
+        !self.in_view.is_empty() && !pieces.any(is_waited_for)
     }
 
     /// Returns `true` if all pieces of a cell are in the scene.

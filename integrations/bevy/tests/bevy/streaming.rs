@@ -89,6 +89,8 @@ fn stream(stage: &Stage) -> &PortalStream {
 
 /// Draws until all that is in view is there. The budget holds all the while.
 fn settle(stage: &mut Stage) {
+    // A camera that was moved is followed from the next frame on.
+    stage.frame();
     for _ in 0..MOST_FRAMES {
         stage.frame();
         let counts = stream(stage).counts();
