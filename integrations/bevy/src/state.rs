@@ -9,7 +9,7 @@ use crate::labels::PortalRoot;
 /// has been loaded.
 #[derive(Component, Debug)]
 pub struct PortalState {
-    /// The state of doors; everything is open at first. [`Door`]s write to it.
+    /// The state of doors; everything is open at first. [`Door`](crate::Door)s write to it.
     pub doors: SightState,
     pub(crate) details: Vec<Option<Entity>>,
     pub(crate) cells: Vec<Option<Entity>>,
