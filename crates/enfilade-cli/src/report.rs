@@ -1,7 +1,7 @@
 //! `enfilade report`: writes a page about a world.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
@@ -39,6 +39,9 @@ pub(crate) struct Report {
     /// Adapter to draw pictures with: `best`, `gpu`, `software`, or part of a name.
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: AdapterChoice,
+    /// Title of the page; by default the file's name in words, `World` for standard input.
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
     /// Leave out pictures: no adapter is needed.
     #[arg(long)]
     no_pictures: bool,
@@ -81,13 +84,8 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         outputs.write("--walk", Format::Page, walk)?;
     }
     let world = read_world(&args.world)?;
-    let name = if is_stream(&args.world) {
-        "world".into()
-    } else {
-        args.world.file_stem().unwrap_or_default().to_string_lossy()
-    };
     let mut parts = ReportParts {
-        title: name.into_owned(),
+        title: args.title.clone().unwrap_or_else(|| title_of(&args.world)),
         walk: walk.as_deref().map(walk_page::address_of_page),
         ..ReportParts::default()
     };
@@ -125,6 +123,18 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         print_json(outputs.printed(), &report)?;
     }
     Ok(())
+}
+
+/// Returns the name of a file in words: `town-hall_2.glb` is `Town hall 2`.
+fn title_of(path: &Path) -> String {
+    if is_stream(path) {
+        return "World".into();
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let words = stem.replace(['-', '_'], " ");
+    let mut letters = words.trim().chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
 }
 
 fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
@@ -203,7 +213,7 @@ fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
     let most_seen = by_cell.max().unwrap_or(0);
     Table {
         title: "In numbers".into(),
-        note: "The numbers by which the literature describes scenes.".into(),
+        note: "Totals, and how much of them a room has.".into(),
         rows: vec![
             row(&["", "all", "mean of a room", "most of a room"]),
             row(&[
@@ -290,7 +300,7 @@ fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figur
     });
     let picture = smooth(SIZE, |size| above(&mut studio, world, &camera, None, size))?;
     out.push(Figure {
-        caption: "The same view from above: what is drawn in the rooms' colors, behind walls red, out of view dark.".into(),
+        caption: "The same view from above: what is visible keeps its color; behind walls reddish, out of view gray, the portals looked through orange.".into(),
         png: picture.to_png()?,
     });
     let mut worst: Vec<&Step> = steps.iter().collect();

@@ -123,8 +123,10 @@ pub use portal_texture_options::{
 };
 pub use prop::{Prop, PropMesh};
 pub use queries::QueryCounts;
-pub use scene::{GpuPiece, GpuWorld, PieceMaker, Put, StreamLimits, cell_color};
+pub use scene::{GpuPiece, GpuWorld, PieceMaker, Put, StreamLimits};
 pub use space::{SpaceCounts, SpaceShot};
 pub use studio::{Culling, Studio, StudioTarget};
 pub use textured::{MadePortalTextures, PortalTextureMaking, PortalTextureProgress};
-pub use viewpoints::{EYE_HEIGHT, FOV, good_camera, portal_looked_at, walk, walk_cameras};
+pub use viewpoints::{
+    EYE_HEIGHT, FOV, PHOTO_FOV, good_camera, portal_looked_at, walk, walk_cameras,
+};

@@ -14,7 +14,7 @@ use glam::{DVec3, UVec3, Vec3};
 use wgpu::util::DeviceExt;
 
 use crate::gpu::{Gpu, RenderError};
-use crate::scene::packed_cell_color;
+use crate::scene::{OUTDOORS, packed_cell_color};
 use field::Field;
 use probes::Probes;
 
@@ -258,7 +258,10 @@ impl Light {
         let first = texels.len();
         for (id, (cell, grid)) in (0..).zip(world.graph.cells.iter().zip(&probes.grids)) {
             let words = |v: Vec3, w: u32| [v.x.to_bits(), v.y.to_bits(), v.z.to_bits(), w];
-            let color = packed_cell_color(CellId(id));
+            let color = match cell.outdoor {
+                true => OUTDOORS,
+                false => packed_cell_color(CellId(id)),
+            };
             let entry: [[u32; 4]; CELL_TEXELS] = match grid {
                 Some(g) => {
                     let low = (g.low.as_dvec3() - field.origin).as_vec3();

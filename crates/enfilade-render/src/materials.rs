@@ -26,6 +26,8 @@ pub(crate) struct Look {
     pub(crate) texture: Option<u32>,
     /// Index of the set of texture coordinates.
     pub(crate) uv_set: usize,
+    /// Without a material: the direction that a surface faces decides its color, as of a floor, a wall or a ceiling.
+    pub(crate) is_bare: bool,
 }
 
 impl Default for Look {
@@ -37,6 +39,7 @@ impl Default for Look {
             is_transparent: false,
             texture: None,
             uv_set: 0,
+            is_bare: true,
         }
     }
 }
@@ -68,6 +71,7 @@ impl Look {
             } else {
                 0.0
             },
+            is_bare: false,
             ..Self::default()
         };
         for (k, e) in look.emissive.iter_mut().enumerate() {

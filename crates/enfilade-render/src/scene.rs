@@ -16,8 +16,7 @@ mod room;
 mod streamed;
 mod textures;
 
-pub use color::cell_color;
-pub(crate) use color::packed_cell_color;
+pub(crate) use color::{OUTDOORS, packed_cell_color};
 pub(crate) use filling::{CORNER_LAYOUT, Corner, Finish, Span};
 pub use gpu_world::GpuWorld;
 pub use hollow::{Put, StreamLimits};

@@ -11,8 +11,12 @@ use crate::studio::{Culling, Studio};
 /// Height of an eye above the floor. [Units: wu]
 pub const EYE_HEIGHT: f32 = 1.6;
 
-/// Default angle of a picture from its lower to its upper edge. [Units: rad]
+/// Angle from the lower to the upper edge of what one sees on a walk. [Units: rad]
 pub const FOV: f32 = 1.1;
+
+/// Default angle of a picture from its lower to its upper edge: 70° from side to side at 16:9, as wide as photographs of
+/// rooms are before their edges look stretched. [Units: rad]
+pub const PHOTO_FOV: f32 = 0.75;
 
 fn center(cell: &Cell) -> [f32; 3] {
     [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5)
@@ -28,14 +32,14 @@ fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
 /// Most rooms that a photographer looks into.
 const ROOMS: usize = 8;
 /// Least distance of a photographer from walls. [Units: wu]
-const ELBOW: f32 = 0.45;
+const ELBOW: f32 = 0.3;
 /// Directions probed for the longest view.
 const HEADINGS: usize = 24;
 
 /// Finds the place a photographer would choose: where two walls of a large, preferably furnished, room meet, at eye
-/// height, along one of the longest views. Among these, takes the place whose picture shows most objects and
-/// openings, far away, with nothing right before it. For a world without rooms, shows all of it from outside. Draws
-/// some 200 small pictures.
+/// height, along one of the longest views or towards what stands in the room. Among these, takes the place whose picture
+/// shows most objects and openings, far away and whole, with nothing right before it. For a world without rooms, shows all
+/// of it from outside. Draws some 200 small pictures.
 ///
 /// # Errors
 ///
@@ -44,12 +48,13 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
     let lines = Sightlines::build(world);
     let mut best = (f32::NEG_INFINITY, overview(studio));
     for (id, cell, worth) in rooms(world) {
+        let objects = objects_in(studio, world, id);
         for eye in corners(&studio.sight, &lines, id, cell) {
-            for toward in headings(&lines, cell, eye) {
+            for toward in headings(&lines, cell, eye, &objects) {
                 let camera = Camera {
                     eye,
                     toward,
-                    fov_y: FOV,
+                    fov_y: PHOTO_FOV,
                 };
                 let score = interest(studio, &camera)? + 0.5 * worth.ln_1p();
                 if score > best.0 {
@@ -59,6 +64,14 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
         }
     }
     Ok(best.1)
+}
+
+/// The centers of the objects that stand in a room.
+fn objects_in(studio: &Studio, world: &World, id: CellId) -> Vec<[f32; 3]> {
+    let here = world.details.iter().filter(|d| d.cells.contains(&id));
+    here.map(|d| [d.transform[12], d.transform[13], d.transform[14]])
+        .filter(|&p| studio.sight.locate([p[0], p[1] + 0.3, p[2]]) == Some(id))
+        .collect()
 }
 
 /// The rooms with the most floor, with their worth: floor area, increased by each object.
@@ -116,8 +129,9 @@ fn corners(sight: &Sight, lines: &Sightlines, id: CellId, cell: &Cell) -> Vec<[f
     out
 }
 
-/// Directions worth a picture: across the room, along the longest view, and between the two; slightly downwards.
-fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
+/// Directions worth a picture: across the room, along the longest view, between the two, and towards the middle of the
+/// objects; slightly downwards.
+fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3], objects: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let angle = |i: usize| i as f32 * std::f32::consts::TAU / HEADINGS as f32;
     let free: Vec<f32> = (0..HEADINGS)
         .map(|i| {
@@ -144,8 +158,19 @@ fn headings(lines: &Sightlines, cell: &Cell, eye: [f32; 3]) -> Vec<[f32; 3]> {
     let to = center(cell);
     let across = [to[0] - eye[0], to[2] - eye[2]];
     let length = across[0].hypot(across[1]);
-    let level = |[x, z]: [f32; 2]| [x, -0.07, z];
+    let level = |[x, z]: [f32; 2]| [x, -0.12, z];
     let mut out = vec![level(along)];
+    let mut middle = [0.0; 2];
+    for p in objects {
+        // Near ones spread over many directions.
+        let to = [p[0] - eye[0], p[2] - eye[2]];
+        let length = to[0].hypot(to[1]).max(1.0);
+        middle = [0, 1].map(|k| middle[k] + to[k] / length);
+    }
+    let reach = middle[0].hypot(middle[1]);
+    if reach > 0.1 {
+        out.push(level(middle.map(|d| d / reach)));
+    }
     // In the middle of a room, no direction leads across it.
     if length > 0.5 {
         let across = across.map(|d| d / length);
@@ -165,8 +190,13 @@ fn overview(studio: &Studio) -> Camera {
     let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
     let size = [0, 1, 2].map(|k| high[k] - low[k]);
     let radius = (size[0] * size[0] + size[1] * size[1] + size[2] * size[2]).sqrt() * 0.5;
-    let back = [0.55, 0.5, 0.67].map(|d| d * radius * 2.1);
-    Camera::looking_at([0, 1, 2].map(|k| center[k] + back[k]), center)
+    // The ball around the world fills the picture from edge to edge.
+    let distance = radius / (0.5 * PHOTO_FOV).sin();
+    let back = [0.55, 0.45, 0.70].map(|d| d * distance);
+    Camera {
+        fov_y: PHOTO_FOV,
+        ..Camera::looking_at([0, 1, 2].map(|k| center[k] + back[k]), center)
+    }
 }
 
 /// The interest of a picture: objects above all, openings of the room, depth; less if something is right before the
@@ -175,8 +205,12 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     const SMALL: [u32; 2] = [48, 27];
     let [solid, _] = studio.ids(camera, Culling::Portals, SMALL)?;
     let (mut walls, mut objects) = (Vec::new(), Vec::new());
-    let (mut near, mut sky, mut depths) = (0_u32, 0_u32, Vec::new());
-    for (shown, depth) in &solid.pixels {
+    let (mut near, mut sky, mut cropped, mut depths) = (0_u32, 0_u32, 0_u32, Vec::new());
+    for (i, (shown, depth)) in (0_u32..).zip(&solid.pixels) {
+        let [x, y] = [i % SMALL[0], i / SMALL[0]];
+        let is_edge = x == 0 || y == 0 || x + 1 == SMALL[0] || y + 1 == SMALL[1];
+        let is_object = matches!(shown, PixelContent::Detail { .. });
+        cropped += u32::from(is_edge && is_object);
         match *shown {
             PixelContent::Sky => sky += 1,
             PixelContent::Structure { triangle } => {
@@ -189,7 +223,7 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
         }
         if *depth > 0.0 {
             let distance = Camera::distance_of(*depth);
-            near += u32::from(distance < 1.2);
+            near += u32::from(distance < 1.5);
             depths.push(distance.min(30.0).ln_1p());
         }
     }
@@ -217,6 +251,7 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
         + 1.5 * quarter
         + 2.0 * share(furnished).min(0.4)
         - 5.0 * share(near)
+        - 2.5 * (cropped as f32 / (2 * (SMALL[0] + SMALL[1])) as f32)
         - share(sky))
 }
 

@@ -76,6 +76,8 @@ pub(crate) enum Class {
     Void,
     Wall,
     Detail,
+    Edge,
+    Swing,
     Open,
     Door,
     Window,
@@ -86,7 +88,7 @@ pub(crate) enum Class {
     Gap,
 }
 
-pub(crate) const CLASSES: [Class; 15] = [
+pub(crate) const CLASSES: [Class; 17] = [
     Class::Cell,
     Class::Beyond,
     Class::Thin,
@@ -94,6 +96,8 @@ pub(crate) const CLASSES: [Class; 15] = [
     Class::Void,
     Class::Wall,
     Class::Detail,
+    Class::Edge,
+    Class::Swing,
     Class::Open,
     Class::Door,
     Class::Window,
@@ -135,13 +139,12 @@ impl Class {
             Self::Cell => filled("cell", [0xff; 3], 1.0),
             Self::Beyond => filled("beyond", [0xff; 3], 0.35),
             Self::Thin => line("thin", [0x66; 3], 3.0, &[6.0, 6.0]),
-            Self::Solid => filled("solid", [0x5a; 3], 1.0),
+            Self::Solid => filled("solid", [0x4d, 0x50, 0x57], 1.0),
             Self::Void => line("hatching", [0x99; 3], 1.0, &[]),
-            Self::Wall => line("wall", BLACK, 2.0, &[]),
-            Self::Detail => Look {
-                stroke: Some(([0x99; 3], 1.0)),
-                ..filled("detail", BLACK, 0.06)
-            },
+            Self::Wall => line("wall", [0x26, 0x28, 0x2c], 2.0, &[]),
+            Self::Detail => filled("detail", [0xff; 3], 0.45),
+            Self::Edge => line("edge", [0x77; 3], 1.0, &[]),
+            Self::Swing => line("swing", [0x44; 3], 1.5, &[]),
             Self::Open => line("open", orange, 7.0, &[]),
             Self::Door => line("door", [0xc9, 0x2a, 0x2a], 7.0, &[]),
             Self::Window => line("window", [0x1c, 0x7e, 0xd6], 6.0, &[]),
@@ -155,20 +158,4 @@ impl Class {
             },
         }
     }
-}
-
-/// Returns a light color for each number; consecutive numbers are far apart in hue.
-pub(crate) fn color(id: u32) -> Rgb {
-    // The golden angle spreads any run of hues evenly. Lightness alternates over three steps, so that hues that recur
-    // still differ.
-    let hue = (f64::from(id) * 137.507_764 + 40.0) % 360.0;
-    let lightness = [0.82, 0.75, 0.87][(id % 3) as usize];
-    let saturation = 0.62;
-    let reach = saturation * f64::min(lightness, 1.0 - lightness);
-    let channel = |n: f64| {
-        let k = (n + hue / 30.0) % 12.0;
-        let value = lightness - reach * f64::min(k - 3.0, 9.0 - k).clamp(-1.0, 1.0);
-        (value * 255.0).round() as u8
-    };
-    [channel(0.0), channel(8.0), channel(4.0)]
 }

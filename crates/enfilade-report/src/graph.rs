@@ -7,11 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use enfilade_cpg::{CellId, PortalKind, World};
+use enfilade_cpg::{CellId, PortalKind, World, cell_color};
 use enfilade_geom::{DVec2, Sets};
 use force_graph::{ForceGraph, NodeData, SimulationParameters};
 
-use crate::drawing::color;
 use crate::label::shortened;
 use crate::storeys::Storey;
 use crate::svg::{escaped, hex};
@@ -20,6 +19,8 @@ use crate::svg::{escaped, hex};
 const DISTANCE: f64 = 70.0;
 /// Least distance between centers of disks: numbers of three digits stay apart. [Units: pixels]
 const LEAST_DISTANCE: f64 = 40.0;
+/// Largest factor by which a page enlarges the drawing.
+const LARGEST: f64 = 1.6;
 /// Width of a page without a scroll bar, minus the margins. [Units: pixels]
 const PAGE: f64 = 980.0;
 /// Radius of the smallest and of the largest disk. [Units: pixels]
@@ -61,8 +62,12 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
         .collect();
     let mut out = format!(
         "<svg class=\"graph\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" viewBox=\"0 0 {:.0} {:.0}\" \
-         font-family=\"sans-serif\" role=\"img\" aria-label=\"graph of rooms\">\n",
-        size.x, size.y, size.x, size.y
+         font-family=\"sans-serif\" role=\"img\" aria-label=\"graph of rooms\" style=\"max-width:{:.0}px\">\n",
+        size.x,
+        size.y,
+        size.x,
+        size.y,
+        LARGEST * size.x
     );
     for ((a, b), kind) in &edges {
         let (p, q) = (at[a], at[b]);
@@ -94,7 +99,7 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
             cell.0,
             p.x,
             p.y,
-            hex(color(cell.0)),
+            hex(cell_color(*cell)),
             p.x,
             p.y + 4.2,
             cell.0,

@@ -6,6 +6,7 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use enfilade_cpg::{CellId, PortalKind, Pvs, World};
 
+use crate::drawing::Drawing;
 use crate::graph::graph_svg;
 use crate::label::shortened;
 use crate::matrix::{Order, matrix_svg};
@@ -69,9 +70,9 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title}: rooms and doorways</title>\n<style>{STYLE}</style></head><body data-voids=\"{}\">\n\
-         <header><h1>{title}</h1><p>{}</p></header>\n",
+         <header><p class=\"kind\">Rooms, doorways, and what can be seen from where</p><h1>{title}</h1>{}</header>\n",
         voids.join(" "),
-        escaped(&summary(world, &storeys, voids.len()))
+        facts(world, &storeys, voids.len())
     );
     if let Some(walk) = &parts.walk {
         let _ = writeln!(
@@ -97,12 +98,16 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     out.push_str(
         "<section><h2>Plans</h2><p>Point at a room, here or below, to see it everywhere on this page; click to go to it.</p>\n",
     );
+    let mut draw = |class: &str, drawing: &Drawing| {
+        let svg = drawing.to_svg();
+        let svg = svg.split_once("?>").map_or(svg.as_str(), |(_, svg)| svg);
+        let _ = writeln!(out, "<div class=\"drawing{class}\">{svg}</div>");
+    };
     for (k, storey) in storeys.iter().enumerate() {
-        let plan = plans.sheet(&[k]).to_svg();
-        let plan = plan.split_once("?>").map_or(plan.as_str(), |(_, svg)| svg);
         let class = if storey.is_between { " between" } else { "" };
-        let _ = writeln!(out, "<div class=\"drawing{class}\">{plan}</div>");
+        draw(class, &plans.bare(k));
     }
+    draw(" legend", &plans.legend());
     let _ = write!(
         out,
         "</section>\n<section><h2>Graph</h2><p>A disk for each room, with its number and as large as its volume; a line for each \
@@ -151,11 +156,14 @@ const SCRIPT: &str = include_str!("report.js");
 const STYLE: &str = "\
 :root{color-scheme:light}*{box-sizing:border-box}\
 body{font:16px/1.5 system-ui,sans-serif;color:#222;background:#fff;max-width:1080px;margin:0 auto;padding:1.2rem}\
-h1{font-size:1.8rem;margin:.2em 0;overflow-wrap:anywhere}h2{font-size:1.2rem;border-bottom:2px solid #e8590c;padding-bottom:.2em}\
-header p{color:#555;margin:.2em 0 1em}.note{background:#fff4e6;border-left:4px solid #e8590c;padding:.5em .8em}\
+h1{font-size:2rem;line-height:1.2;margin:0;overflow-wrap:anywhere}h2{font-size:1.2rem;border-bottom:2px solid #e8590c;padding-bottom:.2em}\
+header{border-bottom:1px solid #ddd;margin-bottom:1rem}.kind{color:#777;margin:0;letter-spacing:.04em}\
+dl{display:flex;flex-wrap:wrap;gap:.4rem 2.2rem;margin:.6rem 0 1.1rem}dl div{display:flex;flex-direction:column}\
+dd{margin:0;font-size:1.5rem;font-weight:600;line-height:1.2}dt{color:#666;font-size:.9rem}.note{background:#fff4e6;border-left:4px solid #e8590c;padding:.5em .8em}\
 figure{margin:0 0 1rem}figure img{width:100%;height:auto;border-radius:6px;display:block}\
 figcaption{color:#555;font-size:.9rem}.gallery{display:grid;grid-template-columns:repeat(auto-fit,minmax(290px,1fr));gap:1rem}\
-.drawing svg{width:100%;height:auto;max-height:90vh;display:block}\
+.drawing svg{width:100%;height:auto;max-height:90vh;display:block}.legend svg{max-width:900px}\
+.graph,.matrix{width:100%;height:auto}\
 .wide{overflow-x:auto}table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-nums;min-width:60%}\
 th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
 th:first-child,td:first-child{text-align:left}th{background:#f4f4f2}\
@@ -168,26 +176,35 @@ footer{color:#777;font-size:.8rem;margin-top:2rem;overflow-wrap:anywhere}\
 @media print{body{max-width:none;padding:0;font-size:11px}section{break-inside:avoid-page}\
 .wide{overflow:visible}h2{break-after:avoid}tr,figure{break-inside:avoid}th{-webkit-print-color-adjust:exact;print-color-adjust:exact}}";
 
-fn summary(world: &World, storeys: &[&Storey], n_voids: usize) -> String {
+/// The main figures, each over its name; those that are zero are left out, except rooms.
+fn facts(world: &World, storeys: &[&Storey], n_voids: usize) -> String {
     let graph = &world.graph;
     let indoors = graph.indoor_cells().map(|(_, c)| c);
     let n = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
     let volume: f32 = indoors.clone().map(|c| c.volume).sum();
-    let voids = match n_voids {
-        0 => String::new(),
-        1 => ", 1 void".into(),
-        n => format!(", {n} voids"),
+    let area: f64 = storeys.iter().map(|s| s.area).sum();
+    let counted = |n: usize, one: &str, many: &str| {
+        (n > 0).then(|| (n.to_string(), if n == 1 { one } else { many }.to_owned()))
     };
-    format!(
-        "{} rooms{voids} in {} storeys, {volume:.0} m³ of air; {} doors, {} windows, {} open passages, {} cracks; {} objects",
-        indoors.count() - n_voids,
-        storeys.iter().filter(|s| !s.is_between).count(),
-        n(PortalKind::Door),
-        n(PortalKind::Window),
-        n(PortalKind::Open),
-        n(PortalKind::Crack),
-        world.details.len()
-    )
+    let rooms = indoors.count() - n_voids;
+    let n_storeys = storeys.iter().filter(|s| !s.is_between).count();
+    let all = [
+        counted(rooms, "room", "rooms").or_else(|| Some(("0".into(), "rooms".into()))),
+        counted(n_voids, "void", "voids"),
+        counted(n_storeys, "storey", "storeys"),
+        (area >= 1.0).then(|| (format!("{area:.0} m²"), "floor".into())),
+        (volume >= 1.0).then(|| (format!("{volume:.0} m³"), "air".into())),
+        counted(n(PortalKind::Door), "door", "doors"),
+        counted(n(PortalKind::Window), "window", "windows"),
+        counted(n(PortalKind::Open), "open passage", "open passages"),
+        counted(n(PortalKind::Crack), "crack", "cracks"),
+        counted(world.details.len(), "object", "objects"),
+    ];
+    let facts = all.into_iter().flatten();
+    let facts: String = facts
+        .map(|(n, name)| format!("<div><dd>{n}</dd><dt>{name}</dt></div>"))
+        .collect();
+    format!("<dl>{facts}</dl>")
 }
 
 fn figures(out: &mut String, figures: &[Figure]) {
@@ -362,7 +379,9 @@ mod tests {
         }
         // Without a floor of its own, a room is listed with the voids.
         let page = report_html(&world, &ReportParts::default());
-        assert!(page.contains("0 rooms, 2 voids in 0 storeys"), "{page}");
+        let facts = ["<dd>0</dd><dt>rooms</dt>", "<dd>2</dd><dt>voids</dt>"];
+        assert!(facts.iter().all(|f| page.contains(f)), "{page}");
+        assert!(!page.contains("storeys</dt>"), "{page}");
         let [_, tables] = [
             page.split("<h2>Rooms").next(),
             page.split("<h2>Rooms").nth(1),

@@ -15,6 +15,8 @@ const LINE: f64 = 1.15;
 const SMALLER: f64 = 0.88;
 /// Height of the area below a name as a fraction of the name's.
 const AREA: f64 = 0.7;
+/// Space between a name and what stands beside it, as a fraction of the letters' height.
+const AROUND: f64 = 0.3;
 /// A number may shrink to this fraction of the least readable size rather than be left out.
 const TINY: f64 = 0.5;
 
@@ -62,7 +64,8 @@ pub(crate) fn fit(
     [name, area, number]: [&str; 3],
     sizes: Sizes,
 ) -> Fitted {
-    let mask = Mask::new(section, label, region);
+    let floor = Mask::new(section, label, region, true);
+    let mask = Mask::new(section, label, region, false);
     let mut tries = vec![
         Try::new(&[name, area], true, false),
         Try::new(&[name], false, false),
@@ -73,14 +76,22 @@ pub(crate) fn fit(
         let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
         tries.push(Try::new(&parts, false, false));
     }
-    let found = tries.iter().find_map(|t| t.largest(&mask, sizes));
+    // On free floor if the letters stay at least half as large as they may be.
+    let readable = Sizes {
+        least: sizes.least.max(0.5 * sizes.most),
+        ..sizes
+    };
+    let found = (tries
+        .iter()
+        .find_map(|t| t.largest(&floor, readable, AROUND)))
+    .or_else(|| tries.iter().find_map(|t| t.largest(&mask, sizes, 0.0)));
     found.unwrap_or_else(|| {
         let one = Try::new(&[number], false, false);
         let tiny = Sizes {
             least: TINY * sizes.least,
             most: sizes.least,
         };
-        let mut out = one.largest(&mask, tiny).unwrap_or_else(|| Fitted {
+        let mut out = one.largest(&mask, tiny, 0.0).unwrap_or_else(|| Fitted {
             at: mask.middle(),
             size: tiny.least,
             ..one.fitted()
@@ -153,9 +164,9 @@ impl Try {
         }
     }
 
-    /// The largest size that fits, with its place.
-    fn largest(&self, mask: &Mask, sizes: Sizes) -> Option<Fitted> {
-        let extent = self.extent();
+    /// The largest size that fits with some space around it, in heights of its letters, with its place.
+    fn largest(&self, mask: &Mask, sizes: Sizes, around: f64) -> Option<Fitted> {
+        let extent = self.extent() + 2.0 * around;
         let mut size = sizes.most;
         loop {
             if let Some(at) = mask.place(extent * size) {
@@ -186,13 +197,16 @@ struct Mask {
 }
 
 impl Mask {
-    fn new(section: &Section, label: Label, region: &Region) -> Self {
+    /// `is_free` leaves out points on which something stands.
+    fn new(section: &Section, label: Label, region: &Region, is_free: bool) -> Self {
         let (first, [width, height]) = (region.first, region.size);
         let mut sums = vec![0_u32; (width + 1) * (height + 1)];
         for row in 0..height {
             let mut in_row = 0;
             for column in 0..width {
-                in_row += u32::from(section.is(label, first[0] + column, first[1] + row));
+                let [at, line] = [first[0] + column, first[1] + row];
+                let is_in = section.is(label, at, line) && (!is_free || section.is_free(at, line));
+                in_row += u32::from(is_in);
                 sums[(row + 1) * (width + 1) + column + 1] =
                     sums[row * (width + 1) + column + 1] + in_row;
             }

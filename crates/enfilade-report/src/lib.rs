@@ -11,6 +11,7 @@
 //! All functions take a valid world (`World::validate`) and return the same bytes every time. A plan is a drawing:
 //! shapes are accurate to about a pixel of its sampling grid, not evidence.
 
+mod borders;
 mod clip;
 mod drawing;
 mod floors;
@@ -24,8 +25,10 @@ mod pdf;
 mod plain;
 mod plan;
 mod raster;
+mod relief;
 mod section;
 mod shafts;
+mod sheet;
 mod storeys;
 mod svg;
 mod walk;

@@ -1,11 +1,14 @@
 //! Marks of a plan beside the cells: walls, doorways, and objects.
 
-use enfilade_cpg::{CellId, Portal, PortalId, PortalKind, World};
-use enfilade_geom::{Aabb, DVec2, DVec3, Plane, Winding};
+use std::collections::BTreeSet;
+
+use enfilade_cpg::{CellId, DetailObject, Motion, MotionKind, Portal, PortalId, PortalKind, World};
+use enfilade_geom::{Aabb, DMat4, DVec2, DVec3, Plane, Winding};
 
 use crate::clip::clipped;
 use crate::drawing::{Class, Item, Path};
 use crate::label::shortened;
+use crate::relief::{Owned, Relief};
 use crate::section::{Section, cell_of};
 use crate::storeys::Page;
 
@@ -120,15 +123,9 @@ impl View<'_> {
         let flat: Vec<DVec2> = outline.iter().map(|p| DVec2::new(p.x, p.z)).collect();
         if portal.normal[1].abs() > 0.7 {
             let is_near = |(floor, top): (f64, f64)| high > floor - FLOOR && low < top + FLOOR;
-            let class = if class == Class::Crack {
-                class
-            } else {
-                Class::Stair
-            };
-            return self
-                .spans(portal)
-                .any(is_near)
-                .then(|| path(class, vec![flat], true, hint));
+            // The outline of a level crack would cross the plan without telling where one passes.
+            let is_drawn = class != Class::Crack && self.spans(portal).any(is_near);
+            return is_drawn.then(|| path(Class::Stair, vec![flat], true, hint));
         }
         let mut segments = self.segments(portal, &flat);
         let mut class = class;
@@ -194,72 +191,113 @@ impl View<'_> {
         }
     }
 
-    /// Footprints of the objects that stand in the storey.
+    /// Footprints of the objects that stand in the storey, except door leaves.
     pub(crate) fn details(&self) -> Vec<Item> {
-        let details = &self.world.details;
-        (0..details.len()).filter_map(|k| self.detail(k)).collect()
+        self.standing().filter_map(|k| self.footprint(k)).collect()
     }
 
-    fn detail(&self, index: usize) -> Option<Item> {
-        let detail = &self.world.details[index];
-        let place = detail.placement();
+    /// Edges of the surfaces below the cut, and where the floor is free.
+    pub(crate) fn relief(&self) -> Relief {
+        let structure = self.world.batches.iter().map(|batch| Owned {
+            owner: 0,
+            triangles: Box::new(batch.primitive.triangles()),
+        });
+        let objects = self.standing().map(|k| {
+            let detail = &self.world.details[k];
+            let place = detail.placement();
+            let mesh = &self.world.detail_meshes[detail.mesh as usize];
+            let parts = mesh.primitives.iter();
+            Owned {
+                owner: k as u32 + 1,
+                triangles: Box::new(parts.flat_map(move |p| p.placed_triangles(place))),
+            }
+        });
+        Relief::new(self.section, self.heights, structure.chain(objects))
+    }
+
+    /// The objects inside that stand in the storey, as indices; door leaves are drawn by [`Self::swings`].
+    fn standing(&self) -> impl Iterator<Item = usize> {
+        let fittings = self.world.graph.portals.iter().flat_map(|p| &p.fittings);
+        let leaves: BTreeSet<u32> = fittings
+            .filter(|f| f.motion.is_some_and(|m| turns_upright(&m)))
+            .map(|f| f.detail)
+            .collect();
+        (0..self.world.details.len())
+            .filter(move |&k| !leaves.contains(&(k as u32)) && self.stands(&self.world.details[k]))
+    }
+
+    /// Returns `true` if an object is in a room of the storey, not above the cut and not under the floor.
+    fn stands(&self, detail: &DetailObject) -> bool {
+        let corners = self.corners(detail, &DMat4::IDENTITY);
+        let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        let high = corners
+            .iter()
+            .map(|p| p.y)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let cuts = self.page.cuts.iter().zip(self.heights);
+        cuts.into_iter().any(|(cut, &y)| {
+            let is_shown = |c: &CellId| cut.tops.contains_key(c);
+            low < y && high > cut.floor && detail.cells.iter().any(is_shown)
+        })
+    }
+
+    /// The vertices of the box around an object, moved; none if it is empty.
+    fn corners(&self, detail: &DetailObject, motion: &DMat4) -> Vec<DVec3> {
+        let place = *motion * detail.placement();
         let mesh = &self.world.detail_meshes[detail.mesh as usize];
         let mut bounds = Aabb::EMPTY;
         for p in mesh.primitives.iter().flat_map(|p| &p.positions) {
             bounds = bounds.including(point(*p));
         }
         if bounds.is_empty() {
-            return None;
+            return Vec::new();
         }
-        let corners: Vec<DVec3> = (0..8)
-            .map(|k| {
-                let pick = |axis: usize| {
-                    if k >> axis & 1 == 0 {
-                        bounds.min[axis]
-                    } else {
-                        bounds.max[axis]
-                    }
-                };
-                place.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-            })
-            .collect();
-        let low = corners.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let high = corners
-            .iter()
-            .map(|p| p.y)
-            .fold(f64::NEG_INFINITY, f64::max);
-        // Objects above the cut are not visible from it. Objects that touch only the outdoors stand on the ground
-        // around the storey.
-        let is_indoor = |c: &CellId| !self.world.graph[*c].outdoor;
-        let cuts = || self.page.cuts.iter().zip(self.heights).enumerate();
-        let is_here = cuts().any(|(k, (cut, &y))| {
-            let stands = low < y && high > cut.floor;
-            let has = if detail.cells.iter().any(is_indoor) {
-                detail.cells.iter().any(|c| cut.tops.contains_key(c))
-            } else {
-                k == 0 && !self.page.storey.is_between
-            };
-            stands && has
-        });
-        if !is_here {
-            return None;
-        }
-        let plane = Plane {
-            normal: DVec3::Y,
-            d: 0.0,
+        let corner = |k: usize| {
+            let pick = |axis: usize| [bounds.min, bounds.max][k >> axis & 1][axis];
+            place.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
         };
-        let level: Vec<DVec3> = corners.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect();
-        let hull = Winding::hull_in_plane(&plane, &level);
-        let flat: Vec<DVec2> = hull.points.iter().map(|p| DVec2::new(p.x, p.z)).collect();
-        if flat.len() < 3 || footprint(&flat) > self.room_of(&detail.cells) {
+        (0..8).map(corner).collect()
+    }
+
+    fn footprint(&self, index: usize) -> Option<Item> {
+        let detail = &self.world.details[index];
+        let flat = hull(&self.corners(detail, &DMat4::IDENTITY));
+        if flat.len() < 3 || area(&flat) > self.room_of(&detail.cells) {
             return None;
         }
-        Some(path(
-            Class::Detail,
-            vec![flat],
-            true,
-            Some(shortened(&detail.name).into_owned()),
-        ))
+        let name = shortened(&detail.name).into_owned();
+        Some(path(Class::Detail, vec![flat], true, Some(name)))
+    }
+
+    /// The leaves of a door, open, and the arcs along which they shut; `None` without any that turn.
+    pub(crate) fn swings(&self, id: PortalId) -> Option<Item> {
+        let mut lines = Vec::new();
+        for fitting in &self.world.graph[id].fittings {
+            let Some(motion) = fitting.motion.filter(turns_upright) else {
+                continue;
+            };
+            let MotionKind::Turn { through, .. } = motion.kind else {
+                continue;
+            };
+            let hinge = DVec2::new(through[0].into(), through[2].into());
+            let detail = &self.world.details[fitting.detail as usize];
+            let far = |p: &DVec3| DVec2::new(p.x, p.z).distance_squared(hinge);
+            let corners = self.corners(detail, &DMat4::IDENTITY);
+            let Some(&end) = (corners.iter()).max_by(|a, b| far(a).total_cmp(&far(b))) else {
+                continue;
+            };
+            let mut open = hull(&self.corners(detail, &motion.at(1.0)));
+            open.extend(open.first().copied());
+            lines.push(open);
+            let along = |k: u16| {
+                let at = motion
+                    .at(f32::from(k) / f32::from(ARC))
+                    .transform_point3(end);
+                DVec2::new(at.x, at.z)
+            };
+            lines.push((0..=ARC).map(along).collect());
+        }
+        (!lines.is_empty()).then(|| path(Class::Swing, lines, false, None))
     }
 
     /// Area of the boxes of some cells. [Units: wu²]
@@ -274,8 +312,27 @@ impl View<'_> {
     }
 }
 
+/// Segments of the arc of a door.
+const ARC: u16 = 16;
+
+/// Returns `true` for a leaf that turns around an upright hinge.
+fn turns_upright(motion: &Motion) -> bool {
+    matches!(motion.kind, MotionKind::Turn { axis, .. } if axis[1].abs() > 0.9)
+}
+
+/// The convex hull of points, seen from above.
+fn hull(points: &[DVec3]) -> Vec<DVec2> {
+    let plane = Plane {
+        normal: DVec3::Y,
+        d: 0.0,
+    };
+    let level: Vec<DVec3> = points.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect();
+    let hull = Winding::hull_in_plane(&plane, &level);
+    hull.points.iter().map(|p| DVec2::new(p.x, p.z)).collect()
+}
+
 /// Area of a convex polygon.
-fn footprint(corners: &[DVec2]) -> f64 {
+fn area(corners: &[DVec2]) -> f64 {
     let n = corners.len();
     let twice = (0..n).map(|i| corners[i].perp_dot(corners[(i + 1) % n]));
     0.5 * twice.sum::<f64>().abs()

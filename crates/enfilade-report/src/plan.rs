@@ -2,22 +2,20 @@
 
 use std::collections::BTreeSet;
 
-use enfilade_cpg::{CellId, World};
+use enfilade_cpg::{CellId, World, cell_color};
 use enfilade_geom::{DVec2, shown};
 
-use crate::drawing::{Class, Drawing, Item, Path, Words, color};
+use crate::drawing::{Class, Drawing, Item, Path, Words};
 use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
 use crate::marks::View;
+use crate::relief::Relief;
 use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
+use crate::sheet::{COLUMN, MARGIN, Sheet};
 use crate::storeys::{Page, Storey, find_pages};
 
-/// Space around each plan, for its title. [Units: wu]
-const MARGIN: f64 = 1.2;
 /// Largest height of the letters of names, in a small house. [Units: wu]
 const NAME: f64 = 0.32;
-/// Height of the legend's letters, in a small house. [Units: wu]
-const SMALL: f64 = 0.16;
 /// The smallest letters as a fraction of the longer side of a sheet: 1.2 mm on A4, 6.5 pixels of 1600.
 const LEGIBLE: f64 = 0.004;
 
@@ -57,14 +55,16 @@ struct Drawn {
     heights: Vec<f64>,
     section: Section,
     regions: Vec<(Label, Region)>,
-    /// Walls, objects, doorways.
+    /// Objects and surfaces below the cut.
+    objects: Vec<Item>,
+    /// Walls and doorways.
     marks: Vec<Item>,
 }
 
 impl Drawn {
     fn new(world: &World, page: Page, cut_height: f64, (min, max): (DVec2, DVec2)) -> Self {
         let heights = heights(&page, cut_height);
-        let section = Section::sample(world, &page, &heights, min, max);
+        let mut section = Section::sample(world, &page, &heights, min, max);
         let regions: Vec<(Label, Region)> = section.regions().into_iter().collect();
         let view = View {
             world,
@@ -72,15 +72,42 @@ impl Drawn {
             section: &section,
             heights: &heights,
         };
-        let mut marks = view.details();
-        marks.extend(view.hatching());
+        let mut objects = view.details();
+        let Relief { lines, is_floor } = view.relief();
+        objects.push(Item::Path(Path {
+            class: Class::Edge,
+            fill: None,
+            lines,
+            is_closed: true,
+            cell: None,
+            hint: None,
+        }));
+        let mut marks: Vec<Item> = view.hatching().into_iter().collect();
         marks.push(view.walls());
-        marks.extend(world.graph.portal_ids().filter_map(|id| view.portal(id)));
+        for id in world.graph.portal_ids() {
+            let Some(portal) = view.portal(id) else {
+                continue;
+            };
+            marks.extend(view.swings(id));
+            marks.push(portal);
+        }
+        section.take(|i| !is_floor[i]);
+        for mark in &marks {
+            if let Item::Path(mark) = mark
+                && matches!(mark.class, Class::Stair | Class::Swing | Class::Low)
+            {
+                for line in &mark.lines {
+                    let ends = line.iter().zip(line.iter().cycle().skip(1));
+                    ends.for_each(|(a, b)| section.take_line(*a, *b));
+                }
+            }
+        }
         Self {
             page,
             heights,
             section,
             regions,
+            objects,
             marks,
         }
     }
@@ -169,13 +196,48 @@ impl<'a> Plans<'a> {
         (0..self.pages.len()).filter(has).collect()
     }
 
-    /// Draws some of the plans, by index, on one sheet.
+    /// Draws some of the plans, by index, on one sheet with a legend.
     ///
     /// # Panics
     ///
     /// If an index is not less than the number of storeys.
     #[must_use]
     pub fn sheet(&self, which: &[usize]) -> Drawing {
+        self.arranged(which, true)
+    }
+
+    /// Draws one plan without a legend, for a page that has one.
+    pub(crate) fn bare(&self, index: usize) -> Drawing {
+        self.arranged(&[index], false)
+    }
+
+    /// Draws the legend of all plans.
+    pub(crate) fn legend(&self) -> Drawing {
+        let zoom = lettering(self.max - self.min, 1);
+        let items = self.pages.iter().flat_map(|p| p.marks.iter().cloned());
+        let mut sheet = Sheet {
+            items: items.collect(),
+            zoom,
+            numbered: BTreeSet::new(),
+            title: 0.0,
+            sizes: Sizes {
+                least: 0.0,
+                most: 0.0,
+            },
+        };
+        let n = sheet.items.len();
+        let margin = DVec2::splat(MARGIN * zoom);
+        let room = 3.0 * COLUMN * sheet.legend();
+        let end = sheet.foot(self.world, margin, room);
+        Drawing {
+            title: "Legend".into(),
+            size: DVec2::new(room + 2.0 * margin.x, end),
+            zoom,
+            items: sheet.items.split_off(n),
+        }
+    }
+
+    fn arranged(&self, which: &[usize], has_legend: bool) -> Drawing {
         let zoom = lettering(self.max - self.min, which.len());
         let margin = MARGIN * zoom;
         let size = self.max - self.min + 2.0 * margin;
@@ -204,12 +266,34 @@ impl<'a> Plans<'a> {
             let place = DVec2::new((k % columns) as f64, (k / columns) as f64) * size;
             self.draw(index, place + margin - self.min, &mut sheet);
         }
-        let foot = DVec2::new(margin, size.y * rows as f64 + 0.5 * zoom);
-        let width = (size.x * columns as f64).max(8.5 * sheet.legend());
-        let end = sheet.foot(self.world, foot, width);
+        let whole = size * DVec2::new(columns as f64, rows as f64);
+        if !has_legend {
+            let at = DVec2::new(margin, whole.y);
+            sheet.items.push(Item::Place { at, storey: None });
+            let names = sheet.numbers(self.world, 0.0, whole.x - 2.0 * margin);
+            return Drawing {
+                title: "Floor plan".into(),
+                size: whole + DVec2::Y * names,
+                zoom,
+                items: sheet.items,
+            };
+        }
+        // The legend takes the place of a missing plan, or else a strip below all.
+        let last = n % columns;
+        let is_beside = last > 0 && size.x * (columns - last) as f64 > sheet.legend_width();
+        let (corner, room) = if is_beside {
+            let corner = DVec2::new(last as f64, rows as f64 - 1.0) * size;
+            (corner + margin, whole.x - corner.x)
+        } else {
+            (
+                DVec2::new(margin, whole.y),
+                whole.x.max(sheet.legend_width()),
+            )
+        };
+        let end = sheet.foot(self.world, corner, room - 2.0 * margin) + margin;
         Drawing {
             title: "Floor plans".into(),
-            size: DVec2::new(width, end),
+            size: DVec2::new(whole.x.max(corner.x - margin + room), end.max(whole.y)),
             zoom,
             items: sheet.items,
         }
@@ -222,9 +306,13 @@ impl<'a> Plans<'a> {
             at: origin,
             storey: Some(storey.name.clone()),
         });
-        for (label, region) in drawn.regions.iter().filter(|r| r.0 != Label::Void) {
-            sheet.items.push(self.region(*label, region));
-        }
+        let filled = drawn.regions.iter().filter(|r| r.0 != Label::Void);
+        let (walls, floors): (Vec<_>, Vec<_>) = filled.partition(|r| r.0 == Label::Solid);
+        let fill = |(label, region): &(Label, Region)| self.region(*label, region);
+        sheet.items.extend(floors.into_iter().map(fill));
+        // Under the walls: the box around an object may reach into one.
+        sheet.items.extend_from_slice(&drawn.objects);
+        sheet.items.extend(walls.into_iter().map(fill));
         sheet.items.extend_from_slice(&drawn.marks);
         for (label, region) in &drawn.regions {
             let Some((cell, is_own)) = cell_of(*label) else {
@@ -283,7 +371,7 @@ impl<'a> Plans<'a> {
                 Label::Beyond(_) => Class::Beyond,
                 Label::Solid | Label::Outdoor | Label::Void => Class::Solid,
             },
-            fill: cell.map(|c| color(c.0)),
+            fill: cell.map(cell_color),
             lines: region.borders.clone(),
             is_closed: true,
             cell,
@@ -366,136 +454,6 @@ impl<'a> Plans<'a> {
             height(storey.floor),
             height(storey.floor + self.cut_height)
         )
-    }
-}
-
-/// The part of the sheet drawn so far.
-struct Sheet {
-    items: Vec<Item>,
-    zoom: f64,
-    sizes: Sizes,
-    /// Height of the letters of titles. [Units: wu]
-    title: f64,
-    /// Cells that are labeled only by a number somewhere on the sheet.
-    numbered: BTreeSet<CellId>,
-}
-
-impl Sheet {
-    fn words(&mut self, at: DVec2, size: f64, is_centered: bool, text: String) {
-        self.items.push(Item::Words(Words {
-            at,
-            size,
-            is_centered,
-            is_turned: false,
-            text,
-            cell: None,
-        }));
-    }
-
-    fn shape(&mut self, class: Class, lines: Vec<Vec<DVec2>>, is_closed: bool) {
-        self.items.push(Item::Path(Path {
-            class,
-            fill: None,
-            lines,
-            is_closed,
-            cell: None,
-            hint: None,
-        }));
-    }
-
-    /// Factor on the usual size of the legend, so that its letters are legible, too.
-    fn legend(&self) -> f64 {
-        self.zoom.max(self.sizes.least / SMALL)
-    }
-
-    /// Draws the scale bar, the legend, and the names of numbered cells. Returns the y of their end. [Units: wu]
-    fn foot(&mut self, world: &World, at: DVec2, width: f64) -> f64 {
-        let (zoom, grown) = (self.zoom, self.legend());
-        let is_there = |class: Class| {
-            let is = |i: &Item| matches!(i, Item::Path(p) if p.class == class);
-            self.items.iter().any(is)
-        };
-        let mut entries = vec![
-            (Class::Open, "opening"),
-            (Class::Door, "door"),
-            (Class::Window, "window"),
-            (Class::Crack, "crack"),
-            (Class::Low, "opening not cut"),
-            (Class::Stair, "hole in floor or ceiling"),
-        ];
-        if is_there(Class::Beyond) {
-            entries.push((Class::Beyond, "pale: floor on another plan"));
-        }
-        if is_there(Class::Void) {
-            entries.push((Class::Void, "void: nobody can stand there"));
-        }
-        if is_there(Class::Thin) {
-            entries.push((Class::Thin, "too thin to draw"));
-        }
-        self.items.push(Item::Place { at, storey: None });
-        for k in 0..5 {
-            let class = if k % 2 == 0 { Class::Bar } else { Class::Gap };
-            let (left, right) = (f64::from(k) * zoom, f64::from(k + 1) * zoom);
-            let high = 0.12 * grown;
-            let bar = [(left, 0.0), (right, 0.0), (right, high), (left, high)];
-            let bar = bar.map(|(x, z)| DVec2::new(x, z)).to_vec();
-            self.shape(class, vec![bar], true);
-        }
-        let under = 0.4 * grown;
-        self.words(DVec2::new(0.0, under), 0.22 * grown, true, "0".into());
-        let words = format!("{} m", 5.0 * zoom);
-        self.words(DVec2::new(5.0 * zoom, under), 0.22 * grown, true, words);
-        for (k, (class, words)) in entries.iter().enumerate() {
-            let place = DVec2::new((k % 3) as f64 * 2.6, 0.75 + 0.4 * (k / 3) as f64);
-            let line = [place - DVec2::Y * 0.07, place + DVec2::new(0.35, -0.07)];
-            let line = line.map(|p| p * grown).to_vec();
-            if *class == Class::Beyond {
-                let up = DVec2::new(0.0, -0.12) * grown;
-                let [a, b] = [line[0], line[1]];
-                self.shape(*class, vec![vec![a, b, b + up, a + up]], true);
-                // Any color of a cell.
-                if let Some(Item::Path(path)) = self.items.last_mut() {
-                    path.fill = Some(color(0));
-                }
-            } else {
-                self.shape(*class, vec![line], false);
-            }
-            let at = (place + DVec2::X * 0.42) * grown;
-            self.words(at, SMALL * grown, false, (*words).into());
-        }
-        let mut below = (0.75 + 0.4 * entries.len().div_ceil(3) as f64) * grown;
-        below = self.numbers(world, below, width - 2.0 * at.x);
-        at.y + below
-    }
-
-    /// Draws the names that numbers stand for, in columns.
-    fn numbers(&mut self, world: &World, below: f64, room: f64) -> f64 {
-        let size = SMALL * self.legend();
-        let mut rows: Vec<String> = Vec::new();
-        for &cell in &self.numbered {
-            let name = &world.graph[cell].name;
-            if *name != format!("cell-{}", cell.0) {
-                rows.push(format!("{}  {}", cell.0, shown(shortened(name))));
-            }
-        }
-        // Default names contain their numbers.
-        if let Some(cell) = self
-            .numbered
-            .iter()
-            .find(|c| world.graph[**c].name == c.to_string())
-        {
-            let words = format!("A number alone stands for a cell: {} is {cell}.", cell.0);
-            self.words(DVec2::new(0.0, below), size, false, words);
-        }
-        let widest = rows.iter().map(|r| width(r)).fold(1.0, f64::max) * size;
-        let columns = ((room / (widest + size)).floor() as usize).max(1);
-        let start = below + 1.6 * size;
-        for (k, row) in rows.iter().enumerate() {
-            let x = (k % columns) as f64 * (widest + size);
-            let z = start + (k / columns) as f64 * 1.5 * size;
-            self.words(DVec2::new(x, z), size, false, row.clone());
-        }
-        start + 1.5 * size * rows.len().div_ceil(columns) as f64
     }
 }
 

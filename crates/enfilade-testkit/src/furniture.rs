@@ -198,6 +198,118 @@ impl Furniture {
     }
 }
 
+/// Things that make a furnished room look lived in, each mesh added to the scene once.
+#[derive(Clone, Copy, Debug)]
+pub struct Comforts {
+    /// 1.2 × 0.6 m, 0.4 m high; 72 triangles.
+    pub low_table: u32,
+    /// 0.8 × 0.8 m; 60 triangles.
+    pub armchair: u32,
+    /// 1.8 × 0.45 m, 0.7 m high; 84 triangles.
+    pub sideboard: u32,
+    /// Books for the niches of a [`Furniture::shelf`].
+    pub books: u32,
+    /// 1.0 × 0.7 m, to hang 1.2 m above the floor; 24 triangles.
+    pub painting: u32,
+    /// A lamp that hangs 1 m below a ceiling, at its origin; 64 triangles.
+    pub pendant: u32,
+    /// 2.4 × 1.7 m, 1 cm thick, with a border; 24 triangles.
+    pub carpet: u32,
+}
+
+impl Comforts {
+    /// Adds the meshes to `site`.
+    pub fn new(site: &mut Site, p: &Palette) -> Self {
+        let mustard = site.material("mustard", [0.62, 0.34, 0.05]);
+        let brick = site.material("terracotta", [0.55, 0.19, 0.10]);
+        let sand = site.material("sand", [0.70, 0.62, 0.48]);
+        let mut low_table = MeshBuilder::new(p.wood);
+        low_table.cuboid(block(1.2, 0.6, 0.36, 0.4));
+        low_table
+            .cuboid(block(1.0, 0.45, 0.12, 0.14))
+            .paint(p.metal);
+        legs(&mut low_table, 1.2, 0.6, 0.05, 0.36);
+
+        let mut armchair = MeshBuilder::new(mustard);
+        armchair.cuboid(block(0.56, 0.7, 0.14, 0.42));
+        for x in [-0.34, 0.34] {
+            armchair.cuboid(at(x, 0.0, 0.12, 0.8, 0.08, 0.6));
+        }
+        armchair.cuboid(at(0.0, -0.32, 0.56, 0.16, 0.42, 0.86));
+        armchair
+            .paint(p.white)
+            .cuboid(at(0.0, -0.16, 0.4, 0.14, 0.42, 0.7));
+
+        let mut sideboard = MeshBuilder::new(p.wood);
+        sideboard.cuboid(block(1.8, 0.42, 0.12, 0.7));
+        for x in [-0.6, 0.0, 0.6] {
+            sideboard.cuboid(at(x, 0.215, 0.57, 0.02, 0.15, 0.67));
+        }
+        sideboard.paint(p.metal);
+        legs(&mut sideboard, 1.7, 0.36, 0.04, 0.12);
+
+        // Rows of books of four colors, as high and wide as a hash of their place.
+        let mut books = MeshBuilder::new(p.fabric);
+        for shelf in 0..4_u32 {
+            let mut x = -0.4;
+            for k in 0..14_u32 {
+                let hash = ((shelf * 31 + k * 17).wrapping_mul(2_654_435_761) >> 16) % 97;
+                let (wide, high) = (
+                    0.03 + 0.03 * f64::from(hash % 3) / 2.0,
+                    0.22 + 0.1 * f64::from(hash % 5) / 4.0,
+                );
+                if x + wide > 0.4 || hash % 7 == 6 {
+                    x += wide;
+                    continue;
+                }
+                books.paint([p.fabric, brick, sand, mustard][(hash % 4) as usize]);
+                let low = 0.05 + 0.44 * f64::from(shelf);
+                books.cuboid(at(
+                    x + wide * 0.5,
+                    -0.02,
+                    wide - 0.002,
+                    0.2,
+                    low,
+                    low + high,
+                ));
+                x += wide;
+            }
+        }
+
+        let mut painting = MeshBuilder::new(p.wood);
+        painting
+            .cuboid(at(0.0, 0.015, 1.0, 0.03, 1.2, 1.9))
+            .paint(sand);
+        painting.cuboid(at(0.0, 0.032, 0.9, 0.006, 1.25, 1.85));
+        painting
+            .paint(brick)
+            .cuboid(at(-0.15, 0.036, 0.4, 0.004, 1.35, 1.7));
+        painting
+            .paint(p.fabric)
+            .cuboid(at(0.2, 0.037, 0.3, 0.004, 1.3, 1.55));
+
+        let mut pendant = MeshBuilder::new(p.metal);
+        pendant
+            .column(DVec2::ZERO, 0.01, 6, -0.8, 0.0)
+            .paint(p.white);
+        pendant.column(DVec2::ZERO, 0.22, 12, -1.0, -0.8);
+
+        let mut carpet = MeshBuilder::new(sand);
+        carpet.cuboid(block(2.4, 1.7, 0.0, 0.008));
+        carpet.paint(brick).cuboid(block(2.1, 1.4, 0.008, 0.01));
+
+        Self {
+            low_table: site.mesh("low table", low_table),
+            armchair: site.mesh("armchair", armchair),
+            sideboard: site.mesh("sideboard", sideboard),
+            books: site.mesh("books", books),
+            painting: site.mesh("painting", painting),
+            pendant: site.mesh("pendant lamp", pendant),
+            carpet: site.mesh("carpet", carpet),
+        }
+    }
+}
+
 /// Width from which a door has two leaves. [Units: wu]
 const DOUBLE: f64 = 1.3;
 

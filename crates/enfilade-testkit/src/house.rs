@@ -2,7 +2,7 @@
 
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::furniture::{Furniture, Palette, glaze, hang_door};
+use crate::furniture::{Comforts, Furniture, Palette, glaze, hang_door};
 use crate::picture;
 use crate::roof::GableRoof;
 use crate::site::{Generated, Site};
@@ -395,21 +395,32 @@ impl House {
     fn furnish(&mut self) {
         let site = &mut self.site;
         let f = Furniture::new(site, &self.palette);
+        let c = Comforts::new(site, &self.palette);
         let up = UPPER[0];
         let mut put = |name: &str, mesh: u32, x: f64, y: f64, z: f64, yaw: f64| {
             site.furnish(name, mesh, DVec3::new(x, y, z), yaw);
         };
-        put("rug", f.rug, 2.2, 0.0, 5.8, 0.0);
-        put("sofa", f.sofa, 2.2, 0.0, 7.2, 180.0);
-        put("table", f.table, 2.2, 0.01, 5.6, 0.0);
-        put("shelf", f.shelf, 2.2, 0.0, 0.56, 0.0);
-        put("plant", f.plant, 0.8, 0.0, 7.8, 0.0);
-        put("lamp", f.lamp, 3.9, 0.0, 7.8, 0.0);
+        // Living room: seats around a carpet, books opposite the windows.
+        put("carpet", c.carpet, 2.35, 0.0, 6.55, 90.0);
+        put("sofa", f.sofa, 3.78, 0.0, 6.55, -90.0);
+        put("low table", c.low_table, 2.45, 0.01, 6.55, 90.0);
+        put("armchair", c.armchair, 1.2, 0.0, 5.75, 70.0);
+        put("armchair", c.armchair, 1.2, 0.0, 7.35, 110.0);
+        put("painting", c.painting, 4.3, 0.0, 6.55, -90.0);
+        for z in [1.3, 2.22] {
+            put("shelf", f.shelf, 4.1, 0.0, z, -90.0);
+            put("books", c.books, 4.1, 0.0, z, -90.0);
+        }
+        put("sideboard", c.sideboard, 0.6, 0.0, 2.25, 90.0);
+        put("pendant lamp", c.pendant, 2.35, GROUND[1], 6.55, 0.0);
+        put("plant", f.plant, 0.75, 0.0, 0.75, 0.0);
+        put("plant", f.plant, 0.75, 0.0, 4.2, 0.0);
+        put("lamp", f.lamp, 3.95, 0.0, 5.25, 0.0);
         put("plant", f.plant, 4.85, 0.0, 2.9, 0.0);
         put("cabinet", f.cabinet, 4.75, 0.0, 6.0, 90.0);
         put("toilet", f.toilet, 6.6, 0.0, 0.72, 0.0);
-        put("kitchen cabinet", f.counter, 10.3, 0.0, 6.0, -90.0);
-        put("kitchen cabinet", f.counter, 9.7, 0.0, 7.9, 180.0);
+        put("kitchen cabinet", f.counter, 10.34, 0.0, 6.0, -90.0);
+        put("kitchen cabinet", f.counter, 9.25, 0.0, 7.94, 180.0);
         put("table", f.table, 8.9, 0.0, 2.2, 90.0);
         for (x, z, yaw) in [
             (8.2, 1.7, 90.0),
@@ -420,6 +431,7 @@ impl House {
             put("chair", f.chair, x, 0.0, z, yaw);
         }
         put("plant", f.plant, 10.2, 0.0, 0.8, 0.0);
+        put("pendant lamp", c.pendant, 8.9, GROUND[1], 2.2, 0.0);
         put("bed", f.bed, 1.45, up, 6.3, 90.0);
         put("wardrobe", f.wardrobe, 2.6, up, 4.75, 0.0);
         put("lamp", f.lamp, 0.7, up, 7.8, 0.0);
@@ -430,13 +442,14 @@ impl House {
         put("desk", f.desk, 10.1, up, 6.3, -90.0);
         put("chair", f.chair, 9.4, up, 6.3, 90.0);
         put("shelf", f.shelf, 8.2, up, 4.6, 0.0);
+        put("books", c.books, 8.2, up, 4.6, 0.0);
         put("plant", f.plant, 10.2, up, 7.8, 0.0);
         put("bathtub", f.tub, 6.6, up, 1.3, 90.0);
         put("toilet", f.toilet, 4.9, up, 0.72, 0.0);
         put("lamp", f.lamp, 4.8, up, 5.2, 0.0);
         put("cabinet", f.cabinet, 2.5, ATTIC, 3.0, 10.0);
         put("cabinet", f.cabinet, 3.2, ATTIC, 3.2, 40.0);
-        put("shelf", f.shelf, 8.5, ATTIC, 1.0, 0.0);
+        put("shelf", f.shelf, 8.5, ATTIC, 2.4, 0.0);
     }
 }
 

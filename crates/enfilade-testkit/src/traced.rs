@@ -443,7 +443,7 @@ fn emitted(material: &Material) -> [u8; 3] {
 fn toned(color: [u8; 3]) -> [f64; 3] {
     let c = color.map(|x| f64::from(x) / 255.0);
     let most = c[0].max(c[1]).max(c[2]);
-    c.map(|x| x / (1.0 + 0.28 * most))
+    c.map(|x| x / (1.0 + most.powi(3)).cbrt())
 }
 
 fn encoded(x: f64) -> u8 {

@@ -36,12 +36,13 @@ pub(crate) fn above(
         ));
     }
     for p in seen.portals() {
-        let outline = world.graph[*p].outline.clone();
-        marks.push(line(
-            MarkShape::Outline(outline),
-            [1.0, 0.42, 0.0, 1.0],
-            width,
-        ));
+        let outline = &world.graph[*p].outline;
+        // An upright portal is drawn where the walls beside it are cut: its outline would lean over the floor.
+        let shape = match across(outline, cut) {
+            Some(segment) => MarkShape::Line(segment),
+            None => MarkShape::Outline(outline.clone()),
+        };
+        marks.push(line(shape, [0.93, 0.45, 0.05, 1.0], 2.0 * width));
     }
     // Pictures from above show rooms, not the ground around them.
     let mut low = [f32::INFINITY; 3];
@@ -58,13 +59,12 @@ pub(crate) fn above(
     let center = [0, 1, 2].map(|k| (low[k] + high[k]) * 0.5);
     let [x, z] = [high[0] - low[0], high[2] - low[2]];
     let reach = x.hypot(z);
-    for corner in camera.corners(aspect.max(1.0)) {
-        let d = corner.to_array();
-        let flat = d[0].hypot(d[2]).max(1e-6);
-        let end = [0, 1, 2].map(|k| camera.eye[k] + d[k] / flat * reach * [1.0, 0.0, 1.0][k]);
+    let corners = camera.corners(aspect.max(1.0));
+    for corner in [corners[0], corners[2]] {
+        let end = edge_of(camera.eye, corner.to_array(), [low, high], 0.02 * reach);
         marks.push(line(
             MarkShape::Line([camera.eye, end]),
-            [0.02, 0.30, 0.85, 0.9],
+            [0.05, 0.30, 0.62, 0.9],
             width,
         ));
     }
@@ -79,7 +79,7 @@ pub(crate) fn above(
             ]
         })
         .collect();
-    marks.push(line(MarkShape::Area(ring), [0.02, 0.30, 0.85, 1.0], 0.0));
+    marks.push(line(MarkShape::Area(ring), [0.05, 0.30, 0.62, 1.0], 0.0));
     // Slightly oblique, so that walls have a side.
     let toward = [0.0, -1.0, -0.38];
     let height = (z * 0.94 + (high[1] - low[1]) * 0.38).max(x / aspect) * 1.06;
@@ -98,6 +98,57 @@ pub(crate) fn above(
         marks: &marks,
     };
     Ok(studio.explained(&view, &frame, size)?)
+}
+
+/// The end of a level line from an eye along `d`, a little `beyond` the bounds of the rooms.
+fn edge_of(eye: [f32; 3], d: [f32; 3], [low, high]: [[f32; 3]; 2], beyond: f32) -> [f32; 3] {
+    let flat = d[0].hypot(d[2]).max(1e-6);
+    let length = |k: usize| {
+        let bound = if d[k] > 0.0 {
+            high[k] + beyond
+        } else {
+            low[k] - beyond
+        };
+        if d[k] == 0.0 {
+            f32::INFINITY
+        } else {
+            (bound - eye[k]) / (d[k] / flat)
+        }
+    };
+    let length = length(0).min(length(2)).max(0.0);
+    let length = if length.is_finite() { length } else { 0.0 };
+    [
+        eye[0] + d[0] / flat * length,
+        eye[1],
+        eye[2] + d[2] / flat * length,
+    ]
+}
+
+/// The segment of an upright portal at a height, or else along its upper edge; `None` for a level one.
+fn across(outline: &[[f32; 3]], height: f32) -> Option<[[f32; 3]; 2]> {
+    let bounds = |k: usize| {
+        let values = || outline.iter().map(move |p| p[k]);
+        [
+            values().fold(f32::INFINITY, f32::min),
+            values().fold(f32::NEG_INFINITY, f32::max),
+        ]
+    };
+    let [low, high] = bounds(1);
+    let level = height.clamp(low, high);
+    let along = |p: &[f32; 3]| (p[0], p[2]);
+    let first = outline.first().map(along)?;
+    let far = |from: (f32, f32)| {
+        let distance = move |p: &(f32, f32)| (p.0 - from.0).hypot(p.1 - from.1);
+        outline
+            .iter()
+            .map(along)
+            .max_by(move |a, b| distance(a).total_cmp(&distance(b)))
+    };
+    let a = far(first)?;
+    let b = far(a)?;
+    // A level portal is as deep as it is wide.
+    let is_upright = high - low > 0.3 * (a.0 - b.0).hypot(a.1 - b.1).min(1.0);
+    is_upright.then_some([[a.0, level, a.1], [b.0, level, b.1]])
 }
 
 /// The segments where a level plane cuts the structure.

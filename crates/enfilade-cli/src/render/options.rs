@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use enfilade_render::{AdapterChoice, Culling, FOV};
+use enfilade_render::{AdapterChoice, Culling, PHOTO_FOV};
 
 use crate::limits::Limits;
 use enfilade_cli::values::{door, point, size};
@@ -33,7 +33,7 @@ pub(crate) struct Render {
     #[arg(long, value_name = "FILE")]
     pub(super) record: Option<PathBuf>,
     /// Angle from the lower to the upper edge of the picture, in degrees.
-    #[arg(long, value_name = "DEG", default_value_t = FOV.to_degrees(), value_parser = angle)]
+    #[arg(long, value_name = "DEG", default_value_t = PHOTO_FOV.to_degrees(), value_parser = angle)]
     pub(super) fov: f32,
     /// Width and height of the picture.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
@@ -55,8 +55,8 @@ pub(crate) struct Render {
     /// Outline the portals in view, and the view as each one narrows it.
     #[arg(long)]
     pub(super) portals: bool,
-    /// Show the world from above, with the view and what is culled: dark is out of view, red behind
-    /// walls, orange hidden by a large polygon.
+    /// Show the world from above, with the view and what is culled: gray is out of view, reddish behind
+    /// walls, brown hidden by a large polygon; the portals looked through are orange lines.
     #[arg(long)]
     pub(super) above: bool,
     /// Remove everything higher than this, in meters, and light the rest evenly; with --above, 0.5 above the eye by

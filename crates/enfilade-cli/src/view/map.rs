@@ -1,9 +1,9 @@
 //! The map in the window: a level cut at the eye's height, from the locator.
 
 use egui::{Align2, Color32, ColorImage, Pos2, Rect, Stroke, TextureHandle, TextureOptions, Vec2};
-use enfilade::cpg::{Cell, CellId, World};
+use enfilade::cpg::{Cell, CellId, World, cell_color};
 use enfilade::geom::DVec3;
-use enfilade_render::{Camera, cell_color};
+use enfilade_render::Camera;
 
 use crate::living::{Blip, BlipKind, RADAR_REACH};
 
@@ -163,7 +163,7 @@ impl Map {
             let Some(cell) = cell else {
                 return Color32::TRANSPARENT;
             };
-            let [r, g, b] = cell_color(*cell).map(|c| (c * 255.0) as u8);
+            let [r, g, b] = cell_color(*cell);
             let is_seen = seen.binary_search(&cell.0).is_ok();
             Color32::from_rgba_unmultiplied(r, g, b, if is_seen { 215 } else { 60 })
         };

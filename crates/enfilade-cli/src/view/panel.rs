@@ -299,8 +299,9 @@ fn draw_times(painter: &egui::Painter, screen: Rect, times: &VecDeque<f32>) {
         ]
     };
     for (i, &ms) in times.iter().enumerate() {
+        // Above 30 frames a second, a frame is smooth; slower ones are marked, and no alarm.
         let color = if ms > 33.4 {
-            Color32::LIGHT_RED
+            Color32::LIGHT_YELLOW
         } else {
             Color32::LIGHT_GREEN
         };

@@ -1,28 +1,26 @@
-//! Colors that distinguish cells.
+//! Colors in the layout of shaders.
 
-use enfilade_cpg::CellId;
+use enfilade_cpg::{CellId, CellPortalGraph, cell_paint};
 
-/// Returns the color of a cell in pictures and drawings; consecutive ids differ most. sRGB, 0 to 1.
-#[must_use]
-pub fn cell_color(cell: CellId) -> [f32; 3] {
-    let hue = (cell.0 as f32 * 0.618_034 + 0.08).fract() * 6.0;
-    let (saturation, value) = ([0.55, 0.42][cell.0 as usize / 2 % 2], 0.92);
-    [5.0_f32, 3.0, 1.0].map(|n| {
-        let k = (n + hue) % 6.0;
-        value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)
-    })
-}
+/// Color of surfaces that no cell sees.
+const GRAY: u8 = 89;
+/// Color of what lies outdoors: paint tells rooms apart.
+pub(crate) const OUTDOORS: u32 = u32::from_le_bytes([0xa8, 0xac, 0xa6, 0xff]);
 
-pub(super) fn packed(c: [f32; 3]) -> u32 {
-    let [r, g, b] = c.map(|x| (x.clamp(0.0, 1.0) * 255.0) as u32);
-    r | g << 8 | b << 16 | 0xff << 24
+pub(super) fn packed([r, g, b]: [u8; 3]) -> u32 {
+    u32::from_le_bytes([r, g, b, 0xff])
 }
 
 /// Returns the color of a cell in the layout that shaders unpack.
 pub(crate) fn packed_cell_color(cell: CellId) -> u32 {
-    packed(cell_color(cell))
+    packed(cell_paint(cell))
 }
 
-pub(super) fn color_of(cells: &[CellId]) -> u32 {
-    packed(cells.first().map_or([0.35; 3], |&c| cell_color(c)))
+/// Returns the color of the first room among some cells.
+pub(super) fn color_of(graph: &CellPortalGraph, cells: &[CellId]) -> u32 {
+    match cells.iter().find(|c| !graph[**c].outdoor) {
+        Some(&room) => packed_cell_color(room),
+        None if cells.is_empty() => packed([GRAY; 3]),
+        None => OUTDOORS,
+    }
 }

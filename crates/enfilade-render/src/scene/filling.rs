@@ -199,18 +199,22 @@ impl<'d> Filling<'d> {
         let emissive = [r, g, b, look.cutoff].map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8);
         let uvs = primitive.uvs.get(look.uv_set);
         let base = self.corners.len() as u32;
+        // An alpha of 0 marks bare surfaces for the shader; that of other opaque ones is ignored.
+        let is_bare = look.is_bare && primitive.colors.is_empty();
+        let is_opaque = !look.is_transparent && look.cutoff <= 0.0;
         for (i, &position) in primitive.positions.iter().enumerate() {
             let normal = primitive.normals.get(i);
             let normal = normal.map_or([0; 4], |n| packed_normal(*n));
-            let color = primitive.colors.get(i).copied().unwrap_or([1.0; 4]);
+            let mut color = primitive.colors.get(i).copied().unwrap_or([1.0; 4]);
+            color = [0, 1, 2, 3].map(|k| color[k] * look.base_color[k]);
+            if is_opaque {
+                color[3] = if is_bare { 0.0 } else { 1.0 };
+            }
             self.corners.push(Corner {
                 position,
                 normal,
                 uv: uvs.and_then(|u| u.get(i)).copied().unwrap_or_default(),
-                color: [0, 1, 2, 3].map(|k| {
-                    let c = color[k] * look.base_color[k];
-                    (c.clamp(0.0, 1.0) * 65535.0).round() as u16
-                }),
+                color: color.map(|c| (c.clamp(0.0, 1.0) * 65535.0).round() as u16),
                 emissive,
                 cell,
             });
@@ -244,7 +248,11 @@ impl<'d> Filling<'d> {
             .enumerate()
             .map(|(i, batch)| {
                 let order = sight.indices(i as u32);
-                self.add(&batch.primitive, order, color_of(&batch.cells))
+                self.add(
+                    &batch.primitive,
+                    order,
+                    color_of(&world.graph, &batch.cells),
+                )
             })
             .collect()
     }
@@ -253,12 +261,13 @@ impl<'d> Filling<'d> {
     pub(super) fn add_plugs(&mut self, world: &World, sight: &Sight) -> Vec<Span> {
         let look = Look {
             base_color: super::plug::COLOR,
+            is_bare: false,
             ..Look::default()
         };
         (0..world.graph.portals.len() as u32)
             .map(|p| {
                 let plug = plug(world, sight, PortalId(p));
-                self.add_dressed(&plug, &plug.indices, color_of(&[]), &look)
+                self.add_dressed(&plug, &plug.indices, color_of(&world.graph, &[]), &look)
             })
             .collect()
     }

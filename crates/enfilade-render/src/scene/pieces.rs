@@ -72,7 +72,9 @@ impl PieceMaker {
         let listed = if gpu.fetches() { 0 } else { PER_LISTED };
         Self(Arc::new(Making {
             dress,
-            colors: world.batches.iter().map(|b| color_of(&b.cells)).collect(),
+            colors: (world.batches.iter())
+                .map(|b| color_of(&world.graph, &b.cells))
+                .collect(),
             mesh_triangles,
             n_images: world.images.len(),
             per_index: PER_INDEX + listed,

@@ -21,7 +21,7 @@ impl Instance {
     /// Returns the transform of a prop of a linear color that emits a share of it.
     pub(crate) fn of_prop(placed: &Mat4, color: [f32; 3], glow: f32) -> Self {
         let glow = (glow.clamp(0.0, 1.0) * 255.0) as u32;
-        let color = packed(color.map(|c| c.clamp(0.0, 1.0).powf(1.0 / 2.2)));
+        let color = packed(color.map(|c| (c.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0) as u8));
         Self {
             rows: rows(placed),
             // Not structure.
@@ -89,7 +89,7 @@ pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed
             [0.0, 0.0, 1.0, 0.0],
         ],
         key: 0,
-        color: packed([0.35; 3]),
+        color: color_of(&world.graph, &[]),
     }];
     let mut details: Vec<Placed> = Vec::new();
     let mut moving = Vec::new();
@@ -98,7 +98,7 @@ pub(super) fn placed(world: &World, sight: &Sight) -> (Vec<Instance>, Vec<Placed
         instances.push(Instance {
             rows: rows(&m),
             key: 0,
-            color: color_of(&detail.cells),
+            color: color_of(&world.graph, &detail.cells),
         });
         let bounds = sight.detail_box(id);
         details.push(Placed {

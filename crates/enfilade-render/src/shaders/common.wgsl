@@ -56,3 +56,9 @@ fn to_root(v: vec3<f32>) -> vec3<f32> {
 fn to_clip(relative: vec3<f32>) -> vec4<f32> {
     return globals.clip_from_relative * vec4(relative, 1.0);
 }
+
+// Returns the exposure of what is outdoors. For an eye in a dim room it is longer, but less than that of the room, as a
+// photographer takes two pictures and joins them: else windows would be white.
+fn outdoor_exposure() -> f32 {
+    return pow(globals.field_shift.w, 0.3);
+}

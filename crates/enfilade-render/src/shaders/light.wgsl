@@ -76,6 +76,11 @@ fn light_in(cell: i32, p: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
         + share.z * probe(base + q, slab.z, n.y);
 }
 
+// Returns `true` for a cell outdoors, and for surfaces that face no cell.
+fn is_outdoors(cell: i32) -> bool {
+    return cell < 0 || entry(globals.light.y + cell * CELL_TEXELS).w != 0u;
+}
+
 fn color_of_cell(cell: i32) -> u32 {
     return entry(globals.light.y + cell * CELL_TEXELS + 1).w;
 }

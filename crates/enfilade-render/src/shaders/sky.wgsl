@@ -13,14 +13,13 @@ fn point_at(p: vec2<i32>, z: f32) -> vec3<f32> {
     return q.xyz / q.w;
 }
 
-// Returns the color of the sky, or of the ground far below, along a line.
+// Returns the color of the sky, or of open land up to the horizon, along a line.
 fn sky_along(ray: vec3<f32>) -> vec3<f32> {
-    let t = clamp(to_root(ray).y, -0.15, 1.0);
-    let below = mix(vec3(0.78, 0.83, 0.90), vec3(0.66, 0.70, 0.74), min(-t / 0.12, 1.0));
-    let above = mix(vec3(0.78, 0.83, 0.90), vec3(0.28, 0.45, 0.75), sqrt(max(t, 0.0)));
-    // Overexposed for an eye in a room.
-    return min(select(above, below, t < 0.0) * (0.7 + 0.3 * globals.field_shift.w), vec3(1.0))
-        * globals.root_z.w;
+    let t = clamp(to_root(ray).y, -1.0, 1.0);
+    let haze = vec3(0.80, 0.85, 0.91);
+    let land = mix(haze, vec3(0.40, 0.47, 0.33), sqrt(min(-t / 0.25, 1.0)));
+    let above = mix(haze, vec3(0.30, 0.48, 0.78), sqrt(max(t, 0.0)));
+    return min(select(above, land, t < 0.0) * outdoor_exposure(), vec3(1.0)) * globals.root_z.w;
 }
 
 fn sky(p: vec2<i32>) -> vec3<f32> {

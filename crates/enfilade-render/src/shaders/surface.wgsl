@@ -84,6 +84,14 @@ fn corner(in: Corner) -> Surface {
     return out;
 }
 
+// Returns the color of a surface without a material: boards below, plaster around, white above.
+fn bare_color(own: vec3<f32>) -> vec3<f32> {
+    let up = to_root(own).y;
+    let wall = vec3(0.70, 0.67, 0.61);
+    let low = mix(wall, vec3(0.45, 0.35, 0.25), smoothstep(0.5, 0.8, up));
+    return mix(low, vec3(0.80, 0.80, 0.78), smoothstep(0.5, 0.8, -up));
+}
+
 fn unpacked(c: u32) -> vec3<f32> {
     let v = unpack4x8unorm(c);
     return pow(v.rgb, vec3(2.2));
@@ -130,6 +138,7 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     facing = abs(facing);
 
     var base = in.color * texel;
+    if in.color.a == 0.0 { base = vec4(bare_color(normal), 1.0) * texel; }
     var emissive = in.emissive.rgb;
     var cell = -1;
     let place = in.relative + globals.field_shift.xyz;
@@ -148,9 +157,11 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
             base = vec4(unpacked(color), base.a);
             emissive = vec3(0.0);
             // Reason: out of view, behind walls, behind an occluder; or not a surface of a room.
-            if reason == 1u { base = vec4(0.10, 0.10, 0.11, base.a); }
-            if reason == 2u { base = vec4(0.42, 0.10, 0.07, base.a); }
-            if reason == 3u { base = vec4(0.62, 0.36, 0.05, base.a); }
+            if reason == 1u { base = vec4(0.25, 0.27, 0.31, base.a); }
+            if reason == 2u { base = vec4(0.47, 0.23, 0.18, base.a); }
+            if reason == 3u { base = vec4(0.55, 0.38, 0.12, base.a); }
+            // The ground around is paper.
+            if cell >= 0 && reason != 0u && is_outdoors(cell) { base = vec4(0.66, 0.68, 0.72, base.a); }
             if reason == 4u { base = vec4(0.015, 0.015, 0.018, base.a); }
         }
     }
@@ -163,8 +174,10 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     if CASTS_SHADOWS {
         sun *= sunlit(in.relative + globals.origin.xyz, normal);
     }
+    var exposure = globals.field_shift.w;
+    if HAS_LIGHT && is_outdoors(cell) { exposure = outdoor_exposure(); }
     // At night, less of both.
-    var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * (globals.field_shift.w * globals.root_z.w);
+    var light = (ambient + vec3(1.25, 1.13, 0.92) * sun) * (exposure * globals.root_z.w);
     if HAS_LAMPS {
         var lit_cell = -2;
         if HAS_LIGHT { lit_cell = cell; }
@@ -175,9 +188,10 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
 }
 
-// Compresses bright values instead of clipping them.
+// Compresses bright values instead of clipping them: the brightest channel stays below 1, and all keep their ratio.
 fn toned(c: vec3<f32>) -> vec3<f32> {
-    return c * (1.0 / (1.0 + 0.28 * max(c.r, max(c.g, c.b))));
+    let most = max(c.r, max(c.g, c.b));
+    return c * pow(1.0 + most * most * most, -1.0 / 3.0);
 }
 
 fn is_above_cut(in: Surface) -> bool {
@@ -240,7 +254,7 @@ fn glass(in: Surface) -> Drawn {
     var around = sky_along(along);
     if HAS_LIGHT {
         let place = in.relative + globals.field_shift.xyz;
-        if s.cell >= 0 && entry(globals.light.y + s.cell * CELL_TEXELS).w == 0u {
+        if s.cell >= 0 && !is_outdoors(s.cell) {
             let inside = light_in(s.cell, place, along) * (globals.origin_low.w * globals.root_z.w);
             around = 0.7 * toned(inside * globals.field_shift.w);
         }
