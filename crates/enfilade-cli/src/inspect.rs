@@ -212,7 +212,7 @@ fn cell_kind(cell: &Cell) -> &'static str {
     }
 }
 
-fn kind_name(kind: PortalKind) -> &'static str {
+pub(crate) fn kind_name(kind: PortalKind) -> &'static str {
     match kind {
         PortalKind::Open => "open",
         PortalKind::Door => "door",

@@ -78,6 +78,39 @@ fn rooms_are_renamed_by_point_and_by_cell_and_all_else_stays() {
     let (code, printed, said) = run(&dir, &["inspect", "n.glb", "--objects", "Hall"]);
     assert_eq!(code, Some(0), "{said}");
     assert!(printed.contains("object"), "{printed}");
+    for (args, says) in [
+        (
+            &["path", "n.glb", "--from", &at, "--to", &at][..],
+            r"from Kü\n\u{1b}[2Jche",
+        ),
+        (
+            &["see", "n.glb", "--eye", &at, "--look", "1,1,1"],
+            r"Kü\n\u{1b}[2Jche",
+        ),
+        (&["inspect", "n.glb"], r"Kü\n\u{1b}[2Jche"),
+    ] {
+        let (_, printed, said) = run(&dir, args);
+        assert!(printed.contains(says), "{args:?}: {printed} {said}");
+    }
+    fs::write(
+        dir.join("points"),
+        format!("{}\n0 -9 0\n", at.replace(',', " ")),
+    )
+    .unwrap();
+    for (json, says) in [
+        (&[][..], "0 Kü\\n\\u{1b}[2Jche\n2 outdoors\n"),
+        (&["--json"], r#""names":["Kü\n\u001b[2Jche","outdoors"]"#),
+    ] {
+        let points = fs::File::open(dir.join("points")).unwrap();
+        let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args([&["locate", "n.glb", "--names"], json].concat())
+            .current_dir(&dir)
+            .stdin(points)
+            .output()
+            .unwrap();
+        let printed = String::from_utf8(done.stdout).unwrap();
+        assert!(printed.contains(says), "{printed}");
+    }
 }
 
 #[test]
