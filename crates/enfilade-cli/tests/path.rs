@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use enfilade_cpg::wire::encode_glb;
-use enfilade_cpg::{CellId, DetailObject, World};
+use enfilade_cpg::{CellId, DetailObject, PortalKind, World};
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::{GridParams, room_grid};
@@ -261,13 +261,8 @@ fn a_point_without_a_floor_is_told_with_the_nearest_floor() {
     );
 }
 
-#[test]
-fn furniture_is_in_the_way_unless_it_is_left_out() {
-    let mut world = room_grid(&GridParams::two_rooms());
-    let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
-    // A counter across the first room, in front of the doorway.
-    let end = DVec3::new(high[0] - 0.2, low[1] + 1.0, high[2]);
-    let counter = Aabb::new(DVec3::new(high[0] - 0.6, low[1], low[2]), end);
+/// Puts an object into a cell.
+fn add_counter(world: &mut World, cell: u32, counter: Aabb) {
     let corners = counter.triangles().concat();
     let primitive = Primitive {
         positions: corners.iter().map(|p| p.as_vec3().to_array()).collect(),
@@ -278,7 +273,7 @@ fn furniture_is_in_the_way_unless_it_is_left_out() {
         name: "counter".into(),
         mesh: world.detail_meshes.len() as u32,
         transform: std::array::from_fn(|i| f32::from(u8::from(i % 5 == 0))),
-        cells: vec![CellId(0)],
+        cells: vec![CellId(cell)],
         source: None,
         part_of: None,
     });
@@ -286,6 +281,72 @@ fn furniture_is_in_the_way_unless_it_is_left_out() {
         primitives: vec![primitive],
         ..Mesh::default()
     });
+}
+
+/// Four rooms in a ring, three of the openings doorways; that between rooms 2 and 3 is high in the wall.
+fn ring() -> World {
+    let params = |seed| GridParams {
+        size: [2, 1, 2],
+        seed,
+        doors: 0.6,
+        windows: 1.0,
+        ..GridParams::two_rooms()
+    };
+    let is_ring = |world: &World| {
+        let portals = world.graph.portals.iter();
+        let mut high = portals.filter(|p| p.kind == PortalKind::Window);
+        let pair = high.next().map(|p| p.cells.map(|c| c.0));
+        let door = (world.graph.portals.iter()).find(|p| p.cells.map(|c| c.0) == [0, 1]);
+        let far = world.graph.cells[1].aabb[1][2];
+        let is_clear = door.is_some_and(|p| p.outline.iter().all(|v| v[2] < far - 1.6));
+        pair == Some([2, 3]) && high.next().is_none() && is_clear
+    };
+    let all = (0..2000).map(|seed| room_grid(&params(seed)));
+    let mut world = all.into_iter().find(is_ring).unwrap();
+    for portal in &mut world.graph.portals {
+        portal.kind = PortalKind::Open;
+    }
+    world
+}
+
+#[test]
+fn a_refusal_names_a_sill_rather_than_a_room_that_objects_divide() {
+    let mut world = ring();
+    let (known, _) = write("ring.glb", &world);
+    let middle = |c: usize| {
+        let [low, high] = world.graph.cells[c].aabb;
+        format!(
+            "{},0.1,{}",
+            (low[0] + high[0]) / 2.0,
+            (low[2] + high[2]) / 2.0
+        )
+    };
+    let [from, to] = [middle(0), middle(3)];
+    let done = enfilade(&["path", &known, "--from", &from, "--to", &to]);
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    // A counter before the doorway from room 1 to room 3.
+    let [low, high] = world.graph.cells[1].aabb.map(|p| p.map(f64::from));
+    let min = DVec3::new(low[0], low[1], high[2] - 1.0);
+    let max = DVec3::new(high[0], low[1] + 1.0, high[2] - 0.7);
+    add_counter(&mut world, 1, Aabb::new(min, max));
+    let (divided, _) = write("divided.glb", &world);
+    let args = ["path", &divided, "--from", &from, "--to", &to];
+    let said = refusal(&[&args[..], &["--height", "1.4"]].concat());
+    assert!(
+        said.contains("an opening between cell-2 and cell-3 at ")
+            && said.contains("is 0.90 m higher"),
+        "{said}"
+    );
+}
+
+#[test]
+fn furniture_is_in_the_way_unless_it_is_left_out() {
+    let mut world = room_grid(&GridParams::two_rooms());
+    let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
+    // A counter across the first room, in front of the doorway.
+    let end = DVec3::new(high[0] - 0.2, low[1] + 1.0, high[2]);
+    let counter = Aabb::new(DVec3::new(high[0] - 0.6, low[1], low[2]), end);
+    add_counter(&mut world, 0, counter);
     let (world, [from, to]) = write("counter.glb", &world);
     let args = ["path", &world, "--from", &from, "--to", &to];
     let said = refusal(&args);

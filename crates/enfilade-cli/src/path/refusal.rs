@@ -170,11 +170,20 @@ impl Wanted<'_> {
                 At(blocked.at.into()),
                 At(blocked.beyond.into())
             ),
-            Obstacle::Gap => format!(
-                "between {} and {} is no floor, or something stands there",
-                At(blocked.at.into()),
-                At(blocked.beyond.into())
-            ),
+            Obstacle::Gap => {
+                let [at, to] = [blocked.at, blocked.beyond];
+                let rise = to.y - at.y;
+                let level = match rise.abs() {
+                    h if h <= walker.step => String::new(),
+                    h if rise > 0.0 => format!(", {h:.2} m higher,"),
+                    h => format!(", {h:.2} m lower,"),
+                };
+                format!(
+                    "between {} and {}{level} is no floor, or something stands there",
+                    At(at.into()),
+                    At(to.into())
+                )
+            }
         };
         // Only other maps tell whether objects, a low ceiling or a narrow place are in the way.
         let walks = self.walks;

@@ -60,6 +60,8 @@ pub enum Obstacle {
 
 /// Farthest from a portal that a walker is at it. [Units: wu]
 const AT: f64 = 1.0;
+/// Price of an obstacle on a route: more than any way round. [Units: wu]
+const DETOUR: f64 = 1e4;
 /// Width of the squares in which the nearest floors across a gap are looked for; gaps up to this width are found. [Units: wu]
 const ACROSS: f64 = 2.0;
 
@@ -175,7 +177,7 @@ impl Look<'_> {
 
     /// Returns the portals from the start's cell to the end's: the fewest that walkers do not pass, and then the shortest way. Each
     /// with the cell before it.
-    fn route(&self, start: Stand) -> Option<Vec<(CellId, PortalId)>> {
+    fn route(&self, reached: &[bool], start: Stand) -> Option<Vec<(CellId, PortalId)>> {
         let (layout, floors) = (self.space.layout(PartId::ROOT), self.floors());
         let [from, to] = [start, self.goal].map(|s| floors.floor(s.floor).cell);
         let mut best: HashMap<CellId, (f64, Option<(CellId, PortalId)>)> = HashMap::new();
@@ -192,8 +194,9 @@ impl Look<'_> {
             }
             let here = via.map_or(start.at, |(_, p)| layout.opening(p).center());
             for exit in layout.exits(cell) {
-                let through =
-                    cost + self.price(exit) + here.distance(layout.opening(exit.portal).center());
+                let price = self.price(exit) + self.price_within(reached, cell, via, exit.portal);
+                let way = here.distance(layout.opening(exit.portal).center());
+                let through = cost + DETOUR * price + way;
                 if best.get(&exit.to).is_none_or(|b| through < b.0) {
                     best.insert(exit.to, (through, Some((cell, exit.portal))));
                     heap.push(Reverse((through.to_bits(), exit.to)));
@@ -210,25 +213,50 @@ impl Look<'_> {
         Some(route)
     }
 
-    /// The price of a portal, in lengths: one that walkers do not pass costs more than any way round. [Units: wu]
+    /// The price of a portal, in detours.
     fn price(&self, exit: &Exit) -> f64 {
-        const DETOUR: f64 = 1e4;
         let layout = self.space.layout(PartId::ROOT);
         let is_void = !self.crawls && is_void(self.space, PartId::ROOT, exit.to);
-        DETOUR
-            * match layout.opening(exit.portal).kind() {
-                _ if is_void => 100.0,
-                _ if self.map.is_walkable(PartId::ROOT, exit.portal) => 0.0,
-                PortalKind::Door | PortalKind::Open => 1.0,
-                PortalKind::Window => 3.0,
-                PortalKind::Crack => 100.0,
+        match layout.opening(exit.portal).kind() {
+            _ if is_void => 100.0,
+            _ if self.map.is_walkable(PartId::ROOT, exit.portal) => 0.0,
+            PortalKind::Door | PortalKind::Open => 1.0,
+            PortalKind::Window => 3.0,
+            PortalKind::Crack => 100.0,
+        }
+    }
+
+    /// The price of the way in a cell to a portal, in detours: from another portal, or else from the start. Portals that walkers do not
+    /// pass have their own price.
+    fn price_within(
+        &self,
+        reached: &[bool],
+        cell: CellId,
+        via: Option<(CellId, PortalId)>,
+        to: PortalId,
+    ) -> f64 {
+        let own = &self.map.parts[PartId::ROOT.idx()];
+        let layout = self.space.layout(PartId::ROOT);
+        let mut ends = own.ways.range(to);
+        let is_way = match via {
+            _ if ends.is_empty() => true,
+            None => ends.any(|k| {
+                let side = usize::from(layout.opening(to).cells()[1] == cell);
+                reached[own.sides[k as usize][side] as usize]
+            }),
+            Some((_, from)) => {
+                let mut starts = own.ways.range(from);
+                let leads = |k: u32| own.ways.lengths(cell, k, to).any(f64::is_finite);
+                starts.is_empty() || from == to || starts.any(leads)
             }
+        };
+        if is_way { 0.0 } else { 2.0 }
     }
 
     /// Finds the obstacle on the route.
     fn on_route(&self, reached: &[bool], start: Stand) -> Option<Blocked> {
         let floors = self.floors();
-        let route = self.route(start)?;
+        let route = self.route(reached, start)?;
         let is_passed = |portal: PortalId| {
             let mut all = floors.crossings().iter().filter(|c| c.portal == portal);
             all.any(|c| {
@@ -333,7 +361,7 @@ impl Look<'_> {
     fn within(&self, reached: &[bool], cell: CellId, target: u32) -> Blocked {
         let floors = self.floors();
         let beyond = self.flood(target, |_| true, true);
-        let Some((at, to)) = self.across(reached, &beyond) else {
+        let Some((at, to)) = self.across(cell, [reached, &beyond]) else {
             let to = floors.point(target);
             let own = |f: u32| reached[f as usize] && floors.floor(f).cell == cell;
             let at = self.nearest(to, own);
@@ -354,12 +382,13 @@ impl Look<'_> {
         self.blocked(at, floors.point(to), by)
     }
 
-    /// Returns the nearest two floors of two sets, if they are close.
-    fn across(&self, from: &[bool], to: &[bool]) -> Option<(u32, u32)> {
+    /// Returns the nearest two floors of two sets in a cell, if they are close.
+    fn across(&self, cell: CellId, [from, to]: [&[bool]; 2]) -> Option<(u32, u32)> {
         let floors = self.floors();
         let is_rim = |set: &[bool], f: u32| {
             let steps = floors.floor(f).steps;
-            set[f as usize] && steps.iter().any(|s| *s == NONE || !set[*s as usize])
+            let is_in = set[f as usize] && floors.floor(f).cell == cell;
+            is_in && steps.iter().any(|s| *s == NONE || !set[*s as usize])
         };
         let all = 0..floors.n_floors() as u32;
         let key = |p: DVec3| [p.x, p.z].map(|v| (v / ACROSS).floor() as i64);
