@@ -10,7 +10,7 @@
 //! | `rooms` | where rooms end: which parts are one room, and the openings between rooms, by one rule for all methods |
 //! | [`complex`] | which space is open: convex leaves and the facets between them, exactly |
 //! | `realize`, `assemble` | the world: which leaves form a cell, which geometry each cell sees |
-//! | [`simplify`], [`bound`], [`edit`] | changes to a finished world |
+//! | [`simplify`], [`bound`], [`edit`], [`names`] | changes to a finished world |
 //! | [`leak`] | where a model is open that should be closed |
 
 mod assemble;
@@ -29,7 +29,7 @@ mod layout;
 pub mod leak;
 mod marked;
 mod method;
-mod names;
+pub mod names;
 mod output;
 mod proposal;
 mod realize;

@@ -1,7 +1,8 @@
 //! Cells take the names that the scene has for rooms. Covers S1.
 
-use enfilade_bake::{BakeConfig, BakeContext, Silent, bake};
-use enfilade_cpg::CellPortalGraph;
+use enfilade_bake::names::rename_cells;
+use enfilade_bake::{BakeConfig, BakeContext, BakeOutput, Silent, bake};
+use enfilade_cpg::{CellId, CellPortalGraph};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::RoomName;
 use enfilade_testkit::mixed::two_rooms;
@@ -19,15 +20,16 @@ fn room(name: &str, points: &[DVec3], volume: f64) -> RoomName {
     }
 }
 
-/// Names of the western and the eastern room, and of the outdoors.
-fn named(rooms: Vec<RoomName>) -> [String; 3] {
+fn baked(rooms: Vec<RoomName>) -> BakeOutput {
     let mut scene = two_rooms().scene;
     scene.rooms = rooms;
     let context = BakeContext::new(&Silent, None);
-    let graph = bake(&scene, &BakeConfig::default(), &context)
-        .unwrap()
-        .world
-        .graph;
+    bake(&scene, &BakeConfig::default(), &context).unwrap()
+}
+
+/// Names of the western and the eastern room, and of the outdoors.
+fn named(rooms: Vec<RoomName>) -> [String; 3] {
+    let graph = baked(rooms).world.graph;
     assert_eq!(graph.validate(), Ok(()));
     let name = |graph: &CellPortalGraph, p| graph[graph.locator.locate(p).unwrap()].name.clone();
     [WEST, EAST, DVec3::splat(-50.0)].map(|p| name(&graph, p))
@@ -85,4 +87,58 @@ fn outdoors_takes_only_a_name_that_someone_set() {
     let garden = DVec3::splat(-50.0);
     assert_eq!(named(vec![room("Balcony", &[garden], 8.0)])[2], "outdoors");
     assert_eq!(named(vec![RoomName::at("Garden", garden)])[2], "Garden");
+}
+
+#[test]
+fn no_cell_has_the_number_of_another() {
+    let [west, _, _] = named(vec![RoomName::at("cell-17", WEST)]);
+    assert_eq!(west, "cell-17 2");
+    let [west, _, _] = named(vec![RoomName::at("cell-1", WEST)]);
+    assert_eq!(west, "cell-1");
+}
+
+#[test]
+fn names_for_points_that_name_no_room_of_their_own_are_told() {
+    let notes = |rooms| baked(rooms).notes.join("\n");
+    let set = |name: &str, at| RoomName::at(name, at);
+    let said = notes(vec![set("Hall", WEST), set("Den", EAST)]);
+    assert!(!said.contains("Hall") && !said.contains("Den"), "{said}");
+    let said = notes(vec![set("Ha\nll", DVec3::new(2.0, -0.1, 2.0))]);
+    assert!(
+        said.contains(r"'Ha\nll' is for the point 2.00 -0.10 2.00, which is in a wall"),
+        "{said}"
+    );
+    let said = notes(vec![set("Garden", DVec3::splat(-50.0))]);
+    assert!(said.contains("'Garden'") && said.contains("the outdoors"));
+    let said = notes(vec![
+        set("Hall", WEST),
+        set("Den", WEST + 0.1),
+        set("Hall", WEST),
+    ]);
+    assert!(
+        said.contains("'Den' and 'Hall' are names for points in one room, cell-1"),
+        "{said}"
+    );
+}
+
+#[test]
+fn cells_of_a_world_may_exchange_their_names() {
+    let mut graph = baked(Vec::new()).world.graph;
+    let names = |graph: &CellPortalGraph| -> Vec<String> {
+        graph.cells.iter().map(|c| c.name.clone()).collect()
+    };
+    let n = names(&graph).len();
+    let all: Vec<CellId> = graph.cell_ids().collect();
+    let rename = |graph: &mut CellPortalGraph, new: &[&str]| {
+        let pairs = all.iter().copied().zip(new.iter().map(|n| (*n).to_owned()));
+        rename_cells(graph, &pairs.collect::<Vec<_>>())
+    };
+    assert_eq!(rename(&mut graph, &["A", "B"]), ["A", "B"]);
+    assert_eq!(rename(&mut graph, &["B", "A"]), ["B", "A"]);
+    // The third cell keeps its name, so it is taken.
+    let third = graph[all[2]].name.clone();
+    assert_eq!(rename(&mut graph, &["A", "A"]), ["A", "A 2"]);
+    assert_eq!(rename(&mut graph, &[&third])[0], format!("{third} 2"));
+    assert_eq!(names(&graph)[2..], [third]);
+    assert_eq!((n, graph.validate()), (3, Ok(())));
 }

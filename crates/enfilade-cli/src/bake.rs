@@ -77,7 +77,8 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let settings = settings::resolve(options)?;
     let bar = StageBar::new();
     bar.start("reading", 0);
-    let imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
+    let mut imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
+    imported.scene.rooms.extend_from_slice(&settings.names);
     bar.finish();
     outputs.read(&imported.report.references)?;
     let said = found::doubts(&imported.report)?;

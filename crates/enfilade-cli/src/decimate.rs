@@ -57,7 +57,8 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     }
     let mut settings = settings::resolve(&args.options)?;
     settings.config.method = Some(Method::Delaunay);
-    let imported = import_scene(&args.inputs, &args.options.detail, &settings.import)?;
+    let mut imported = import_scene(&args.inputs, &args.options.detail, &settings.import)?;
+    imported.scene.rooms.extend_from_slice(&settings.names);
     outputs.read(&imported.report.references)?;
     choices.read(&imported.report.references)?;
     let scene = &imported.scene;

@@ -17,7 +17,7 @@ use serde::Serialize;
 use specials::SpecialReport;
 
 use crate::limits::Limits;
-use crate::screen::{At, print_json, printed_at_once};
+use crate::screen::{At, Rounded, print_json, printed_at_once};
 use crate::verdict::cells_in_words;
 use enfilade_cli::world::read_world;
 
@@ -212,7 +212,7 @@ fn cell_kind(cell: &Cell) -> &'static str {
     }
 }
 
-fn kind_name(kind: PortalKind) -> &'static str {
+pub(crate) fn kind_name(kind: PortalKind) -> &'static str {
     match kind {
         PortalKind::Open => "open",
         PortalKind::Door => "door",
@@ -377,6 +377,16 @@ pub(crate) fn write_seals(out: &mut impl Write, world: &World) -> io::Result<()>
     )
 }
 
+/// Counts of builders whose names need words.
+const COUNTS: [(&str, &str); 6] = [
+    ("basins", "parts of the air as the flood divided it"),
+    ("leaks", "gaps of the model that became portals"),
+    ("leaves", "convex pieces of space that the walls part"),
+    ("occupied_voxels", "those that walls meet"),
+    ("screens", "openings that were proposed as portals"),
+    ("seals", "polygons that close gaps"),
+];
+
 fn write_totals(out: &mut impl Write, world: &World, all: bool) -> io::Result<()> {
     let graph = &world.graph;
     let mut row = |name: &str, value: String| writeln!(out, "{name:<22} {value}");
@@ -448,8 +458,17 @@ fn write_totals(out: &mut impl Write, world: &World, all: bool) -> io::Result<()
     }
     for (name, value) in &graph.statistics.counts {
         if name != "input_triangles" {
-            row(&name.replace('_', " "), value.to_string())?;
+            row(&name.replace('_', " "), Rounded(*value).to_string())?;
         }
+    }
+    let known = |name: &&(&str, &str)| graph.statistics.counts.contains_key(name.0);
+    let words: Vec<String> = COUNTS
+        .iter()
+        .filter(known)
+        .map(|(name, words)| format!("{}: {words}", name.replace('_', " ")))
+        .collect();
+    if !words.is_empty() {
+        writeln!(out, "{}", words.join("; "))?;
     }
     Ok(())
 }

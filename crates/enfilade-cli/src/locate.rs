@@ -4,7 +4,7 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use enfilade::cpg::{Locator, World};
+use enfilade::cpg::{CellId, CellPortalGraph, Locator, World};
 use enfilade::geom::DVec3;
 use enfilade::import::{Glob, GlobState};
 
@@ -22,6 +22,9 @@ pub(crate) struct Locate {
     /// match other letters, and it may include the nodes above, as in 'storey 2/*/IfcDoor*'.
     #[arg(long, value_name = "PATTERN")]
     object: Option<String>,
+    /// Print the name of each cell behind its id.
+    #[arg(long)]
+    names: bool,
     /// Print JSON for machines: the ids of all points, `null` if there is no cell, once all lines are read; with
     /// `--object`, the ids of its cells.
     #[arg(long)]
@@ -32,8 +35,36 @@ pub(crate) struct Locate {
 
 /// The output of `--json`.
 #[derive(serde::Serialize)]
-struct LocateReport {
+struct LocateReport<'a> {
     cells: Vec<Option<u32>>,
+    /// With `--names`, the name of each.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    names: Option<Vec<Option<&'a str>>>,
+}
+
+/// Cells as they are printed: their ids, and their names if these are wanted.
+struct Printed<'a>(Option<&'a CellPortalGraph>);
+
+impl<'a> Printed<'a> {
+    fn line(&self, cell: CellId) -> String {
+        match self.name(cell) {
+            Some(name) => format!("{} {name}", cell.0),
+            None => cell.0.to_string(),
+        }
+    }
+
+    fn name(&self, cell: CellId) -> Option<&'a str> {
+        self.0.map(|graph| graph[cell].name.as_str())
+    }
+
+    fn report(&self, cells: impl Iterator<Item = Option<CellId>>) -> LocateReport<'a> {
+        let cells: Vec<Option<CellId>> = cells.collect();
+        let named = || cells.iter().map(|c| c.and_then(|c| self.name(c)));
+        LocateReport {
+            names: self.0.map(|_| named().collect()),
+            cells: cells.iter().map(|c| c.map(|c| c.0)).collect(),
+        }
+    }
 }
 
 /// Longest line: three numbers are always shorter, and a file without line ends must not fill the memory.
@@ -45,7 +76,9 @@ const MAX_PATTERN: usize = 1000;
 pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     args.limits.begin()?;
     if let Some(pattern) = &args.object {
-        return locate_object(&read_world(&args.world)?, pattern, args.json);
+        let world = read_world(&args.world)?;
+        let printed = Printed(args.names.then_some(&world.graph));
+        return locate_object(&world, pattern, &printed, args.json);
     }
     if is_stream(&args.world) {
         bail!("standard input is for the points; give the world as a file, not '-'");
@@ -54,19 +87,25 @@ pub(crate) fn run(args: &Locate) -> anyhow::Result<()> {
     let input = BufReader::with_capacity(1 << 16, io::stdin().lock());
     let output = printed_at_once();
     let locator = &world.graph.locator;
+    let printed = Printed(args.names.then_some(&world.graph));
     if args.json {
         let mut cells = Vec::new();
         each_point(input, |p, _| {
-            cells.push(locator.locate(p).map(|c| c.0));
+            cells.push(locator.locate(p));
             Ok(())
         })?;
-        return print_json(output, &LocateReport { cells });
+        return print_json(output, &printed.report(cells.into_iter()));
     }
-    locate_lines(locator, input, output)
+    locate_lines(locator, &printed, input, output)
 }
 
 /// Prints the cells of all sources whose name or path matches.
-fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()> {
+fn locate_object(
+    world: &World,
+    pattern: &str,
+    printed: &Printed<'_>,
+    json: bool,
+) -> anyhow::Result<()> {
     if pattern.len() > MAX_PATTERN {
         bail!("--object: the pattern must have at most {MAX_PATTERN} letters");
     }
@@ -79,11 +118,10 @@ fn locate_object(world: &World, pattern: &str, json: bool) -> anyhow::Result<()>
     let cells = world.cells_of_sources(|source| found[source as usize]);
     let mut output = printed_at_once();
     if json {
-        let cells = cells.into_iter().map(|c| Some(c.0)).collect();
-        return print_json(output, &LocateReport { cells });
+        return print_json(output, &printed.report(cells.into_iter().map(Some)));
     }
     for cell in cells {
-        writeln!(output, "{}", cell.0)?;
+        writeln!(output, "{}", printed.line(cell))?;
     }
     output.flush().context("cannot write to standard output")
 }
@@ -127,12 +165,13 @@ fn sources_named(world: &World, pattern: &str) -> Vec<bool> {
 
 fn locate_lines<R: Read>(
     locator: &Locator,
+    printed: &Printed<'_>,
     input: BufReader<R>,
     mut output: impl Write,
 ) -> anyhow::Result<()> {
     let done = each_point(input, |p, is_waiting| {
         match locator.locate(p) {
-            Some(cell) => writeln!(output, "{}", cell.0)?,
+            Some(cell) => writeln!(output, "{}", printed.line(cell))?,
             None => output.write_all(b"-\n")?,
         }
         // A user who queries one point at a time waits for the answer.
@@ -191,7 +230,8 @@ mod tests {
     #[test]
     fn a_line_without_an_end_is_refused() {
         let endless = BufReader::new(io::repeat(b'1'));
-        let error = locate_lines(&Locator::default(), endless, Vec::new()).unwrap_err();
+        let error =
+            locate_lines(&Locator::default(), &Printed(None), endless, Vec::new()).unwrap_err();
         assert!(error.to_string().contains("line 1"), "{error}");
     }
 }

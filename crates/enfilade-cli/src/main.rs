@@ -18,6 +18,7 @@ mod limits;
 mod living;
 mod locate;
 mod manual;
+mod name;
 mod output;
 mod pack;
 mod path;
@@ -72,6 +73,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Locate(locate::Locate),
     Man(manual::Man),
+    Name(name::Name),
     Pack(pack::Pack),
     Path(path::WalkedPath),
     Plan(plan::Plan),
@@ -103,6 +105,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),
+        Command::Name(args) => name::run(&args),
         Command::Pack(args) => pack::pack(&args),
         Command::Path(args) => path::run(&args),
         Command::Plan(args) => plan::run(&args),

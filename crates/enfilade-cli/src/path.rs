@@ -1,18 +1,20 @@
 //! `enfilade path`: finds the walk from one point to another.
 
+pub(crate) mod refusal;
+
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
-use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
 use enfilade::stream::PackedPlace;
-use enfilade::world::{Agent, NoPath, PartId, Path, PathSearch, Space};
+use enfilade::world::{Agent, PartId, Path, Space};
 
+use self::refusal::{MovedEnd, Wanted};
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::Outputs;
-use crate::screen::{print_json, printed_at_once};
+use crate::screen::{Warned, print_json, printed_at_once};
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::is_stream;
 use enfilade_cli::values::point;
@@ -66,6 +68,8 @@ struct PathReport {
     cells: Vec<u32>,
     portals: Vec<u32>,
     points: Vec<[f64; 3]>,
+    /// Ends that are elsewhere than they were asked for.
+    moved: Vec<MovedEnd>,
 }
 
 pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
@@ -110,20 +114,20 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
     if args.keep {
         walk::keep(file, &space, &walks, &map)?;
     }
-    let ends = [args.from, args.to];
-    let ends = ends.map(|p| (PartId::ROOT, DVec3::from_array(p.map(f64::from))));
+    let exact = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+    let wanted = Wanted {
+        space: &space,
+        map: &map,
+        walks,
+        ends: [exact(args.from), exact(args.to)],
+        options: ["--from", "--to"],
+        closed: &args.closed,
+    };
     let mut path = Path::default();
-    let is_open = |_, portal: PortalId| !args.closed.contains(&portal.0);
-    let found = PathSearch::new().find(&map, &space, ends, is_open, &mut path);
-    let side = map.floors(PartId::ROOT).side();
-    match found {
-        // Squares are a quarter of the radius wide unless the world is too large for that.
-        Err(NoPath::NoWay) if side > 0.26 * args.radius => bail!(
-            "{}; with floors divided into squares of {side:.3} m, doorways narrower than {:.2} m may be missed",
-            NoPath::NoWay,
-            2.0 * (args.radius + side)
-        ),
-        found => found?,
+    wanted.find(&mut path)?;
+    let moved = wanted.moved(&path);
+    for end in &moved {
+        writeln!(Warned, "{}", wanted.told(end))?;
     }
     let layout = space.layout(PartId::ROOT);
     let start = layout.locate(path.points[0].at + DVec3::Y * 0.5 * args.height);
@@ -134,6 +138,7 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         cells: start.into_iter().chain(cells).map(|c| c.0).collect(),
         portals: path.portals.iter().map(|p| p.exit.portal.0).collect(),
         points: path.points.iter().map(|p| p.at.to_array()).collect(),
+        moved,
     };
     let mut out = printed_at_once();
     if args.json {

@@ -477,14 +477,13 @@ fn print(mut out: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::
     writeln!(out, "{} cells, {} portals", r.cells, r.portals)?;
     writeln!(
         out,
-        "{} pairs of cells see each other: {:.2} cells on average, {:.2} %",
+        "{} pairs: a cell sees {:.1} cells on average, {:.1} % of all",
         r.pairs, r.mean_visible, r.mean_visible_percent
     )?;
     writeln!(
         out,
-        "tightness: {:.2} % of them proved by {} lines, {} undecided; {} by sides of planes alone",
+        "{:.1} % of the pairs proved, {} undecided; planes alone would leave {} pairs",
         percent(r.proved_visible),
-        r.lines,
         r.undecided,
         r.base_pairs
     )?;
@@ -517,7 +516,12 @@ fn print(mut out: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::
         .map(|(&c, name)| format!("{name} ({})", r.visible_cells[c]))
         .collect();
     writeln!(out, "cells that see most: {}", worst.join(", "))?;
-    writeln!(out, "{:.2} s, {} chains searched", r.seconds, r.steps)?;
+    writeln!(out, "{:.2} s", r.seconds)?;
+    writeln!(
+        out,
+        "pair: a cell and one that counts as seen from it, itself included; proved: by a line of sight between them; undecided: \
+         neither that nor its absence is proved; planes: the quick test on which the search improves"
+    )?;
     out.flush().context("cannot write to standard output")
 }
 

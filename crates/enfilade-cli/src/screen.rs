@@ -75,6 +75,22 @@ impl fmt::Display for At {
     }
 }
 
+/// A number for people: three digits, or all of its integer part, and never minus zero.
+pub(crate) struct Rounded(pub(crate) f64);
+
+impl fmt::Display for Rounded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let exact = self.0;
+        let rounded = if exact.abs() >= 1000.0 || exact == exact.trunc() {
+            exact.round()
+        } else {
+            format!("{exact:.2e}").parse().unwrap_or(exact)
+        };
+        // Adding zero makes 0 of -0.
+        write!(f, "{}", rounded + 0.0)
+    }
+}
+
 /// A writer of text for people: each call of `writeln!` makes one line.
 pub(crate) struct Screen<W>(W);
 
@@ -211,6 +227,21 @@ mod tests {
             text,
             format!("in {shown}\\n\n{shown}\n\na\\u{{9b}}\nb\nc\\n\n")
         );
+    }
+
+    #[test]
+    fn numbers_for_people_have_few_digits() {
+        for (number, text) in [
+            (0.099_999_999_999_999_99, "0.1"),
+            (0.001_374_639_782_323_491, "0.00137"),
+            (-0.0, "0"),
+            (1_689_900.0, "1689900"),
+            (1234.567, "1235"),
+            (-12.345, "-12.3"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(Rounded(number).to_string(), text);
+        }
     }
 
     #[test]

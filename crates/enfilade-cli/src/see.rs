@@ -181,7 +181,7 @@ fn print_table(
     let [structure, details] = triangles(sight, seen);
     writeln!(
         out,
-        "{} of {} cells, {} of {} portals, {} of {} triangles ({} of details), {:.1} us",
+        "{} of {} cells, {} of {} portals, {} of {} triangles ({} of furniture and other objects), {:.1} µs",
         seen.cells().len(),
         world.graph.cells.len(),
         seen.portals().len(),
@@ -190,6 +190,10 @@ fn print_table(
         sight.n_triangles(),
         details,
         seconds * 1e6
+    )?;
+    writeln!(
+        out,
+        "depth: distance along the view to the nearest point of the portal; portal: the one through which the cell is seen"
     )?;
     Ok(())
 }

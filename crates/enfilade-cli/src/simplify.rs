@@ -228,7 +228,11 @@ fn simplify_portal_file(
         notes: Vec::new(),
         warning: over_bound(args, simple.max_cost),
     };
-    compared.print(outputs.printed(), args.json, ["clusters", "cluster"])
+    compared.print(
+        outputs.printed(),
+        args.json,
+        ["clusters", "cluster", CLUSTER_COST],
+    )
 }
 
 /// The costs of the clusters of a portal file: by their solid faces, which Quake 3's files have, else by their
@@ -245,6 +249,13 @@ fn cluster_costs(file: &PrtFile, cost: &CostModel) -> Vec<f64> {
     }
     costs
 }
+
+/// The cost of a cell in words, of which options set the factors.
+const CELL_COST: &str =
+    "triangles of walls and objects that the cell sees, unless other costs are given";
+/// The cost of a cluster in words.
+const CLUSTER_COST: &str =
+    "triangles of its solid faces, or its leaves if the file has no faces, times --triangle-cost";
 
 /// A file compared with the one that it was made from.
 #[derive(Serialize)]
@@ -264,14 +275,15 @@ pub(crate) struct Compared {
 
 impl Compared {
     /// Prints the differences; a bound that could not be met is also a warning.
-    fn print(&self, mut out: Box<dyn Write>, is_json: bool, what: [&str; 2]) -> anyhow::Result<()> {
+    /// `what`: the word for cells, for one of them, and for its cost.
+    fn print(&self, mut out: Box<dyn Write>, is_json: bool, what: [&str; 3]) -> anyhow::Result<()> {
         if let Some(warning) = &self.warning {
             write_lines(&mut Warned, warning)?;
         }
         if is_json {
             return print_json(out, self);
         }
-        let [cells, cell] = what;
+        let [cells, cell, cost] = what;
         let width = cells.len().max("portals".len());
         for (name, [before, after]) in [(cells, self.cells), ("portals", self.portals)] {
             writeln!(out, "{name:<width$} {before:>7} → {after}")?;
@@ -283,6 +295,9 @@ impl Compared {
             writeln!(out, "{note}")?;
         }
         writeln!(out, "{}", self.written)?;
+        if self.costs.is_some() {
+            writeln!(out, "cost: {cost}")?;
+        }
         Ok(())
     }
 }
@@ -313,5 +328,5 @@ pub(crate) fn write(
         notes: done.notes,
         warning: done.warning,
     };
-    compared.print(outputs.printed(), is_json, ["cells", "cell"])
+    compared.print(outputs.printed(), is_json, ["cells", "cell", CELL_COST])
 }

@@ -1,6 +1,7 @@
 //! `enfilade sound`: renders a source as a walking listener hears it.
 
 mod materials;
+mod walked;
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -17,9 +18,9 @@ use self::materials::{Absorption, Absorptions, Given, given, tell};
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, write_streamed};
-use crate::screen::print_json;
+use crate::screen::{At, Warned, print_json};
 use enfilade_cli::values::point;
-use enfilade_cli::world::read_world;
+use enfilade_cli::world::read_world_hashed;
 
 /// Renders a source as a listener hears it who walks from point to point: through openings and closed doors, from the
 /// direction of the sound, with the rooms' reverberation.
@@ -34,6 +35,10 @@ pub(crate) struct Sound {
     /// Position of the source, in meters.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     source: [f32; 3],
+    /// Lead the listener along the walking path from point to point, over floors, with the ears at 1.6 m: through doors, which stay as
+    /// they are for the sound, but not through portals that are `--closed`.
+    #[arg(long)]
+    walk: bool,
     /// Sound that the source repeats: the first channel of a WAV file. A test sound if not given.
     #[arg(long, value_name = "FILE")]
     wav: Option<PathBuf>,
@@ -90,8 +95,9 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         outputs.write("-o", Format::Sound, path)?;
     }
-    let (points, seconds) = path(&args.listener)?;
-    let world = read_world(&args.world)?;
+    let given: Vec<DVec3> = args.listener.iter().copied().map(exact).collect();
+    let mut seconds = duration(&given)?;
+    let (world, hash) = read_world_hashed(&args.world)?;
     let n = world.graph.portals.len();
     if let Some(p) = args.closed.iter().find(|p| **p as usize >= n) {
         bail!(
@@ -100,6 +106,16 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
         );
     }
     let opened = opened(&args.open, n)?;
+    let (mut points, mut warnings) = (given, Vec::new());
+    if args.walk {
+        points = walked::along_paths(args, (&world, hash), &points, &mut warnings)?;
+        seconds = duration(&points)?;
+    } else {
+        walked::check(&world, &points, &mut warnings)?;
+    }
+    for warning in &warnings {
+        writeln!(Warned, "{warning}")?;
+    }
     let (rate, source) = match &args.wav {
         Some(path) => read_wav(path, seconds)?,
         None => (RATE, test_sound(RATE)),
@@ -138,6 +154,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
                 "file": args.output.as_ref().map(|p| p.display().to_string()),
                 "heard": heard.rows,
                 "absorption": heard.absorption,
+                "warnings": warnings,
             }),
         );
     }
@@ -183,7 +200,12 @@ impl HeardWalk<'_> {
         let source = self.source;
         let source_cell = space
             .locate(root, source)
-            .context("the source is in no cell")?;
+            .with_context(|| {
+                format!(
+                    "--source: it is in solid matter or outside of all cells, at {}; `enfilade locate` tells the cell of a point",
+                    At(source.into())
+                )
+            })?;
         let mut fields = DiffuseFields::new();
         let passes = |part, portal| acoustics.transmitted(&space, part, portal);
         fields.solve(&reverb, &space, source_cell, passes);
@@ -200,7 +222,11 @@ impl HeardWalk<'_> {
             let Some(cell) = space.locate(root, at) else {
                 match &before {
                     Some(last) => each(last)?,
-                    None => bail!("the listener starts in no cell, at {at}"),
+                    None => bail!(
+                        "--listener: the walk starts in solid matter or outside of all cells, at {}; `enfilade locate` tells the cell \
+                         of a point",
+                        At(at.into())
+                    ),
                 }
                 continue;
             };
@@ -269,9 +295,8 @@ fn exact(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// The points of a walk, and its duration. [Units: wu, s] Refused if it takes longer than is rendered.
-fn path(listener: &[[f32; 3]]) -> anyhow::Result<(Vec<DVec3>, f64)> {
-    let points: Vec<DVec3> = listener.iter().copied().map(exact).collect();
+/// The duration of a walk. [Units: s] Refused if it is longer than is rendered.
+fn duration(points: &[DVec3]) -> anyhow::Result<f64> {
     let length: f64 = points.windows(2).map(|p| p[0].distance(p[1])).sum();
     let seconds = if length > 0.0 {
         length / SPEED
@@ -285,7 +310,7 @@ fn path(listener: &[[f32; 3]]) -> anyhow::Result<(Vec<DVec3>, f64)> {
             LONGEST * SPEED / 1000.0
         );
     }
-    Ok((points, seconds))
+    Ok(seconds)
 }
 
 fn n_blocks(seconds: f64, rate: u32) -> usize {

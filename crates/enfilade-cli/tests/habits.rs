@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 23] = [
+const COMMANDS: [(&str, &[&str]); 24] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -30,6 +30,10 @@ const COMMANDS: [(&str, &[&str]); 23] = [
     ("export world.glb -o graph.graphml", &["file", "bytes"]),
     ("inspect world.glb", &["cells", "portals", "stats"]),
     ("locate world.glb", &["cells"]),
+    (
+        "name world.glb --at 2,1,2 Hall --cell outdoors Garden -o n.glb",
+        &["file", "bytes", "names", "warnings"],
+    ),
     ("pack world.glb -o w.enf", &["file", "packed", "pieces"]),
     ("unpack w.enf -o u.glb", &["file", "bytes"]),
     ("plan world.glb -o p.svg", &["file", "bytes"]),

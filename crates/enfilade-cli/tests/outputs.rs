@@ -37,6 +37,7 @@ fn no_command_writes_over_an_input_or_twice() {
         ("decimate s.obj -o s.obj", is_input),
         ("decimate s.obj --choices c.toml -o c.toml", is_input),
         ("edit w.glb --delete-portal 0 -o w.glb", is_input),
+        ("name w.glb --cell 0 Hall -o w.glb", is_input),
         ("simplify w.glb --max-cells 2 -o w.glb", is_input),
         ("plan w.glb -o w.glb", is_input),
         ("report w.glb --no-pictures -o w.glb", is_input),
@@ -255,7 +256,7 @@ fn files_that_nobody_named_are_not_written_over() {
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         (done.status.code(), said)
     };
-    let n_pages = if cfg!(feature = "view") { 24 } else { 23 };
+    let n_pages = if cfg!(feature = "view") { 25 } else { 24 };
     for (line, file, n_files) in [
         ("demo -o d", "house.glb", 3),
         ("demo -o d", "world.glb", 3),

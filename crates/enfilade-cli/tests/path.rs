@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use enfilade_cpg::wire::encode_glb;
-use enfilade_cpg::{CellId, DetailObject, World};
+use enfilade_cpg::{CellId, DetailObject, PortalKind, World};
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::{GridParams, room_grid};
@@ -70,7 +70,6 @@ fn no_path_is_an_error_that_says_why() {
     let (world, [from, to]) = two_rooms("no_path.glb");
     let args = ["path", &world, "--from", &from, "--to", &to];
     for (more, says) in [
-        (["--closed", "0"], "no way"),
         (["--radius", "9"], "no floor"),
         (["--closed", "7"], "1 portals"),
         (["--radius", "0"], "above 0"),
@@ -88,13 +87,182 @@ fn no_path_is_an_error_that_says_why() {
     }
 }
 
+/// The error of a path that is not found.
+fn refusal(args: &[&str]) -> String {
+    let done = enfilade(args);
+    assert_eq!(done.status.code(), Some(1), "{args:?}");
+    assert!(done.stdout.is_empty(), "{args:?}");
+    let said = text(&done.stderr);
+    assert!(said.contains("no way that a walker can go: "), "{said}");
+    said.to_owned()
+}
+
+/// How far one gets, and how far the end then is, in a refusal. [Units: wu]
+fn how_far(said: &str) -> [f64; 2] {
+    let number = |before: &str, after: &str| {
+        let (_, rest) = said.split_once(before).unwrap();
+        let (number, _) = rest.split_once(after).unwrap();
+        let number = number.rsplit(' ').next().unwrap();
+        number.parse::<f64>().unwrap()
+    };
+    [
+        number("one gets ", " m far"),
+        number("m far, to", " m from the end"),
+    ]
+}
+
 #[test]
-fn furniture_is_in_the_way_unless_it_is_left_out() {
-    let mut world = room_grid(&GridParams::two_rooms());
-    let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
-    // A counter across the first room, in front of the doorway.
-    let end = DVec3::new(high[0] - 0.2, low[1] + 1.0, high[2]);
-    let counter = Aabb::new(DVec3::new(high[0] - 0.6, low[1], low[2]), end);
+fn a_refusal_names_the_closed_door_and_how_far_one_gets() {
+    let mut named = room_grid(&GridParams::two_rooms());
+    named.graph.cells[0].name = "Hall".into();
+    named.graph.cells[1].name = "Kit\u{1b}chen".into();
+    let (world, [from, to]) = write("closed.glb", &named);
+    let said = refusal(&[
+        "path", &world, "--from", &from, "--to", &to, "--closed", "0",
+    ]);
+    assert!(
+        said.contains(r"portal-0, an opening between Hall and Kit\u{1b}chen at ")
+            && said.contains("is closed")
+            && said.contains("in Hall, "),
+        "{said}"
+    );
+    let [far, left] = how_far(&said);
+    let done = enfilade(&["path", &world, "--from", &from, "--to", &to, "--json"]);
+    let whole: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let whole = whole["length"].as_f64().unwrap();
+    assert!(
+        far > 1.0 && left > 1.0 && (far + left - whole).abs() < 0.6,
+        "{said} {whole}"
+    );
+}
+
+#[test]
+fn a_refusal_names_the_opening_that_a_walker_does_not_fit_through() {
+    let door = room_grid(&GridParams::two_rooms());
+    let window = room_grid(&GridParams {
+        doors: 0.0,
+        windows: 1.0,
+        ..GridParams::two_rooms()
+    });
+    let step = "is 0.90 m higher than the floor before it, more than a step of 0.30 m (--step)";
+    for (name, world, walker, says) in [
+        (
+            "narrow",
+            &door,
+            ["--radius", "0.9"],
+            "m wide, too narrow for a walker of 1.80 m",
+        ),
+        (
+            "low",
+            &door,
+            ["--height", "2.5"],
+            "is 2.10 m high, too low for a walker of 2.50 m",
+        ),
+        ("sill", &window, ["--height", "1.2"], step),
+    ] {
+        let (world, [from, to]) = write(&format!("unfit-{name}.glb"), world);
+        let args = ["path", &world, "--from", &from, "--to", &to];
+        let said = refusal(&[&args[..], &walker].concat());
+        assert!(
+            said.contains("portal-0, ") && said.contains(says),
+            "{name}: {said}"
+        );
+        assert!(
+            said.contains(" between cell-0 and cell-1 at "),
+            "{name}: {said}"
+        );
+        assert!(how_far(&said)[0] > 0.5, "{name}: {said}");
+    }
+}
+
+#[test]
+fn a_refusal_names_a_stair_that_is_too_low_and_a_leaf_in_the_way() {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("path-stair");
+    let _ = fs::remove_dir_all(&dir);
+    let made = enfilade(&["demo", "-q", "-o", dir.to_str().unwrap()]);
+    assert_eq!(made.status.code(), Some(0), "{}", text(&made.stderr));
+    let world = dir.join("world.glb");
+    let args = [
+        "path",
+        world.to_str().unwrap(),
+        "--from",
+        "2,0,4",
+        "--to",
+        "9,2.9,6",
+    ];
+    assert_eq!(
+        enfilade(&[&args[..], &["--height", "1.7"]].concat())
+            .status
+            .code(),
+        Some(0)
+    );
+    let said = refusal(&[&args[..], &["--height", "2.0"]].concat());
+    assert!(
+        said.contains(
+            "a walker 1.50 m high would get there, and this one is 2.00 m high (--height)"
+        ),
+        "{said}"
+    );
+    assert!(how_far(&said)[0] > 3.0, "{said}");
+    // Leaves of the double door reach far into the hall.
+    let args = [
+        "path",
+        world.to_str().unwrap(),
+        "--from",
+        "2,0,4",
+        "--to",
+        "5.5,0,7",
+    ];
+    let said = refusal(&[&args[..], &["--radius", "0.45"]].concat());
+    assert!(
+        said.contains("the open leaf of portal-19, a door between cell-2 and cell-4 at 4.35 0.00 4.00, is in the way"),
+        "{said}"
+    );
+    assert!(how_far(&said)[0] > 1.5, "{said}");
+}
+
+#[test]
+fn a_path_tells_ends_that_are_elsewhere() {
+    let (world, [from, to]) = two_rooms("moved.glb");
+    let ask = |to: &str| {
+        let done = enfilade(&["path", &world, "--from", &from, "--to", to, "--json"]);
+        let said = text(&done.stderr).to_owned();
+        assert_eq!(done.status.code(), Some(0), "{said}");
+        let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+        (report["moved"].as_array().unwrap().clone(), said)
+    };
+    let (moved, said) = ask(&to);
+    assert!(moved.is_empty() && said.is_empty(), "{said}");
+    // Beside the far wall, in solid matter.
+    let wall = room_grid(&GridParams::two_rooms()).graph.cells[1].aabb[1][0];
+    let z = to.rsplit(',').next().unwrap();
+    let (moved, said) = ask(&format!("{},0.5,{z}", wall + 0.1));
+    assert_eq!(moved.len(), 1);
+    assert_eq!(moved[0]["option"], "--to");
+    let distance = moved[0]["distance"].as_f64().unwrap();
+    assert!((0.3..0.5).contains(&distance), "{distance}");
+    assert!(
+        said.contains("--to: a walker cannot stand at")
+            && said.contains(&format!("{distance:.2} m beside")),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_point_without_a_floor_is_told_with_the_nearest_floor() {
+    let (world, [from, _]) = two_rooms("no_floor.glb");
+    let done = enfilade(&["path", &world, "--from", &from, "--to", "1,9,1"]);
+    let said = text(&done.stderr);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(
+        said.contains("--to: no floor for a walker")
+            && said.contains("the nearest is 9.00 m away, at 0.97 0.00"),
+        "{said}"
+    );
+}
+
+/// Puts an object into a cell.
+fn add_counter(world: &mut World, cell: u32, counter: Aabb) {
     let corners = counter.triangles().concat();
     let primitive = Primitive {
         positions: corners.iter().map(|p| p.as_vec3().to_array()).collect(),
@@ -105,7 +273,7 @@ fn furniture_is_in_the_way_unless_it_is_left_out() {
         name: "counter".into(),
         mesh: world.detail_meshes.len() as u32,
         transform: std::array::from_fn(|i| f32::from(u8::from(i % 5 == 0))),
-        cells: vec![CellId(0)],
+        cells: vec![CellId(cell)],
         source: None,
         part_of: None,
     });
@@ -113,14 +281,78 @@ fn furniture_is_in_the_way_unless_it_is_left_out() {
         primitives: vec![primitive],
         ..Mesh::default()
     });
+}
+
+/// Four rooms in a ring, three of the openings doorways; that between rooms 2 and 3 is high in the wall.
+fn ring() -> World {
+    let params = |seed| GridParams {
+        size: [2, 1, 2],
+        seed,
+        doors: 0.6,
+        windows: 1.0,
+        ..GridParams::two_rooms()
+    };
+    let is_ring = |world: &World| {
+        let portals = world.graph.portals.iter();
+        let mut high = portals.filter(|p| p.kind == PortalKind::Window);
+        let pair = high.next().map(|p| p.cells.map(|c| c.0));
+        let door = (world.graph.portals.iter()).find(|p| p.cells.map(|c| c.0) == [0, 1]);
+        let far = world.graph.cells[1].aabb[1][2];
+        let is_clear = door.is_some_and(|p| p.outline.iter().all(|v| v[2] < far - 1.6));
+        pair == Some([2, 3]) && high.next().is_none() && is_clear
+    };
+    let all = (0..2000).map(|seed| room_grid(&params(seed)));
+    let mut world = all.into_iter().find(is_ring).unwrap();
+    for portal in &mut world.graph.portals {
+        portal.kind = PortalKind::Open;
+    }
+    world
+}
+
+#[test]
+fn a_refusal_names_a_sill_rather_than_a_room_that_objects_divide() {
+    let mut world = ring();
+    let (known, _) = write("ring.glb", &world);
+    let middle = |c: usize| {
+        let [low, high] = world.graph.cells[c].aabb;
+        format!(
+            "{},0.1,{}",
+            (low[0] + high[0]) / 2.0,
+            (low[2] + high[2]) / 2.0
+        )
+    };
+    let [from, to] = [middle(0), middle(3)];
+    let done = enfilade(&["path", &known, "--from", &from, "--to", &to]);
+    assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));
+    // A counter before the doorway from room 1 to room 3.
+    let [low, high] = world.graph.cells[1].aabb.map(|p| p.map(f64::from));
+    let min = DVec3::new(low[0], low[1], high[2] - 1.0);
+    let max = DVec3::new(high[0], low[1] + 1.0, high[2] - 0.7);
+    add_counter(&mut world, 1, Aabb::new(min, max));
+    let (divided, _) = write("divided.glb", &world);
+    let args = ["path", &divided, "--from", &from, "--to", &to];
+    let said = refusal(&[&args[..], &["--height", "1.4"]].concat());
+    assert!(
+        said.contains("an opening between cell-2 and cell-3 at ")
+            && said.contains("is 0.90 m higher"),
+        "{said}"
+    );
+}
+
+#[test]
+fn furniture_is_in_the_way_unless_it_is_left_out() {
+    let mut world = room_grid(&GridParams::two_rooms());
+    let [low, high] = world.graph.cells[0].aabb.map(|p| p.map(f64::from));
+    // A counter across the first room, in front of the doorway.
+    let end = DVec3::new(high[0] - 0.2, low[1] + 1.0, high[2]);
+    let counter = Aabb::new(DVec3::new(high[0] - 0.6, low[1], low[2]), end);
+    add_counter(&mut world, 0, counter);
     let (world, [from, to]) = write("counter.glb", &world);
     let args = ["path", &world, "--from", &from, "--to", &to];
-    let done = enfilade(&args);
-    assert_eq!(done.status.code(), Some(1));
+    let said = refusal(&args);
     assert!(
-        text(&done.stderr).contains("no way"),
-        "{}",
-        text(&done.stderr)
+        said.contains("objects stand between ") && said.contains("nearest 'counter' (--no-objects"),
+        "{said}"
     );
     let done = enfilade(&[&args[..], &["--no-objects"]].concat());
     assert_eq!(done.status.code(), Some(0), "{}", text(&done.stderr));

@@ -109,3 +109,91 @@ fn a_walk_has_no_clicks_and_a_table() {
         assert!(jump > 1e-4 && jump <= most, "{jump} {most}");
     }
 }
+
+/// Without `--walk` the listener of two points goes straight, also through walls, and is told.
+#[test]
+fn a_listener_walks_through_walls_only_with_a_warning() {
+    let world = room_grid(&GridParams {
+        outdoors: true,
+        ..GridParams::two_rooms()
+    });
+    let path = file("sound-walls.glb");
+    fs::write(&path, encode_glb(&world).unwrap()).unwrap();
+    let [low, high] = world.graph.cells[0].aabb;
+    let outline = &world.graph.portals[0].outline;
+    let z = outline.iter().map(|p| p[2]).sum::<f32>() / outline.len() as f32;
+    // Beside the doorway, as far from it as the room allows.
+    let beside = if z - low[2] > high[2] - z {
+        low[2] + 0.4
+    } else {
+        high[2] - 0.4
+    };
+    let at = |x: f32, z: f32| format!("{x},1.6,{z}");
+    let [a, b] = [at(high[0] - 1.0, beside), at(high[0] + 1.0, beside)];
+    let ask = |listener: &str, more: &[&str]| -> Value {
+        let args = [
+            "sound",
+            &path,
+            "--listener",
+            listener,
+            "--source",
+            &a,
+            "--json",
+        ];
+        let done = enfilade(&[&args[..], more].concat());
+        let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+        let said = String::from_utf8(done.stderr).unwrap();
+        let warnings = report["warnings"].as_array().unwrap();
+        let lines: Vec<&str> = warnings.iter().map(|w| w.as_str().unwrap()).collect();
+        assert_eq!(said.lines().collect::<Vec<_>>(), lines);
+        report
+    };
+    let said = |report: &Value| report["warnings"].to_string();
+    let straight = ask(&format!("{a};{b}"), &[]);
+    assert!(
+        said(&straight).contains("walks through a wall at")
+            && said(&straight).contains("after 0.7 s"),
+        "{straight}"
+    );
+    let walked = ask(&format!("{a};{b}"), &["--walk"]);
+    assert_eq!(said(&walked), "[]");
+    let last = |report: &Value| report["heard"].as_array().unwrap().last().unwrap().clone();
+    let seconds = |report: &Value| last(report)["seconds"].as_f64().unwrap();
+    assert!(seconds(&walked) > 1.1 * seconds(&straight), "{walked}");
+    assert!((last(&walked)["position"][1].as_f64().unwrap() - 1.6).abs() < 0.1);
+    // Through the doorway, and around in front of it: no warning.
+    let through = format!("{};{}", at(high[0] - 1.0, z), at(high[0] + 1.0, z));
+    assert_eq!(said(&ask(&through, &[])), "[]");
+    // Outdoors, beside the building and below it.
+    assert_eq!(said(&ask("-5,1.6,2", &[])), "[]");
+    let below = ask("2,-3,2", &[]);
+    assert!(
+        said(&below).contains("below the ground, or under the building"),
+        "{below}"
+    );
+}
+
+#[test]
+fn a_walk_that_is_not_possible_says_why() {
+    let (world, [a, _, b]) = two_rooms("sound-no-walk.glb");
+    let walk = format!("{a};{b}");
+    let ask = |args: &[&str]| {
+        let all = [&["sound", &world, "--source", &a][..], args].concat();
+        let done = Command::new(env!("CARGO_BIN_EXE_enfilade"))
+            .args(all)
+            .output()
+            .unwrap();
+        assert_eq!(done.status.code(), Some(1));
+        String::from_utf8(done.stderr).unwrap()
+    };
+    let said = ask(&["--listener", &walk, "--walk", "--closed", "0"]);
+    assert!(
+        said.contains("portal-0, an opening") && said.contains("is closed"),
+        "{said}"
+    );
+    let said = ask(&["--listener", "1,-0.1,1"]);
+    assert!(
+        said.contains("--listener: the walk starts in solid matter"),
+        "{said}"
+    );
+}

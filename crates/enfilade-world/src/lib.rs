@@ -29,9 +29,9 @@ pub use bodies::{Agent, Body, Cast, CastCounts, Caster, Contact, Impact, Pairs, 
 pub use layout::{CellShape, Exit, Layout, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{
-    Arrival, Corner, Floors, Geodesics, Hop, Hops, KeptMapError, LengthSearch, NoPath,
-    PassedPortal, Path, PathFollower, PathPoint, PathPortal, PathSearch, Progress, Sampling,
-    WalkMap, WalkMapKey, Ways,
+    Arrival, Blocked, Corner, Floors, Geodesics, Hop, Hops, KeptMapError, LengthSearch, NoPath,
+    Obstacle, PassedPortal, Path, PathFollower, PathPoint, PathPortal, PathSearch, Progress,
+    Sampling, WalkMap, WalkMapKey, Ways,
 };
 pub use pose::Pose;
 pub use saved::{

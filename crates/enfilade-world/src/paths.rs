@@ -19,6 +19,7 @@ use enfilade_geom::DVec3;
 use crate::layout::Exit;
 use crate::space::PartId;
 
+pub use blocked::{Blocked, Obstacle};
 pub use edges::Corner;
 pub(crate) use ends::{End, Limit};
 pub use floors::Floors;
@@ -35,6 +36,7 @@ pub use walk_map::WalkMap;
 pub use ways::Ways;
 
 mod all_pairs;
+mod blocked;
 mod columns;
 mod edges;
 mod ends;

@@ -2,22 +2,23 @@
 //!
 //! Every value is checked where it is read, so that an error message names its place.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use enfilade::bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade::bake::simplify::{CostModel, SimplifySettings};
 use enfilade::bake::{BakeConfig, Method, SmallestHole};
-use enfilade::geom::scene::Scene;
+use enfilade::geom::scene::{RoomName, Scene};
 use enfilade::geom::{Aabb, DVec3, Plane};
 use enfilade::import::{IfcConverter, ImportOptions, RepairOptions, RoleRules, Up};
 
 use enfilade_cli::input::{name_of, read_text};
 
 use super::values::{
-    Amount, Budget, Hole, Length, Unit, Weld, parse_hole, parse_length, parse_point, parse_toml,
-    parse_unit, parse_weld,
+    Amount, Budget, Hole, Length, SettingsPoint, Unit, Weld, parse_hole, parse_length, parse_point,
+    parse_toml, parse_unit, parse_weld,
 };
 
 /// Options for reading scenes, shared by the baked scene and the scene that a world is compared with.
@@ -173,6 +174,9 @@ struct ConfigFile {
     merge: MergeTable,
     #[serde(default)]
     bsp: BspTable,
+    /// Names of rooms, each with a point in its room.
+    #[serde(default)]
+    names: BTreeMap<String, SettingsPoint>,
 }
 
 /// The table `[bsp]` of the settings file.
@@ -196,7 +200,7 @@ struct BspTable {
     triangle_cost: Option<Amount>,
     area_cost: Option<Amount>,
     detail_cost: Option<Amount>,
-    material_costs: std::collections::BTreeMap<String, Amount>,
+    material_costs: BTreeMap<String, Amount>,
 }
 
 #[derive(Clone, Copy, serde::Deserialize)]
@@ -225,12 +229,16 @@ struct MergeTable {
 impl ConfigFile {
     fn read(path: &Path) -> anyhow::Result<Self> {
         let text = read_text("settings", path)?;
-        parse_toml(&text).with_context(|| {
+        let file: Self = parse_toml(&text).with_context(|| {
             format!(
                 "settings {} are not understood; correct or remove the line",
                 name_of(path)
             )
-        })
+        })?;
+        if file.names.keys().any(|name| name.trim().is_empty()) {
+            bail!("settings {}: a name in [names] is empty", name_of(path));
+        }
+        Ok(file)
     }
 }
 
@@ -267,7 +275,7 @@ fn resolve_costs(options: &BakeOptions, table: &BspTable) -> anyhow::Result<Simp
         ..SimplifySettings::default()
     };
     if let Some(max) = costs.max_cost.filter(|m| *m < costs.min_cost) {
-        anyhow::bail!(
+        bail!(
             "max_cost {max} is below min_cost {}; no cell can be within both",
             costs.min_cost
         );
@@ -318,6 +326,8 @@ fn resolve_bsp(table: BspTable) -> anyhow::Result<BspConfig> {
 pub(crate) struct Resolved {
     pub(crate) import: ImportOptions,
     pub(crate) config: BakeConfig,
+    /// Names of rooms, beside those of the scene.
+    pub(crate) names: Vec<RoomName>,
     /// No bound for merging was given: the default applies to levels of brushes alone.
     merges_brushes_only: bool,
 }
@@ -409,9 +419,11 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     config.delaunay = options.delaunay.resolve()?;
     let merges_brushes_only = options.min_cost.is_none() && file.bsp.min_cost.is_none();
     config.bsp = resolve_bsp(file.bsp)?;
+    let named = file.names.into_iter();
     Ok(Resolved {
         import: import_options,
         config,
+        names: named.map(|(name, at)| RoomName::at(name, at.0)).collect(),
         merges_brushes_only,
     })
 }
@@ -507,6 +519,10 @@ mod tests {
         of_line("unit = \"feet\"", 1, "ft");
         of_line("up = \"x\"", 1, "up");
         of_line("origin = [1, 2]", 1, "origin");
+        of_line("[names]\nHall = [1, 2]", 2, "three numbers");
+        of_line("[names]\nHall = [1, 2, inf]", 2, "finite");
+        of_line("[names]\nHall = \"1,2,3\"", 2, "three numbers");
+        of_line("[names]\nHall = [1,2,3]\nHall = [4,5,6]", 3, "duplicate");
     }
 
     #[test]
@@ -519,7 +535,7 @@ mod tests {
             let problem = problem.unwrap().to_string();
             let (_, known) = problem.split_once("expected one of").unwrap();
             for key in known.split('`').skip(1).step_by(2) {
-                let is_table = key == "merge" || key == "bsp";
+                let is_table = ["merge", "bsp", "names"].contains(&key);
                 let name = if is_table {
                     format!("`[{key}]`")
                 } else {
@@ -529,10 +545,11 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 40);
+        assert_eq!(n, 41);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: ConfigFile = toml::from_str(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));
+        assert_eq!(file.names["Kitchen"].0, DVec3::new(4.0, 1.0, -2.5));
     }
 
     #[test]

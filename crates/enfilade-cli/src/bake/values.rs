@@ -168,6 +168,41 @@ impl<'de> Deserialize<'de> for Budget {
 /// The least budget that the bake accepts. [Units: vx]
 const LEAST_VOXELS: usize = 1000;
 
+/// A point in the settings file, `[x, y, z]`. [Units: wu]
+pub(super) struct SettingsPoint(pub(super) DVec3);
+
+impl<'de> Deserialize<'de> for SettingsPoint {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ThreeNumbers;
+        impl<'de> serde::de::Visitor<'de> for ThreeNumbers {
+            type Value = SettingsPoint;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "a point: three numbers of meters, [x, y, z]")
+            }
+            fn visit_seq<A: serde::de::SeqAccess<'de>>(
+                self,
+                mut list: A,
+            ) -> Result<SettingsPoint, A::Error> {
+                let mut numbers: Vec<f64> = Vec::new();
+                while let Some(number) = list.next_element()? {
+                    numbers.push(number);
+                }
+                match numbers[..] {
+                    [x, y, z] if numbers.iter().all(|n| n.is_finite()) => {
+                        Ok(SettingsPoint(DVec3::new(x, y, z)))
+                    }
+                    [_, _, _] => Err(A::Error::custom("a point needs finite numbers")),
+                    _ => Err(A::Error::custom(format!(
+                        "a point has three numbers of meters, [x, y, z], not {}",
+                        numbers.len()
+                    ))),
+                }
+            }
+        }
+        deserializer.deserialize_seq(ThreeNumbers)
+    }
+}
+
 /// A unit in the settings file: a name or a number.
 pub(super) struct Unit(pub(super) f64);
 

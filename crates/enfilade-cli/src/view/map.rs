@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, ColorImage, Pos2, Rect, Stroke, TextureHandle, TextureOptions, Vec2};
 use enfilade::cpg::{Cell, CellId, World, cell_color};
-use enfilade::geom::DVec3;
+use enfilade::geom::{DVec3, shown};
 use enfilade_render::Camera;
 
 use crate::living::{Blip, BlipKind, RADAR_REACH};
@@ -83,7 +83,9 @@ impl Map {
         let size = [high[0] - low[0], high[1] - low[1]];
         let density = POINTS / size[0].max(size[1]).max(0.1);
         Self {
-            names: world.graph.cells.iter().map(|c| c.name.clone()).collect(),
+            names: (world.graph.cells.iter())
+                .map(|c| shown(&c.name).to_string())
+                .collect(),
             is_room: world.graph.cells.iter().map(Cell::is_room).collect(),
             portals: portals.collect(),
             n: size.map(|s| (s * density).max(1.0) as usize),

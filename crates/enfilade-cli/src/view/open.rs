@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::pointed::FAR;
 use enfilade::cpg::{Cell, CellId, PortalId, World};
-use enfilade::geom::DVec3;
+use enfilade::geom::{DVec3, shown};
 use enfilade::runtime::Sightlines;
 use enfilade::runtime::View;
 use enfilade::stream::Eye;
@@ -79,7 +79,7 @@ pub(super) struct Open {
 /// The name of a cell, and what it is unless a room or the outdoors.
 fn titled(cell: &Cell) -> String {
     let kind = if cell.is_void { " (void)" } else { "" };
-    format!("{}{kind}", cell.name)
+    format!("{}{kind}", shown(&cell.name))
 }
 
 /// The name of the cell in the middle of the picture: of the air before the surface there.
@@ -208,7 +208,7 @@ impl Open {
             self.shown
                 .blips
                 .extend_from_slice(self.lived.radar(&player));
-            let name = |c: CellId| world.graph[c].name.clone();
+            let name = |c: CellId| shown(&world.graph[c].name).to_string();
             self.shown.told = radar_words(&self.shown.blips, name);
         }
     }
@@ -559,5 +559,20 @@ impl Open {
         let [drawn, ..] = self.shown.counts;
         self.say(format!("wrote {}, {drawn} triangles", to.display()));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_title_is_one_line_whatever_the_name() {
+        let cell = Cell {
+            name: "Ha\nll\u{1b}".into(),
+            is_void: true,
+            ..Cell::default()
+        };
+        assert_eq!(titled(&cell), r"Ha\nll\u{1b} (void)");
     }
 }

@@ -273,6 +273,14 @@ impl Floors {
         self.squares.side
     }
 
+    /// Returns the floor nearest to a point, to tell where a walker could stand; `None` if there is none. O(floors). [Units: wu]
+    #[must_use]
+    pub fn nearest(&self, p: DVec3) -> Option<DVec3> {
+        let all = (0..self.floors.len() as u32).filter(|f| !self.floor(*f).is_edge);
+        let points = all.map(|f| self.point(f));
+        points.min_by(|a, b| a.distance_squared(p).total_cmp(&b.distance_squared(p)))
+    }
+
     pub(crate) fn squares(&self) -> &Squares {
         &self.squares
     }

@@ -9,7 +9,7 @@ use super::walk_map::{Stand, WalkMap};
 use super::{NoPath, Path, PathPortal};
 use crate::layout::Exit;
 use crate::space::{PartId, Place, Space};
-use enfilade_cpg::PortalId;
+use enfilade_cpg::{CellId, PortalId};
 
 /// Searches for paths, with reusable buffers: allocates nothing once they have grown, while parts rest.
 #[derive(Clone, Debug, Default)]
@@ -65,14 +65,11 @@ impl PathSearch {
         path.clear();
         let start = map.stand(space, from).ok_or(NoPath::NoFloorAtStart)?;
         let goal = map.stand(space, to).ok_or(NoPath::NoFloorAtEnd)?;
-        let is_void = |part, cell| space.layout(part).cell(cell).is_void;
-        let ends = [start, goal];
-        let crawls = ends
-            .iter()
-            .any(|s| is_void(s.part, map.floors(s.part).floor(s.floor).cell));
+        let crawls = crawls(map, space, [start, goal]);
         let mut may_pass = |part, portal| {
             let cells = space.layout(part).opening(portal).cells();
-            may_pass(part, portal) && (crawls || !cells.into_iter().any(|c| is_void(part, c)))
+            may_pass(part, portal)
+                && (crawls || !cells.into_iter().any(|c| is_void(space, part, c)))
         };
         let infinite = f64::INFINITY;
         let last = self.spread(map, space, start, (Some(goal), infinite), &mut may_pass);
@@ -385,6 +382,16 @@ impl PathSearch {
             path.length_in_plan += way.with_y(0.0).length();
         }
     }
+}
+
+/// Returns `true` if a path from one place to another leads through [voids](enfilade_cpg::Cell::is_void).
+pub(super) fn crawls(map: &WalkMap, space: &Space, ends: [Stand; 2]) -> bool {
+    let cell = |s: &Stand| map.floors(s.part).floor(s.floor).cell;
+    ends.iter().any(|s| is_void(space, s.part, cell(s)))
+}
+
+pub(super) fn is_void(space: &Space, part: PartId, cell: CellId) -> bool {
+    space.layout(part).cell(cell).is_void
 }
 
 /// Adds the portals of a step across a joint, from the last point of a path to a point of the next part.
