@@ -153,7 +153,7 @@ impl Wanted<'_> {
                     walker.height
                 );
             }
-            Obstacle::Sill(p, rise) => format!("{} is {}", self.portal(p), step(rise)),
+            Obstacle::Sill(p, rise) => return format!("{} is {}", self.portal(p), step(rise)),
             Obstacle::Unfit(p) => format!(
                 "{} has no floor on one side, or something stands in it",
                 self.portal(p)
