@@ -420,7 +420,7 @@ impl House {
         put("cabinet", f.cabinet, 4.75, 0.0, 6.0, 90.0);
         put("toilet", f.toilet, 6.6, 0.0, 0.72, 0.0);
         put("kitchen cabinet", f.counter, 10.34, 0.0, 6.0, -90.0);
-        put("kitchen cabinet", f.counter, 9.25, 0.0, 7.94, 180.0);
+        put("kitchen cabinet", f.counter, 9.7, 0.0, 7.94, 180.0);
         put("table", f.table, 8.9, 0.0, 2.2, 90.0);
         for (x, z, yaw) in [
             (8.2, 1.7, 90.0),
