@@ -96,7 +96,7 @@ fn counts_are_those_of_the_picture() {
         // Pictures are drawn at twice their size and halved: four pixels for each.
         let size = [320, 180];
         let camera = Camera {
-            fov_y: enfilade_render::FOV,
+            fov_y: enfilade_render::PHOTO_FOV,
             ..Camera::looking_at(eye, look)
         };
         let view = camera.view(size[0] as f32 / size[1] as f32).unwrap();

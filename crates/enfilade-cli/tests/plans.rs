@@ -181,7 +181,7 @@ fn the_extension_says_what_is_written_and_a_storey_can_be_chosen() {
     for (args, said) in [
         ("-o x.svg --storey 9", "its storeys are 1, 2, 3"),
         ("-o x.svg --scale 1:50", "leave --scale out"),
-        ("-o x.pdf --scale 1:20", "use 1:100 or larger paper"),
+        ("-o x.pdf --scale 1:20", "use 1:75 or larger paper"),
         ("-o x.pdf --paper B7", "a size of paper is needed: A5, A4"),
         ("-o x.pdf --scale 0.5", "a scale from 1:1"),
         ("-o x.png --width 99999", "16384"),
