@@ -1,11 +1,13 @@
 //! Votes: voxels that assign a region to a point.
 
-use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle};
+use std::collections::BTreeMap;
+
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Ray, Triangle};
 use rayon::prelude::*;
 
 use super::regions::Regions;
 use crate::complex::{Label, Vote};
-use crate::structure::{Frame, bounds_of};
+use crate::structure::Frame;
 use crate::voxel::{BitVolume, Grid, Labels, voxelize};
 
 /// Approximate upper limit on the number of votes.
@@ -130,6 +132,27 @@ fn voter_at(of: [usize; 3], block: usize, k: usize) -> [usize; 3] {
     [0, 1, 2].map(|axis| of[axis] * block + within[axis])
 }
 
+/// Returns the columns of voxels (z, x) that stairs are in, and those beside them, each with the heights between which
+/// they are: most of a building has none.
+fn columns_of(stairs: &[Triangle], grid: &Grid) -> BTreeMap<[usize; 2], [usize; 2]> {
+    let mut columns = BTreeMap::new();
+    for triangle in stairs {
+        let bounds = Aabb::of_points(triangle);
+        let (Some(lo), Some(hi)) = (grid.voxel_at(bounds.min), grid.voxel_at(bounds.max)) else {
+            continue;
+        };
+        let around = |k: usize| lo[k].saturating_sub(1)..=(hi[k] + 1).min(grid.dims[k] - 1);
+        for z in around(2) {
+            for x in around(0) {
+                let [low, high] = columns.entry([z, x]).or_insert([lo[1], hi[1]]);
+                *low = (*low).min(lo[1]);
+                *high = (*high).max(hi[1]);
+            }
+        }
+    }
+    columns
+}
+
 /// Returns the voxels that stairs fill: those that they touch, and those between where rays up and down hit back
 /// faces.
 pub(super) fn inside_of(
@@ -139,10 +162,7 @@ pub(super) fn inside_of(
     allowance: &Allowance,
 ) -> BitVolume {
     let mut filled = voxelize(grid, stairs, allowance);
-    let bounds = bounds_of(stairs);
-    let (Some(lo), Some(hi)) = (grid.voxel_at(bounds.min), grid.voxel_at(bounds.max)) else {
-        return filled;
-    };
+    let columns = columns_of(stairs, grid);
     let is_free = |&[x, y, z]: &[usize; 3]| !filled.get(x, y, z);
     let is_inside = |&[x, y, z]: &[usize; 3]| {
         let origin = grid.center(x, y, z);
@@ -159,10 +179,9 @@ pub(super) fn inside_of(
             bvh.closest_hit(&ray, |_| false).is_some_and(|h| !h.front)
         })
     };
-    let row = |y: usize, z: usize| (lo[0]..=hi[0]).map(move |x| [x, y, z]);
-    let inner: Vec<[usize; 3]> = (lo[2]..=hi[2])
+    let inner: Vec<[usize; 3]> = columns
         .into_par_iter()
-        .flat_map_iter(|z| (lo[1]..=hi[1]).flat_map(move |y| row(y, z)))
+        .flat_map_iter(|([z, x], [low, high])| (low..=high).map(move |y| [x, y, z]))
         .filter(is_free)
         .filter(allowance.each(WORK_A_RAY))
         .filter(is_inside)

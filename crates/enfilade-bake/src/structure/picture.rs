@@ -2,6 +2,8 @@
 //!
 //! The resolution is fixed, so that a section costs no more than a picture and the triangles near it.
 
+use std::ops::Range;
+
 use enfilade_geom::{DVec3, Plane, Triangle};
 
 /// Most lattice cells along one side.
@@ -89,15 +91,27 @@ impl Picture {
 
     /// Returns a set of cells with all cells up to `reach` from it, along both sides.
     pub(super) fn grown(&self, cells: &[bool], reach: usize) -> Vec<bool> {
-        let [nu, nv] = self.side;
-        let mut out = cells.to_vec();
         if reach == 0 {
-            return out;
+            return cells.to_vec();
         }
-        for (k, _) in cells.iter().enumerate().filter(|(_, c)| **c) {
-            let near = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
-            for j in near(k / nu, nv) {
-                out[j * nu..][near(k % nu, nu)].fill(true);
+        let [nu, nv] = self.side;
+        let near = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
+        // Along rows, then across them.
+        let mut wide = vec![false; cells.len()];
+        for (row, wide) in cells.chunks_exact(nu).zip(wide.chunks_exact_mut(nu)) {
+            let mut done = 0;
+            for (i, _) in row.iter().enumerate().filter(|(_, c)| **c) {
+                let Range { start, end } = near(i, nu);
+                wide[start.max(done)..end].fill(true);
+                done = end;
+            }
+        }
+        let mut out = vec![false; cells.len()];
+        for (j, out) in out.chunks_exact_mut(nu).enumerate() {
+            for row in near(j, nv) {
+                for (out, &wide) in out.iter_mut().zip(&wide[row * nu..]) {
+                    *out |= wide;
+                }
             }
         }
         out
