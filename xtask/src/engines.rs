@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use anyhow::Context;
 
 use crate::apt::{self, Need, has_tool};
+use crate::python;
 use crate::steps::Steps;
 use crate::{
     GATE, Profile, RELEASE, cargo, name_of, output_of, root, run_to_end, scenes, target_dir,
@@ -13,7 +14,8 @@ use crate::{
 };
 
 /// Compilers, engines and browsers.
-const NEEDS: [Need; 8] = [
+const NEEDS: [Need; 9] = [
+    python::NEED,
     Need {
         what: "a C# compiler",
         why: "builds the reader for Unity",
@@ -80,6 +82,7 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
         build_web()?;
         run_to_end(&mut web("npm", GATE, &["test"]))
     })?;
+    steps.step("python", || python::test(&worlds))?;
     // Compiles all of it; to build the engine and to run the tests takes longer than the gate may.
     steps.step("lint of bevy", || {
         let clippy = ["--all-targets", "--", "-D", "warnings"];
@@ -163,7 +166,7 @@ fn tools() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn folder(name: &str) -> PathBuf {
+pub(crate) fn folder(name: &str) -> PathBuf {
     root().join("integrations").join(name)
 }
 
@@ -252,12 +255,12 @@ fn web(program: &str, profile: Profile, args: &[&str]) -> Command {
 }
 
 /// Returns the folder of builds of all integrations, which have much in common.
-fn builds() -> PathBuf {
+pub(crate) fn builds() -> PathBuf {
     target_dir().join("engines")
 }
 
 /// Returns a cargo command in the workspace of an integration.
-fn in_workspace(name: &str, args: &[&str]) -> Command {
+pub(crate) fn in_workspace(name: &str, args: &[&str]) -> Command {
     let mut command = cargo(args);
     command.current_dir(folder(name));
     command.env("CARGO_TARGET_DIR", builds());

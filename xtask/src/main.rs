@@ -10,6 +10,7 @@ mod features;
 mod lengths;
 mod mutual;
 mod names;
+mod python;
 mod steps;
 mod suites;
 mod tidy;

@@ -7,7 +7,6 @@ mod found;
 mod gaps;
 mod leak_path;
 pub(crate) mod settings;
-mod values;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -31,10 +30,10 @@ use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
-use crate::verdict::{Verdict, is_empty, why_empty};
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
+use enfilade_report::{Verdict, is_empty, why_empty};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
@@ -78,13 +77,13 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let bar = StageBar::new();
     bar.start("reading", 0);
     let mut imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
-    imported.scene.rooms.extend_from_slice(&settings.names);
+    imported.scene.rooms.extend_from_slice(&settings.bake.names);
     bar.finish();
     outputs.read(&imported.report.references)?;
     let said = found::doubts(&imported.report)?;
     found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
-    let mut config = settings.config_for(scene);
+    let mut config = settings.bake.config_for(scene);
     config.budget.began = Some(began);
     let config = &config;
     config.costs.cost.check(&scene.materials)?;

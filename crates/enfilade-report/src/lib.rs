@@ -1,4 +1,4 @@
-//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, and an HTML page about a world.
+//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, an HTML page about a world, and a verdict on it.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -28,9 +28,11 @@ mod raster;
 mod relief;
 mod section;
 mod shafts;
+mod shapes;
 mod sheet;
 mod storeys;
 mod svg;
+mod verdict;
 mod walk;
 
 pub use drawing::Drawing;
@@ -42,5 +44,7 @@ pub use plain::{
 };
 pub use plan::{PlanOptions, Plans, plan_svg};
 pub use raster::{MAX_PIXELS, RasterError};
+pub use shapes::{PlanLabel, PlanShape};
 pub use storeys::{Storey, find_storeys};
+pub use verdict::{Verdict, cells_in_words, is_empty, why_empty};
 pub use walk::walk_html;
