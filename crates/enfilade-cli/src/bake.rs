@@ -182,28 +182,7 @@ fn refuse_leak(
         write_whole(path, lines.as_bytes())?;
         way = format!("; the way is in {}", path.display());
     }
-    let shown: Vec<String> = leak
-        .points
-        .iter()
-        .take(8)
-        .map(|p| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z))
-        .collect();
-    let entities: Vec<_> = scene
-        .entities
-        .iter()
-        .filter(|e| e.object.is_none() && e.position.is_some())
-        .collect();
-    let class = entities.get(leak.from).map_or("an entity", |e| &e.class);
-    let text = format!(
-        "the map leaks: {class} reaches the void in {} steps, by {}{}{way}",
-        leak.points.len(),
-        shown.join(", "),
-        if leak.points.len() > shown.len() {
-            ", …"
-        } else {
-            ""
-        },
-    );
+    let text = format!("{}{way}", leak.says(scene));
     if options.allow_leak {
         writeln!(Warned, "{text}")?;
         return Ok(());

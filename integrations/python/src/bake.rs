@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use enfilade::bake::bsp::find_leak;
 use enfilade::bake::{BakeConfig, BakeContext, Method, Progress, Stage, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::geom::DMat4;
+use enfilade::geom::scene::Scene;
 use enfilade::import::{ArrayMesh, IfcConverter, ImportOptions, Imported, import, import_arrays};
 use enfilade_report::{Verdict, is_empty, why_empty};
 use enfilade_settings::{Resolved, Settings, parse_toml};
@@ -32,7 +34,14 @@ pub(crate) struct Options {
     max_memory: Option<u64>,
     max_time: Option<f64>,
     allow_empty: bool,
+    allow_leak: bool,
     allow_outside: bool,
+}
+
+/// Worlds that are made although they are probably not wanted.
+struct Allowed {
+    empty: bool,
+    leak: bool,
 }
 
 /// A mesh: two names, vertices, faces, a transform of four rows, `true` if it is detail.
@@ -97,11 +106,14 @@ fn baked(
     progress: Option<Bound<'_, PyAny>>,
     read: impl FnOnce(&ImportOptions) -> PyResult<Imported> + Send,
 ) -> PyResult<(World, Vec<String>)> {
-    let allow_empty = options.allow_empty;
+    let allow = Allowed {
+        empty: options.allow_empty,
+        leak: options.allow_leak,
+    };
     let (import_options, resolved) = options.resolve()?;
     let threads = options.threads;
     run(py, threads, progress.as_ref(), move |watcher| {
-        work(&watcher, || read(&import_options), resolved, allow_empty)
+        work(&watcher, || read(&import_options), resolved, allow)
     })?
 }
 
@@ -110,7 +122,7 @@ fn work(
     watcher: &Watcher,
     read: impl FnOnce() -> PyResult<Imported>,
     resolved: Resolved,
-    allow_empty: bool,
+    allow: Allowed,
 ) -> PyResult<(World, Vec<String>)> {
     let imported = read()?;
     let report = &imported.report;
@@ -122,6 +134,9 @@ fn work(
     let unclear = report.up_doubt.as_ref().filter(|doubt| !doubt.is_clear);
     warnings.extend(unclear.map(|doubt| doubt.text.clone()));
     let config = resolved.config_for(&imported.scene);
+    if !allow.leak {
+        refuse_leak(&imported.scene, &config, watcher)?;
+    }
     let told = Told::new(watcher, &config);
     let context = BakeContext::new(&told, Some(watcher.cancel.clone()));
     let baked = bake(&imported.scene, &config, &context).map_err(|e| match e {
@@ -131,7 +146,7 @@ fn work(
     warnings.extend(baked.notes);
     if is_empty(&baked.world) {
         let why = format!("no room was found: {}", why_empty(&baked.world));
-        if !allow_empty {
+        if !allow.empty {
             return Err(BakeError::new_err(format!(
                 "{why}; --allow-empty returns the world all the same"
             )));
@@ -145,6 +160,22 @@ fn work(
     let bytes = encode_glb(&baked.world).map_err(bug)?;
     drop(baked.world);
     Ok((World::new(decode_glb(&bytes).map_err(bug)?), warnings))
+}
+
+/// Ends the bake of a map whose inside is open to the void.
+fn refuse_leak(scene: &Scene, config: &BakeConfig, watcher: &Watcher) -> PyResult<()> {
+    let n_faces = scene.solids.iter().map(|s| s.faces.len()).sum();
+    let allowance = config.budget.allowance(n_faces, None);
+    let allowance = allowance.unless(Some(watcher.cancel.clone()));
+    let leak = find_leak(scene, (&allowance).into());
+    // An exhausted allowance makes the search incomplete; the bake then ends with its own error at once.
+    match leak.filter(|_| !allowance.is_over()) {
+        None => Ok(()),
+        Some(leak) => Err(BakeError::new_err(format!(
+            "{}; close the gap, or go on with --allow-leak",
+            leak.says(scene)
+        ))),
+    }
 }
 
 impl Options {

@@ -289,6 +289,49 @@ def test_files_that_are_missing_or_no_scenes_are_errors_of_the_command(command, 
     assert str(error.value) in command.refusal("bake", text, "-o", tmp_path / "w.glb")
 
 
+LEAKING_MAP = """{
+"classname" "worldspawn"
+%s
+}
+{
+"classname" "info_player_start"
+"origin" "64 64 32"
+}
+"""
+
+
+def brush(low, high):
+    """Returns a cuboid of a Quake map."""
+    (a, b, c), (x, y, z) = low, high
+    planes = [
+        ((a, 0, 0), (a, 1, 0), (a, 0, 1)),
+        ((x, 0, 0), (x, 0, 1), (x, 1, 0)),
+        ((0, b, 0), (0, b, 1), (1, b, 0)),
+        ((0, y, 0), (1, y, 0), (0, y, 1)),
+        ((0, 0, c), (1, 0, c), (0, 1, c)),
+        ((0, 0, z), (0, 1, z), (1, 0, z)),
+    ]
+    lines = [" ".join("( %g %g %g )" % p for p in plane) + " wall 0 0 0 1 1" for plane in planes]
+    return "{\n" + "\n".join(lines) + "\n}"
+
+
+def test_a_map_that_leaks_is_an_error_of_the_command(command, tmp_path):
+    walls = [
+        brush((-8, -8, -8), (136, 136, 0)),
+        brush((-8, -8, 0), (0, 136, 136)),
+        brush((128, -8, 0), (136, 136, 136)),
+        brush((0, -8, 0), (128, 0, 136)),
+        brush((0, 128, 0), (128, 136, 136)),
+    ]
+    path = tmp_path / "open.map"
+    path.write_text(LEAKING_MAP % "\n".join(walls))
+    with pytest.raises(enfilade.BakeError, match="allow_leak=True") as error:
+        enfilade.bake_file(path)
+    said = str(error.value).split(";")[0]
+    assert said.startswith("the map leaks: info_player_start")
+    assert said in command.refusal("bake", path, "-o", tmp_path / "w.glb")
+
+
 def test_worlds_travel_as_files_bytes_and_pickles(tmp_path):
     world = enfilade.bake(*two_rooms())
     path = tmp_path / "world.glb"

@@ -102,6 +102,7 @@ def bake(
         max_time,
         allow_empty,
         False,
+        False,
         unit=unit,
         up=up,
         min_opening=min_opening,
@@ -130,6 +131,7 @@ def bake_file(
     max_memory: Optional[int] = None,
     max_time: Optional[float] = None,
     allow_empty: bool = False,
+    allow_leak: bool = False,
     allow_outside: bool = False,
     progress: Optional[Progress] = None,
 ) -> World:
@@ -138,6 +140,7 @@ def bake_file(
     files: a path, or several that make one scene: GLB, glTF, OBJ, PLY, STL, Quake ``.map``, or IFC, which needs the
     package ifcopenshell.
     detail: files whose objects bound no room.
+    allow_leak: go on with a map whose inside is open to the void, rather than raise ``BakeError``.
     allow_outside: also read files outside the scene's folder that it refers to; unsafe for scenes from strangers.
 
     All other arguments, exceptions and warnings are those of ``bake``; a missing file is ``FileNotFoundError``.
@@ -149,6 +152,7 @@ def bake_file(
         max_memory,
         max_time,
         allow_empty,
+        allow_leak,
         allow_outside,
         unit=unit,
         up=up,
@@ -183,6 +187,7 @@ _ARGUMENTS = {
     "max-memory": "max_memory",
     "max-time": "max_time",
     "allow-empty": "allow_empty",
+    "allow-leak": "allow_leak",
 }
 
 
@@ -191,8 +196,8 @@ def _in_python(text: str) -> str:
 
     def argument(match: "re.Match[str]") -> str:
         name, value = _ARGUMENTS[match[1]], match[2]
-        if name == "allow_empty":
-            return "allow_empty=True" + (f" {value}" if value else "")
+        if name.startswith("allow_"):
+            return f"{name}=True" + (f" {value}" if value else "")
         if value is None:
             return name
         if name.endswith("_names"):
@@ -212,6 +217,7 @@ def _options(
     max_memory: Optional[int],
     max_time: Optional[float],
     allow_empty: bool,
+    allow_leak: bool,
     allow_outside: bool,
     **arguments: Any,
 ) -> dict:
@@ -234,6 +240,7 @@ def _options(
         "max_memory": max_memory,
         "max_time": max_time,
         "allow_empty": allow_empty,
+        "allow_leak": allow_leak,
         "allow_outside": allow_outside,
     }
 
