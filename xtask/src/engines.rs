@@ -260,7 +260,7 @@ pub(crate) fn builds() -> PathBuf {
 }
 
 /// Returns a cargo command in the workspace of an integration.
-pub(crate) fn in_workspace(name: &str, args: &[&str]) -> Command {
+fn in_workspace(name: &str, args: &[&str]) -> Command {
     let mut command = cargo(args);
     command.current_dir(folder(name));
     command.env("CARGO_TARGET_DIR", builds());

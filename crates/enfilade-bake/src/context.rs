@@ -188,6 +188,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_cancelled_bake_ends_in_the_middle_of_a_stage() {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let context = BakeContext::new(&Silent, Some(Arc::clone(&cancel)));
+        let context = context.within(&Budget::default(), 12);
+        let work = 1 << 16;
+        assert!(context.allowance().spend(work) && context.check().is_ok());
+        cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+        assert!(!context.allowance().spend(work));
+        assert!(matches!(context.check(), Err(BakeError::Cancelled)));
+    }
+
+    #[test]
     fn a_scene_of_many_voxels_may_do_more() {
         let context = BakeContext::default().within(&Budget::default(), 12);
         let of_triangles = Budget::default().allowance(12, None);

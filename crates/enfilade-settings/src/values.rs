@@ -164,11 +164,19 @@ pub(crate) fn amount<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, 
 pub(crate) fn amounts<'de, D: Deserializer<'de>>(
     from: D,
 ) -> Result<BTreeMap<String, f64>, D::Error> {
-    let read = BTreeMap::<String, f64>::deserialize(from)?;
-    for value in read.values() {
-        check_amount(*value).map_err(D::Error::custom)?;
+    /// Read one by one, so that an error has the line of its value.
+    struct Amount(f64);
+    impl<'de> Deserialize<'de> for Amount {
+        fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+            let value = Deserialize::deserialize(from)?;
+            check_amount(value).map(Self).map_err(D::Error::custom)
+        }
     }
-    Ok(read)
+    let read = BTreeMap::<String, Amount>::deserialize(from)?;
+    Ok(read
+        .into_iter()
+        .map(|(name, Amount(v))| (name, v))
+        .collect())
 }
 
 /// Reads a number of voxels, with serde.

@@ -23,13 +23,12 @@ pub(crate) fn demo_meshes(py: Python<'_>) -> PyResult<Vec<DemoMesh<'_>>> {
         for primitive in &scene.meshes[object.mesh as usize].primitives {
             let place = |p: &[f32; 3]| {
                 let p = enfilade::geom::DVec3::from_array(p.map(f64::from));
-                object.transform.transform_point3(p).to_array().to_vec()
+                object.transform.transform_point3(p).to_array()
             };
-            let faces = primitive.triples().iter().map(|t| t.to_vec()).collect();
             meshes.push((
                 object.name.clone(),
-                table(py, primitive.positions.iter().map(place).collect(), 3)?,
-                table(py, faces, 3)?,
+                table(py, primitive.positions.iter().map(place))?,
+                table(py, primitive.triples().iter().copied())?,
                 object.role == Role::Detail,
             ));
         }

@@ -56,7 +56,7 @@ impl World {
         let mut shapes = Vec::new();
         for shape in sheet.shapes() {
             let lines = shape.lines.into_iter();
-            let lines = lines.map(|line| table(py, line.iter().map(|p| p.to_vec()).collect(), 2));
+            let lines = lines.map(|line| table(py, line));
             shapes.push((
                 shape.class,
                 shape.fill,

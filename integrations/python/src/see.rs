@@ -71,18 +71,15 @@ impl World {
             )
         });
         let (cells, portals, batches, details, n_triangles) = seen;
-        let rows = list.draws().iter().map(|d| {
-            [d.batch, d.first_index, d.n_indices]
-                .map(i64::from)
-                .to_vec()
-        });
+        let draws = list.draws().iter();
+        let draws = draws.map(|d| [d.batch, d.first_index, d.n_indices].map(i64::from));
         Ok((
             sight.locate(eye).map(|c| c.0),
             PyArray1::from_vec(py, cells),
             PyArray1::from_vec(py, portals),
             PyArray1::from_vec(py, batches),
             PyArray1::from_vec(py, details),
-            table(py, rows.collect(), 3)?,
+            table(py, draws)?,
             [n_triangles, sight.n_triangles()],
         ))
     }

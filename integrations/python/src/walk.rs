@@ -87,13 +87,13 @@ impl World {
             PyResult::Ok(space.layout(PartId::ROOT).locate(first))
         })?;
         let cells = path.portals.iter().map(|p| p.exit.to);
-        let points = path.points.iter().map(|p| p.at.to_array().to_vec());
+        let points = path.points.iter().map(|p| p.at.to_array());
         Ok((
             path.length,
             path.length_in_plan,
             start.into_iter().chain(cells).map(|c| c.0).collect(),
             path.portals.iter().map(|p| p.exit.portal.0).collect(),
-            table(py, points.collect(), 3)?,
+            table(py, points)?,
         ))
     }
 }

@@ -42,7 +42,7 @@ type SparseRows<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i32>>);
 /// Counts, and texts, by name.
 type AboutTables = (Vec<(String, f64)>, Vec<(String, String)>);
 
-/// Names, kinds, volumes, bounds (six numbers each), triangles, and portals of each cell.
+/// Names, kinds, volumes, bounds (two rows each), triangles, and portals of each cell.
 type CellTable<'py> = (
     Vec<String>,
     Vec<&'static str>,
@@ -210,33 +210,29 @@ impl World {
     /// Returns all cells as columns.
     fn cells<'py>(&self, py: Python<'py>) -> PyResult<CellTable<'py>> {
         let cells = &self.world.graph.cells;
-        let bounds = cells.iter().map(|c| c.aabb.concat()).collect();
+        let portals = |c: &Cell| c.portals.iter().map(|p| p.0).collect();
         Ok((
             cells.iter().map(|c| c.name.clone()).collect(),
             cells.iter().map(cell_kind).collect(),
             PyArray1::from_iter(py, cells.iter().map(|c| c.volume)),
-            table(py, bounds, 6)?,
+            table(py, cells.iter().flat_map(|c| c.aabb))?,
             PyArray1::from_iter(py, cells.iter().map(|c| i64::from(c.n_triangles))),
-            cells
-                .iter()
-                .map(|c| c.portals.iter().map(|p| p.0).collect())
-                .collect(),
+            cells.iter().map(portals).collect(),
         ))
     }
 
     /// Returns all portals as columns.
     fn portals<'py>(&self, py: Python<'py>) -> PyResult<PortalTable<'py>> {
         let portals = &self.world.graph.portals;
-        let outline =
-            |p: &enfilade::Portal| table(py, p.outline.iter().map(|v| v.to_vec()).collect(), 3);
-        let ends = portals.iter().map(|p| p.cells.map(|c| c.0 as i32).to_vec());
+        let outline = |p: &enfilade::Portal| table(py, p.outline.iter().copied());
+        let ends = portals.iter().map(|p| p.cells.map(|c| c.0 as i32));
         Ok((
-            table(py, ends.collect(), 2)?,
+            table(py, ends)?,
             portals.iter().map(|p| portal_kind(p.kind)).collect(),
             PyArray1::from_iter(py, portals.iter().map(|p| p.area)),
-            table(py, portals.iter().map(|p| p.size().to_vec()).collect(), 2)?,
-            table(py, portals.iter().map(|p| p.center().to_vec()).collect(), 3)?,
-            table(py, portals.iter().map(|p| p.normal.to_vec()).collect(), 3)?,
+            table(py, portals.iter().map(enfilade::Portal::size))?,
+            table(py, portals.iter().map(enfilade::Portal::center))?,
+            table(py, portals.iter().map(|p| p.normal))?,
             portals.iter().map(outline).collect::<PyResult<_>>()?,
         ))
     }
@@ -294,15 +290,14 @@ impl World {
     }
 }
 
-/// Returns rows of so many numbers as one array.
-pub(crate) fn table<'py, T: numpy::Element>(
+/// Returns rows as one array.
+pub(crate) fn table<'py, T: numpy::Element, const N: usize>(
     py: Python<'py>,
-    rows: Vec<Vec<T>>,
-    columns: usize,
+    rows: impl IntoIterator<Item = [T; N]>,
 ) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let n = rows.len();
     let all: Vec<T> = rows.into_iter().flatten().collect();
-    PyArray1::from_vec(py, all).reshape([n, columns])
+    let n = all.len() / N;
+    PyArray1::from_vec(py, all).reshape([n, N])
 }
 
 fn cell_kind(cell: &Cell) -> &'static str {

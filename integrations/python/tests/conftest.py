@@ -50,6 +50,7 @@ def worlds():
 
 @pytest.fixture(scope="session")
 def world():
+    # Nothing is said of a world without doubts: warnings are errors here.
     return enfilade.bake(enfilade.demo_house())
 
 

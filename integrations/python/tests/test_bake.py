@@ -6,7 +6,6 @@ import re
 import signal
 import threading
 import time
-import warnings
 
 import numpy as np
 import pytest
@@ -349,9 +348,3 @@ def test_worlds_travel_as_files_bytes_and_pickles(tmp_path):
     path.write_bytes(b"no world")
     with pytest.raises(enfilade.WorldError, match="world.glb"):
         enfilade.open(path)
-
-
-def test_nothing_is_said_of_a_world_without_doubts():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        enfilade.bake(enfilade.demo_house())
