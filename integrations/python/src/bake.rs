@@ -81,7 +81,7 @@ pub(crate) fn bake_arrays(
             is_detail,
         });
     }
-    baked(py, options, progress, |import_options| {
+    baked(py, options, progress, move |import_options| {
         import_arrays("arrays", arrays, import_options).map_err(|e| of_import(&e))
     })
 }
@@ -95,7 +95,7 @@ pub(crate) fn bake_files(
     options: Options,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(World, Vec<String>)> {
-    baked(py, options, progress, |import_options| {
+    baked(py, options, progress, move |import_options| {
         import(&files, &detail, import_options).map_err(|e| of_import(&e))
     })
 }
@@ -104,7 +104,7 @@ fn baked(
     py: Python<'_>,
     options: Options,
     progress: Option<Bound<'_, PyAny>>,
-    read: impl FnOnce(&ImportOptions) -> PyResult<Imported> + Send,
+    read: impl FnOnce(&ImportOptions) -> PyResult<Imported> + Send + 'static,
 ) -> PyResult<(World, Vec<String>)> {
     let allow = Allowed {
         empty: options.allow_empty,

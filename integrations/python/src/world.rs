@@ -130,9 +130,9 @@ impl World {
             config.mode = VisMode::Fast;
         }
         config.max_memory = max_memory.unwrap_or(config.max_memory);
-        let world = &self.world;
+        let world = Arc::clone(&self.world);
         let found = run(py, threads, None, move |watcher| {
-            let walls: Vec<Triangle> = (structural_triangles(world).into_iter())
+            let walls: Vec<Triangle> = (structural_triangles(&world).into_iter())
                 .map(|(triangle, _)| triangle)
                 .collect();
             let mut context = VisContext {

@@ -6,6 +6,7 @@ import re
 import signal
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -54,6 +55,12 @@ def test_strides_and_lists_do_not_matter():
 def test_a_mesh_of_trimesh_is_its_arrays():
     mesh = trimesh.Trimesh(*two_rooms(), process=False)
     assert bytes(enfilade.bake(mesh)) == bytes(enfilade.bake(*two_rooms()))
+
+
+def test_a_mesh_of_open3d_has_triangles():
+    vertices, faces = two_rooms()
+    mesh = types.SimpleNamespace(vertices=vertices.tolist(), triangles=faces.tolist())
+    assert bytes(enfilade.bake(mesh)) == bytes(enfilade.bake(vertices, faces))
 
 
 def test_nodes_of_a_trimesh_scene_place_and_name_its_meshes():

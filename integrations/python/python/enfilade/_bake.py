@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Callable, List, Optional, Union
+from typing import Any, Callable, List, Optional, Tuple, Union
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def bake(
     """Finds the rooms and doorways of meshes.
 
     ``bake(vertices, faces)`` takes arrays: (n, 3) floats, and (m, 3) integers that number vertices from 0.
-    ``bake(mesh)`` takes what has ``vertices`` and ``faces``, as meshes of trimesh do; a ``trimesh.Scene``; a mapping of
+    ``bake(mesh)`` takes what has ``vertices`` and ``faces`` or ``triangles``, as meshes of trimesh and open3d do; a ``trimesh.Scene``; a mapping of
     names to meshes; or a list of meshes. Names tell doors, windows and furniture from walls, and are kept; meshes
     without names, and one mesh of all, are judged by shape. Colors and pictures are left out: ``bake_file`` keeps them.
 
@@ -275,16 +275,16 @@ def _add(meshes: List[tuple], given: Any, detail: bool, argument: str) -> None:
     """Adds a mesh, a scene, or several."""
     if hasattr(given, "geometry") and hasattr(given, "graph"):
         _add_scene(meshes, given, detail)
-    elif hasattr(given, "vertices") and hasattr(given, "faces"):
+    elif _is_mesh(given):
         metadata = getattr(given, "metadata", None)
         name = metadata.get("name") if isinstance(metadata, Mapping) else getattr(given, "name", None)
         detail = detail or getattr(given, "detail", False) is True
-        meshes.append(_placed(str(name or ""), "", given.vertices, given.faces, None, detail))
+        meshes.append(_placed(str(name or ""), "", *_pair(given, argument), None, detail))
     elif isinstance(given, Mapping):
         for name, mesh in given.items():
             vertices, faces = _pair(mesh, f"{argument}[{name!r}]")
             meshes.append(_placed(str(name), "", vertices, faces, None, detail))
-    elif isinstance(given, (list, tuple)) and all(hasattr(m, "faces") or hasattr(m, "graph") for m in given):
+    elif isinstance(given, (list, tuple)) and all(_is_mesh(m) or hasattr(m, "graph") for m in given):
         for mesh in given:
             _add(meshes, mesh, detail, argument)
     elif isinstance(given, (list, tuple)) and len(given) == 2 and argument == "detail":
@@ -296,9 +296,14 @@ def _add(meshes: List[tuple], given: Any, detail: bool, argument: str) -> None:
         )
 
 
-def _pair(mesh: Any, name: str) -> tuple:
-    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        return mesh.vertices, mesh.faces
+def _is_mesh(given: Any) -> bool:
+    return hasattr(given, "vertices") and (hasattr(given, "faces") or hasattr(given, "triangles"))
+
+
+def _pair(mesh: Any, name: str) -> Tuple[Any, Any]:
+    """Returns the vertices and faces of a mesh; open3d calls them triangles."""
+    if _is_mesh(mesh):
+        return mesh.vertices, mesh.faces if hasattr(mesh, "faces") else mesh.triangles
     if isinstance(mesh, (list, tuple)) and len(mesh) == 2:
         return mesh[0], mesh[1]
     raise TypeError(f"{name}: expected a mesh, or a pair of vertices and faces, not {type(mesh).__name__}")
@@ -310,10 +315,10 @@ def _add_scene(meshes: List[tuple], scene: Any, detail: bool) -> None:
     for node in scene.graph.nodes_geometry:
         transform, key = scene.graph[node]
         shape = scene.geometry[key]
-        if not (hasattr(shape, "vertices") and hasattr(shape, "faces")):
+        if not _is_mesh(shape):
             n_left += 1
             continue
-        meshes.append(_placed(str(node), str(key), shape.vertices, shape.faces, transform, detail))
+        meshes.append(_placed(str(node), str(key), *_pair(shape, str(key)), transform, detail))
     if n_left > 0:
         text = f"{n_left} of the scene's objects have no faces (points or lines), and are left out"
         warnings.warn(text, BakeWarning, stacklevel=4)
