@@ -6,8 +6,7 @@ use std::process::Command;
 use anyhow::{Context, bail};
 
 use crate::apt::Need;
-use crate::engines::{builds, folder};
-use crate::{GATE, output_of, run_to_end, tools_dir};
+use crate::{GATE, engine_builds, integration, output_of, run_to_end, tools_dir};
 
 /// The language itself.
 pub(crate) const NEED: Need = Need {
@@ -36,7 +35,7 @@ pub(crate) fn test(worlds: &[PathBuf]) -> anyhow::Result<()> {
     run_to_end(Command::new(&python).args(pip).arg(wheel))?;
     let mut pytest = Command::new(&python);
     // In the folder of the tests: above them, the package's sources would hide what is installed.
-    pytest.current_dir(folder("python").join("tests"));
+    pytest.current_dir(integration("python").join("tests"));
     pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
     pytest.env("PYTHONDONTWRITEBYTECODE", "1");
     pytest.env("ENFILADE", GATE.binary("enfilade"));
@@ -49,7 +48,7 @@ fn environment() -> anyhow::Result<PathBuf> {
     let dir = tools_dir().join("python");
     let bin = if cfg!(windows) { "Scripts" } else { "bin" };
     let python = dir.join(bin).join("python");
-    let wanted = std::fs::read_to_string(folder("python").join("requirements.txt"))?;
+    let wanted = std::fs::read_to_string(integration("python").join("requirements.txt"))?;
     let installed = dir.join("installed.txt");
     if std::fs::read_to_string(&installed).is_ok_and(|has| has == wanted) {
         return Ok(python);
@@ -66,7 +65,7 @@ fn environment() -> anyhow::Result<PathBuf> {
         "--disable-pip-version-check",
         "-r",
     ]);
-    run_to_end(pip.arg(folder("python").join("requirements.txt")))?;
+    run_to_end(pip.arg(integration("python").join("requirements.txt")))?;
     // Last, so that an installation that was cut off is made again.
     std::fs::write(&installed, wanted)?;
     Ok(python)
@@ -74,11 +73,11 @@ fn environment() -> anyhow::Result<PathBuf> {
 
 /// Builds the wheel, and returns its path.
 fn build(python: &Path) -> anyhow::Result<PathBuf> {
-    let dir = builds().join("wheels");
+    let dir = engine_builds().join("wheels");
     // A wheel of an earlier version would be a second one.
     let _ = std::fs::remove_dir_all(&dir);
     let mut maturin = Command::new(python);
-    maturin.current_dir(folder("python"));
+    maturin.current_dir(integration("python"));
     maturin.args([
         "-m",
         "maturin",
@@ -89,7 +88,7 @@ fn build(python: &Path) -> anyhow::Result<PathBuf> {
         GATE.0,
     ]);
     maturin.arg("--out").arg(&dir);
-    maturin.env("CARGO_TARGET_DIR", builds());
+    maturin.env("CARGO_TARGET_DIR", engine_builds());
     // As `cargo clippy -- -D warnings` does, which would check all crates below once more.
     maturin.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
     maturin.env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");

@@ -169,6 +169,7 @@ const FENCES: [Fence; 20] = [
             "enfilade-render",
             "enfilade-report",
             "enfilade-verify",
+            "enfilade-settings",
             "enfilade-testkit",
         ],
         not: &[],

@@ -16,7 +16,7 @@ const LONGEST: f64 = 10.0;
 ///
 /// # Errors
 ///
-/// If the text is no TOML, or its keys and values are not those of `T`.
+/// If the text is not TOML, or its keys and values are not those of `T`.
 pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T, SettingsError> {
     toml::from_str(text).map_err(|error: toml::de::Error| {
         let before = error.span().and_then(|at| text.get(..at.start));

@@ -2,7 +2,7 @@
 //!
 //! The package hands over arrays of three columns in one of the types below; what does not fit is named with its row.
 
-use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -90,4 +90,14 @@ fn rows<T: Copy, U>(shape: &[usize], values: &[T], of: impl Fn(T) -> U) -> Optio
 
 fn bad_shape(name: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected three columns"))
+}
+
+/// Returns rows as one array.
+pub(crate) fn table<'py, T: numpy::Element, const N: usize>(
+    py: Python<'py>,
+    rows: impl IntoIterator<Item = [T; N]>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let all: Vec<T> = rows.into_iter().flatten().collect();
+    let n = all.len() / N;
+    PyArray1::from_vec(py, all).reshape([n, N])
 }

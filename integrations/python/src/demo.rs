@@ -4,7 +4,7 @@ use enfilade::geom::scene::Role;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::world::table;
+use crate::arrays::table;
 
 /// Name, vertices, faces, `true` if it is detail.
 type DemoMesh<'py> = (

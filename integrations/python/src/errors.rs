@@ -66,7 +66,7 @@ pub(crate) fn of_bake(error: &Bake) -> PyErr {
     }
 }
 
-/// Returns the exception for a file that is no world.
+/// Returns the exception for a file that is not a world.
 pub(crate) fn of_file(error: &enfilade::FileError) -> PyErr {
     let text = error.to_string();
     match error {

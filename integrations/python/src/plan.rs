@@ -5,7 +5,8 @@ use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::world::{World, table};
+use crate::arrays::table;
+use crate::world::World;
 
 /// Class, color and opacity of the inside, color and width (cm) of lines, the lines, `true` if they are closed, cell.
 type ShapeArrays<'py> = (

@@ -5,7 +5,8 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::world::{World, table};
+use crate::arrays::table;
+use crate::world::World;
 
 /// The cell of the eye, cells and portals from near to far, batches, details, draws, and numbers of triangles: of
 /// what is seen and of the world.

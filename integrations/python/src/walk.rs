@@ -8,15 +8,9 @@ use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arrays::table;
 use crate::errors::NoPathError;
-use crate::world::{World, table};
-
-/// The floors of a walker, and whether objects are in the way.
-pub(crate) struct KeptMap {
-    walker: Agent,
-    objects: bool,
-    map: Arc<WalkMap>,
-}
+use crate::world::{KeptMap, World};
 
 /// Length, length in plan, cells, portals, and the points where it bends.
 type PathArrays<'py> = (f64, f64, Vec<u32>, Vec<u32>, Bound<'py, PyArray2<f64>>);

@@ -41,7 +41,7 @@ impl Watcher {
 ///
 /// # Errors
 ///
-/// Of `progress`, or an interrupt. The work has then ended, too, or ends by itself without being waited for: reading
+/// An exception of `progress`, or an interrupt. The work has then ended, too, or ends by itself without being waited for: reading
 /// files looks at no flag.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,

@@ -9,17 +9,16 @@ use enfilade::cpg::{Cell, CellId, PortalId, PortalKind, Pvs, World as File};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::runtime::Sight;
 use enfilade::vis::{VisConfig, VisContext, VisMode, see_world};
-use enfilade::world::Space;
+use enfilade::world::{Agent, Space, WalkMap};
 use enfilade_report::Verdict;
 use enfilade_verify::structural_triangles;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::arrays::Points;
+use crate::arrays::{Points, table};
 use crate::errors::{EnfiladeError, WorldError, of_file};
-use crate::walk::KeptMap;
 use crate::watch::run;
 
 /// Cell of points in matter, or outside of everything.
@@ -34,6 +33,13 @@ pub(crate) struct World {
     /// The floors of the last walker.
     pub(crate) map: Mutex<Option<KeptMap>>,
     pvs: OnceLock<Pvs>,
+}
+
+/// The floors of a walker, and whether objects are in the way.
+pub(crate) struct KeptMap {
+    pub(crate) walker: Agent,
+    pub(crate) objects: bool,
+    pub(crate) map: Arc<WalkMap>,
 }
 
 /// Rows of unequal length as in `scipy.sparse.csr_array`: ends of rows, and columns.
@@ -288,16 +294,6 @@ impl World {
             _ => Cow::Borrowed(&self.world),
         }
     }
-}
-
-/// Returns rows as one array.
-pub(crate) fn table<'py, T: numpy::Element, const N: usize>(
-    py: Python<'py>,
-    rows: impl IntoIterator<Item = [T; N]>,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
-    let all: Vec<T> = rows.into_iter().flatten().collect();
-    let n = all.len() / N;
-    PyArray1::from_vec(py, all).reshape([n, N])
 }
 
 fn cell_kind(cell: &Cell) -> &'static str {
