@@ -1,6 +1,7 @@
 //! The shapes of a plan, for programs that draw it with means of their own.
 
 use enfilade_cpg::CellId;
+use enfilade_geom::DVec2;
 
 use crate::drawing::{Drawing, Item, Rgb};
 
@@ -52,7 +53,7 @@ impl Drawing {
                 fill: fill.map(|(color, opacity)| (path.fill.unwrap_or(color), opacity)),
                 stroke: stroke.map(|(color, width)| (color, width * self.zoom)),
                 lines: (path.lines.iter())
-                    .map(|line| line.iter().map(|p| p.to_array()).collect())
+                    .map(|line| line.iter().map(DVec2::to_array).collect())
                     .collect(),
                 is_closed: path.is_closed,
                 cell: path.cell,

@@ -215,10 +215,7 @@ impl<'de> Deserialize<'de> for SettingsPoint {
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 write!(f, "a point: three numbers of meters, [x, y, z]")
             }
-            fn visit_seq<A: SeqAccess<'de>>(
-                self,
-                mut list: A,
-            ) -> Result<SettingsPoint, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<SettingsPoint, A::Error> {
                 let mut numbers: Vec<f64> = Vec::new();
                 while let Some(number) = list.next_element()? {
                     numbers.push(number);

@@ -124,7 +124,8 @@ fn work(
     resolved: Resolved,
     allow: Allowed,
 ) -> PyResult<(World, Vec<String>)> {
-    let imported = read()?;
+    let mut imported = read()?;
+    imported.scene.rooms.extend_from_slice(&resolved.names);
     let report = &imported.report;
     if let Some(why) = report.refusal() {
         return Err(SceneError::new_err(why));
