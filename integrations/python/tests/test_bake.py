@@ -128,7 +128,8 @@ def test_settings_come_from_a_mapping_or_a_file_and_arguments_take_precedence(tm
     assert of_file.provenance["min_opening"] == "0.7"
     given = enfilade.bake(vertices, faces, settings=file, min_opening=0.8)
     assert given.provenance["min_opening"] == "0.8"
-    named = enfilade.bake(vertices, faces, settings={"names": {"Hall": [1, 1.5, 2]}})
+    with pytest.warns(enfilade.BakeWarning, match="1 of 3 cells named"):
+        named = enfilade.bake(vertices, faces, settings={"names": {"Hall": [1, 1.5, 2]}})
     assert named.cells["Hall"].id == named.locate([1, 1.5, 2])
     for settings, word in [
         ({"names": {"Hall": [1, 2]}}, "three numbers"),

@@ -9,8 +9,8 @@ import pytest
 
 import enfilade
 
-# Points of the demo house, at the feet.
-LIVING, DINING = [2.25, 0, 4.25], [9, 0, 6.5]
+# Points of the demo house, a little above the floor.
+BEDROOM, BATH = [9, 3, 6.5], [5.75, 3, 1.25]
 
 
 def test_cells_and_portals_are_sequences_with_columns(world):
@@ -100,18 +100,18 @@ def test_a_saved_set_is_read_again(world, tmp_path):
 
 
 def test_walks_pass_doors_but_not_shut_ones(world):
-    walk = world.path(LIVING, DINING)
+    walk = world.path(BEDROOM, BATH)
     assert walk.length >= walk.length_in_plan > 4
     assert walk.points.shape[1] == 3
-    np.testing.assert_allclose(walk.points[[0, -1]], [LIVING, DINING], atol=0.2)
+    np.testing.assert_allclose(walk.points[[0, -1]], [BEDROOM, BATH], atol=0.2)
     assert len(walk.cells) == len(walk.portals) + 1
-    assert walk.cells[0] == world.locate(np.add(LIVING, [0, 1, 0]))
+    assert walk.cells[0] == world.locate(BEDROOM)
     with pytest.raises(enfilade.NoPathError, match="no way"):
-        world.path(LIVING, DINING, closed=walk.portals)
+        world.path(BEDROOM, BATH, closed=walk.portals)
     with pytest.raises(enfilade.NoPathError, match="no floor"):
-        world.path(LIVING, [2, 500, 2])
+        world.path(BEDROOM, [2, 500, 2])
     with pytest.raises(ValueError, match="radius"):
-        world.path(LIVING, DINING, radius=-1)
+        world.path(BEDROOM, BATH, radius=-1)
 
 
 def test_graphs_have_a_node_for_each_cell_and_an_edge_for_each_portal(world):
@@ -213,8 +213,8 @@ def test_sets_walks_and_plans_are_those_of_the_command(command, worlds, tmp_path
     into = tmp_path / "pvs.glb"
     command("pvs", path, "--into", into, "-o", tmp_path / "world.pvs")
     assert (enfilade.open(into).pvs().matrix() == world.pvs().matrix()).all()
-    walked = command.json("path", path, f"--from={text(LIVING)}", f"--to={text(DINING)}")
-    walk = world.path(LIVING, DINING)
+    walked = command.json("path", path, f"--from={text(BEDROOM)}", f"--to={text(BATH)}")
+    walk = world.path(BEDROOM, BATH)
     assert walk.length == walked["length"]
     assert walk.cells == tuple(walked["cells"]) and walk.portals == tuple(walked["portals"])
     np.testing.assert_array_equal(walk.points, walked["points"])
