@@ -6,14 +6,16 @@ use std::process::{Command, Stdio};
 use anyhow::Context;
 
 use crate::apt::{self, Need, has_tool};
+use crate::python;
 use crate::steps::Steps;
 use crate::{
-    GATE, Profile, RELEASE, cargo, name_of, output_of, root, run_to_end, scenes, target_dir,
-    world_of,
+    GATE, Profile, RELEASE, cargo, engine_builds, integration, name_of, output_of, run_to_end,
+    scenes, target_dir, world_of,
 };
 
 /// Compilers, engines and browsers.
-const NEEDS: [Need; 8] = [
+const NEEDS: [Need; 9] = [
+    python::NEED,
     Need {
         what: "a C# compiler",
         why: "builds the reader for Unity",
@@ -80,6 +82,7 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
         build_web()?;
         run_to_end(&mut web("npm", GATE, &["test"]))
     })?;
+    steps.step("python", || python::test(&worlds))?;
     // Compiles all of it; to build the engine and to run the tests takes longer than the gate may.
     steps.step("lint of bevy", || {
         let clippy = ["--all-targets", "--", "-D", "warnings"];
@@ -163,10 +166,6 @@ fn tools() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn folder(name: &str) -> PathBuf {
-    root().join("integrations").join(name)
-}
-
 fn demo_world() -> PathBuf {
     target_dir().join("demo").join("world.glb")
 }
@@ -200,7 +199,7 @@ fn fresh_worlds() -> anyhow::Result<Vec<PathBuf>> {
 /// Compares readers in other languages with the command.
 fn readers(profile: Profile, worlds: &[PathBuf]) -> Command {
     let mut node = Command::new("node");
-    node.arg(folder("readers").join("check.mjs"));
+    node.arg(integration("readers").join("check.mjs"));
     node.arg(profile.binary("enfilade")).args(worlds);
     node
 }
@@ -230,7 +229,7 @@ fn bevy_figures(args: &[&str], worlds: &[PathBuf]) -> Command {
 /// Installs the packages of the browser's package, and builds it anew: module, code, walk.
 fn build_web() -> anyhow::Result<()> {
     // Worlds of an earlier build.
-    let _ = std::fs::remove_dir_all(folder("web").join("dist"));
+    let _ = std::fs::remove_dir_all(integration("web").join("dist"));
     for args in [
         &["ci", "--silent"][..],
         &["run", "-s", "wasm"],
@@ -245,21 +244,16 @@ fn build_web() -> anyhow::Result<()> {
 /// Returns a command in the folder of the browser's package, which takes worlds from the command of a profile.
 fn web(program: &str, profile: Profile, args: &[&str]) -> Command {
     let mut command = Command::new(program);
-    command.current_dir(folder("web")).args(args);
+    command.current_dir(integration("web")).args(args);
     command.env("ENFILADE", profile.binary("enfilade"));
-    command.env("CARGO_TARGET_DIR", builds());
+    command.env("CARGO_TARGET_DIR", engine_builds());
     command
-}
-
-/// Returns the folder of builds of all integrations, which have much in common.
-fn builds() -> PathBuf {
-    target_dir().join("engines")
 }
 
 /// Returns a cargo command in the workspace of an integration.
 fn in_workspace(name: &str, args: &[&str]) -> Command {
     let mut command = cargo(args);
-    command.current_dir(folder(name));
-    command.env("CARGO_TARGET_DIR", builds());
+    command.current_dir(integration(name));
+    command.env("CARGO_TARGET_DIR", engine_builds());
     command
 }

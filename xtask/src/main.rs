@@ -10,6 +10,7 @@ mod features;
 mod lengths;
 mod mutual;
 mod names;
+mod python;
 mod steps;
 mod suites;
 mod tidy;
@@ -134,7 +135,17 @@ fn target_dir() -> PathBuf {
     root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// Returns the folder of packages of node.
+/// Returns the folder of builds of all integrations, which have much in common.
+fn engine_builds() -> PathBuf {
+    target_dir().join("engines")
+}
+
+/// Returns the folder of an integration.
+fn integration(name: &str) -> PathBuf {
+    root().join("integrations").join(name)
+}
+
+/// Returns the folder of packages of node and Python.
 fn tools_dir() -> PathBuf {
     target_dir().join("tools")
 }

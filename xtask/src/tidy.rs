@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 19] = [
+const FENCES: [Fence; 20] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -83,6 +83,12 @@ const FENCES: [Fence; 19] = [
             "enfilade-complex",
         ],
         not: FORMATS,
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
+        name: "enfilade-settings",
+        siblings: &["enfilade-geom", "enfilade-import", "enfilade-bake"],
+        not: &["rayon", "serde_json", "clap", "anyhow"],
         words: &["std::fs", "std::thread"],
     },
     Fence {
@@ -163,6 +169,7 @@ const FENCES: [Fence; 19] = [
             "enfilade-render",
             "enfilade-report",
             "enfilade-verify",
+            "enfilade-settings",
             "enfilade-testkit",
         ],
         not: &[],

@@ -1,7 +1,7 @@
 //! The context of a bake: progress, stage times and cancellation.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use enfilade_geom::{Allowance, End, MemoryProbe};
@@ -42,7 +42,7 @@ struct Stages {
 /// State carried through a bake. Threads come from the rayon pool in which the bake is called.
 pub struct BakeContext<'a> {
     progress: &'a dyn Progress,
-    cancel: Option<&'a AtomicBool>,
+    cancel: Option<Arc<AtomicBool>>,
     probe: Option<MemoryProbe>,
     stages: Mutex<Stages>,
     allowance: Allowance,
@@ -58,15 +58,16 @@ impl Default for BakeContext<'_> {
 }
 
 impl<'a> BakeContext<'a> {
-    /// Makes a context that reports to `progress` and stops when `cancel` becomes true.
+    /// Makes a context that reports to `progress`, and whose bake ends within about a second after `cancel` becomes
+    /// true, in the middle of a stage, too.
     #[must_use]
-    pub fn new(progress: &'a dyn Progress, cancel: Option<&'a AtomicBool>) -> Self {
+    pub fn new(progress: &'a dyn Progress, cancel: Option<Arc<AtomicBool>>) -> Self {
         Self {
             progress,
+            allowance: Allowance::default().unless(cancel.clone()),
             cancel,
             probe: None,
             stages: Mutex::default(),
-            allowance: Allowance::default(),
             budget: Budget::default(),
             n_triangles: 0,
         }
@@ -81,12 +82,13 @@ impl<'a> BakeContext<'a> {
 
     /// Makes a context for a bake of so many triangles, within a budget.
     pub(crate) fn within(&self, budget: &Budget, n_triangles: usize) -> Self {
+        let allowance = budget.allowance(n_triangles, self.probe);
         Self {
-            allowance: budget.allowance(n_triangles, self.probe),
+            allowance: allowance.unless(self.cancel.clone()),
             probe: self.probe,
             budget: *budget,
             n_triangles,
-            ..Self::new(self.progress, self.cancel)
+            ..Self::new(self.progress, self.cancel.clone())
         }
     }
 
@@ -100,9 +102,6 @@ impl<'a> BakeContext<'a> {
     /// # Errors
     /// If the caller cancels, or the budget is spent.
     pub(crate) fn check(&self) -> Result<(), BakeError> {
-        if self.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
-            return Err(BakeError::Cancelled);
-        }
         let Some(end) = self.allowance.end() else {
             return Ok(());
         };
@@ -117,6 +116,7 @@ impl<'a> BakeContext<'a> {
                 stage,
                 memory: self.budget.memory.unwrap_or_default(),
             },
+            End::Cancelled => BakeError::Cancelled,
             End::Work => BakeError::TooMuchWork {
                 stage,
                 n_triangles: self.n_triangles,
@@ -186,6 +186,18 @@ impl<'a> BakeContext<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cancelled_bake_ends_in_the_middle_of_a_stage() {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let context = BakeContext::new(&Silent, Some(Arc::clone(&cancel)));
+        let context = context.within(&Budget::default(), 12);
+        let work = 1 << 16;
+        assert!(context.allowance().spend(work) && context.check().is_ok());
+        cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+        assert!(!context.allowance().spend(work));
+        assert!(matches!(context.check(), Err(BakeError::Cancelled)));
+    }
 
     #[test]
     fn a_scene_of_many_voxels_may_do_more() {

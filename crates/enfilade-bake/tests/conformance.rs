@@ -2,6 +2,7 @@
 //!
 //! The oracles (free lines by brute force, volumes by counting points) share no code with a builder.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use enfilade_bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Silent, bake};
@@ -235,8 +236,8 @@ macro_rules! builder_tests {
         #[test]
         fn no_structure_is_an_error_and_a_wish_to_stop_is_heard() {
             let mut g = rooms_with_closet();
-            let stop = AtomicBool::new(true);
-            let stopped = BUILDER(&g.scene, &BakeContext::new(&Silent, Some(&stop)));
+            let stop = Arc::new(AtomicBool::new(true));
+            let stopped = BUILDER(&g.scene, &BakeContext::new(&Silent, Some(stop)));
             assert!(matches!(stopped, Err(BakeError::Cancelled)));
             for o in &mut g.scene.objects {
                 o.role = Role::Detail;

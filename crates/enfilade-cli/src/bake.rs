@@ -7,7 +7,6 @@ mod found;
 mod gaps;
 mod leak_path;
 pub(crate) mod settings;
-mod values;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -31,10 +30,10 @@ use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
-use crate::verdict::{Verdict, is_empty, why_empty};
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
+use enfilade_report::{Verdict, is_empty, why_empty};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
@@ -78,13 +77,13 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     let bar = StageBar::new();
     bar.start("reading", 0);
     let mut imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
-    imported.scene.rooms.extend_from_slice(&settings.names);
+    imported.scene.rooms.extend_from_slice(&settings.bake.names);
     bar.finish();
     outputs.read(&imported.report.references)?;
     let said = found::doubts(&imported.report)?;
     found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
-    let mut config = settings.config_for(scene);
+    let mut config = settings.bake.config_for(scene);
     config.budget.began = Some(began);
     let config = &config;
     config.costs.cost.check(&scene.materials)?;
@@ -183,28 +182,7 @@ fn refuse_leak(
         write_whole(path, lines.as_bytes())?;
         way = format!("; the way is in {}", path.display());
     }
-    let shown: Vec<String> = leak
-        .points
-        .iter()
-        .take(8)
-        .map(|p| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z))
-        .collect();
-    let entities: Vec<_> = scene
-        .entities
-        .iter()
-        .filter(|e| e.object.is_none() && e.position.is_some())
-        .collect();
-    let class = entities.get(leak.from).map_or("an entity", |e| &e.class);
-    let text = format!(
-        "the map leaks: {class} reaches the void in {} steps, by {}{}{way}",
-        leak.points.len(),
-        shown.join(", "),
-        if leak.points.len() > shown.len() {
-            ", …"
-        } else {
-            ""
-        },
-    );
+    let text = format!("{}{way}", leak.says(scene));
     if options.allow_leak {
         writeln!(Warned, "{text}")?;
         return Ok(());

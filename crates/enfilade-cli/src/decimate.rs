@@ -56,13 +56,13 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
         choices.write("-o", Format::World, path)?;
     }
     let mut settings = settings::resolve(&args.options)?;
-    settings.config.method = Some(Method::Delaunay);
+    settings.bake.config.method = Some(Method::Delaunay);
     let mut imported = import_scene(&args.inputs, &args.options.detail, &settings.import)?;
-    imported.scene.rooms.extend_from_slice(&settings.names);
+    imported.scene.rooms.extend_from_slice(&settings.bake.names);
     outputs.read(&imported.report.references)?;
     choices.read(&imported.report.references)?;
     let scene = &imported.scene;
-    let config = settings.config_for(scene);
+    let config = settings.bake.config_for(scene);
     config.costs.cost.check(&scene.materials)?;
     let context = BakeContext::new(&Silent, None).measured_by(held_memory);
     let session = Session::begin(scene, &config, &context)?;

@@ -18,8 +18,8 @@ use specials::SpecialReport;
 
 use crate::limits::Limits;
 use crate::screen::{At, Rounded, print_json, printed_at_once};
-use crate::verdict::cells_in_words;
 use enfilade_cli::world::read_world;
+use enfilade_report::cells_in_words;
 
 /// Shows the cells, portals and statistics of a world.
 #[derive(clap::Args)]

@@ -35,7 +35,6 @@ mod serve;
 mod simplify;
 mod sound;
 mod specials;
-mod verdict;
 mod verify;
 #[cfg(feature = "view")]
 mod view;

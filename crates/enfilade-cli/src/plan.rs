@@ -11,9 +11,9 @@ use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
 use crate::screen::{Warned, print_json};
-use crate::verdict::{is_empty, why_empty};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
+use enfilade_report::{is_empty, why_empty};
 
 /// Placeholder for a storey's name in the name of an output.
 const PLACE: &str = "{}";

@@ -20,10 +20,10 @@ use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
 use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
 use crate::screen::{Warned, print_json};
-use crate::verdict::{Verdict, cells_in_words};
 use crate::walk_page;
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
+use enfilade_report::{Verdict, cells_in_words};
 
 /// Writes a self-contained page: plans, the graph, visibility, tables, pictures.
 #[derive(clap::Args)]

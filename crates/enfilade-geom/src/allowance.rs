@@ -1,6 +1,7 @@
 //! Limits on work, time and memory, checked inside long loops so that no input makes them run away.
 
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::time::Instant;
 
 /// Work between two looks at the clock. About half a millisecond.
@@ -26,7 +27,8 @@ pub struct Allowance {
     most: AtomicU64,
     until: Option<Instant>,
     memory: Option<(u64, MemoryProbe)>,
-    /// The end found at the last look, [`LATE`] or [`FULL`]; 0 for none.
+    cancel: Option<Arc<AtomicBool>>,
+    /// The end found at the last look, [`LATE`], [`FULL`] or [`CANCELLED`]; 0 for none.
     seen: AtomicU8,
 }
 
@@ -39,10 +41,13 @@ pub enum End {
     Time,
     /// The process holds more memory than allowed.
     Memory,
+    /// The caller does not want the result anymore.
+    Cancelled,
 }
 
 const LATE: u8 = 1;
 const FULL: u8 = 2;
+const CANCELLED: u8 = 3;
 
 impl Default for Allowance {
     fn default() -> Self {
@@ -59,6 +64,7 @@ impl Allowance {
             most: AtomicU64::new(most),
             until,
             memory: None,
+            cancel: None,
             seen: AtomicU8::new(0),
         }
     }
@@ -67,6 +73,13 @@ impl Allowance {
     #[must_use]
     pub fn holding(mut self, bytes: u64, probe: MemoryProbe) -> Self {
         self.memory = Some((bytes.saturating_add(PROGRAM), probe));
+        self
+    }
+
+    /// Adds a way to end it from outside: over soon after `cancel` becomes true.
+    #[must_use]
+    pub fn unless(mut self, cancel: Option<Arc<AtomicBool>>) -> Self {
+        self.cancel = cancel;
         self
     }
 
@@ -103,7 +116,10 @@ impl Allowance {
 
     #[cold]
     fn look(&self, at_memory: bool) {
-        if self.until.is_some_and(|until| Instant::now() >= until) {
+        let is_cancelled = |cancel: &Arc<AtomicBool>| cancel.load(Ordering::Relaxed);
+        if self.cancel.as_ref().is_some_and(is_cancelled) {
+            self.seen.store(CANCELLED, Ordering::Relaxed);
+        } else if self.until.is_some_and(|until| Instant::now() >= until) {
             self.seen.store(LATE, Ordering::Relaxed);
         } else if let Some((most, probe)) = self.memory
             && at_memory
@@ -113,7 +129,7 @@ impl Allowance {
         }
     }
 
-    /// Returns the reason why it is over, if it is; looks at clock and memory. An end by time or memory stays.
+    /// Returns the reason why it is over, if it is; looks at clock and memory. An end other than by work stays.
     #[must_use]
     pub fn end(&self) -> Option<End> {
         if self.seen.load(Ordering::Relaxed) == 0 {
@@ -122,6 +138,7 @@ impl Allowance {
         match self.seen.load(Ordering::Relaxed) {
             LATE => Some(End::Time),
             FULL => Some(End::Memory),
+            CANCELLED => Some(End::Cancelled),
             _ => (self.spent() > self.most()).then_some(End::Work),
         }
     }
@@ -199,6 +216,18 @@ mod tests {
         assert_eq!(full.end(), Some(End::Memory));
         let unknown = Allowance::default().holding(0, || None);
         assert!(unknown.spend(LOOK_AT_MEMORY) && !unknown.is_over());
+    }
+
+    #[test]
+    fn it_is_over_when_its_caller_cancels() {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let some = Allowance::default().unless(Some(Arc::clone(&cancel)));
+        assert!(some.spend(10 * LOOK) && !some.is_over());
+        cancel.store(true, Ordering::Relaxed);
+        assert!(some.spend(1), "not yet looked");
+        assert!(!some.spend(LOOK));
+        cancel.store(false, Ordering::Relaxed);
+        assert_eq!(some.end(), Some(End::Cancelled), "it stays");
     }
 
     #[test]

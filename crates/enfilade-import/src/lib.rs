@@ -19,6 +19,7 @@
 //!
 //! Not supported: animation, skins, curves, points and lines; they are left out with a note.
 
+mod arrays;
 mod builder;
 mod error;
 mod export;
@@ -45,6 +46,7 @@ mod soup;
 mod stl;
 mod textures;
 
+pub use arrays::{ArrayMesh, import_arrays};
 pub use enfilade_prepare::{
     BadOption, CleaningOptions, CleaningReport, Example, Finding, Glob, GlobState, RepairOptions,
     RepairReport, RoleRules, ShellCounts, is_match, repair,

@@ -84,11 +84,37 @@ pub struct Note {
 }
 
 impl ImportReport {
-    /// Returns `true` if all files are in formats that state neither a unit nor an axis that points up.
+    /// Returns `true` if all input states neither a unit nor an axis that points up: arrays, and files of some formats.
     #[must_use]
     pub fn is_bare(&self) -> bool {
-        let is_bare = |f: &FileReport| matches!(f.format, "OBJ" | "PLY" | "STL");
+        let is_bare = |f: &FileReport| matches!(f.format, "OBJ" | "PLY" | "STL" | "arrays");
         self.files.iter().all(is_bare)
+    }
+
+    /// Returns the doubts about unit and axis that lower the trust in a world.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let clear = self.up_doubt.as_ref().filter(|doubt| doubt.is_clear);
+        let texts = [self.unit_doubt.clone(), clear.map(|d| d.text.clone())];
+        texts.into_iter().flatten().collect()
+    }
+
+    /// Returns the reason to bake nothing, with the remedy: the input states neither unit nor axis, so that its numbers
+    /// alone speak, and they speak against what was assumed.
+    #[must_use]
+    pub fn refusal(&self) -> Option<String> {
+        let said = self.doubts();
+        if !self.is_bare() || said.is_empty() {
+            return None;
+        }
+        let unit = self.unit_doubt.as_ref().map(|_| "--unit m");
+        let up = self.up_doubt.as_ref().filter(|doubt| doubt.is_clear);
+        let as_is: Vec<&str> = unit.into_iter().chain(up.map(|_| "--up y")).collect();
+        Some(format!(
+            "{}; if it is right as it is, {}",
+            said.join("; and "),
+            as_is.join(" ")
+        ))
     }
 
     pub(crate) fn note(&mut self, path: &Path, place: impl Into<String>, text: impl Into<String>) {

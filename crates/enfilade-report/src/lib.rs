@@ -1,4 +1,4 @@
-//! Reports on enfilade worlds for people: floor plans as SVG, PNG and PDF, and an HTML page about a world.
+//! Reports on enfilade worlds for people: floor plans as SVG, with the feature `print` also as PNG and PDF, an HTML page about a world, and a verdict on it.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -15,32 +15,41 @@ mod borders;
 mod clip;
 mod drawing;
 mod floors;
+#[cfg(feature = "print")]
 mod font;
 mod graph;
 mod html;
 mod label;
 mod marks;
 mod matrix;
+#[cfg(feature = "print")]
 mod pdf;
 mod plain;
 mod plan;
+#[cfg(feature = "print")]
 mod raster;
 mod relief;
 mod section;
 mod shafts;
+mod shapes;
 mod sheet;
 mod storeys;
 mod svg;
+mod verdict;
 mod walk;
 
 pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
+#[cfg(feature = "print")]
 pub use pdf::{PAPERS, Paper, PaperError, to_pdf};
 pub use plain::{
     SceneFile, SceneFiles, cells_csv, graph_dot, graph_graphml, graph_json, portals_csv,
     surfaces_obj,
 };
 pub use plan::{PlanOptions, Plans, plan_svg};
+#[cfg(feature = "print")]
 pub use raster::{MAX_PIXELS, RasterError};
+pub use shapes::{PlanLabel, PlanShape};
 pub use storeys::{Storey, find_storeys};
+pub use verdict::{Verdict, cells_in_words, is_empty, why_empty};
 pub use walk::walk_html;

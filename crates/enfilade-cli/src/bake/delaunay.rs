@@ -8,7 +8,7 @@ use enfilade::bake::delaunay::{Choices, DelaunayConfig, Weight};
 use enfilade::geom::DVec3;
 use enfilade_cli::input::{name_of, read_text};
 
-use super::values::parse_toml;
+use enfilade_settings::parse_toml;
 
 #[derive(clap::Args)]
 pub(crate) struct DelaunayOptions {

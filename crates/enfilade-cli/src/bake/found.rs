@@ -51,25 +51,14 @@ pub(super) fn report_import(
 /// Returns the doubts about unit and axis, for the verdict. They are reported; the bake ends if the files state neither,
 /// as their numbers alone then speak.
 pub(super) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<String>> {
-    let up = report.up_doubt.as_ref();
-    let clear = up.filter(|doubt| doubt.is_clear);
-    let said: Vec<String> = [report.unit_doubt.clone(), clear.map(|d| d.text.clone())]
-        .into_iter()
-        .flatten()
-        .collect();
-    if report.is_bare() && !said.is_empty() {
-        let unit = report.unit_doubt.as_ref().map(|_| "--unit m");
-        let as_is: Vec<&str> = unit.into_iter().chain(clear.map(|_| "--up y")).collect();
-        bail!(
-            "{}; if it is right as it is, {}",
-            said.join("; and "),
-            as_is.join(" ")
-        );
+    if let Some(why) = report.refusal() {
+        bail!("{why}");
     }
+    let said = report.doubts();
     for text in &said {
         writeln!(Warned, "{text}")?;
     }
-    if let Some(doubt) = up.filter(|doubt| !doubt.is_clear) {
+    if let Some(doubt) = report.up_doubt.as_ref().filter(|doubt| !doubt.is_clear) {
         writeln!(Warned, "{}", doubt.text)?;
     }
     Ok(said)

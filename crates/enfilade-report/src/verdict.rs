@@ -1,8 +1,8 @@
-//! A verdict on a world in plain words: how far to trust it, and the option to try if not.
+//! A verdict on a world in plain words: how far to trust it, and the option of `enfilade bake` to try if not.
 
 use std::fmt::Write as _;
 
-use enfilade::cpg::{CellPortalGraph, Doubt, World};
+use enfilade_cpg::{CellPortalGraph, Doubt, World};
 use serde::Serialize;
 
 /// A foot. [Units: wu]
@@ -12,7 +12,7 @@ const DOOR: [f32; 2] = [1.8, 2.5];
 
 /// How far to trust a world, by what was found in it.
 #[derive(Serialize)]
-pub(crate) struct Verdict {
+pub struct Verdict {
     trust: Trust,
     /// A sentence about what was found.
     summary: String,
@@ -42,8 +42,9 @@ struct Reason {
 }
 
 impl Verdict {
-    /// Judges a world. `said` are doubts about its input that were reported before the bake.
-    pub(crate) fn of(world: &World, said: &[String]) -> Self {
+    /// Judges a valid world. `said` are doubts about its input that were reported before the bake.
+    #[must_use]
+    pub fn of(world: &World, said: &[String]) -> Self {
         let doubts = world.doubts();
         let is_grave = |doubt: &Doubt| {
             !matches!(
@@ -73,8 +74,9 @@ impl Verdict {
 }
 
 impl Verdict {
-    /// The verdict as a sentence of a page.
-    pub(crate) fn sentence(&self) -> String {
+    /// Returns the verdict as a sentence of a page.
+    #[must_use]
+    pub fn sentence(&self) -> String {
         let text = self.to_string();
         let mut letters = text.chars();
         let first = letters.next().map(|c| c.to_ascii_uppercase());
@@ -83,12 +85,14 @@ impl Verdict {
 }
 
 /// Returns `true` if no cell is indoors.
-pub(crate) fn is_empty(world: &World) -> bool {
+#[must_use]
+pub fn is_empty(world: &World) -> bool {
     world.graph.indoor_cells().next().is_none()
 }
 
 /// Returns the reasons why a world has no room, with the options to try.
-pub(crate) fn why_empty(world: &World) -> String {
+#[must_use]
+pub fn why_empty(world: &World) -> String {
     Reason::all(&Verdict::of(world, &[]).reasons)
 }
 
@@ -121,8 +125,9 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// The cells of a graph by kind, always in this order: rooms, voids, outdoors.
-pub(crate) fn cells_in_words(graph: &CellPortalGraph) -> String {
+/// Returns the cells of a graph by kind in words, always in this order: rooms, voids, outdoors.
+#[must_use]
+pub fn cells_in_words(graph: &CellPortalGraph) -> String {
     let rooms = graph.rooms().count();
     let indoors = graph.indoor_cells().count();
     let voids = match indoors - rooms {

@@ -1,0 +1,470 @@
+"""Worlds, and the answers to questions about them."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Dict, List, Optional, Tuple, Union, overload
+
+import numpy as np
+
+from . import _arrays, _native
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A connected region of air: a room, the outdoors, or a void in which nobody can stand."""
+
+    id: int
+    name: str
+    """The name of the room in the scene, or ``cell-0``, ``cell-1``, …"""
+    kind: str
+    """``"room"``, ``"outdoors"`` or ``"void"`` (above ceilings, in walls and shafts)."""
+    volume: float
+    """In cubic meters."""
+    bounds: np.ndarray
+    """Two rows, the least and the greatest coordinates, as in trimesh. (2, 3) float32."""
+    triangles: int
+    """The number of triangles of walls seen without passing a portal."""
+    portals: Tuple[int, ...]
+    """The ids of its portals."""
+
+    @property
+    def outdoors(self) -> bool:
+        """True for the space around the building, which is one cell."""
+        return self.kind == "outdoors"
+
+    def __repr__(self) -> str:
+        return f"<Cell {self.id} {self.name!r}, {self.kind}, {self.volume:.1f} m³>"
+
+
+@dataclass(frozen=True, eq=False)
+class Portal:
+    """An opening that joins two cells."""
+
+    id: int
+    kind: str
+    """``"open"``, ``"door"``, ``"window"`` or ``"crack"``."""
+    cells: Tuple[int, int]
+    """The ids of its two cells."""
+    polygon: np.ndarray
+    """A convex outline around the opening, counter-clockwise seen from the second cell. (n, 3) float32."""
+    area: float
+    """The area of the opening itself, in square meters."""
+    size: np.ndarray
+    """Width and height, in meters. (2,) float32."""
+    center: np.ndarray
+    """(3,) float32."""
+    normal: np.ndarray
+    """The direction from the first cell to the second. (3,) float32."""
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return f"<Portal {self.id}, {self.kind}, {self.cells[0]}–{self.cells[1]}, {width:.2f} × {height:.2f} m>"
+
+
+class Cells(Sequence):
+    """The cells of a world: a sequence, and their attributes as columns.
+
+    ``cells[3]`` and ``cells["kitchen"]`` are cells; ``cells.volumes`` is an array.
+    """
+
+    names: List[str]
+    kinds: List[str]
+    volumes: np.ndarray
+    """Volumes in cubic meters. (n,) float32."""
+    bounds: np.ndarray
+    """The least and the greatest coordinates. (n, 2, 3) float32."""
+
+    def __init__(self, native: _native.World) -> None:
+        columns = native.cells()
+        self.names, self.kinds, self.volumes, bounds, self._triangles, self._portals = columns
+        self.bounds = bounds.reshape(-1, 2, 3)
+        _freeze(self.volumes, self.bounds)
+        self._by_name: Dict[str, int] = {}
+        for i, name in enumerate(self.names):
+            self._by_name.setdefault(name, i)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @overload
+    def __getitem__(self, index: Union[int, str]) -> Cell: ...
+    @overload
+    def __getitem__(self, index: slice) -> List[Cell]: ...
+    def __getitem__(self, index: Union[int, str, slice]) -> Union[Cell, List[Cell]]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        if isinstance(index, str):
+            if index not in self._by_name:
+                raise KeyError(f"no cell is called {index!r}")
+            index = self._by_name[index]
+        i = _index(index, len(self), "cell")
+        return Cell(
+            i,
+            self.names[i],
+            self.kinds[i],
+            float(self.volumes[i]),
+            self.bounds[i],
+            int(self._triangles[i]),
+            tuple(self._portals[i]),
+        )
+
+    def __repr__(self) -> str:
+        counts = {kind: self.kinds.count(kind) for kind in ("room", "void", "outdoors")}
+        return "<Cells: " + ", ".join(f"{n} {kind}" for kind, n in counts.items() if n > 0) + ">"
+
+
+class Portals(Sequence):
+    """The portals of a world: a sequence, and their attributes as columns."""
+
+    cells: np.ndarray
+    """The ids of their two cells. (n, 2) int32."""
+    kinds: List[str]
+    areas: np.ndarray
+    """Areas in square meters. (n,) float32."""
+    sizes: np.ndarray
+    """Widths and heights in meters. (n, 2) float32."""
+    centers: np.ndarray
+    """(n, 3) float32."""
+    normals: np.ndarray
+    """Directions from the first cell to the second. (n, 3) float32."""
+    polygons: List[np.ndarray]
+    """Outlines, each (n, 3) float32."""
+
+    def __init__(self, native: _native.World) -> None:
+        columns = native.portals()
+        self.cells, self.kinds, self.areas, self.sizes, self.centers, self.normals, self.polygons = columns
+        _freeze(self.cells, self.areas, self.sizes, self.centers, self.normals, *self.polygons)
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    @overload
+    def __getitem__(self, index: int) -> Portal: ...
+    @overload
+    def __getitem__(self, index: slice) -> List[Portal]: ...
+    def __getitem__(self, index: Union[int, slice]) -> Union[Portal, List[Portal]]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        i = _index(index, len(self), "portal")
+        one, other = self.cells[i].tolist()
+        return Portal(
+            i,
+            self.kinds[i],
+            (one, other),
+            self.polygons[i],
+            float(self.areas[i]),
+            self.sizes[i],
+            self.centers[i],
+            self.normals[i],
+        )
+
+    def __repr__(self) -> str:
+        counts = {kind: self.kinds.count(kind) for kind in ("open", "door", "window", "crack")}
+        return "<Portals: " + ", ".join(f"{n} {kind}" for kind, n in counts.items() if n > 0) + ">"
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What one view sees. Never leaves out anything visible."""
+
+    eye_cell: int
+    """The cell of the eye; -1 in matter, where all that meets the view counts as visible."""
+    cells: np.ndarray
+    """Visible cells from near to far. (n,) int32."""
+    portals: np.ndarray
+    """Portals looked through. (n,) int32."""
+    batches: np.ndarray
+    """Batches of walls in the file, with visible triangles. (n,) int32."""
+    details: np.ndarray
+    """Visible objects, such as furniture. (n,) int32."""
+    draws: np.ndarray
+    """Rows of batch, first index and number of indices: the draws of a renderer. (n, 3) int64."""
+    triangles: int
+    """The number of triangles to draw."""
+    of_triangles: int
+    """The number of triangles in the world."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A walk from one point to another."""
+
+    length: float
+    """In meters."""
+    length_in_plan: float
+    """In meters, as seen from above."""
+    cells: Tuple[int, ...]
+    """The cells on the way, in order."""
+    portals: Tuple[int, ...]
+    """The portals passed, in order."""
+    points: np.ndarray
+    """The start, the points where the walk bends, the end; at the feet. (n, 3) float64."""
+
+
+@dataclass(frozen=True)
+class Storey:
+    """Connected floors, none above another."""
+
+    name: str
+    floor: float
+    """The height of its floor, in meters."""
+    cells: Tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Pvs:
+    """The potentially visible set: for each cell, the cells of which something may be seen from somewhere in it.
+
+    Rows as in ``scipy.sparse.csr_array((pvs.data, pvs.indices, pvs.indptr))``.
+    """
+
+    indptr: np.ndarray
+    """Row ``i`` is ``indices[indptr[i]:indptr[i + 1]]``. (n + 1,) int64."""
+    indices: np.ndarray
+    """Ascending in each row. int32."""
+
+    def __len__(self) -> int:
+        return len(self.indptr) - 1
+
+    @property
+    def data(self) -> np.ndarray:
+        """A true for each of ``indices``."""
+        return np.ones(len(self.indices), dtype=bool)
+
+    def visible_from(self, cell: int) -> np.ndarray:
+        """Returns the cells visible from a cell, ascending, with itself."""
+        i = _index(cell, len(self), "cell")
+        return self.indices[self.indptr[i] : self.indptr[i + 1]]
+
+    def matrix(self) -> np.ndarray:
+        """Returns the set as (n, n) bool: a row for each cell from which is looked."""
+        out = np.zeros((len(self), len(self)), dtype=bool)
+        out[np.repeat(np.arange(len(self)), np.diff(self.indptr)), self.indices] = True
+        return out
+
+
+class World:
+    """Cells, portals, and the answers to questions about them. Made by ``bake``, or read by ``open``.
+
+    Meters, +y up, right-handed. Queries keep what they need from call to call; any number of threads may ask.
+    """
+
+    def __init__(self, native: _native.World) -> None:
+        self._native = native
+        self._cells: Optional[Cells] = None
+        self._portals: Optional[Portals] = None
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "World":
+        """Reads a world from the bytes of its file."""
+        return cls(_native.World.of_bytes(data))
+
+    def save(self, path: "os.PathLike[str] | str", *, pvs: bool = False) -> None:
+        """Writes the world as one GLB, whole or not at all. Equal input gives equal bytes.
+
+        pvs: write what is seen from each cell, too; computes it if need be.
+        """
+        if pvs:
+            self._native.pvs(False, None, None)
+        self._native.save(os.fspath(path), pvs)
+
+    def __bytes__(self) -> bytes:
+        return self._native.to_bytes()
+
+    def __reduce__(self) -> tuple:
+        return World.from_bytes, (bytes(self),)
+
+    @property
+    def cells(self) -> Cells:
+        """Rooms, voids and the outdoors."""
+        if self._cells is None:
+            self._cells = Cells(self._native)
+        return self._cells
+
+    @property
+    def portals(self) -> Portals:
+        """Doors, windows and other openings."""
+        if self._portals is None:
+            self._portals = Portals(self._native)
+        return self._portals
+
+    @property
+    def storeys(self) -> List[Storey]:
+        """Storeys from the lowest up; each has a plan."""
+        return [Storey(name, floor, tuple(cells)) for name, floor, cells in self._native.storeys()]
+
+    @property
+    def verdict(self) -> str:
+        """How far to trust it, in a sentence that begins with ``trust: good``, ``fair``, ``low`` or ``none``."""
+        from ._bake import _in_python
+
+        return _in_python(self._native.verdict())
+
+    @property
+    def counts(self) -> Dict[str, float]:
+        """Counts of the bake, such as ``input_triangles``."""
+        return dict(self._native.about()[0])
+
+    @property
+    def provenance(self) -> Dict[str, str]:
+        """The program, the method, a hash of the input, and all settings."""
+        return dict(self._native.about()[1])
+
+    def locate(self, points: Any) -> Any:
+        """Returns the cells of points: (n,) int32 for an (n, 3) array, a number for one point; -1 in matter."""
+        array = np.asarray(points)
+        if array.shape == (3,):
+            return int(self._native.locate(_arrays.points("points", array[np.newaxis]))[0])
+        return self._native.locate(_arrays.points("points", array))
+
+    def see(
+        self,
+        eye: Any,
+        look: Any,
+        *,
+        up: Any = (0.0, 1.0, 0.0),
+        fov: float = 60.0,
+        aspect: float = 16 / 9,
+        far: Optional[float] = None,
+        closed: Any = (),
+    ) -> View:
+        """Returns what a view sees, in microseconds.
+
+        eye, look: the eye, and a point that it looks at; not a direction.
+        fov: the angle from the lower to the upper edge of the picture, in degrees; from 180 on all around.
+        aspect: its width divided by its height.
+        far: treat everything farther than this as hidden, in meters.
+        closed: ids of portals that are shut.
+        """
+        start, end = _arrays.point("eye", eye), _arrays.point("look", look)
+        # As the command does: rounded to single precision before the difference.
+        x, y, z = (np.asarray(end, np.float32) - np.asarray(start, np.float32)).tolist()
+        found = self._native.see(
+            start,
+            (x, y, z),
+            _arrays.point("up", up),
+            float(np.radians(np.float32(fov))),
+            float(aspect),
+            far,
+            _ids(closed),
+        )
+        eye_cell, cells, portals, batches, details, draws, (triangles, of_triangles) = found
+        eye_cell = -1 if eye_cell is None else eye_cell
+        return View(eye_cell, cells, portals, batches, details, draws, triangles, of_triangles)
+
+    def pvs(
+        self, *, fast: bool = False, threads: Optional[int] = None, max_memory: Optional[int] = None
+    ) -> Pvs:
+        """Returns the cells visible from each cell; computed once, and kept. An interrupt ends it.
+
+        fast: a larger answer, in less time; not kept.
+        max_memory: refuse a world that is estimated to need more, in bytes; 8 GiB by default.
+        """
+        indptr, indices = self._native.pvs(fast, threads, max_memory)
+        _freeze(indptr, indices)
+        return Pvs(indptr, indices)
+
+    def path(
+        self,
+        start: Any,
+        end: Any,
+        *,
+        radius: float = 0.25,
+        height: float = 1.8,
+        step: float = 0.3,
+        closed: Any = (),
+        objects: bool = True,
+    ) -> Path:
+        """Returns the walk from one point to another, over floors and stairs, around walls and furniture.
+
+        start, end: points at the feet, or at any height up to the head.
+        radius, height, step: the walker's, in meters: its distance from walls, its height, its highest step.
+        closed: ids of portals that are shut; other doors it opens.
+        objects: False to walk through objects, such as furniture.
+
+        The first path of a walker takes seconds in a large building, later ones milliseconds. Raises ``NoPathError`` if
+        there is none.
+        """
+        ends = [_arrays.point("start", start), _arrays.point("end", end)]
+        found = self._native.path(ends, radius, height, step, _ids(closed), objects)
+        length, in_plan, cells, portals, points = found
+        return Path(length, in_plan, tuple(cells), tuple(portals), points)
+
+    def to_networkx(self) -> Any:
+        """Returns a ``networkx.MultiGraph``: a node for each cell, an edge for each portal, keyed by its id.
+
+        Nodes have ``name``, ``kind``, ``volume`` and ``bounds``; edges ``kind``, ``area`` and ``center``.
+        """
+        networkx = _lazily("networkx")
+        graph = networkx.MultiGraph()
+        for cell in self.cells:
+            graph.add_node(
+                cell.id, name=cell.name, kind=cell.kind, volume=cell.volume, bounds=cell.bounds
+            )
+        for portal in self.portals:
+            graph.add_edge(
+                *portal.cells, key=portal.id, kind=portal.kind, area=portal.area, center=portal.center
+            )
+        return graph
+
+    def plan_svg(self, storey: Optional[str] = None, *, height: float = 1.2) -> str:
+        """Returns floor plans as SVG: of all storeys, or of one, by its name or that of a room on it.
+
+        height: that of the cut above each floor, in meters.
+        """
+        return self._native.plan_svg(storey, height)
+
+    def _repr_svg_(self) -> str:
+        return self.plan_svg()
+
+    def plot(
+        self, ax: Any = None, *, storey: Optional[str] = None, height: float = 1.2, labels: bool = True
+    ) -> Any:
+        """Draws the plan of a storey, the lowest if not given, with matplotlib; returns the axes.
+
+        Coordinates are those of the world: x to the right, z down. So ``ax.scatter(points[:, 0], points[:, 2])`` marks
+        points on the plan.
+        """
+        from ._plot import draw
+
+        return draw(self._native, ax, storey, height, labels)
+
+    def __repr__(self) -> str:
+        rooms = self.cells.kinds.count("room")
+        return f"<enfilade.World: {rooms} rooms, {len(self.cells)} cells, {len(self.portals)} portals>"
+
+
+def open(path: "os.PathLike[str] | str") -> World:  # noqa: A001
+    """Reads a world that ``World.save`` or ``enfilade bake`` wrote. All of it is checked: queries cannot fail later.
+
+    Raises ``FileNotFoundError``, and ``WorldError`` if the file is not a world, or is damaged.
+    """
+    return World(_native.World.open(os.fspath(path)))
+
+
+def _ids(portals: Any) -> List[int]:
+    return [int(getattr(portal, "id", portal)) for portal in portals]
+
+
+def _index(index: Any, n: int, what: str) -> int:
+    i = int(index)
+    if not -n <= i < n:
+        raise IndexError(f"{what} {i}: the world has {n}, counted from 0")
+    return i % n
+
+
+def _freeze(*arrays: np.ndarray) -> None:
+    for array in arrays:
+        array.flags.writeable = False
+
+
+def _lazily(name: str) -> Any:
+    """Imports a package that only one function needs."""
+    import importlib
+
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        package = name.split(".")[0]
+        raise ImportError(f"this needs {package}: pip install {package}", name=package) from None
