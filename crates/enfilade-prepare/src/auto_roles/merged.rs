@@ -17,23 +17,26 @@ const MOST_TRIANGLES: usize = 2_000_000;
 /// Returns `true` if an object may be several things: it is longer than any furniture, as large as a room in all directions,
 /// and no user's rule says that all of it is structure. A name does not: merged meshes keep that of their first part.
 pub(super) fn may_be_merged(object: &Object, triangles: &[Triangle]) -> bool {
-    is_large(Aabb::of_points(triangles.as_flattened()))
+    let bounds = Aabb::of_points(triangles.as_flattened());
+    is_roomy(bounds)
+        && bounds.size().max_element() > LONG
         && triangles.len() <= MOST_TRIANGLES
         && (is_open(object) || is_by_name(&object.reason))
 }
 
-fn is_large(bounds: Aabb) -> bool {
-    let size = bounds.size();
-    size.max_element() > LONG && size.min_element() > SMALL
+/// Returns `true` for a box in which a room has space: no furniture is as large in all directions.
+fn is_roomy(bounds: Aabb) -> bool {
+    bounds.size().min_element() > SMALL
 }
 
-/// Forgets names by which all objects are detail, for those that may be merged: the first part of one was a door.
+/// Forgets names by which all objects are detail, for those as large as a room: the first part of a merged one was a door,
+/// and a room alone may be called `box`.
 pub(super) fn forget_misleading_names(scene: &mut Scene) {
     if scene.objects.iter().any(|o| o.role == Role::Structural) {
         return;
     }
     for i in 0..scene.objects.len() {
-        if is_by_name(&scene.objects[i].reason) && is_large(scene.object_aabb(i)) {
+        if is_by_name(&scene.objects[i].reason) && is_roomy(scene.object_aabb(i)) {
             let object = &mut scene.objects[i];
             object.role = Role::Structural;
             object.reason = DEFAULT.to_owned();

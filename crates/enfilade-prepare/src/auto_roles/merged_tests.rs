@@ -76,6 +76,14 @@ fn the_name_of_a_door_makes_no_detail_of_a_whole_house() {
     assert_eq!(by_class.objects[0].reason, "default");
     let by_rule = named("rule: detail 'House'");
     assert_eq!(n_triangles(&by_rule, Role::Structural), 0);
+    // A room of 4 × 3 × 5 m under a name of cartons.
+    let mut room = Build::default();
+    room.block("box", [0.0; 3], [4.0, 3.0, 5.0]);
+    let mut room = room.judged();
+    room.objects[0].reason = "name: 'box'".to_owned();
+    room.objects[0].role = Role::Detail;
+    super::judge(&mut room);
+    assert_eq!(room.objects[0].role, Role::Structural);
     // Beside structure, it is what it says.
     let mut scene = house().merged("IFC class IfcDoor").judged();
     scene.objects.truncate(1);
