@@ -258,10 +258,10 @@ impl Comforts {
         let mut books = MeshBuilder::new(p.fabric);
         for shelf in 0..4_u32 {
             let mut x = -0.4;
-            for k in 0..14_u32 {
+            for k in 0..8_u32 {
                 let hash = ((shelf * 31 + k * 17).wrapping_mul(2_654_435_761) >> 16) % 97;
                 let (wide, high) = (
-                    0.03 + 0.03 * f64::from(hash % 3) / 2.0,
+                    0.06 + 0.05 * f64::from(hash % 3) / 2.0,
                     0.22 + 0.1 * f64::from(hash % 5) / 4.0,
                 );
                 if x + wide > 0.4 || hash % 7 == 6 {
