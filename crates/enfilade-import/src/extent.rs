@@ -402,7 +402,7 @@ mod tests {
     fn tiers_of_seats_in_a_hall_are_not_stairs_in_feet() {
         // Sixteen rows, 12 m wide and 0.85 m deep, in a hall with walls of 9 m.
         let hall = |rise: f64| {
-            let mut scene = mixed::stair_hall().scene;
+            let scene = mixed::stair_hall().scene;
             let at = scene.objects.iter().position(|o| o.name == "stairs");
             let at = at.unwrap();
             let stairs = scene.objects[at].clone();
