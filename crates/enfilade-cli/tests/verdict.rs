@@ -107,6 +107,23 @@ fn feet_are_seen_by_the_height_of_the_doors() {
 }
 
 #[test]
+fn feet_are_seen_by_the_steps_of_stairs() {
+    let dir = folder("steps");
+    // Its two doorways without leaves show nothing.
+    let scene = mixed::stair_hall().scene;
+    let feet = |p: [f64; 3]| p.map(|v| v / 0.3048);
+    fs::write(dir.join("a.obj"), obj(&scene, feet)).unwrap();
+    let done = run(&dir, "bake a.obj -o a.glb");
+    assert!(done.status.success(), "{}", said(&done));
+    assert!(said(&done).contains("--unit ft"), "{}", said(&done));
+    let last = printed(&done);
+    assert!(last.contains("trust: low") && last.contains("--unit ft"));
+    let done = run(&dir, "bake a.obj -o b.glb --unit ft");
+    assert!(!said(&done).contains("--unit"), "{}", said(&done));
+    assert!(printed(&done).contains("trust: good: 4 rooms"));
+}
+
+#[test]
 fn a_world_without_rooms_is_written_only_if_asked_for() {
     let dir = folder("empty");
     fs::write(dir.join("flat.obj"), "v 0 0 0\nv 9 0 0\nv 0 0 9\nf 1 2 3\n").unwrap();

@@ -1,7 +1,7 @@
 //! Checks of a scene's size for a wrong unit.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, DVec3, triangle_area_normal};
+use enfilade_geom::{Aabb, DVec3, MOST_FLIGHT_PLAN, Triangle, is_flight, triangle_area_normal};
 use enfilade_prepare::{Upward, judge_up};
 
 use crate::report::UpDoubt;
@@ -253,6 +253,60 @@ pub(crate) fn unit_doubt(
     ))
 }
 
+/// A foot. [Units: wu]
+const FOOT: f64 = 0.3048;
+/// Tiers of seats, up to 0.47 m high, are flights if they are made lower by this factor, and as narrow as stairs; stairs
+/// whose numbers are feet are not: theirs rise by 0.49 (0.15 m) and more.
+const TIER: f64 = 0.85;
+
+/// Returns the reason to take the numbers for feet: stairs whose steps one can climb only if they are, below walls at
+/// least a storey high in feet. Only if no unit was given and the format does not have one that all its writers know.
+///
+/// A house in feet is a plausible hall, so nothing but its stairs and doors shows it. Stairs that fit in meters speak
+/// against it.
+pub(crate) fn feet_hint(
+    scene: &Scene,
+    report: &ImportReport,
+    options: &ImportOptions,
+) -> Option<String> {
+    let is_known = options.unit.is_some() || report.files.iter().any(|f| f.format == MAP);
+    if is_known || report.unit_doubt.is_some() {
+        return None;
+    }
+    if FOOT * wall_height(scene, 1) < WALL / WALL_FACTOR {
+        return None;
+    }
+    let mut is_feet = false;
+    for i in 0..scene.objects.len() {
+        let has_steps = |factors: DVec3| is_flight_at(scene, i, factors);
+        if has_steps(DVec3::ONE) || has_steps(DVec3::new(FOOT, TIER, FOOT)) {
+            return None;
+        }
+        is_feet |= has_steps(DVec3::splat(FOOT));
+    }
+    is_feet.then(|| {
+        format!(
+            "{}: one can climb its stairs only if its numbers are feet: give --unit ft; if they are meters, --unit m",
+            paths_of(report)
+        )
+    })
+}
+
+/// Returns `true` if an object is a structural flight of stairs once its numbers are multiplied by factors.
+fn is_flight_at(scene: &Scene, object: usize, factors: DVec3) -> bool {
+    let size = scene.object_aabb(object).size() * factors;
+    let object = &scene.objects[object];
+    if object.role != Role::Structural || size.x * size.z > MOST_FLIGHT_PLAN {
+        return false;
+    }
+    let parts = &scene.meshes[object.mesh as usize].primitives;
+    let triangles = parts
+        .iter()
+        .flat_map(|p| p.placed_triangles(object.transform));
+    let scaled: Vec<Triangle> = triangles.map(|t| t.map(|p| factors * p)).collect();
+    is_flight(&scaled)
+}
+
 /// Format whose unit is known, and whose z axis points up.
 const MAP: &str = "Quake map";
 
@@ -297,4 +351,87 @@ pub(crate) fn up_doubt(
         up,
         is_clear,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::DMat4;
+    use enfilade_testkit::{TowerParams, furnished_house, mixed, office_tower};
+
+    fn hint(scene: &Scene, unit: Option<f64>) -> Option<String> {
+        let options = ImportOptions {
+            unit,
+            ..ImportOptions::default()
+        };
+        feet_hint(scene, &ImportReport::default(), &options)
+    }
+
+    fn scaled(mut scene: Scene, factor: f64) -> Scene {
+        for object in &mut scene.objects {
+            object.transform = DMat4::from_scale(DVec3::splat(factor)) * object.transform;
+        }
+        scene
+    }
+
+    #[test]
+    fn stairs_show_feet() {
+        let scene = scaled(mixed::stair_hall().scene, 1.0 / FOOT);
+        let text = hint(&scene, None).unwrap();
+        assert!(text.contains("--unit ft"), "{text}");
+        assert_eq!(hint(&scene, Some(1.0)), None, "who says meters means them");
+        assert_eq!(hint(&scaled(scene, FOOT), None), None);
+    }
+
+    #[test]
+    fn buildings_in_meters_are_not_taken_for_feet() {
+        let towers = [4, 64].map(|n| office_tower(&TowerParams::with_rooms(n, 1)));
+        let all = mixed::all()
+            .into_iter()
+            .chain(towers)
+            .chain([furnished_house()]);
+        for (i, building) in all.enumerate() {
+            assert_eq!(hint(&building.scene, None), None, "{i}");
+            // A storey twice as high as usual.
+            let high = scaled(building.scene, 2.0);
+            assert_eq!(hint(&high, None), None, "{i}");
+        }
+    }
+
+    #[test]
+    fn tiers_of_seats_in_a_hall_are_not_stairs_in_feet() {
+        // Sixteen rows, 12 m wide and 0.85 m deep, in a hall with walls of 9 m.
+        let hall = |rise: f64| {
+            let scene = mixed::stair_hall().scene;
+            let at = scene.objects.iter().position(|o| o.name == "stairs");
+            let at = at.unwrap();
+            let stairs = scene.objects[at].clone();
+            let tall = 16.0 * rise / scene.object_aabb(at).size().y;
+            let grow = DMat4::from_scale(DVec3::new(12.0 / 0.9, tall, 0.85 / 0.26));
+            let mut scene = scaled(scene, 1.0 / FOOT);
+            scene.objects[at].transform = grow * stairs.transform;
+            scene
+        };
+        for rise in [0.40, 0.45] {
+            assert_eq!(hint(&hall(rise), None), None, "{rise}");
+        }
+        assert!(hint(&hall(0.6), None).is_some(), "nobody climbs these");
+    }
+
+    #[test]
+    fn stairs_in_meters_and_low_walls_speak_against_feet() {
+        let feet = scaled(mixed::stair_hall().scene, 1.0 / FOOT);
+        let is_stairs = |o: &&enfilade_geom::scene::Object| o.name == "stairs";
+        let mut both = feet.clone();
+        let mut small = feet.objects.iter().find(is_stairs).unwrap().clone();
+        small.transform = DMat4::from_scale(DVec3::splat(FOOT)) * small.transform;
+        both.objects.push(small);
+        assert_eq!(hint(&both, None), None);
+        // Terraces in the open, 7 m wide.
+        let mut open = feet;
+        open.objects.retain(|o| is_stairs(&o));
+        let wide = DMat4::from_scale(DVec3::new(8.0, 1.0, 1.0));
+        open.objects[0].transform = wide * open.objects[0].transform;
+        assert_eq!(hint(&open, None), None);
+    }
 }

@@ -290,6 +290,7 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     }
     report.up_doubt = extent::up_doubt(&scene, &report, options);
     report.unit_doubt = extent::unit_doubt(&scene, &report, options);
+    report.feet_hint = extent::feet_hint(&scene, &report, options);
     extent::check(&scene, &report, options)?;
     if options.roles.is_automatic && !options.roles.is_manual {
         enfilade_prepare::judge_undecided(&mut scene);

@@ -37,6 +37,8 @@ pub struct ImportReport {
     pub references: Vec<PathBuf>,
     /// The reason why the numbers are probably not meters, and the remedy; `None` without evidence.
     pub unit_doubt: Option<String>,
+    /// The reason why the numbers may be feet, and the remedy; `None` without evidence.
+    pub feet_hint: Option<String>,
     /// The reason why the axis taken for up probably is not, and the remedy; `None` without evidence, and if the options
     /// give an axis.
     pub up_doubt: Option<UpDoubt>,
@@ -94,6 +96,12 @@ impl ImportReport {
     /// Returns the doubts about unit and axis that lower the trust in a world.
     #[must_use]
     pub fn doubts(&self) -> Vec<String> {
+        let mut said = self.grave_doubts();
+        said.extend(self.feet_hint.clone());
+        said
+    }
+
+    fn grave_doubts(&self) -> Vec<String> {
         let clear = self.up_doubt.as_ref().filter(|doubt| doubt.is_clear);
         let texts = [self.unit_doubt.clone(), clear.map(|d| d.text.clone())];
         texts.into_iter().flatten().collect()
@@ -103,7 +111,8 @@ impl ImportReport {
     /// alone speak, and they speak against what was assumed.
     #[must_use]
     pub fn refusal(&self) -> Option<String> {
-        let said = self.doubts();
+        // Not for feet: high halls with high steps exist.
+        let said = self.grave_doubts();
         if !self.is_bare() || said.is_empty() {
             return None;
         }

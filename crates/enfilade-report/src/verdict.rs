@@ -7,8 +7,9 @@ use serde::Serialize;
 
 /// A foot. [Units: wu]
 const FOOT: f32 = 0.3048;
-/// Usual heights of doors. [Units: wu]
-const DOOR: [f32; 2] = [1.8, 2.5];
+/// Usual heights of doors, up to those of public buildings with a light above. In no other unit but feet do the numbers
+/// come near. [Units: wu]
+const DOOR: [f32; 2] = [1.8, 3.0];
 
 /// How far to trust a world, by what was found in it.
 #[derive(Serialize)]
@@ -240,5 +241,22 @@ fn reason(doubt: &Doubt) -> Reason {
     Reason {
         text,
         options: options.to_vec(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn doors_as_high_in_feet_as_doors_are_name_feet() {
+        for (height, option) in [
+            (6.6, "--unit ft"),
+            (8.25, "--unit ft"),
+            (79.0, "--unit UNIT"),
+        ] {
+            let reason = reason(&Doubt::DoorHeight(height));
+            assert_eq!(reason.options, [option], "{height}");
+        }
     }
 }
