@@ -258,7 +258,7 @@ impl Comforts {
         let mut books = MeshBuilder::new(p.fabric);
         for shelf in 0..4_u32 {
             let mut x = -0.4;
-            for k in 0..8_u32 {
+            for k in 0..6_u32 {
                 let hash = ((shelf * 31 + k * 17).wrapping_mul(2_654_435_761) >> 16) % 97;
                 let (wide, high) = (
                     0.06 + 0.05 * f64::from(hash % 3) / 2.0,
