@@ -7,6 +7,7 @@ use enfilade_cpg::{Fitting, FittingPart, MotionKind, Portal, PortalKind, World};
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 use enfilade_testkit::furnished_house;
+use enfilade_verify::{VerifyOptions, verify_world};
 
 fn baked(scene: &Scene) -> World {
     let context = BakeContext::new(&Silent, None);
@@ -271,21 +272,28 @@ fn what_stands_beside_a_doorway_is_no_leaf_of_it() {
 }
 
 #[test]
-fn halves_of_a_door_that_is_cut_keep_its_leaves() {
+fn the_larger_half_of_a_door_that_is_cut_keeps_its_leaves_and_neither_its_frame() {
     let world = baked(&two_rooms(&FRAMED));
     let door = the_door(&world).clone();
-    // Through the middle of the doorway, across the first room.
+    // Through the doorway, beside its middle, across the first room.
     let polygon = [
-        [-0.1, -0.1, 1.5],
-        [4.1, -0.1, 1.5],
-        [4.1, 2.7, 1.5],
-        [-0.1, 2.7, 1.5],
+        [-0.1, -0.1, 1.4],
+        [4.1, -0.1, 1.4],
+        [4.1, 2.7, 1.4],
+        [-0.1, 2.7, 1.4],
     ];
     let added = add_portal(&world, &polygon.map(DVec3::from)).unwrap();
     assert_eq!(added.halved.len(), 1, "{:?}", added.halved);
     let (a, b) = added.halved[0];
-    for half in [a, b] {
-        assert_eq!(added.world.graph[half].fittings, door.fittings);
-    }
-    assert!(added.world.validate().is_ok());
+    let leaves: Vec<_> = (door.fittings.iter())
+        .filter(|f| f.motion.is_some())
+        .cloned()
+        .collect();
+    assert!(!leaves.is_empty() && leaves.len() < door.fittings.len());
+    let [larger, smaller] = [a, b].map(|half| &added.world.graph[half]);
+    assert!(larger.area > smaller.area);
+    assert_eq!(larger.fittings, leaves);
+    assert_eq!(smaller.fittings, []);
+    let report = verify_world(&added.world, None, &VerifyOptions::default());
+    assert!(report.holds(), "{report}");
 }

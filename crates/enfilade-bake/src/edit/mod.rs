@@ -13,7 +13,7 @@ mod splice;
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Cell, CellId, Portal, PortalId, SourceRuns, SpecialId, World};
+use enfilade_cpg::{Cell, CellId, FittingPart, Portal, PortalId, SourceRuns, SpecialId, World};
 use enfilade_geom::{DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::rounded_portal;
@@ -423,21 +423,31 @@ impl Parts {
             }
             halves.sort_by(|a, b| b.1.area.total_cmp(&a.1.area));
             let (mut kept, base) = (p.clone(), p.clone());
-            let renamed = |side: u32, mut portal: Portal| {
+            // A leaf belongs to the half in which its middle is; a frame runs around neither.
+            let fits = |part: FittingPart, is_larger: bool| match part {
+                FittingPart::Leaf => is_larger,
+                FittingPart::Frame => false,
+                FittingPart::Pane => true,
+            };
+            let renamed = |side: u32, mut portal: Portal, is_larger: bool| {
                 portal.cells = base.cells;
                 portal.cells[end] = self.id(side);
                 portal.kind = base.kind;
                 portal.normal = base.normal;
-                portal.fittings.clone_from(&base.fittings);
+                let fittings = base.fittings.iter();
+                portal.fittings = fittings
+                    .filter(|f| fits(f.part, is_larger))
+                    .cloned()
+                    .collect();
                 portal
             };
             match &halves[..] {
                 [(a, big), (b, small)] => {
                     let second = PortalId(out.graph.portals.len() as u32);
-                    let small = renamed(*b, small.clone());
+                    let small = renamed(*b, small.clone(), false);
                     let beyond = base.cells[1 - end].0 as usize;
                     out.graph.cells[beyond].portals.push(second);
-                    out.graph[id] = renamed(*a, big.clone());
+                    out.graph[id] = renamed(*a, big.clone(), true);
                     out.graph.portals.push(small);
                     halved.push((id, second));
                 }
