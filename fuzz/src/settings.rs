@@ -12,8 +12,6 @@ use enfilade::geom::scene::Scene;
 mod command;
 #[path = "../../crates/enfilade-cli/src/bake/delaunay.rs"]
 mod delaunay;
-#[path = "../../crates/enfilade-cli/src/bake/values.rs"]
-mod values;
 
 #[derive(Parser)]
 struct Line {
@@ -31,7 +29,7 @@ pub fn settings(data: &[u8]) {
         let line = Line::try_parse_from([Path::new("bake"), Path::new("--config"), path]);
         let resolved = command::resolve(&line.expect("a good line").options);
         match resolved {
-            Ok(resolved) => drop(resolved.config_for(&Scene::default())),
+            Ok(resolved) => drop(resolved.bake.config_for(&Scene::default())),
             Err(error) => assert!(format!("{error:#}").contains("settings"), "{error:#}"),
         }
     });
