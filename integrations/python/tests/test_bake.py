@@ -195,7 +195,9 @@ def test_scenes_that_hold_no_rooms_are_errors_that_name_arguments():
     with pytest.raises(enfilade.EnfiladeError):
         enfilade.bake(vertices, faces[:0])
     with pytest.raises(enfilade.BakeError, match="no structural"):
-        enfilade.bake({"chair": (vertices, faces)})
+        enfilade.bake({"chair": (0.2 * vertices, faces)})
+    # Alone and as large as a room, it is one, whatever it is called.
+    assert enfilade.bake({"chair": (vertices, faces)}).cells.kinds.count("room") == 1
     with pytest.raises(enfilade.BakeError, match="max_time"):
         enfilade.bake(vertices, faces, max_time=0)
 
