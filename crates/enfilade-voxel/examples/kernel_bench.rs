@@ -190,7 +190,7 @@ impl Run<'_> {
                         let answer = watershed(
                             dims,
                             field,
-                            WatershedOptions {
+                            &WatershedOptions {
                                 h: self.h,
                                 outdoors: None,
                             },

@@ -40,7 +40,7 @@ pub fn far_outdoors(blocked: &BitVolume, allowance: &Allowance) -> BitVolume {
         h: NOISE,
         outdoors: Some(border(dims)),
     };
-    let flood = watershed(dims, squared.clone(), options, allowance);
+    let flood = watershed(dims, squared.clone(), &options, allowance);
     let depth = |v: usize| f64::from(squared[v]).sqrt();
     // Reach of the ball around each block of another basin, rounded up.
     let mut reach: Vec<u16> = (0..squared.len())
@@ -210,7 +210,7 @@ mod tests {
             outdoors: Some(outdoors),
         };
         assert_eq!(squared.len(), voxels.n_voxels());
-        watershed(DIMS, squared, options, &Allowance::default())
+        watershed(DIMS, squared, &options, &Allowance::default())
     }
 
     proptest! {

@@ -193,6 +193,24 @@ impl BitVolume {
         set_bits(&mut self.words[row * n..][..n], along.start, along.end);
     }
 
+    /// Clears the voxels `along` x of one row.
+    ///
+    /// # Panics
+    /// If they do not lie in the row.
+    pub fn clear_row(&mut self, row: usize, along: Range<usize>) {
+        assert!(along.end <= self.dims[0], "{along:?} outside the row");
+        let n = self.row_words();
+        let row = &mut self.words[row * n..][..n];
+        for_words(along.start, along.end, |w, mask| row[w] &= !mask);
+    }
+
+    /// Sets the voxels of one row that are set in `words`. Bits past its end must be 0.
+    pub fn unite_row(&mut self, row: usize, words: &[u64]) {
+        let n = self.row_words();
+        let own = self.words[row * n..][..n].iter_mut().zip(words);
+        own.for_each(|(own, word)| *own |= word);
+    }
+
     /// Returns the bit of voxel `(i, j, k)`.
     ///
     /// # Panics
@@ -317,6 +335,16 @@ impl BitVolume {
         out
     }
 
+    /// Clears every voxel that is set in `other`.
+    ///
+    /// # Panics
+    /// If the boxes differ in size.
+    pub fn subtract(&mut self, other: &Self) {
+        assert_eq!(self.dims, other.dims, "boxes of one size");
+        let words = self.words.iter_mut().zip(&other.words);
+        words.for_each(|(a, b)| *a &= !b);
+    }
+
     /// Sets every voxel that is set in `other`.
     ///
     /// # Panics
@@ -331,7 +359,12 @@ impl BitVolume {
 }
 
 /// Sets bits `from..to` of a row.
-pub(super) fn set_bits(row: &mut [u64], from: usize, to: usize) {
+pub fn set_bits(row: &mut [u64], from: usize, to: usize) {
+    for_words(from, to, |w, mask| row[w] |= mask);
+}
+
+/// Calls `word` with the index of each word that bits `from..to` lie in, and these bits.
+fn for_words(from: usize, to: usize, mut word: impl FnMut(usize, u64)) {
     if from >= to {
         return;
     }
@@ -339,16 +372,16 @@ pub(super) fn set_bits(row: &mut [u64], from: usize, to: usize) {
     let head = !0u64 << (from % 64);
     let tail = !0u64 >> (63 - (to - 1) % 64);
     if first == last {
-        row[first] |= head & tail;
+        word(first, head & tail);
     } else {
-        row[first] |= head;
-        row[first + 1..last].fill(!0);
-        row[last] |= tail;
+        word(first, head);
+        (first + 1..last).for_each(|w| word(w, !0));
+        word(last, tail);
     }
 }
 
 /// Calls `run(from, to)` for each maximal run of set bits `from..to` of a row, ascending.
-pub(super) fn for_runs(row: &[u64], mut run: impl FnMut(u32, u32)) {
+pub fn for_runs(row: &[u64], mut run: impl FnMut(u32, u32)) {
     let mut open: Option<u32> = None;
     for (w, &word) in row.iter().enumerate() {
         let base = w as u32 * 64;

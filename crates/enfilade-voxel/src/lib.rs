@@ -22,7 +22,7 @@ pub use components::{Components, Connectivity, components, flood};
 pub use edt::{distance, distance_squared, distance_squared_near};
 pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use far::far_outdoors;
-pub use grid::{BitVolume, Grid};
+pub use grid::{BitVolume, Grid, for_runs, set_bits};
 pub use voxelize::voxelize;
 pub use watershed::{Basin, Labels, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
 pub use widest::{WidestPath, border, widest_path};

@@ -49,7 +49,7 @@ fn flood(
         h: config.noise / grid.voxel,
         outdoors: Some(outdoors),
     };
-    let flood = watershed(grid.dims, distances, options, allowance);
+    let flood = watershed(grid.dims, distances, &options, allowance);
     let peaks = flood.basins.iter().map(|b| b.peak as f32);
     let saddles = flood.saddles.iter();
     Basins {

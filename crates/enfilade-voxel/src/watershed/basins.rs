@@ -1,4 +1,4 @@
-//! Result of a flood: the basin of each voxel, the basins, and their contacts.
+//! Result of a watershed: the basin of each voxel, the basins, and their contacts.
 
 use std::ops::{BitOr, BitXor, Range};
 

@@ -1,6 +1,5 @@
 use std::collections::BTreeMap;
 
-use super::queue::{BATCH, NONE, Queue, Shape};
 use super::*;
 use crate::distance_squared;
 use proptest::prelude::*;
@@ -59,7 +58,7 @@ fn check(dims: [usize; 3], squared: &[u16], h: f64, outdoors: Option<&BitVolume>
     let w = watershed(
         dims,
         squared.to_vec(),
-        WatershedOptions {
+        &WatershedOptions {
             h,
             outdoors: outdoors.cloned(),
         },
@@ -247,43 +246,21 @@ proptest! {
 }
 
 proptest! {
-    /// Compares with one list per level. Long bursts cross the ends of chunks, full and empty.
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    /// Wide plateaus, which slabs cut.
     #[test]
-    fn queues_are_first_in_first_out(bursts in prop::collection::vec((0u32..3, 0u32..1200, 0usize..50), 1..60)) {
-        let mut queue = Queue::new(3);
-        let mut plain = [(); 3].map(|()| std::collections::VecDeque::new());
-        let mut next = 0;
-        for (level, pushes, pops) in bursts {
-            for _ in 0..pushes {
-                queue.push(level, next);
-                plain[level as usize].push_back(next);
-                next += 1;
-            }
-            for _ in 0..pops {
-                let mut batch = [0; BATCH];
-                let n = queue.pop(level, &mut batch);
-                prop_assert_eq!(n == 0, plain[level as usize].is_empty());
-                for &v in &batch[..n] {
-                    prop_assert_eq!(Some(v), plain[level as usize].pop_front());
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn neighbors_are_found_without_dividing(
-        nx in 1usize..70_000, ny in 1usize..300, nz in 1usize..40, at in prop::array::uniform3(any::<usize>()),
+    fn slabs_of_any_thickness_give_the_same(
+        nx in 1usize..12, ny in 1usize..6, nz in 1usize..12, seed in any::<u64>(), values in 2u64..6,
+        h in 0.0..1.0, inside in any::<bool>(),
     ) {
         let dims = [nx, ny, nz];
-        let n = (nx * ny * nz).min(u32::MAX as usize);
-        let voxels = at.map(|a| a % n).into_iter().chain([0, n - 1, n / 2]);
-        for v in voxels.filter(|&v| v < n) {
-            let mut found: Vec<usize> =
-                Shape::new(dims).neighbors(v as u32).into_iter().filter(|&q| q != NONE).map(|q| q as usize).collect();
-            let mut expected: Vec<usize> = plain_neighbors(dims, v).collect();
-            found.sort_unstable();
-            expected.sort_unstable();
-            prop_assert_eq!(found, expected);
+        let squared: Vec<u16> = noise(nx * ny * nz, seed, values).map(|v| v as u16).collect();
+        let outdoors = inside.then(|| BitVolume::from_fn(dims, |v| v % nx == 0));
+        let options = WatershedOptions { h, outdoors };
+        let by = |thick| watershed_by(thick, dims, squared.clone(), &options, &Allowance::default());
+        let whole = by(nz);
+        for thick in 1..nz {
+            prop_assert_eq!(&by(thick), &whole, "slabs of {} layers", thick);
         }
     }
 }
@@ -300,7 +277,7 @@ fn the_number_of_threads_changes_nothing() {
             let w = watershed(
                 dims,
                 distance_squared(&occupied, &Allowance::default()),
-                WatershedOptions::default(),
+                &WatershedOptions::default(),
                 &Allowance::default(),
             );
             let dams = mark_dams(dims, &w.labels);
@@ -431,7 +408,7 @@ fn many_basins(dims: [usize; 3], h: f64) -> Watershed {
     watershed(
         dims,
         squared,
-        WatershedOptions { h, outdoors: None },
+        &WatershedOptions { h, outdoors: None },
         &Allowance::default(),
     )
 }
@@ -465,7 +442,7 @@ fn renumbering_changes_nothing() {
     let w = watershed(
         dims,
         hills.clone(),
-        WatershedOptions {
+        &WatershedOptions {
             h: 0.5,
             outdoors: None,
         },
@@ -475,7 +452,7 @@ fn renumbering_changes_nothing() {
     let w = watershed(
         dims,
         hills,
-        WatershedOptions {
+        &WatershedOptions {
             h: 0.0,
             outdoors: None,
         },
