@@ -16,6 +16,8 @@
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
 
 use super::picture::Picture;
+use crate::SmallestHole;
+use crate::voxel::{BitVolume, for_runs};
 
 /// An opening between two cells, as the builder describes it.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +70,7 @@ pub(crate) fn fit_candidate(
             for plane in candidate_planes(opening, normal, &around, hole) {
                 let section = free_section(&plane, centers, &around, [spacing, hole]);
                 // A picture of so many cells; each triangle is drawn into it.
-                let n = section.open.len() / 4 + 5 * around.len() + centers.len() / 2;
+                let n = section.open.n_voxels() / 4 + 5 * around.len() + centers.len() / 2;
                 if !allowance.spend(n as u64) {
                     return Candidate {
                         winding: section.winding(),
@@ -148,27 +150,34 @@ fn candidate_planes(
     around: &[Triangle],
     hole: f64,
 ) -> Vec<Plane> {
-    // Steps within a surface are at most as wide as gaps that are closed anyway.
-    let step = 0.2 * hole;
+    // Steps within a surface are at most as wide as gaps that are closed anyway, or would be.
+    let step = 0.2 * hole.max(SmallestHole::LEAST);
     let middle = Plane::through(opening.center, normal);
-    let mut offsets: Vec<f64> = Vec::new();
+    let mut faces: Vec<(f64, f64)> = Vec::new();
     for t in around {
         let d = t.map(|p| middle.signed_distance(p));
         let (lo, hi) = (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2]));
-        if hi - lo < step && hi > -OFFSET && lo < OFFSET && triangle_area_normal(t).length() > 1e-4
-        {
-            offsets.push((lo + hi) * 0.5);
+        let area = triangle_area_normal(t).length();
+        if hi - lo < step && hi > -OFFSET && lo < OFFSET && area > 1e-4 {
+            faces.push(((lo + hi) * 0.5, area));
         }
     }
-    offsets.sort_by(f64::total_cmp);
-    offsets.dedup_by(|a, b| (*a - *b).abs() < step);
+    faces.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    // The largest triangle represents those in about its plane, as in the complex.
+    let mut offsets: Vec<f64> = Vec::new();
+    for sheet in faces.chunk_by(|a, b| b.0 - a.0 < step) {
+        let largest = sheet.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
+        offsets.extend(largest.map(|face| face.0));
+    }
     let mut tries: Vec<f64> = offsets
         .windows(2)
         .filter(|w| w[1] - w[0] > 2.0 * step)
         .map(|w| (w[0] + w[1]) * 0.5)
         .collect();
     tries.extend(&offsets);
-    tries.extend((-6..=6).map(|i| f64::from(i) * OFFSET / 6.0));
+    // A plane hardly off a wall's would leave a sliver of space between the two.
+    let sweep = (-6..=6).map(|i| f64::from(i) * OFFSET / 6.0);
+    tries.extend(sweep.filter(|t| offsets.iter().all(|at| (at - t).abs() >= step)));
     tries
         .iter()
         .map(|&t| Plane::through(opening.center + normal * t, normal))
@@ -179,7 +188,7 @@ fn candidate_planes(
 struct FreeSection {
     plane: Plane,
     picture: Picture,
-    open: Vec<bool>,
+    open: BitVolume,
     area: f64,
     bounded: bool,
     /// Distance from the front's middle.
@@ -205,16 +214,17 @@ impl FreeSection {
             step,
             side,
         } = self.picture;
-        let [nu, nv] = side;
+        let nv = side[1];
         let grow = step * 1.5 + 0.01;
         for j in 0..nv {
-            let row = &self.open[j * nu..(j + 1) * nu];
-            let (Some(first), Some(last)) =
-                (row.iter().position(|&o| o), row.iter().rposition(|&o| o))
-            else {
+            let mut ends: Option<[u32; 2]> = None;
+            for_runs(self.open.row(j), |from, to| {
+                ends = Some([ends.map_or(from, |e| e[0]), to]);
+            });
+            let Some([first, end]) = ends.map(|e| e.map(f64::from)) else {
                 continue;
             };
-            for (i, sign) in [(first as f64, -1.0), (last as f64 + 1.0, 1.0)] {
+            for (i, sign) in [(first, -1.0), (end, 1.0)] {
                 for (dj, up) in [(0.0, -1.0), (1.0, 1.0)] {
                     corners.push(
                         origin
@@ -238,27 +248,19 @@ fn free_section(
     let blocked = picture.blocked(plane, around);
     // Half a hole from each side, rounded to cells.
     let reach = (0.5 * hole / picture.step).round() as usize;
-    let (pieces, found) = picture.pieces(&picture.grown(&blocked, reach), centers);
-    // The piece that most of the front projects onto.
-    let main = (0..found.len()).max_by_key(|&i| (found[i].n_hits, usize::MAX - i));
+    let patches = picture.patches(&picture.grown(&blocked, reach), centers);
+    // The patch that most of the front projects onto, the first of several.
+    let main = patches.iter().rev().max_by_key(|patch| patch.n_hits);
     let (open, area, bounded) = match main {
-        Some(i) => {
-            let main = &found[i];
+        Some(main) => {
             // A plane that most of the front misses does not belong to this opening.
             let share = main.n_hits as f64 / centers.len() as f64;
-            let open: Vec<bool> = pieces.iter().map(|&p| p as usize == i + 1).collect();
-            let mut open = picture.grown(&open, reach);
-            for (open, &blocked) in open.iter_mut().zip(&blocked) {
-                *open &= !blocked;
-            }
-            let n_cells = open.iter().filter(|&&o| o).count();
-            (
-                open,
-                n_cells as f64 * picture.step * picture.step,
-                !main.meets_border && share > 0.5,
-            )
+            let mut open = picture.grown(&main.cells, reach);
+            open.subtract(&blocked);
+            let area = open.count() as f64 * picture.step * picture.step;
+            (open, area, !main.meets_border && share > 0.5)
         }
-        None => (blocked.iter().map(|b| !b).collect(), f64::MAX / 1e6, false),
+        None => (blocked.complement(), f64::MAX / 1e6, false),
     };
     let offset: f64 = centers.iter().map(|&c| plane.signed_distance(c)).sum();
     FreeSection {

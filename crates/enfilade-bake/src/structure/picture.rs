@@ -6,6 +6,8 @@ use std::ops::Range;
 
 use enfilade_geom::{DVec3, Plane, Triangle};
 
+use crate::voxel::{BitVolume, for_runs, set_bits};
+
 /// Most lattice cells along one side.
 const MAX_SIDE: usize = 320;
 /// Finest lattice spacing. [Units: wu]
@@ -23,6 +25,7 @@ pub(super) struct Picture {
 
 /// A connected set of open cells.
 pub(super) struct OpenPatch {
+    pub(super) cells: BitVolume,
     /// Number of the opening's points in it.
     pub(super) n_hits: usize,
     pub(super) meets_border: bool,
@@ -55,8 +58,8 @@ impl Picture {
     }
 
     /// Returns the cells that triangles lie in or cross.
-    pub(super) fn blocked(&self, plane: &Plane, around: &[Triangle]) -> Vec<bool> {
-        let mut blocked = vec![false; self.side[0] * self.side[1]];
+    pub(super) fn blocked(&self, plane: &Plane, around: &[Triangle]) -> BitVolume {
+        let mut blocked = BitVolume::new([self.side[0], self.side[1], 1]);
         for t in around {
             let d = t.map(|p| plane.signed_distance(p));
             if d.iter().all(|d| d.abs() < 1e-3) {
@@ -68,80 +71,115 @@ impl Picture {
         blocked
     }
 
-    /// Returns, for each open cell, the number of its piece from 1 on (0 for none), and the pieces. Only pieces that
-    /// contain a point count.
-    pub(super) fn pieces(&self, blocked: &[bool], points: &[DVec3]) -> (Vec<u32>, Vec<OpenPatch>) {
-        let mut piece_of = vec![0_u32; blocked.len()];
-        let mut pieces: Vec<OpenPatch> = Vec::new();
+    /// Returns the connected sets of open cells that contain a point, in order of the points.
+    pub(super) fn patches(&self, blocked: &BitVolume, points: &[DVec3]) -> Vec<OpenPatch> {
+        let mut open = blocked.complement();
+        let mut patches: Vec<OpenPatch> = Vec::new();
         for &p in points {
             let place = self.place(p);
             let [i, j] = [0, 1].map(|k| (place[k].max(0.0) as usize).min(self.side[k] - 1));
-            let at = j * self.side[0] + i;
-            if blocked[at] {
-                continue;
+            if open.get(i, j, 0) {
+                patches.push(self.take_patch(i, j, &mut open));
             }
-            if piece_of[at] == 0 {
-                let id = pieces.len() as u32 + 1;
-                pieces.push(self.fill(at, id, blocked, &mut piece_of));
+            // The last patch most often holds the next point.
+            let here = patches.iter_mut().rev().find(|p| p.cells.get(i, j, 0));
+            if let Some(patch) = here {
+                patch.n_hits += 1;
             }
-            pieces[piece_of[at] as usize - 1].n_hits += 1;
         }
-        (piece_of, pieces)
+        patches
     }
 
     /// Returns a set of cells with all cells up to `reach` from it, along both sides.
-    pub(super) fn grown(&self, cells: &[bool], reach: usize) -> Vec<bool> {
+    pub(super) fn grown(&self, cells: &BitVolume, reach: usize) -> BitVolume {
         if reach == 0 {
-            return cells.to_vec();
+            return cells.clone();
         }
         let [nu, nv] = self.side;
-        let near = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
-        // Along rows, then across them.
-        let mut wide = vec![false; cells.len()];
-        for (row, wide) in cells.chunks_exact(nu).zip(wide.chunks_exact_mut(nu)) {
-            let mut done = 0;
-            for (i, _) in row.iter().enumerate().filter(|(_, c)| **c) {
-                let Range { start, end } = near(i, nu);
-                wide[start.max(done)..end].fill(true);
-                done = end;
-            }
-        }
-        let mut out = vec![false; cells.len()];
-        for (j, out) in out.chunks_exact_mut(nu).enumerate() {
-            for row in near(j, nv) {
-                for (out, &wide) in out.iter_mut().zip(&wide[row * nu..]) {
-                    *out |= wide;
-                }
+        let near =
+            |from: usize, to: usize, n: usize| from.saturating_sub(reach)..(to + reach).min(n);
+        let mut out = BitVolume::new(cells.dims());
+        let mut wide = vec![0; cells.row(0).len()];
+        for j in 0..nv {
+            wide.fill(0);
+            for_runs(cells.row(j), |from, to| {
+                let along = near(from as usize, to as usize, nu);
+                set_bits(&mut wide, along.start, along.end);
+            });
+            for row in near(j, j + 1, nv) {
+                out.unite_row(row, &wide);
             }
         }
         out
     }
 
-    /// Marks the open cells connected to `start`.
-    fn fill(&self, start: usize, id: u32, blocked: &[bool], piece_of: &mut [u32]) -> OpenPatch {
-        let side = self.side;
+    /// Takes the open cells connected to `(i, j)`: a scan line fill, with a step for each run of cells.
+    fn take_patch(&self, i: usize, j: usize, open: &mut BitVolume) -> OpenPatch {
+        let [nu, nv] = self.side;
+        let mut cells = BitVolume::new(open.dims());
         let mut meets_border = false;
-        piece_of[start] = id;
-        let mut stack = vec![start];
-        while let Some(k) = stack.pop() {
-            let (i, j) = (k % side[0], k / side[0]);
-            meets_border |= i == 0 || j == 0 || i + 1 == side[0] || j + 1 == side[1];
-            let mut visit = |inside: bool, next: usize| {
-                if inside && !blocked[next] && piece_of[next] == 0 {
-                    piece_of[next] = id;
-                    stack.push(next);
+        let mut stack = vec![(i, j)];
+        while let Some((i, j)) = stack.pop() {
+            if !open.get(i, j, 0) {
+                continue;
+            }
+            let run = run_around(open.row(j), i);
+            meets_border |= j == 0 || j + 1 == nv || run.start == 0 || run.end == nu;
+            open.clear_row(j, run.clone());
+            cells.fill_row(j, run.clone());
+            let beside = [(j > 0, j.wrapping_sub(1)), (j + 1 < nv, j + 1)];
+            for (_, row) in beside.into_iter().filter(|b| b.0) {
+                let mut at = run.start;
+                while let Some(next) = next_set(open.row(row), at).filter(|&i| i < run.end) {
+                    stack.push((next, row));
+                    at = run_around(open.row(row), next).end;
                 }
-            };
-            visit(i > 0, k.wrapping_sub(1));
-            visit(i + 1 < side[0], k + 1);
-            visit(j > 0, k.wrapping_sub(side[0]));
-            visit(j + 1 < side[1], k + side[0]);
+            }
         }
         OpenPatch {
+            cells,
             n_hits: 0,
             meets_border,
         }
     }
+}
+
+/// Returns the first set bit of a row from `at` on.
+fn next_set(row: &[u64], at: usize) -> Option<usize> {
+    let first = row.get(at / 64)? & (!0 << (at % 64));
+    let rest = row[at / 64 + 1..].iter().copied();
+    let mut words = std::iter::once(first).chain(rest).zip(at / 64..);
+    words
+        .find(|w| w.0 != 0)
+        .map(|(word, w)| w * 64 + word.trailing_zeros() as usize)
+}
+
+/// Returns the run of set bits around `at`, which is set.
+fn run_around(row: &[u64], at: usize) -> Range<usize> {
+    let (mut start, mut end) = (at, at + 1);
+    // Bits before `at` in its word, aligned to the top.
+    loop {
+        let in_word = start % 64;
+        if in_word > 0 {
+            let ones = (row[start / 64] << (64 - in_word)).leading_ones() as usize;
+            start -= ones.min(in_word);
+            if ones < in_word {
+                break;
+            }
+        }
+        if start == 0 || row[start / 64 - 1] >> 63 == 0 {
+            break;
+        }
+        start -= 1;
+    }
+    while let Some(word) = row.get(end / 64) {
+        let ones = (word >> (end % 64)).trailing_ones() as usize;
+        end += ones;
+        if ones == 0 || !end.is_multiple_of(64) {
+            break;
+        }
+    }
+    start..end
 }
 
 /// Returns the segment in which a triangle crosses a plane, given the distances `d` of its vertices.
@@ -165,20 +203,20 @@ fn crossing(t: &Triangle, d: [f64; 3]) -> Option<[DVec3; 2]> {
 }
 
 /// Marks the lattice cells along a segment, so that no step between edge neighbors crosses it.
-fn draw_segment(blocked: &mut [bool], side: [usize; 2], p: [f64; 2], q: [f64; 2]) {
+fn draw_segment(blocked: &mut BitVolume, side: [usize; 2], p: [f64; 2], q: [f64; 2]) {
     let length = (q[0] - p[0]).abs().max((q[1] - p[1]).abs());
     let n = ((length * 2.0).ceil() as usize).clamp(1, 4 * MAX_SIDE * 8);
     for k in 0..=n {
         let t = k as f64 / n as f64;
         let (x, y) = (p[0] + (q[0] - p[0]) * t, p[1] + (q[1] - p[1]) * t);
         if x >= 0.0 && y >= 0.0 && (x as usize) < side[0] && (y as usize) < side[1] {
-            blocked[y as usize * side[0] + x as usize] = true;
+            blocked.set(x as usize, y as usize, 0, true);
         }
     }
 }
 
 /// Marks the lattice cells whose centers lie in a triangle of the plane.
-fn fill_triangle(blocked: &mut [bool], side: [usize; 2], t: [[f64; 2]; 3]) {
+fn fill_triangle(blocked: &mut BitVolume, side: [usize; 2], t: [[f64; 2]; 3]) {
     for i in 0..3 {
         draw_segment(blocked, side, t[i], t[(i + 1) % 3]);
     }
@@ -204,7 +242,7 @@ fn fill_triangle(blocked: &mut [bool], side: [usize; 2], t: [[f64; 2]; 3]) {
                 cross(t[2], t[0], c),
             ];
             if s.iter().all(|&s| s >= 0.0) || s.iter().all(|&s| s <= 0.0) {
-                blocked[y * side[0] + x] = true;
+                blocked.set(x, y, 0, true);
             }
         }
     }
