@@ -115,22 +115,21 @@ pub(crate) fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
     voxels.dedup();
     let mut sets = Sets::new(voxels.len());
     let (nx64, layer) = (nx as i64, (nx * ny) as i64);
+    // Half of the 26 neighbors lie ahead, three by three; the other half finds this voxel.
+    let rows = [nx64, layer - nx64, layer, layer + nx64];
+    let mut ahead = [0; 4];
     for (at, &voxel) in voxels.iter().enumerate() {
-        // Half of the 26 neighbors: the other half finds this voxel.
-        for dz in 0..=1_i64 {
-            for dy in -1..=1_i64 {
-                for dx in -1..=1_i64 {
-                    let step = dz * layer + dy * nx64 + dx;
-                    if step <= 0 {
-                        continue;
-                    }
-                    let Some(other) = voxel.checked_add_signed(step) else {
-                        continue;
-                    };
-                    if let Ok(found) = voxels.binary_search(&other) {
-                        sets.join(at as u32, found as u32);
-                    }
-                }
+        if voxels.get(at + 1) == Some(&(voxel + 1)) {
+            sets.join(at as u32, at as u32 + 1);
+        }
+        for (next, row) in ahead.iter_mut().zip(rows) {
+            let first = voxel.saturating_add_signed(row - 1);
+            while voxels.get(*next).is_some_and(|&v| v < first) {
+                *next += 1;
+            }
+            let near = voxels[*next..].iter().take_while(|&&v| v <= first + 2);
+            for (other, _) in (*next..).zip(near) {
+                sets.join(at as u32, other as u32);
             }
         }
     }

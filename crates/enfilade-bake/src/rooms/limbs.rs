@@ -20,6 +20,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use enfilade_geom::{Allowance, Sets};
+use rayon::prelude::*;
 
 use crate::voxel::{BitVolume, Grid, Labels, distance};
 
@@ -55,8 +56,14 @@ pub(crate) fn split_limbs(
     // Largest half-width of each region, in plan. [Units: vx]
     let mut thickness: BTreeMap<u32, f64> = BTreeMap::new();
     let n = regions.region_of_basin.len();
-    for (region, plan) in plans(grid, labels, regions) {
-        let (thickest, found) = plan.limbs(least, allowance);
+    let found: Vec<(u32, Plan, (f64, Vec<Limb>))> = plans(grid, labels, regions)
+        .into_par_iter()
+        .map(|(region, plan)| {
+            let limbs = plan.limbs(least, allowance);
+            (region, plan, limbs)
+        })
+        .collect();
+    for (region, plan, (thickest, found)) in found {
         thickness.insert(region, thickest);
         for limb in found {
             thickness.insert((n + limbs.len()) as u32, limb.half_width);
@@ -214,7 +221,7 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
     }
     let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
     layers
-        .into_iter()
+        .into_par_iter()
         .map(|(region, of)| {
             let most = of.iter().map(|l| l.n_voxels).max().unwrap_or(0);
             let row = of.iter().position(|l| l.n_voxels == most).unwrap_or(0);
