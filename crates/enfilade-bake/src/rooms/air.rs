@@ -30,7 +30,9 @@ pub(crate) fn prepare(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<VoxelAir, BakeError> {
-    let grid = config.grid(&structure.bounds(), structure.triangles.len())?;
+    config.check_opening()?;
+    let bounds = structure.built_up(config.min_opening);
+    let grid = config.grid(&bounds, structure.triangles.len())?;
     context.tell(resolution_of(&grid), BYTES_A_VOXEL * grid.n_voxels() as f64);
     context.begin(Stage::Voxelize)?;
     let solid = Solid::of(structure, &grid, config);

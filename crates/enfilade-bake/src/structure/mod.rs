@@ -5,6 +5,7 @@
 //! | which triangles bound rooms, which are stairs, along which axes | `of`, `stairs`, `frame` |
 //! | surfaces that close openings: door leaves and panes | `blockers` |
 //! | where storeys end | `slabs` |
+//! | which part of a site is built up, and which is open land | `site` |
 //! | how badly triangles fit together, and how to make them fit | `misfit`, `settle`, `weld`, `sheets` |
 //! | where surfaces end, which triangles are missing | `rims` |
 //! | which side of a surface is matter | `backs` |
@@ -24,6 +25,7 @@ mod pinch;
 mod rims;
 mod settle;
 mod sheets;
+mod site;
 mod slabs;
 mod stairs;
 mod weld;

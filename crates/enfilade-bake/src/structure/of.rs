@@ -8,6 +8,7 @@ use super::frame::Frame;
 use super::misfit::misfit;
 use super::rims::Rims;
 use super::settle::settle;
+use super::site::built_up;
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
 use crate::{BakeConfig, BakeError, Method, SmallestHole};
@@ -136,6 +137,11 @@ impl<'a> Structure<'a> {
     /// Returns the box around everything structural, in frame coordinates.
     pub(crate) fn bounds(&self) -> Aabb {
         bounds_of(&self.walls).union(bounds_of(&self.stairs))
+    }
+
+    /// Returns the box around all that can bound rooms, in frame coordinates: without open land.
+    pub(crate) fn built_up(&self, opening: f64) -> Aabb {
+        built_up(&self.walls, &self.bounds(), opening, self.allowance)
     }
 
     /// Returns the heights at which storeys end, ascending. [Units: wu]
