@@ -374,6 +374,7 @@ mod tests {
         let mut graph = LeafGraph {
             facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],
             volumes: vec![5.0, 1e-6, 5.0, 1e-6, 1e-6],
+            boxes: Vec::new(),
             at_border: vec![false; 5],
             faces: vec![1.0; 5],
             hole: 0.01,

@@ -62,6 +62,8 @@ pub(super) struct LeafGraph<'a> {
     pub(super) volumes: Vec<f64>,
     /// Area of the largest face of each leaf. Volume divided by it is the leaf's thickness, within a factor of three.
     pub(super) faces: Vec<f32>,
+    /// Box of each leaf.
+    pub(super) boxes: Vec<Aabb>,
     /// For each leaf, `true` if it touches the border of the box.
     pub(super) at_border: Vec<bool>,
     /// Diameter of the smallest hole: openings through which no such ball passes are narrow. [Units: wu]
@@ -85,12 +87,14 @@ impl<'a> LeafGraph<'a> {
             facets: Vec::new(),
             volumes: vec![0.0; tree.n_leaves as usize],
             faces: vec![0.0; tree.n_leaves as usize],
+            boxes: vec![Aabb::EMPTY; tree.n_leaves as usize],
         };
         visitor.visit(&mut sink);
         let LeafSink {
             facets,
             mut volumes,
             faces,
+            mut boxes,
             ..
         } = sink;
         let mut at_border = vec![false; tree.n_leaves as usize];
@@ -102,6 +106,7 @@ impl<'a> LeafGraph<'a> {
                 visitor.tolerance.cut,
                 &mut |leaf, piece| {
                     at_border[leaf as usize] = true;
+                    grow(&mut boxes[leaf as usize], piece);
                     volumes[leaf as usize] += cone_volume(piece, outward, origin);
                 },
             );
@@ -114,6 +119,7 @@ impl<'a> LeafGraph<'a> {
             facets,
             volumes,
             faces,
+            boxes,
             at_border,
             hole: clearance.hole,
             rounding: visitor.tolerance.width,
@@ -252,6 +258,10 @@ fn cone_volume(points: &[DVec3], normal: DVec3, origin: DVec3) -> f64 {
     poly::area(points) * normal.dot(points[0] - origin) / 3.0
 }
 
+fn grow(b: &mut Aabb, points: &[DVec3]) {
+    *b = points.iter().fold(*b, |b, &p| b.including(p));
+}
+
 /// Returns the six faces of a box with their outward normals.
 pub(super) fn box_faces(b: &Aabb) -> [(Poly, DVec3); 6] {
     std::array::from_fn(|i| {
@@ -301,6 +311,8 @@ struct LeafSink<'a> {
     volumes: Vec<f64>,
     /// For the same leaves.
     faces: Vec<f32>,
+    /// For the same leaves.
+    boxes: Vec<Aabb>,
 }
 
 impl FacetSink for LeafSink<'_> {
@@ -313,6 +325,7 @@ impl FacetSink for LeafSink<'_> {
         let face = poly::area(facet.points) as f32;
         for leaf in [front, back] {
             self.faces[leaf] = self.faces[leaf].max(face);
+            grow(&mut self.boxes[leaf], facet.points);
         }
         let first = self.facets.len();
         let rounding = self.visitor.tolerance.width;
@@ -356,6 +369,7 @@ impl FacetSink for LeafSink<'_> {
             facets: Vec::new(),
             volumes: vec![0.0; leaves.len()],
             faces: vec![0.0; leaves.len()],
+            boxes: vec![Aabb::EMPTY; leaves.len()],
         }
     }
 
@@ -372,6 +386,9 @@ impl FacetSink for LeafSink<'_> {
             }
             for (most, v) in self.faces[at..].iter_mut().zip(&part.faces) {
                 *most = most.max(*v);
+            }
+            for (all, b) in self.boxes[at..].iter_mut().zip(&part.boxes) {
+                *all = all.union(*b);
             }
         }
     }
