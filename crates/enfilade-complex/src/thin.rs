@@ -22,6 +22,8 @@ use std::ops::Range;
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{DVec3, Plane, Purse};
 
+use rayon::prelude::*;
+
 use super::facet::{Cover, CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
 use super::surface::Tolerance;
 use super::tree::{Node, Tree, leaf_index};
@@ -58,7 +60,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     visitor.visit(&mut sink);
     let mut edges = sink.found;
     // A stable sort keeps the order of the tree.
-    edges.sort_by_key(|e| e.leaf);
+    edges.par_sort_by_key(|e| e.leaf);
     let tree = visitor.tree;
     let mut cutter = LeafCutter {
         tree,

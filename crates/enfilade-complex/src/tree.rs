@@ -8,6 +8,8 @@
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 
+use rayon::prelude::*;
+
 use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
 /// A box with this many fragments or fewer is split by their own planes.
@@ -155,6 +157,8 @@ pub(super) fn build(
     purse: Purse<'_>,
 ) -> Tree {
     let fragments: Vec<Fragment> = (0..set.surfaces.len() as u32)
+        .into_par_iter()
+        .with_min_len(1024)
         .filter_map(|surface| {
             let s = &set.surfaces[surface as usize];
             if s.plane == NO_PLANE {
@@ -166,6 +170,7 @@ pub(super) fn build(
         .collect();
     let axis_of: Vec<Option<u8>> = set
         .planes
+        .planes()
         .iter()
         .map(|p| (0..3).find(|&a| p.normal[a] == 1.0).map(|a| a as u8))
         .collect();
@@ -177,7 +182,7 @@ pub(super) fn build(
     };
     let mut part = Part::default();
     let root = builder.split_box(fragments, bounds, &mut part);
-    let mut planes = set.planes.clone();
+    let mut planes = set.planes.planes().to_vec();
     // Adjacent boxes are often split at the same place; keep each plane once.
     let mut distinct: Vec<(u8, u64)> = part.sides.iter().map(|&(a, x)| (a, x.to_bits())).collect();
     distinct.sort_unstable();
@@ -240,7 +245,7 @@ impl Builder<'_> {
         let Some(split) = split else {
             return self.split_by_planes(fragments, out);
         };
-        let n_surface_planes = self.set.planes.len() as u32;
+        let n_surface_planes = self.set.planes.planes().len() as u32;
         let node = out.nodes.len();
         let plane = split
             .plane
@@ -293,7 +298,7 @@ impl Builder<'_> {
         on_plane: &mut Vec<u32>,
     ) -> (Vec<Fragment>, Vec<Fragment>) {
         let on_start = on_plane.len();
-        let (mut front, mut back) = (Vec::new(), Vec::new());
+        let [mut front, mut back] = [0; 2].map(|_| Vec::with_capacity(fragments.len() / 2 + 1));
         for f in fragments {
             let own = self.plane_of(&f);
             if let Some(id) = plane_id
@@ -301,7 +306,7 @@ impl Builder<'_> {
                     own,
                     &self.set.surfaces[f.surface as usize].points,
                     id,
-                    &self.set.planes,
+                    self.set.planes.planes(),
                     &self.tolerance,
                 )
             {
@@ -370,7 +375,11 @@ impl Builder<'_> {
                 .filter(|f| self.axis_of[self.plane_of(f) as usize] == Some(axis as u8))
                 .map(|f| {
                     let id = self.plane_of(f);
-                    (-self.set.planes[id as usize].d, id, poly::area(&f.points))
+                    (
+                        -self.set.planes.planes()[id as usize].d,
+                        id,
+                        poly::area(&f.points),
+                    )
                 })
                 .filter(|&(at, ..)| at > lo + self.tolerance.cut && at < hi - self.tolerance.cut)
                 .collect();
@@ -391,10 +400,13 @@ impl Builder<'_> {
                     ));
                 }
             }
-            let mut ends: Vec<f64> = mins.iter().chain(&maxs).copied().collect();
+            let mut ends: Vec<f64> = Vec::with_capacity(2 * mins.len() + 2);
             ends.push(lo);
+            ends.extend_from_slice(&mins);
+            ends.extend_from_slice(&maxs);
             ends.push(hi);
-            ends.sort_unstable_by(f64::total_cmp);
+            // A stable sort merges what is in order.
+            ends.sort_by(f64::total_cmp);
             let step = (ends.len() / 128).max(1);
             for pair in ends.windows(2).step_by(step) {
                 let at = 0.5 * (pair[0] + pair[1]);
@@ -466,7 +478,7 @@ impl Builder<'_> {
             on_start: out.on_plane.len() as u32,
             children: [0; 2],
         });
-        let cut = self.set.planes[plane as usize];
+        let cut = self.set.planes.planes()[plane as usize];
         let (front, back) = self.distribute(fragments, Some(plane), &cut, &mut out.on_plane);
         let children = [
             self.split_by_planes(front, out),
@@ -485,7 +497,7 @@ impl Builder<'_> {
         ids.truncate(16);
         let mut best: Option<(i64, u32)> = None;
         for &id in &ids {
-            let plane = &self.set.planes[id as usize];
+            let plane = &self.set.planes.planes()[id as usize];
             let (mut n_front, mut n_back, mut n_cut) = (0i64, 0i64, 0i64);
             for f in fragments {
                 if self.plane_of(f) == id {
