@@ -22,7 +22,7 @@ pub(super) struct Cover {
     pub(super) points: Poly,
     bounds: Aabb,
     /// Planes through its edges, square to its own; they face inwards.
-    edges: SmallVec<[Plane; 4]>,
+    edges: SmallVec<[Plane; 3]>,
 }
 
 impl Cover {
@@ -71,7 +71,8 @@ impl Cover {
                     Side::Front => true,
                     Side::Back | Side::On => false,
                     Side::Both => {
-                        let (front, back) = poly::parts(points, edge, eps);
+                        let (mut front, mut back) = (Poly::new(), Poly::new());
+                        poly::add_parts(points, edge, eps, &mut front, &mut back);
                         outside.push(back);
                         inside = Some(front);
                         true
@@ -114,6 +115,11 @@ impl<'a> Covers<'a> {
         self.near.iter().map(move |&i| &self.all[i as usize])
     }
 
+    /// Returns `true` if there are triangles among them.
+    pub(super) fn has_triangles(self) -> bool {
+        self.iter().any(|c| c.candidate.is_none())
+    }
+
     /// Returns the indices of the surfaces that come near a part of the facet.
     fn near(self, part: &[DVec3], reach: f64) -> SmallVec<[u32; 16]> {
         if self.near.is_empty() {
@@ -139,6 +145,10 @@ pub(super) trait FacetSink: Send + Sized {
     fn wants_pair(&self, _front: i32, _back: i32) -> bool {
         true
     }
+    /// Returns `true` if facets under these covers matter.
+    fn wants_under(&self, _covers: Covers<'_>) -> bool {
+        true
+    }
     /// Receives a facet.
     fn take(&mut self, facet: &RawFacet<'_>);
     /// Makes a sink for one subtree.
@@ -154,6 +164,22 @@ pub(super) struct Visitor<'a> {
     pub(super) tolerance: Tolerance,
     /// Bounds the work of a visit; once it is spent, facets are skipped.
     pub(super) purse: Purse<'a>,
+}
+
+/// One thread's means of a visit.
+struct Hand<'a> {
+    tab: Tab<'a>,
+    /// Those of the last node; its memory serves the next.
+    covers: Vec<Cover>,
+}
+
+impl<'a> From<Purse<'a>> for Hand<'a> {
+    fn from(purse: Purse<'a>) -> Self {
+        Self {
+            tab: purse.into(),
+            covers: Vec::new(),
+        }
+    }
 }
 
 /// A node's region: a box, cut by the oblique planes above the node, which face inwards.
@@ -196,8 +222,8 @@ impl Visitor<'_> {
     /// Passes every facet of the tree to `sink`. Time: the number of facets times the depth.
     pub(super) fn visit<S: FacetSink + Sync>(&self, sink: &mut S) {
         let mut region = CutBox::all(self.tree.bounds);
-        let mut tab = self.purse.into();
-        self.visit_node(self.tree.root, &mut region, true, &mut tab, sink);
+        let mut hand = self.purse.into();
+        self.visit_node(self.tree.root, &mut region, true, &mut hand, sink);
     }
 
     /// `may_fork` is `false` within small subtrees.
@@ -206,10 +232,10 @@ impl Visitor<'_> {
         child: i32,
         region: &mut CutBox,
         may_fork: bool,
-        tab: &mut Tab<'_>,
+        hand: &mut Hand<'_>,
         sink: &mut S,
     ) {
-        if child < 0 || !sink.wants_subtree(child) || !tab.spend(1) {
+        if child < 0 || !sink.wants_subtree(child) || !hand.tab.spend(1) {
             return;
         }
         let node = self.tree.nodes[child as usize];
@@ -218,8 +244,8 @@ impl Visitor<'_> {
         if forks {
             let visit = |side: usize, mut sink: S| {
                 region.clone().on_side(&plane, side, |part| {
-                    let mut tab = self.purse.into();
-                    self.visit_node(node.children[side], part, true, &mut tab, &mut sink);
+                    let mut hand = self.purse.into();
+                    self.visit_node(node.children[side], part, true, &mut hand, &mut sink);
                 });
                 sink
             };
@@ -229,7 +255,7 @@ impl Visitor<'_> {
         } else {
             for (side, child) in node.children.into_iter().enumerate() {
                 region.on_side(&plane, side, |part| {
-                    self.visit_node(child, part, false, tab, sink);
+                    self.visit_node(child, part, false, hand, sink);
                 });
             }
         }
@@ -240,24 +266,26 @@ impl Visitor<'_> {
             return;
         };
         let reach = Aabb::of_points(&points).expanded(self.tolerance.plane);
-        let covers: Vec<Cover> = self
-            .tree
-            .surfaces_on(child as usize)
-            .iter()
-            .filter_map(|&s| {
-                let surface = &self.surfaces[s as usize];
-                let points = projected(&surface.points, &plane);
-                let candidate = match surface.source {
-                    Source::Candidate(id) => Some(id),
-                    Source::Triangle(_) | Source::Seam => None,
-                };
-                let is_near = Aabb::of_points(&points).overlaps(&reach);
-                is_near.then(|| Cover::new(candidate, points, plane.normal))
-            })
-            .collect();
+        let Hand { tab, covers } = hand;
+        covers.clear();
+        covers.extend(
+            self.tree
+                .surfaces_on(child as usize)
+                .iter()
+                .filter_map(|&s| {
+                    let surface = &self.surfaces[s as usize];
+                    let points = projected(&surface.points, &plane);
+                    let candidate = match surface.source {
+                        Source::Candidate(id) => Some(id),
+                        Source::Triangle(_) | Source::Seam => None,
+                    };
+                    let is_near = Aabb::of_points(&points).overlaps(&reach);
+                    is_near.then(|| Cover::new(candidate, points, plane.normal))
+                }),
+        );
         let near: SmallVec<[u32; 16]> = (0..covers.len() as u32).collect();
         let covers = Covers {
-            all: &covers,
+            all: covers,
             near: &near,
         };
         self.push_down(node.plane, &points, covers, node.children, tab, sink);
@@ -280,6 +308,9 @@ impl Visitor<'_> {
         tab: &mut Tab<'_>,
         sink: &mut S,
     ) {
+        if !sink.wants_under(covers) {
+            return;
+        }
         loop {
             if !sink.wants_pair(children[0], children[1])
                 || !tab.spend(1 + covers.near.len() as u64)
@@ -305,14 +336,15 @@ impl Visitor<'_> {
                     usize::from(sum < 0.0)
                 }
                 Side::Both => {
-                    let (front, back) = poly::parts(points, cut, self.tolerance.cut);
+                    let (mut front, mut back) = (Poly::new(), Poly::new());
+                    poly::add_parts(points, cut, self.tolerance.cut, &mut front, &mut back);
                     for (child, part) in node.children.into_iter().zip([&front, &back]) {
+                        children[at] = child;
                         let near = covers.near(part, self.tolerance.plane);
                         let covers = Covers {
                             near: &near,
                             ..covers
                         };
-                        children[at] = child;
                         self.push_down(plane, part, covers, children, tab, sink);
                     }
                     return;

@@ -96,7 +96,8 @@ const WORK_A_SURFACE: u64 = 2;
 fn canonical_order(surfaces: &mut Vec<Surface>) {
     let key = |s: &Surface| {
         let by_area = Reverse(ordered_bits(poly::area(&s.points)));
-        (matches!(s.source, Source::Candidate(_)), by_area)
+        let is_candidate = matches!(s.source, Source::Candidate(_));
+        (is_candidate, by_area, s.points.iter().map(bits).min())
     };
     let mut order: Vec<_> = surfaces.par_iter().map(|s| (key(s), s)).collect();
     order.par_sort_unstable_by(|(p, a), (q, b)| {
@@ -108,10 +109,13 @@ fn canonical_order(surfaces: &mut Vec<Surface>) {
     *surfaces = order.into_par_iter().map(|(_, s)| s.clone()).collect();
 }
 
+fn bits(p: &DVec3) -> [u64; 3] {
+    p.to_array().map(ordered_bits)
+}
+
 /// Returns the vertices in an order that is the same for duplicates, which may start at different vertices or have the
 /// opposite orientation.
 fn sorted_points(s: &Surface) -> SmallVec<[[u64; 3]; 4]> {
-    let bits = |p: &DVec3| p.to_array().map(ordered_bits);
     let mut points: SmallVec<_> = s.points.iter().map(bits).collect();
     points.sort_unstable();
     points

@@ -24,8 +24,8 @@ use enfilade_geom::{DVec3, Plane, Purse};
 
 use rayon::prelude::*;
 
-use super::facet::{Cover, CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
-use super::surface::Tolerance;
+use super::facet::{Cover, Covers, CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
+use super::surface::{Source, Tolerance};
 use super::tree::{Node, Tree, leaf_index};
 
 /// Most cuts through one leaf; the longest come first.
@@ -100,10 +100,20 @@ struct Edges<'a> {
 }
 
 impl FacetSink for Edges<'_> {
+    fn enter(&mut self, node: i32) -> bool {
+        let on_plane = self.visitor.tree.surfaces_on(node as usize);
+        let is_candidate = |&s: &u32| {
+            let source = self.visitor.surfaces[s as usize].source;
+            matches!(source, Source::Candidate(_))
+        };
+        !on_plane.iter().all(is_candidate)
+    }
+
+    fn wants_under(&self, covers: Covers<'_>) -> bool {
+        covers.has_triangles()
+    }
+
     fn take(&mut self, facet: &RawFacet<'_>) {
-        if facet.covers.iter().all(|c| c.candidate.is_some()) {
-            return;
-        }
         let tolerance = &self.visitor.tolerance;
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let pieces = OpenPieces::of(facet, normal, tolerance).pieces;

@@ -364,10 +364,22 @@ impl Builder<'_> {
             maxs.sort_unstable_by(f64::total_cmp);
             let (u, v) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
             let share = |extent: f64| 2.0 * (u * v + extent * (u + v));
-            let cost = |at: f64, slack: f64| {
-                let n_back = mins.partition_point(|&x| x < at - slack) as f64;
-                let n_front = total - maxs.partition_point(|&x| x <= at + slack) as f64;
-                (share(at - lo) * n_back + share(hi - at) * n_front) / share(hi - lo)
+            // Returns a function for ascending places.
+            let costs = |slack: f64| {
+                let (mut n_back, mut n_behind) = (0, 0);
+                let (mins, maxs) = (&mins, &maxs);
+                move |at: f64| {
+                    n_back += mins[n_back..]
+                        .iter()
+                        .take_while(|&&x| x < at - slack)
+                        .count();
+                    n_behind += maxs[n_behind..]
+                        .iter()
+                        .take_while(|&&x| x <= at + slack)
+                        .count();
+                    let (n_back, n_front) = (n_back as f64, total - n_behind as f64);
+                    (share(at - lo) * n_back + share(hi - at) * n_front) / share(hi - lo)
+                }
             };
             // The planes of axis-aligned surfaces; those that cover much of the section are preferred.
             let mut flat: Vec<(f64, u32, f64)> = sample
@@ -384,11 +396,12 @@ impl Builder<'_> {
                 .filter(|&(at, ..)| at > lo + self.tolerance.cut && at < hi - self.tolerance.cut)
                 .collect();
             flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let mut cost = costs(self.tolerance.plane);
             for group in flat.chunk_by(|a, b| a.1 == b.1) {
                 let (at, id, _) = group[0];
                 let covered: f64 = group.iter().map(|g| g.2).sum::<f64>() * stride as f64;
                 let coverage = (covered / (u * v)).min(1.0);
-                let c = cost(at, self.tolerance.plane) * (1.0 - 0.3 * coverage);
+                let c = cost(at) * (1.0 - 0.3 * coverage);
                 if best.as_ref().is_none_or(|b| c < b.0) {
                     best = Some((
                         c,
@@ -408,6 +421,7 @@ impl Builder<'_> {
             // A stable sort merges what is in order.
             ends.sort_by(f64::total_cmp);
             let step = (ends.len() / 128).max(1);
+            let mut cost = costs(0.0);
             for pair in ends.windows(2).step_by(step) {
                 let at = 0.5 * (pair[0] + pair[1]);
                 if pair[1] - pair[0] < 2.0 * gap
@@ -416,7 +430,7 @@ impl Builder<'_> {
                 {
                     continue;
                 }
-                let c = cost(at, 0.0);
+                let c = cost(at);
                 if best.as_ref().is_none_or(|b| c < b.0) {
                     best = Some((
                         c,

@@ -70,18 +70,16 @@ pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
         Side::Front => Sides::Front,
         Side::Back => Sides::Back,
         Side::Both => {
-            let (front, back) = parts(points, plane, eps);
+            let [mut front, mut back] = [Poly::new(), Poly::new()];
+            add_parts(points, plane, eps, &mut front, &mut back);
             Sides::Both(front, back)
         }
     }
 }
 
-/// Returns the positive and the negative part of a polygon on both sides of a plane, as [`split`] does.
-#[must_use]
-pub fn parts(points: &[DVec3], plane: &Plane, eps: f64) -> (Poly, Poly) {
-    let (mut front, mut back) = (Poly::new(), Poly::new());
+/// Appends the vertices of the positive and the negative part of a polygon on both sides of a plane, as [`split`] does.
+pub fn add_parts(points: &[DVec3], plane: &Plane, eps: f64, front: &mut Poly, back: &mut Poly) {
     divide(points, plane, eps, |p| front.push(p), |p| back.push(p));
-    (front, back)
 }
 
 /// Passes on the vertices of both parts, in order.
