@@ -409,6 +409,19 @@ mod tests {
     use enfilade_geom::Purse;
 
     #[test]
+    fn pairs_of_a_round_share_no_cell_and_others_keep_their_order() {
+        let pairs = [[0, 1], [0, 2], [1, 2], [3, 4], [2, 4]];
+        let found = rounds(pairs.into_iter(), 5);
+        let expected = [
+            vec![[0, 1], [3, 4]],
+            vec![[0, 2]],
+            vec![[1, 2]],
+            vec![[2, 4]],
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
     fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
         // Rooms 0 and 2; cell 1 consists of three slivers: one beside both rooms, one behind that, and a closed one.
         let facet = |a, b, area| OpenFacet {

@@ -79,7 +79,7 @@ pub(super) struct LeafGraph<'a> {
     pub(super) known: Known,
 }
 
-/// What follows from the openings alone, found when it is needed first.
+/// Findings from the openings alone, made when they are needed first.
 #[derive(Default)]
 pub(super) struct Known {
     components: OnceLock<Vec<u32>>,

@@ -246,15 +246,14 @@ fn may_merge(graph: &LeafGraph<'_>, a: &Group, b: &Group) -> bool {
     graph.purse.spend(2 + n_neighbors as u64)
 }
 
-/// Merges groups without a label, and small duplicates of a label, into their neighbors.
-fn merge_groups(
+/// Makes a group of each set that is open, by least leaf.
+fn groups_of(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
     label_of_set: &[Label],
-    settings: &LabelSettings,
 ) -> BTreeMap<u32, Group> {
-    let is_open = open_sets(graph, sets, label_of_set);
     const NOT_OPEN: usize = usize::MAX;
+    let is_open = open_sets(graph, sets, label_of_set);
     let mut place = vec![NOT_OPEN; is_open.len()];
     let mut list: Vec<(u32, Group)> = Vec::new();
     for leaf in 0..graph.volumes.len() as u32 {
@@ -292,7 +291,17 @@ fn merge_groups(
             }
         }
     }
-    let mut groups: BTreeMap<u32, Group> = list.into_iter().collect();
+    list.into_iter().collect()
+}
+
+/// Merges groups without a label, and small duplicates of a label, into their neighbors.
+fn merge_groups(
+    graph: &LeafGraph<'_>,
+    sets: &mut Sets,
+    label_of_set: &[Label],
+    settings: &LabelSettings,
+) -> BTreeMap<u32, Group> {
+    let mut groups = groups_of(graph, sets, label_of_set);
     // The largest group of each label keeps it, whatever its size.
     let mut main: BTreeMap<Label, (f64, Reverse<u32>)> = BTreeMap::new();
     for (&id, group) in &groups {

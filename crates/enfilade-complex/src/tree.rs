@@ -227,6 +227,39 @@ struct BoxSplit {
     plane: Option<u32>,
 }
 
+/// Counts the intervals on both sides of a place that moves up.
+struct Sweep<'a> {
+    /// Those not yet passed, ascending.
+    mins: &'a [f64],
+    maxs: &'a [f64],
+    /// Number of intervals that begin before the place.
+    n_back: usize,
+    slack: f64,
+}
+
+impl<'a> Sweep<'a> {
+    fn over(mins: &'a [f64], maxs: &'a [f64], slack: f64) -> Self {
+        Self {
+            mins,
+            maxs,
+            n_back: 0,
+            slack,
+        }
+    }
+
+    /// Returns the number of intervals that reach behind a place by more than the slack, and of those that reach in front
+    /// of it. Places must ascend.
+    fn sides(&mut self, at: f64) -> [usize; 2] {
+        let is_back = |x: &&f64| **x < at - self.slack;
+        let n = self.mins.iter().take_while(is_back).count();
+        self.mins = &self.mins[n..];
+        self.n_back += n;
+        let is_behind = |x: &&f64| **x <= at + self.slack;
+        self.maxs = &self.maxs[self.maxs.iter().take_while(is_behind).count()..];
+        [self.n_back, self.maxs.len()]
+    }
+}
+
 impl Builder<'_> {
     fn plane_of(&self, f: &Fragment) -> u32 {
         self.set.surfaces[f.surface as usize].plane
@@ -364,22 +397,9 @@ impl Builder<'_> {
             maxs.sort_unstable_by(f64::total_cmp);
             let (u, v) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
             let share = |extent: f64| 2.0 * (u * v + extent * (u + v));
-            // Returns a function for ascending places.
-            let costs = |slack: f64| {
-                let (mut n_back, mut n_behind) = (0, 0);
-                let (mins, maxs) = (&mins, &maxs);
-                move |at: f64| {
-                    n_back += mins[n_back..]
-                        .iter()
-                        .take_while(|&&x| x < at - slack)
-                        .count();
-                    n_behind += maxs[n_behind..]
-                        .iter()
-                        .take_while(|&&x| x <= at + slack)
-                        .count();
-                    let (n_back, n_front) = (n_back as f64, total - n_behind as f64);
-                    (share(at - lo) * n_back + share(hi - at) * n_front) / share(hi - lo)
-                }
+            let cost = |[n_back, n_front]: [usize; 2], at: f64| {
+                let weighed = share(at - lo) * n_back as f64 + share(hi - at) * n_front as f64;
+                weighed / share(hi - lo)
             };
             // The planes of axis-aligned surfaces; those that cover much of the section are preferred.
             let mut flat: Vec<(f64, u32, f64)> = sample
@@ -396,12 +416,12 @@ impl Builder<'_> {
                 .filter(|&(at, ..)| at > lo + self.tolerance.cut && at < hi - self.tolerance.cut)
                 .collect();
             flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let mut cost = costs(self.tolerance.plane);
+            let mut sweep = Sweep::over(&mins, &maxs, self.tolerance.plane);
             for group in flat.chunk_by(|a, b| a.1 == b.1) {
                 let (at, id, _) = group[0];
                 let covered: f64 = group.iter().map(|g| g.2).sum::<f64>() * stride as f64;
                 let coverage = (covered / (u * v)).min(1.0);
-                let c = cost(at) * (1.0 - 0.3 * coverage);
+                let c = cost(sweep.sides(at), at) * (1.0 - 0.3 * coverage);
                 if best.as_ref().is_none_or(|b| c < b.0) {
                     best = Some((
                         c,
@@ -421,7 +441,7 @@ impl Builder<'_> {
             // A stable sort merges what is in order.
             ends.sort_by(f64::total_cmp);
             let step = (ends.len() / 128).max(1);
-            let mut cost = costs(0.0);
+            let mut sweep = Sweep::over(&mins, &maxs, 0.0);
             for pair in ends.windows(2).step_by(step) {
                 let at = 0.5 * (pair[0] + pair[1]);
                 if pair[1] - pair[0] < 2.0 * gap
@@ -430,7 +450,7 @@ impl Builder<'_> {
                 {
                     continue;
                 }
-                let c = cost(at);
+                let c = cost(sweep.sides(at), at);
                 if best.as_ref().is_none_or(|b| c < b.0) {
                     best = Some((
                         c,
