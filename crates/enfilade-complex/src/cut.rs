@@ -13,11 +13,14 @@
 //! leaves take part.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use enfilade_geom::Sets;
+use rayon::prelude::*;
 
+use super::Label;
 use super::flow::Flow;
-use super::graph::{LeafGraph, NO_CANDIDATE};
+use super::graph::{LeafGraph, NO_CANDIDATE, OpenFacet};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
 
 /// Cost of a piece of a border besides its area. [Units: wu²]
@@ -34,10 +37,6 @@ const INFINITE: u64 = 1 << 60;
 
 /// Moves the borders between cells that leak into each other.
 pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: &Tally) {
-    let votes = |leaf: u32, cell: u32| {
-        let label = cells.label_of_cell[cell as usize];
-        tally.get(&(leaf, label)).copied().unwrap_or(0.0)
-    };
     if !graph.spend_pass() {
         return;
     }
@@ -55,25 +54,67 @@ pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: 
         return;
     }
     let adjacency = Adjacency::of(graph, &cells.cell_of_leaf, &leaks);
-    let mut node_of = vec![NO_NODE; graph.volumes.len()];
-    let mut moves: Vec<(u32, u32)> = Vec::new();
-    for (pair, (_, facets)) in &leaks {
+    let n_leaves = graph.volumes.len();
+    let node_of: Vec<AtomicU32> = (0..n_leaves).map(|_| AtomicU32::new(NO_NODE)).collect();
+    let votes = LeafVotes::of(tally, n_leaves);
+    for round in rounds(leaks.keys().copied(), cells.label_of_cell.len()) {
         // Earlier moves may have changed the leaf's cell.
-        for (leaf, to) in cut(
-            graph,
-            &cells.cell_of_leaf,
-            &adjacency,
-            &mut node_of,
-            (*pair, facets),
-            &votes,
-        ) {
-            moves.push((leaf, to));
-        }
-        for (leaf, to) in moves.drain(..) {
+        let moves: Vec<(u32, u32)> = round
+            .into_par_iter()
+            .flat_map_iter(|pair| {
+                let labels = pair.map(|c| cells.label_of_cell[c as usize]);
+                let votes = |leaf| labels.map(|label| votes.weight(leaf, label));
+                let leaves = &cells.cell_of_leaf;
+                let border = (pair, &leaks[&pair].1[..]);
+                cut(graph, leaves, &adjacency, &node_of, border, &votes)
+            })
+            .collect();
+        for (leaf, to) in moves {
             cells.cell_of_leaf[leaf as usize] = to;
         }
     }
     cells.drop_empty(&graph.volumes);
+}
+
+/// Divides pairs of cells into rounds: no cell is twice in a round, and pairs with a common cell keep their order. So
+/// the pairs of a round, in any order, come out as if all had their turn one by one.
+fn rounds(pairs: impl Iterator<Item = [u32; 2]>, n_cells: usize) -> Vec<Vec<[u32; 2]>> {
+    let mut rounds: Vec<Vec<[u32; 2]>> = Vec::new();
+    let mut next = vec![0; n_cells];
+    for pair in pairs {
+        let [a, b] = pair.map(|c| c as usize);
+        let round = next[a].max(next[b]);
+        [next[a], next[b]] = [round + 1; 2];
+        rounds.resize_with(rounds.len().max(round + 1), Vec::new);
+        rounds[round].push(pair);
+    }
+    rounds
+}
+
+/// The votes of each leaf.
+struct LeafVotes {
+    start: Vec<u32>,
+    votes: Vec<(Label, f64)>,
+}
+
+impl LeafVotes {
+    fn of(tally: &Tally, n_leaves: usize) -> Self {
+        let mut start = vec![0_u32; n_leaves + 1];
+        for (leaf, _) in tally.keys() {
+            start[*leaf as usize + 1] += 1;
+        }
+        for i in 1..start.len() {
+            start[i] += start[i - 1];
+        }
+        let votes = tally.iter().map(|(&(_, label), &w)| (label, w)).collect();
+        Self { start, votes }
+    }
+
+    fn weight(&self, leaf: u32, label: Label) -> f64 {
+        let [from, to] = [0, 1].map(|k| self.start[leaf as usize + k] as usize);
+        let mut votes = self.votes[from..to].iter();
+        votes.find(|v| v.0 == label).map_or(0.0, |v| v.1)
+    }
 }
 
 /// Gives chips of a cell, which are disconnected from the rest of it and smaller than `min_volume`, to the cell that
@@ -204,10 +245,33 @@ pub(super) fn dissolve_slivers(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     cells.drop_empty(&graph.volumes);
 }
 
-/// Open facets of each leaf, for leaves of cells that leak.
+/// An opening from one leaf to another.
+#[derive(Clone, Copy, Default)]
+struct Way {
+    to: u32,
+    /// Cost of a border there, see [`UNIT`].
+    cost: u64,
+}
+
+impl Way {
+    /// Returns the ways through an opening, each with the leaf where it begins.
+    fn both(f: &OpenFacet) -> [(u32, Self); 2] {
+        // A gap makes no portal, so a border of many gaps is better than one that makes a portal.
+        let shows = f.candidate == NO_CANDIDATE && !f.is_gap;
+        let each = if shows { PER_FACET } else { 0.0 };
+        let (cost, [a, b]) = (units(f.cost() + each), f.leaves);
+        [(a, Self { to: b, cost }), (b, Self { to: a, cost })]
+    }
+}
+
+fn units(cost: f64) -> u64 {
+    (cost / UNIT).round() as u64
+}
+
+/// The ways from each leaf, for leaves of cells that leak.
 struct Adjacency {
     start: Vec<u32>,
-    facets: Vec<u32>,
+    ways: Vec<Way>,
 }
 
 impl Adjacency {
@@ -235,19 +299,19 @@ impl Adjacency {
             start[i] += start[i - 1];
         }
         let mut at = start.clone();
-        let mut facets = vec![0_u32; start.last().map_or(0, |&n| n as usize)];
-        for (i, f) in graph.facets.iter().enumerate() {
-            for l in f.leaves.into_iter().filter(|&l| is_in(l)) {
-                facets[at[l as usize] as usize] = i as u32;
+        let mut ways = vec![Way::default(); start.last().map_or(0, |&n| n as usize)];
+        for f in &graph.facets {
+            for (l, way) in Way::both(f).into_iter().filter(|&(l, _)| is_in(l)) {
+                ways[at[l as usize] as usize] = way;
                 at[l as usize] += 1;
             }
         }
-        Self { start, facets }
+        Self { start, ways }
     }
 
-    fn of_leaf(&self, leaf: u32) -> &[u32] {
+    fn of_leaf(&self, leaf: u32) -> &[Way] {
         let [from, to] = [0, 1].map(|k| self.start[leaf as usize + k] as usize);
-        &self.facets[from..to]
+        &self.ways[from..to]
     }
 }
 
@@ -255,23 +319,24 @@ impl Adjacency {
 const NO_NODE: u32 = u32::MAX;
 
 /// Returns the leaves that change sides, each with its new cell. `node_of` is [`NO_NODE`] for every leaf, before and
-/// after.
+/// after; only entries of the two cells change. `votes` returns the weights of a leaf's votes for them.
 fn cut(
     graph: &LeafGraph<'_>,
     cell_of_leaf: &[u32],
     adjacency: &Adjacency,
-    node_of: &mut [u32],
+    node_of: &[AtomicU32],
     (pair, border): ([u32; 2], &[u32]),
-    votes: &impl Fn(u32, u32) -> f64,
+    votes: &impl Fn(u32) -> [f64; 2],
 ) -> Vec<(u32, u32)> {
+    let node = |leaf: u32| node_of[leaf as usize].load(Relaxed);
+    let set_node = |leaf: u32, node: u32| node_of[leaf as usize].store(node, Relaxed);
     let cell = |leaf: u32| cell_of_leaf[leaf as usize];
     let is_ours = |leaf: u32| pair.contains(&cell(leaf));
     // The leaves around the border, nearest first.
     let mut leaves: Vec<u32> = Vec::new();
-    let mut take = |leaf: u32, leaves: &mut Vec<u32>| {
-        let node = &mut node_of[leaf as usize];
-        if is_ours(leaf) && leaves.len() < MAX_LEAVES && *node == NO_NODE {
-            *node = leaves.len() as u32;
+    let take = |leaf: u32, leaves: &mut Vec<u32>| {
+        if is_ours(leaf) && leaves.len() < MAX_LEAVES && node(leaf) == NO_NODE {
+            set_node(leaf, leaves.len() as u32);
             leaves.push(leaf);
         }
     };
@@ -282,25 +347,20 @@ fn cut(
     }
     let mut at = 0;
     while at < leaves.len() {
-        for &f in adjacency.of_leaf(leaves[at]) {
-            for l in graph.facets[f as usize].leaves {
-                take(l, &mut leaves);
-            }
+        for way in adjacency.of_leaf(leaves[at]) {
+            take(way.to, &mut leaves);
         }
         at += 1;
     }
     if !graph.purse.spend(5 * leaves.len() as u64) {
-        for &leaf in &leaves {
-            node_of[leaf as usize] = NO_NODE;
-        }
+        leaves.iter().for_each(|&leaf| set_node(leaf, NO_NODE));
         return Vec::new();
     }
-    let units = |cost: f64| (cost / UNIT).round() as u64;
     let n = leaves.len();
     let mut flow = Flow::new(n);
     let mut before = 0;
     for (i, &leaf) in leaves.iter().enumerate() {
-        let [mut to_a, mut to_b] = pair.map(|c| units(VOTE * votes(leaf, c)));
+        let [mut to_a, mut to_b] = votes(leaf).map(|weight| units(VOTE * weight));
         let mut add = |c: u32, cost: u64| {
             if c == pair[0] {
                 to_a = to_a.saturating_add(cost).min(INFINITE);
@@ -308,20 +368,12 @@ fn cut(
                 to_b = to_b.saturating_add(cost).min(INFINITE);
             }
         };
-        for &f in adjacency.of_leaf(leaf) {
-            let f = &graph.facets[f as usize];
-            let other = if f.leaves[0] == leaf {
-                f.leaves[1]
-            } else {
-                f.leaves[0]
-            };
-            // A gap makes no portal, so a border of many gaps is better than one that makes a portal.
-            let shows = f.candidate == NO_CANDIDATE && !f.is_gap;
-            let each = if shows { PER_FACET } else { 0.0 };
-            let cost = units(f.cost() + each);
-            match node_of[other as usize] {
+        for &Way { to: other, cost } in adjacency.of_leaf(leaf) {
+            let is_other_ours = is_ours(other);
+            // The nodes of third cells may be those of another cut.
+            match if is_other_ours { node(other) } else { NO_NODE } {
                 // A leaf outside the cut keeps its side.
-                NO_NODE if is_ours(other) => add(cell(other), cost),
+                NO_NODE if is_other_ours => add(cell(other), cost),
                 // A border to a third cell stays a border either way.
                 NO_NODE => {}
                 j if (j as usize) > i => {
@@ -336,9 +388,7 @@ fn cut(
         before += if cell(leaf) == pair[0] { to_b } else { to_a };
         flow.tie(i, to_a, to_b);
     }
-    for &leaf in &leaves {
-        node_of[leaf as usize] = NO_NODE;
-    }
+    leaves.iter().for_each(|&leaf| set_node(leaf, NO_NODE));
     let (after, is_a) = flow.cut(graph.purse);
     if after >= before {
         return Vec::new();
@@ -354,10 +404,22 @@ fn cut(
 
 #[cfg(test)]
 mod tests {
-    use super::super::graph::OpenFacet;
     use super::*;
-    use crate::Label;
+    use crate::graph::Known;
     use enfilade_geom::Purse;
+
+    #[test]
+    fn pairs_of_a_round_share_no_cell_and_others_keep_their_order() {
+        let pairs = [[0, 1], [0, 2], [1, 2], [3, 4], [2, 4]];
+        let found = rounds(pairs.into_iter(), 5);
+        let expected = [
+            vec![[0, 1], [3, 4]],
+            vec![[0, 2]],
+            vec![[1, 2]],
+            vec![[2, 4]],
+        ];
+        assert_eq!(found, expected);
+    }
 
     #[test]
     fn slivers_go_where_they_open_to_most_and_closed_ones_are_solid() {
@@ -374,11 +436,13 @@ mod tests {
         let mut graph = LeafGraph {
             facets: vec![facet(0, 1, 0.1), facet(1, 2, 0.2), facet(4, 1, 0.05)],
             volumes: vec![5.0, 1e-6, 5.0, 1e-6, 1e-6],
+            boxes: Vec::new(),
             at_border: vec![false; 5],
             faces: vec![1.0; 5],
             hole: 0.01,
             rounding: 1e-5,
             purse: Purse::endless(),
+            known: Known::default(),
         };
         let cells = || LeafCells {
             cell_of_leaf: vec![0, 1, 2, 1, 1],

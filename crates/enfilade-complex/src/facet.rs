@@ -4,8 +4,8 @@
 //! clip the plane by its parents, split it by its children). No polygon outlives its visit: the first visit keeps a
 //! few numbers per facet, the second makes the polygons again where two cells meet.
 
-use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, DVec3, Plane, Purse};
+use enfilade_geom::poly::{self, Poly, Side};
+use enfilade_geom::{Aabb, DVec3, Plane, Purse, Tab};
 use smallvec::SmallVec;
 
 use super::surface::{MIN_AREA, Source, Surface, Tolerance, projected};
@@ -21,6 +21,73 @@ pub(super) struct Cover {
     /// Vertices, counter-clockwise about the plane's normal.
     pub(super) points: Poly,
     bounds: Aabb,
+    /// Planes through its edges, square to its own; they face inwards.
+    edges: SmallVec<[Plane; 3]>,
+}
+
+impl Cover {
+    /// Makes a cover of a polygon, counter-clockwise about `normal`.
+    fn new(candidate: Option<u32>, points: Poly, normal: DVec3) -> Self {
+        let edge = |(i, &a): (usize, &DVec3)| {
+            let b = points[if i + 1 == points.len() { 0 } else { i + 1 }];
+            let inward = normal.cross(b - a).try_normalize()?;
+            Some(Plane::through(a, inward))
+        };
+        Self {
+            candidate,
+            bounds: Aabb::of_points(&points),
+            edges: points.iter().enumerate().filter_map(edge).collect(),
+            points,
+        }
+    }
+
+    /// Returns `true` if a point is nearer than `reach` to the box around it.
+    pub(super) fn is_near(&self, p: DVec3, reach: f64) -> bool {
+        self.bounds.expanded(reach).contains(p)
+    }
+
+    /// Returns `true` if a polygon in its plane, wider than `eps`, is inside, with `eps` to spare.
+    fn holds(&self, points: &[DVec3], eps: f64) -> bool {
+        let is_inside = |edge: &Plane| points.iter().all(|&p| edge.signed_distance(p) >= -eps);
+        self.edges.iter().all(is_inside)
+    }
+
+    /// Cuts a polygon in its plane: appends the parts outside to `outside` and returns the part inside. If none is, or
+    /// one narrower than `min_width`, appends the whole polygon.
+    fn cut_from(
+        &self,
+        whole: Poly,
+        eps: f64,
+        min_width: f64,
+        outside: &mut Vec<Poly>,
+    ) -> Option<Poly> {
+        let before = outside.len();
+        let is_near = Aabb::of_points(&whole).expanded(eps).overlaps(&self.bounds);
+        let mut inside: Option<Poly> = None;
+        let is_hit = is_near
+            && self.edges.iter().all(|edge| {
+                let points = inside.as_ref().unwrap_or(&whole);
+                match poly::side(points, edge, eps) {
+                    Side::Front => true,
+                    Side::Back | Side::On => false,
+                    Side::Both => {
+                        let (mut front, mut back) = (Poly::new(), Poly::new());
+                        poly::add_parts(points, edge, eps, &mut front, &mut back);
+                        outside.push(back);
+                        inside = Some(front);
+                        true
+                    }
+                }
+            });
+        let is_wide = |inside: &Poly| min_width <= 0.0 || poly::width(inside) >= min_width;
+        if is_hit && is_wide(inside.as_ref().unwrap_or(&whole)) {
+            return inside.or(Some(whole));
+        }
+        // No significant overlap: keep the polygon in one piece instead of the shreds cut so far.
+        outside.truncate(before);
+        outside.push(whole);
+        None
+    }
 }
 
 /// The polygon between two leaves, with nothing subtracted yet.
@@ -48,6 +115,11 @@ impl<'a> Covers<'a> {
         self.near.iter().map(move |&i| &self.all[i as usize])
     }
 
+    /// Returns `true` if there are triangles among them.
+    pub(super) fn has_triangles(self) -> bool {
+        self.iter().any(|c| c.candidate.is_none())
+    }
+
     /// Returns the indices of the surfaces that come near a part of the facet.
     fn near(self, part: &[DVec3], reach: f64) -> SmallVec<[u32; 16]> {
         if self.near.is_empty() {
@@ -65,8 +137,16 @@ pub(super) trait FacetSink: Send + Sized {
     fn wants_subtree(&self, _child: i32) -> bool {
         true
     }
-    /// Returns `true` if facets between two subtrees matter.
+    /// Returns `true` if facets in the plane of a node matter; called before those facets are.
+    fn enter(&mut self, _node: i32) -> bool {
+        true
+    }
+    /// Returns `true` if facets between two subtrees, in the plane of the node entered last, matter.
     fn wants_pair(&self, _front: i32, _back: i32) -> bool {
+        true
+    }
+    /// Returns `true` if facets under these covers matter.
+    fn wants_under(&self, _covers: Covers<'_>) -> bool {
         true
     }
     /// Receives a facet.
@@ -86,94 +166,129 @@ pub(super) struct Visitor<'a> {
     pub(super) purse: Purse<'a>,
 }
 
+/// One thread's means of a visit.
+struct Hand<'a> {
+    tab: Tab<'a>,
+    /// Those of the last node; its memory serves the next.
+    covers: Vec<Cover>,
+}
+
+impl<'a> From<Purse<'a>> for Hand<'a> {
+    fn from(purse: Purse<'a>) -> Self {
+        Self {
+            tab: purse.into(),
+            covers: Vec::new(),
+        }
+    }
+}
+
 /// A node's region: a box, cut by the oblique planes above the node, which face inwards.
 #[derive(Clone)]
 pub(super) struct CutBox {
     pub(super) bounds: Aabb,
-    pub(super) cuts: SmallVec<[Plane; 16]>,
+    pub(super) cuts: Vec<Plane>,
 }
 
 impl CutBox {
-    /// Returns its parts on the positive and on the negative side of a plane.
-    pub(super) fn split(&self, plane: &Plane) -> [Self; 2] {
-        let (mut front, mut back) = (self.clone(), self.clone());
-        match (0..3).find(|&a| plane.normal[a] == 1.0) {
-            Some(axis) => {
-                front.bounds.min[axis] = front.bounds.min[axis].max(-plane.d);
-                back.bounds.max[axis] = back.bounds.max[axis].min(-plane.d);
-            }
-            None => {
-                front.cuts.push(*plane);
-                back.cuts.push(plane.flipped());
-            }
+    pub(super) fn all(bounds: Aabb) -> Self {
+        Self {
+            bounds,
+            cuts: Vec::new(),
         }
-        [front, back]
+    }
+
+    /// Calls `then` with the part on the positive side of a plane, 0, or on the negative side, 1.
+    pub(super) fn on_side<T>(
+        &mut self,
+        plane: &Plane,
+        side: usize,
+        then: impl FnOnce(&mut Self) -> T,
+    ) -> T {
+        let before = (self.bounds, self.cuts.len());
+        match ((0..3).find(|&a| plane.normal[a] == 1.0), side) {
+            (Some(axis), 0) => self.bounds.min[axis] = self.bounds.min[axis].max(-plane.d),
+            (Some(axis), _) => self.bounds.max[axis] = self.bounds.max[axis].min(-plane.d),
+            (None, 0) => self.cuts.push(*plane),
+            (None, _) => self.cuts.push(plane.flipped()),
+        }
+        let out = then(self);
+        self.bounds = before.0;
+        self.cuts.truncate(before.1);
+        out
     }
 }
 
 impl Visitor<'_> {
     /// Passes every facet of the tree to `sink`. Time: the number of facets times the depth.
     pub(super) fn visit<S: FacetSink + Sync>(&self, sink: &mut S) {
-        let region = CutBox {
-            bounds: self.tree.bounds,
-            cuts: SmallVec::new(),
-        };
-        self.visit_node(self.tree.root, &region, sink);
+        let mut region = CutBox::all(self.tree.bounds);
+        let mut hand = self.purse.into();
+        self.visit_node(self.tree.root, &mut region, true, &mut hand, sink);
     }
 
-    fn visit_node<S: FacetSink + Sync>(&self, child: i32, region: &CutBox, sink: &mut S) {
-        if child < 0 || !sink.wants_subtree(child) || !self.purse.spend(1) {
+    /// `may_fork` is `false` within small subtrees.
+    fn visit_node<S: FacetSink + Sync>(
+        &self,
+        child: i32,
+        region: &mut CutBox,
+        may_fork: bool,
+        hand: &mut Hand<'_>,
+        sink: &mut S,
+    ) {
+        if child < 0 || !sink.wants_subtree(child) || !hand.tab.spend(1) {
             return;
         }
         let node = self.tree.nodes[child as usize];
         let plane = self.tree.planes[node.plane as usize];
-        let [front, back] = region.split(&plane);
-        let [f, b] = node.children;
-        let leaves = self.tree.leaf_range(child);
-        if leaves.len() as u32 > PARALLEL_LEAVES {
-            let mut f_sink = sink.fork(self.tree.leaf_range(f));
-            let mut b_sink = sink.fork(self.tree.leaf_range(b));
-            rayon::join(
-                || self.visit_node(f, &front, &mut f_sink),
-                || self.visit_node(b, &back, &mut b_sink),
-            );
+        let forks = may_fork && self.tree.leaf_range(child).len() as u32 > PARALLEL_LEAVES;
+        if forks {
+            let visit = |side: usize, mut sink: S| {
+                region.clone().on_side(&plane, side, |part| {
+                    let mut hand = self.purse.into();
+                    self.visit_node(node.children[side], part, true, &mut hand, &mut sink);
+                });
+                sink
+            };
+            let [f_sink, b_sink] = node.children.map(|c| sink.fork(self.tree.leaf_range(c)));
+            let (f_sink, b_sink) = rayon::join(|| visit(0, f_sink), || visit(1, b_sink));
             sink.join(f_sink, b_sink);
         } else {
-            self.visit_node(f, &front, sink);
-            self.visit_node(b, &back, sink);
+            for (side, child) in node.children.into_iter().enumerate() {
+                region.on_side(&plane, side, |part| {
+                    self.visit_node(child, part, false, hand, sink);
+                });
+            }
         }
-        if !sink.wants_pair(f, b) {
+        if !sink.enter(child) || !sink.wants_pair(node.children[0], node.children[1]) {
             return;
         }
         let Some(points) = self.section(&plane, region) else {
             return;
         };
         let reach = Aabb::of_points(&points).expanded(self.tolerance.plane);
-        let covers: Vec<Cover> = self
-            .tree
-            .surfaces_on(child as usize)
-            .iter()
-            .filter_map(|&s| {
-                let surface = &self.surfaces[s as usize];
-                let points = projected(&surface.points, &plane);
-                let bounds = Aabb::of_points(&points);
-                let candidate = match surface.source {
-                    Source::Candidate(id) => Some(id),
-                    Source::Triangle(_) | Source::Seam => None,
-                };
-                bounds.overlaps(&reach).then_some(Cover {
-                    candidate,
-                    points,
-                    bounds,
-                })
-            })
-            .collect();
+        let Hand { tab, covers } = hand;
+        covers.clear();
+        covers.extend(
+            self.tree
+                .surfaces_on(child as usize)
+                .iter()
+                .filter_map(|&s| {
+                    let surface = &self.surfaces[s as usize];
+                    let points = projected(&surface.points, &plane);
+                    let candidate = match surface.source {
+                        Source::Candidate(id) => Some(id),
+                        Source::Triangle(_) | Source::Seam => None,
+                    };
+                    let is_near = Aabb::of_points(&points).overlaps(&reach);
+                    is_near.then(|| Cover::new(candidate, points, plane.normal))
+                }),
+        );
         let near: SmallVec<[u32; 16]> = (0..covers.len() as u32).collect();
         let covers = Covers {
-            all: &covers,
+            all: covers,
             near: &near,
         };
-        self.push_down(node.plane, &points, covers, [f, b], sink);
+        self.push_down(node.plane, &points, covers, node.children, tab, sink);
     }
 
     fn section(&self, plane: &Plane, region: &CutBox) -> Option<Poly> {
@@ -189,48 +304,53 @@ impl Visitor<'_> {
         plane: u32,
         points: &[DVec3],
         covers: Covers<'_>,
-        children: [i32; 2],
+        mut children: [i32; 2],
+        tab: &mut Tab<'_>,
         sink: &mut S,
     ) {
-        if !sink.wants_pair(children[0], children[1])
-            || !self.purse.spend(1 + covers.near.len() as u64)
-        {
+        if !sink.wants_under(covers) {
             return;
         }
-        let Some(at) = (0..2).find(|&i| children[i] >= 0) else {
-            sink.take(&RawFacet {
-                plane,
-                leaves: children.map(leaf_index),
-                points,
-                covers,
-            });
-            return;
-        };
-        let node = &self.tree.nodes[children[at] as usize];
-        let cut = &self.tree.planes[node.plane as usize];
-        let with = |child: usize| {
-            let mut next = children;
-            next[at] = node.children[child];
-            next
-        };
-        match poly::split(points, cut, self.tolerance.cut) {
-            Sides::Front => self.push_down(plane, points, covers, with(0), sink),
-            Sides::Back => self.push_down(plane, points, covers, with(1), sink),
-            Sides::On => {
-                // In the node's plane up to rounding: the sum of the small distances decides.
-                let sum: f64 = points.iter().map(|&p| cut.signed_distance(p)).sum();
-                self.push_down(plane, points, covers, with(usize::from(sum < 0.0)), sink);
+        loop {
+            if !sink.wants_pair(children[0], children[1])
+                || !tab.spend(1 + covers.near.len() as u64)
+            {
+                return;
             }
-            Sides::Both(f, b) => {
-                for (child, part) in [(0, f), (1, b)] {
-                    let near = covers.near(&part, self.tolerance.plane);
-                    let covers = Covers {
-                        near: &near,
-                        ..covers
-                    };
-                    self.push_down(plane, &part, covers, with(child), sink);
+            let Some(at) = (0..2).find(|&i| children[i] >= 0) else {
+                return sink.take(&RawFacet {
+                    plane,
+                    leaves: children.map(leaf_index),
+                    points,
+                    covers,
+                });
+            };
+            let node = &self.tree.nodes[children[at] as usize];
+            let cut = &self.tree.planes[node.plane as usize];
+            let side = match poly::side(points, cut, self.tolerance.cut) {
+                Side::Front => 0,
+                Side::Back => 1,
+                Side::On => {
+                    // In the node's plane up to rounding: the sum of the small distances decides.
+                    let sum: f64 = points.iter().map(|&p| cut.signed_distance(p)).sum();
+                    usize::from(sum < 0.0)
                 }
-            }
+                Side::Both => {
+                    let (mut front, mut back) = (Poly::new(), Poly::new());
+                    poly::add_parts(points, cut, self.tolerance.cut, &mut front, &mut back);
+                    for (child, part) in node.children.into_iter().zip([&front, &back]) {
+                        children[at] = child;
+                        let near = covers.near(part, self.tolerance.plane);
+                        let covers = Covers {
+                            near: &near,
+                            ..covers
+                        };
+                        self.push_down(plane, part, covers, children, tab, sink);
+                    }
+                    return;
+                }
+            };
+            children[at] = node.children[side];
         }
     }
 }
@@ -250,35 +370,37 @@ impl OpenPieces {
     /// it would part a cell.
     pub(super) fn of(facet: &RawFacet<'_>, normal: DVec3, tolerance: &Tolerance) -> Self {
         let structural = || facet.covers.iter().filter(|c| c.candidate.is_none());
-        let open = |p: &Poly| {
+        let open = |p: &[DVec3]| {
             poly::is_larger(p, MIN_AREA, tolerance.width)
                 || poly::is_larger(p, 0.0, 2.0 * tolerance.cut)
                     && !is_along(p, structural(), normal, tolerance.width)
         };
-        let mut rest: Vec<Poly> = vec![facet.points.into()];
-        rest.retain(open);
+        // Narrower than this, a polygon is open for no cover, so half of it is to spare for rounding.
+        let eps = tolerance.cut;
+        let is_closed = structural().any(|c| c.holds(facet.points, 0.5 * eps));
+        let mut rest: Vec<Poly> = Vec::new();
+        if !is_closed && open(facet.points) {
+            rest.push(facet.points.into());
+        }
+        let mut outside = Vec::new();
         for cover in structural() {
-            let mut outside = Vec::with_capacity(rest.len() + 2);
-            for p in &rest {
-                poly::cut_out(p, &cover.points, normal, tolerance.cut, 0.0, &mut outside);
-            }
-            outside.retain(open);
-            rest = outside;
             if rest.is_empty() {
                 break;
             }
+            for p in rest.drain(..) {
+                cover.cut_from(p, eps, 0.0, &mut outside);
+            }
+            outside.retain(|p| open(p));
+            std::mem::swap(&mut rest, &mut outside);
         }
         let mut pieces = Vec::new();
         for cover in facet.covers.iter().filter(|c| c.candidate.is_some()) {
-            let mut outside = Vec::with_capacity(rest.len());
-            for p in &rest {
-                let width = tolerance.width;
-                let inside =
-                    poly::cut_out(p, &cover.points, normal, tolerance.cut, width, &mut outside);
-                pieces.extend(inside.filter(open).map(|p| (p, cover.candidate)));
+            for p in rest.drain(..) {
+                let inside = cover.cut_from(p, eps, tolerance.width, &mut outside);
+                pieces.extend(inside.filter(|p| open(p)).map(|p| (p, cover.candidate)));
             }
-            outside.retain(open);
-            rest = outside;
+            outside.retain(|p| open(p));
+            std::mem::swap(&mut rest, &mut outside);
         }
         pieces.extend(rest.into_iter().map(|p| (p, None)));
         Self { pieces }
@@ -387,12 +509,7 @@ mod tests {
             "shorter than the tolerance is wide"
         );
         let points = Poly::from_slice(&[DVec3::ZERO, DVec3::NEG_Y, DVec3::X]);
-        let bounds = Aabb::of_points(&points);
-        let beside = |candidate| Cover {
-            candidate,
-            points: points.clone(),
-            bounds,
-        };
+        let beside = |candidate| Cover::new(candidate, points.clone(), DVec3::Z);
         assert_eq!(pieces_of_sliver(&[beside(None)]), 0);
         assert_eq!(pieces_of_sliver(&[beside(Some(0))]), 1);
     }
@@ -406,12 +523,7 @@ mod tests {
                 DVec3::new(from, -1.0, 0.0),
                 DVec3::new(to, 0.0, 0.0),
             ];
-            let bounds = Aabb::of_points(&points);
-            Cover {
-                candidate: None,
-                points: Poly::from_slice(&points),
-                bounds,
-            }
+            Cover::new(None, Poly::from_slice(&points), DVec3::Z)
         };
         assert_eq!(pieces_of_sliver(&[cover(0.0, 0.1)]), 1);
         assert_eq!(pieces_of_sliver(&[cover(0.0, 0.4), cover(0.6, 1.0)]), 1);

@@ -1,9 +1,12 @@
 //! The first visit: which leaves are open to each other, how wide those openings are, and the volume of each leaf.
 
+use std::cmp::Reverse;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Purse};
+use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Purse, Sets};
+use rayon::prelude::*;
 
 use smallvec::SmallVec;
 
@@ -62,6 +65,8 @@ pub(super) struct LeafGraph<'a> {
     pub(super) volumes: Vec<f64>,
     /// Area of the largest face of each leaf. Volume divided by it is the leaf's thickness, within a factor of three.
     pub(super) faces: Vec<f32>,
+    /// Box of each leaf.
+    pub(super) boxes: Vec<Aabb>,
     /// For each leaf, `true` if it touches the border of the box.
     pub(super) at_border: Vec<bool>,
     /// Diameter of the smallest hole: openings through which no such ball passes are narrow. [Units: wu]
@@ -70,6 +75,15 @@ pub(super) struct LeafGraph<'a> {
     pub(super) rounding: f64,
     /// Pays for later passes over the graph.
     pub(super) purse: Purse<'a>,
+    /// The same for all labels.
+    pub(super) known: Known,
+}
+
+/// Findings from the openings alone, made when they are needed first.
+#[derive(Default)]
+pub(super) struct Known {
+    components: OnceLock<Vec<u32>>,
+    gaps: OnceLock<Vec<u32>>,
 }
 
 impl<'a> LeafGraph<'a> {
@@ -85,12 +99,15 @@ impl<'a> LeafGraph<'a> {
             facets: Vec::new(),
             volumes: vec![0.0; tree.n_leaves as usize],
             faces: vec![0.0; tree.n_leaves as usize],
+            boxes: vec![Aabb::EMPTY; tree.n_leaves as usize],
+            series: NearSeries::default(),
         };
         visitor.visit(&mut sink);
         let LeafSink {
             facets,
             mut volumes,
             faces,
+            mut boxes,
             ..
         } = sink;
         let mut at_border = vec![false; tree.n_leaves as usize];
@@ -102,6 +119,7 @@ impl<'a> LeafGraph<'a> {
                 visitor.tolerance.cut,
                 &mut |leaf, piece| {
                     at_border[leaf as usize] = true;
+                    grow(&mut boxes[leaf as usize], piece);
                     volumes[leaf as usize] += cone_volume(piece, outward, origin);
                 },
             );
@@ -114,19 +132,55 @@ impl<'a> LeafGraph<'a> {
             facets,
             volumes,
             faces,
+            boxes,
             at_border,
             hole: clearance.hole,
             rounding: visitor.tolerance.width,
             purse,
+            known: Known::default(),
         };
-        for i in 0..graph.facets.len() {
-            let mut f = graph.facets[i];
+        let mut facets = std::mem::take(&mut graph.facets);
+        facets.par_iter_mut().with_min_len(1024).for_each(|f| {
             let width = f64::from(f.width);
             f.is_gap |= graph.is_rim(f.leaves, width, graph.hole);
             f.is_narrow |= f.is_gap || graph.is_rim(f.leaves, width, CRACK_GAPS * graph.hole);
-            graph.facets[i] = f;
+        });
+        Self { facets, ..graph }
+    }
+
+    /// Returns the least leaf of the component of each leaf: leaves connected without crossing candidates or gaps.
+    pub(super) fn components(&self) -> &[u32] {
+        self.known
+            .components
+            .get_or_init(|| self.components_without(|_| false))
+    }
+
+    /// Returns the components of leaves connected without crossing candidates, gaps or facets that part.
+    pub(super) fn components_without(&self, parts: impl Fn(&OpenFacet) -> bool) -> Vec<u32> {
+        self.spend_pass();
+        let mut sets = Sets::new(self.volumes.len());
+        for f in &self.facets {
+            if f.candidate == NO_CANDIDATE && !f.is_gap && !parts(f) {
+                sets.join(f.leaves[0], f.leaves[1]);
+            }
         }
-        graph
+        sets.into_least()
+    }
+
+    /// Returns the gaps, those in the air first, then largest first.
+    pub(super) fn gaps(&self) -> impl Iterator<Item = &OpenFacet> {
+        let facet = |&i: &u32| &self.facets[i as usize];
+        let gaps = self.known.gaps.get_or_init(|| {
+            let all = 0..self.facets.len() as u32;
+            let mut gaps: Vec<u32> = all.filter(|i| facet(i).is_gap).collect();
+            // Areas are not negative, so their bits compare like numbers.
+            gaps.par_sort_unstable_by_key(|i| {
+                let f = facet(i);
+                (Reverse((f.is_clear, f.area.to_bits())), f.leaves)
+            });
+            gaps
+        });
+        gaps.iter().map(facet)
     }
 
     /// Spends the cost of one pass over all leaves and openings; returns `false` once the purse is empty.
@@ -179,20 +233,19 @@ impl Clearance<'_> {
 
     /// Returns two flags for an opening: narrow, that is, no wider than a crack; and gap. Of pieces narrower than the
     /// respective diameter, which cuts of the tree make, only the middle is tested.
-    fn narrowness(&self, points: &[DVec3], width: f64) -> [bool; 2] {
-        let (crack, mut series) = (CRACK_GAPS * self.hole, NearSeries::default());
+    fn narrowness(&self, points: &[DVec3], width: f64, series: &mut NearSeries) -> [bool; 2] {
+        let crack = CRACK_GAPS * self.hole;
+        series.n_looked = 0;
         // Most are in the open and take one query.
-        let in_middle = self
-            .bvh
-            .any_within(middle_of(points), 0.5 * crack, &mut series);
+        let in_middle = self.bvh.any_within(middle_of(points), 0.5 * crack, series);
         let mut is_narrower =
-            |diameter: f64| self.is_narrower(points, diameter, width >= diameter, &mut series);
+            |diameter: f64| self.is_narrower(points, diameter, width >= diameter, series);
         let [mut is_narrow, mut is_gap] = [false; 2];
         if crack > 0.0 && in_middle.is_some() {
             is_gap = is_narrower(self.hole);
             is_narrow = is_gap || is_narrower(crack);
         }
-        self.spend(&series);
+        self.spend(series);
         [is_narrow, is_gap]
     }
 
@@ -252,6 +305,10 @@ fn cone_volume(points: &[DVec3], normal: DVec3, origin: DVec3) -> f64 {
     poly::area(points) * normal.dot(points[0] - origin) / 3.0
 }
 
+fn grow(b: &mut Aabb, points: &[DVec3]) {
+    *b = points.iter().fold(*b, |b, &p| b.including(p));
+}
+
 /// Returns the six faces of a box with their outward normals.
 pub(super) fn box_faces(b: &Aabb) -> [(Poly, DVec3); 6] {
     std::array::from_fn(|i| {
@@ -301,6 +358,10 @@ struct LeafSink<'a> {
     volumes: Vec<f64>,
     /// For the same leaves.
     faces: Vec<f32>,
+    /// For the same leaves.
+    boxes: Vec<Aabb>,
+    /// Pieces come in an order in which the next one is mostly near.
+    series: NearSeries,
 }
 
 impl FacetSink for LeafSink<'_> {
@@ -313,13 +374,16 @@ impl FacetSink for LeafSink<'_> {
         let face = poly::area(facet.points) as f32;
         for leaf in [front, back] {
             self.faces[leaf] = self.faces[leaf].max(face);
+            grow(&mut self.boxes[leaf], facet.points);
         }
         let first = self.facets.len();
         let rounding = self.visitor.tolerance.width;
         for (piece, candidate) in OpenPieces::of(facet, normal, &self.visitor.tolerance).pieces {
             let candidate = candidate.unwrap_or(NO_CANDIDATE);
             let (width, area) = (poly::width(&piece) as f32, poly::area(&piece) as f32);
-            let [is_narrow, is_gap] = self.clearance.narrowness(&piece, f64::from(width));
+            let [is_narrow, is_gap] =
+                self.clearance
+                    .narrowness(&piece, f64::from(width), &mut self.series);
             let is_clear = !is_gap || self.clearance.is_clear(&piece, rounding);
             match self.facets[first..]
                 .iter_mut()
@@ -356,6 +420,8 @@ impl FacetSink for LeafSink<'_> {
             facets: Vec::new(),
             volumes: vec![0.0; leaves.len()],
             faces: vec![0.0; leaves.len()],
+            boxes: vec![Aabb::EMPTY; leaves.len()],
+            series: NearSeries::default(),
         }
     }
 
@@ -372,6 +438,9 @@ impl FacetSink for LeafSink<'_> {
             }
             for (most, v) in self.faces[at..].iter_mut().zip(&part.faces) {
                 *most = most.max(*v);
+            }
+            for (all, b) in self.boxes[at..].iter_mut().zip(&part.boxes) {
+                *all = all.union(*b);
             }
         }
     }

@@ -15,6 +15,7 @@
 //!
 //! Time: `O(F log F)` in open facets. Every merge reduces the number of groups, so it ends.
 
+use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -77,14 +78,15 @@ pub(super) fn label_leaves(
             *tally.entry((leaf, vote.label)).or_default() += f64::from(vote.weight);
         }
     }
-    let mut component_of = components(graph, |_| false);
+    let mut component_of = Cow::from(graph.components());
     let mut strong = strong_labels(graph, &tally, &component_of, settings);
     let has_leak =
         |strong: &BTreeMap<u32, Vec<Label>>, c: u32| strong.get(&c).is_some_and(|s| s.len() > 1);
     if strong.keys().any(|&c| has_leak(&strong, c)) {
         // Rooms leak into each other, perhaps only through cracks.
         let leaked: Vec<bool> = component_of.iter().map(|&c| has_leak(&strong, c)).collect();
-        component_of = components(graph, |leaf| leaked[leaf as usize]);
+        let parts = |f: &OpenFacet| f.is_narrow && leaked[f.leaves[0] as usize];
+        component_of = graph.components_without(parts).into();
         strong = strong_labels(graph, &tally, &component_of, settings);
     }
 
@@ -149,21 +151,6 @@ fn keep_border_outside(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
     }
 }
 
-/// Returns the component of each leaf: leaves connected without crossing candidates, gaps or, where `parts_cracks`
-/// returns `true` for a leaf, cracks.
-fn components(graph: &LeafGraph<'_>, parts_cracks: impl Fn(u32) -> bool) -> Vec<u32> {
-    graph.spend_pass();
-    let n_leaves = graph.volumes.len() as u32;
-    let mut sets = Sets::new(n_leaves as usize);
-    for f in &graph.facets {
-        let is_crack = f.is_narrow && parts_cracks(f.leaves[0]);
-        if f.candidate == NO_CANDIDATE && !f.is_gap && !is_crack {
-            sets.join(f.leaves[0], f.leaves[1]);
-        }
-    }
-    (0..n_leaves).map(|l| sets.find(l)).collect()
-}
-
 /// Returns the strong labels in each component, and leaves out components without any.
 fn strong_labels(
     graph: &LeafGraph<'_>,
@@ -171,9 +158,9 @@ fn strong_labels(
     component_of: &[u32],
     settings: &LabelSettings,
 ) -> BTreeMap<u32, Vec<Label>> {
-    let mut volume: BTreeMap<u32, f64> = BTreeMap::new();
+    let mut volume = vec![0.0; component_of.len()];
     for (leaf, &c) in component_of.iter().enumerate() {
-        *volume.entry(c).or_default() += graph.volumes[leaf];
+        volume[c as usize] += graph.volumes[leaf];
     }
     let by_component = tally_by(tally, |leaf| component_of[leaf as usize]);
     let (mut of_label, mut of_component) =
@@ -188,7 +175,7 @@ fn strong_labels(
         // together, yet all of the toilet.
         let main = w >= settings.strong_share * of_label[&label];
         let rules = w >= (1.0 - settings.dominance) * of_component[&c]
-            && of_component[&c] >= 0.25 * volume[&c];
+            && of_component[&c] >= 0.25 * volume[c as usize];
         if main || rules {
             strong.entry(c).or_default().push(label);
         }
@@ -259,6 +246,54 @@ fn may_merge(graph: &LeafGraph<'_>, a: &Group, b: &Group) -> bool {
     graph.purse.spend(2 + n_neighbors as u64)
 }
 
+/// Makes a group of each set that is open, by least leaf.
+fn groups_of(
+    graph: &LeafGraph<'_>,
+    sets: &mut Sets,
+    label_of_set: &[Label],
+) -> BTreeMap<u32, Group> {
+    const NOT_OPEN: usize = usize::MAX;
+    let is_open = open_sets(graph, sets, label_of_set);
+    let mut place = vec![NOT_OPEN; is_open.len()];
+    let mut list: Vec<(u32, Group)> = Vec::new();
+    for leaf in 0..graph.volumes.len() as u32 {
+        let set = sets.find(leaf);
+        if !is_open[set as usize] {
+            continue;
+        }
+        let at = &mut place[set as usize];
+        if *at == NOT_OPEN {
+            *at = list.len();
+            let label = label_of_set[set as usize];
+            let group = Group {
+                root: set,
+                label: (label != Label::Solid).then_some(label),
+                keeps: false,
+                volume: 0.0,
+                neighbors: BTreeMap::new(),
+                open: 0.0,
+                leak: 0.0,
+            };
+            list.push((set, group));
+        }
+        list[*at].1.volume += graph.volumes[leaf as usize];
+    }
+    for f in graph.facets.iter().filter(|f| !f.is_gap) {
+        let [a, b] = f.leaves.map(|l| sets.find(l));
+        if a != b {
+            for (from, to) in [(a, b), (b, a)] {
+                let group = &mut list[place[from as usize]].1;
+                *group.neighbors.entry(to).or_default() += f.cost();
+                group.open += f64::from(f.area);
+                if f.candidate == NO_CANDIDATE {
+                    group.leak += f64::from(f.area);
+                }
+            }
+        }
+    }
+    list.into_iter().collect()
+}
+
 /// Merges groups without a label, and small duplicates of a label, into their neighbors.
 fn merge_groups(
     graph: &LeafGraph<'_>,
@@ -266,39 +301,7 @@ fn merge_groups(
     label_of_set: &[Label],
     settings: &LabelSettings,
 ) -> BTreeMap<u32, Group> {
-    let is_open = open_sets(graph, sets, label_of_set);
-    let mut groups: BTreeMap<u32, Group> = BTreeMap::new();
-    for leaf in 0..graph.volumes.len() as u32 {
-        let set = sets.find(leaf);
-        if !is_open[set as usize] {
-            continue;
-        }
-        let label = label_of_set[set as usize];
-        let group = groups.entry(set).or_insert(Group {
-            root: set,
-            label: (label != Label::Solid).then_some(label),
-            keeps: false,
-            volume: 0.0,
-            neighbors: BTreeMap::new(),
-            open: 0.0,
-            leak: 0.0,
-        });
-        group.volume += graph.volumes[leaf as usize];
-    }
-    for f in graph.facets.iter().filter(|f| !f.is_gap) {
-        let [a, b] = f.leaves.map(|l| sets.find(l));
-        if a != b {
-            for (from, to) in [(a, b), (b, a)] {
-                if let Some(group) = groups.get_mut(&from) {
-                    *group.neighbors.entry(to).or_default() += f.cost();
-                    group.open += f64::from(f.area);
-                    if f.candidate == NO_CANDIDATE {
-                        group.leak += f64::from(f.area);
-                    }
-                }
-            }
-        }
-    }
+    let mut groups = groups_of(graph, sets, label_of_set);
     // The largest group of each label keeps it, whatever its size.
     let mut main: BTreeMap<Label, (f64, Reverse<u32>)> = BTreeMap::new();
     for (&id, group) in &groups {
@@ -383,10 +386,7 @@ fn give_away_crumbs(
             stays[sets.find(leaf) as usize] = true;
         }
     }
-    // Areas are not negative, so their bits compare like numbers.
-    let mut gaps: Vec<&OpenFacet> = graph.facets.iter().filter(|f| f.is_gap).collect();
-    gaps.par_sort_unstable_by_key(|f| (Reverse((f.is_clear, f.area.to_bits())), f.leaves));
-    for gap in gaps {
+    for gap in graph.gaps() {
         let [a, b] = gap.leaves.map(|l| sets.find(l));
         let [a_stays, b_stays] = [a, b].map(|s| stays[s as usize]);
         if a != b && !(a_stays && b_stays) {
@@ -464,6 +464,7 @@ fn number_cells(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::graph::Known;
     use enfilade_geom::Purse;
 
     /// A band above the floor of one room, beneath a door to another, joined to the rest of its room only by cracks.
@@ -482,10 +483,12 @@ mod tests {
             facets: vec![facet(0, NO_CANDIDATE, 0.06), facet(1, 0, 0.1)],
             volumes: vec![30.0, 20.0, 0.005],
             faces: vec![10.0, 10.0, 0.1],
+            boxes: Vec::new(),
             at_border: vec![false; 3],
             hole: 0.023,
             rounding: 1e-5,
             purse: Purse::endless(),
+            known: Known::default(),
         };
         let settings = LabelSettings::default();
         let home = |graph: &LeafGraph<'_>| {
@@ -519,10 +522,12 @@ mod tests {
                 facets: vec![facet(0, 1e-7, is_clear), facet(2, 2e-6, false)],
                 volumes: vec![30.0, 5e-12, 1.0],
                 faces: vec![10.0, 2e-6, 1.0],
+                boxes: Vec::new(),
                 at_border: vec![false; 3],
                 hole: 0.023,
                 rounding: 1e-5,
                 purse: Purse::endless(),
+                known: Known::default(),
             };
             let mut sets = Sets::new(3);
             let groups = merge_groups(

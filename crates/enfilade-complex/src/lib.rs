@@ -223,7 +223,11 @@ fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'
         bounds = Aabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
     }
     let tolerance = Tolerance::for_extent(bounds.extent());
-    let set = surface::gather(surfaces, &bounds, &tolerance, purse);
+    let (bvh, mut set) = rayon::join(
+        || Bvh::build(input.triangles),
+        || surface::gather(surfaces, bounds.center(), &tolerance, purse),
+    );
+    surface::add_seams(&mut set, &bvh, &tolerance, purse);
     let visitor = |tree| Visitor {
         tree,
         surfaces: &set.surfaces,
@@ -232,7 +236,6 @@ fn build_complex_of<'a>(input: &ComplexInput<'_>, purse: Purse<'a>) -> Complex<'
     };
     let tree = tree::build(&set, bounds, &tolerance, purse);
     let tree = thin::cut_thin_leaves(&visitor(&tree), input.gap);
-    let bvh = Bvh::build(input.triangles);
     let hole = input.gap;
     let clearance = Clearance {
         bvh: &bvh,

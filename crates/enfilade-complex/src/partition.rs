@@ -1,18 +1,18 @@
 //! The second visit: makes cells, portals and locator from labeled leaves.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use enfilade_cpg::{Locator, PortalKind};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding, poly};
+use rayon::prelude::*;
 
 use super::facet::{FacetSink, OpenPieces, RawFacet, Visitor};
-use super::graph::{Clearance, LeafGraph, box_faces, sides_of_border};
+use super::graph::{Clearance, LeafGraph};
 use super::leaf_cells::{LeafCells, SOLID};
 use super::pieces::{self, Opening, Piece, Rules};
 use super::seen::{self, TriangleCells};
 use super::surface::{NO_PLANE, Source, Surface};
-use super::tagged::{MIXED, TaggedTree};
+use super::tagged::TaggedTree;
 use super::{CRACK_WIDTH, Complex, Label};
 
 /// Exact cells and portals.
@@ -93,46 +93,72 @@ pub struct Leak {
 struct PieceSink<'a> {
     tagged: &'a TaggedTree<'a>,
     visitor: &'a Visitor<'a>,
-    has_seals: bool,
     /// For each candidate, the plane of its surface.
     plane_of_candidate: &'a [u32],
     graph: &'a LeafGraph<'a>,
     clearance: Clearance<'a>,
+    wanted: &'a Wanted,
+    /// The part of the wanted facets in the plane of the node entered last.
+    here: Range<usize>,
     pieces: Vec<Piece>,
-    boxes: BTreeMap<u32, Aabb>,
 }
 
-impl PieceSink<'_> {
-    fn grow_box(&mut self, cell: u32, points: &[DVec3]) {
-        if cell != SOLID {
-            let b = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
-            *b = points.iter().fold(*b, |b, &p| b.including(p));
+/// The facets with openings between leaves of different cells. The first visit has found them.
+struct Wanted {
+    /// The node of each and its leaves, ascending.
+    facets: Vec<(i32, [u32; 2])>,
+    /// For each node, `true` if some of them are in its plane or below it.
+    is_above: Vec<bool>,
+}
+
+impl Wanted {
+    fn of(complex: &Complex<'_>, tagged: &TaggedTree<'_>) -> Self {
+        let is_wanted = |leaves: &[u32; 2]| {
+            let cells = leaves.map(|l| tagged.cell_of_leaf[l as usize]);
+            cells[0] != cells[1] && (complex.has_seals || !cells.contains(&SOLID))
+        };
+        let leaves = complex.graph.facets.par_iter().map(|f| f.leaves);
+        let mut facets: Vec<_> = leaves
+            .filter(is_wanted)
+            .map(|leaves| (tagged.node_between(leaves), leaves))
+            .collect();
+        facets.par_sort_unstable();
+        // Openings on several candidates are several entries.
+        facets.dedup();
+        let nodes = &complex.tree.nodes;
+        let mut is_above = vec![false; nodes.len()];
+        for &(node, _) in &facets {
+            is_above[node as usize] = true;
         }
+        for i in (0..nodes.len()).rev() {
+            let mut below = nodes[i].children.into_iter().filter(|&c| c >= 0);
+            is_above[i] |= below.any(|c| is_above[c as usize]);
+        }
+        Self { facets, is_above }
     }
 }
 
 impl FacetSink for PieceSink<'_> {
     fn wants_subtree(&self, child: i32) -> bool {
-        self.tagged.tag(child) == MIXED
+        self.wanted.is_above[child as usize]
+    }
+
+    fn enter(&mut self, node: i32) -> bool {
+        let at = |node: i32| self.wanted.facets.partition_point(|f| f.0 < node);
+        self.here = at(node)..at(node + 1);
+        !self.here.is_empty()
     }
 
     fn wants_pair(&self, front: i32, back: i32) -> bool {
-        let tag = self.tagged.tag(front);
-        tag == MIXED || tag != self.tagged.tag(back)
+        let here = &self.wanted.facets[self.here.clone()];
+        let [front, back] = [front, back].map(|c| self.tagged.leaves(c));
+        let first = here.partition_point(|f| f.1[0] < *front.start());
+        let in_front = here[first..].iter().take_while(|f| front.contains(&f.1[0]));
+        in_front.map(|f| f.1[1]).any(|l| back.contains(&l))
     }
 
     fn take(&mut self, facet: &RawFacet<'_>) {
         let cells = facet.leaves.map(|l| self.tagged.cell_of_leaf[l as usize]);
-        if cells[0] == cells[1] {
-            return;
-        }
-        // A cell's extreme points lie on facets to something else.
-        for cell in cells {
-            self.grow_box(cell, facet.points);
-        }
-        if !self.has_seals && cells.contains(&SOLID) {
-            return;
-        }
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
         let is_flipped = cells[0] < cells[1];
         let cells = [cells[0].min(cells[1]), cells[0].max(cells[1])];
@@ -161,22 +187,18 @@ impl FacetSink for PieceSink<'_> {
         Self {
             tagged: self.tagged,
             visitor: self.visitor,
-            has_seals: self.has_seals,
             plane_of_candidate: self.plane_of_candidate,
             graph: self.graph,
             clearance: self.clearance,
+            wanted: self.wanted,
+            here: 0..0,
             pieces: Vec::new(),
-            boxes: BTreeMap::new(),
         }
     }
 
     fn join(&mut self, front: Self, back: Self) {
         for part in [front, back] {
             self.pieces.extend(part.pieces);
-            for (cell, b) in part.boxes {
-                let sum = self.boxes.entry(cell).or_insert(Aabb::EMPTY);
-                *sum = sum.union(b);
-            }
         }
     }
 }
@@ -184,7 +206,7 @@ impl FacetSink for PieceSink<'_> {
 /// Makes the partition for a labeling.
 pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
     let tagged = TaggedTree::new(&complex.tree, &cells.cell_of_leaf);
-    let (pieces, boxes) = gather_pieces(complex, &tagged);
+    let pieces = gather_pieces(complex, &tagged);
     let rules = Rules {
         planes: &complex.tree.planes,
         hole: complex.graph.hole,
@@ -203,9 +225,12 @@ pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
         .into_iter()
         .map(portal_of)
         .partition(|p| p.width >= least_width);
-    let aabbs = (0..cells.volumes.len() as u32)
-        .map(|c| boxes.get(&c).copied().unwrap_or(Aabb::EMPTY))
-        .collect();
+    let mut aabbs = vec![Aabb::EMPTY; cells.volumes.len()];
+    for (&cell, leaf) in cells.cell_of_leaf.iter().zip(&complex.graph.boxes) {
+        if let Some(b) = aabbs.get_mut(cell as usize) {
+            *b = b.union(*leaf);
+        }
+    }
     let locator = tagged.locator(cells.outside);
     let triangle_cells = seen::cells_of_triangles(
         &tagged,
@@ -228,14 +253,11 @@ pub(super) fn realize(complex: &Complex<'_>, cells: LeafCells) -> Partition {
     }
 }
 
-/// Returns the open pieces between leaves of different cells, and the box of each cell.
-fn gather_pieces(
-    complex: &Complex<'_>,
-    tagged: &TaggedTree<'_>,
-) -> (Vec<Piece>, BTreeMap<u32, Aabb>) {
-    let tree = &complex.tree;
+/// Returns the open pieces between leaves of different cells.
+fn gather_pieces(complex: &Complex<'_>, tagged: &TaggedTree<'_>) -> Vec<Piece> {
+    let wanted = Wanted::of(complex, tagged);
     let visitor = Visitor {
-        tree,
+        tree: &complex.tree,
         surfaces: &complex.set.surfaces,
         tolerance: complex.tolerance,
         purse: complex.graph.purse,
@@ -244,24 +266,15 @@ fn gather_pieces(
     let mut sink = PieceSink {
         tagged,
         visitor: &visitor,
-        has_seals: complex.has_seals,
         plane_of_candidate: &plane_of_candidate,
         graph: &complex.graph,
         clearance: complex.clearance(),
+        wanted: &wanted,
+        here: 0..0,
         pieces: Vec::new(),
-        boxes: BTreeMap::new(),
     };
     visitor.visit(&mut sink);
-    for (face, _) in box_faces(&tree.bounds) {
-        sides_of_border(
-            tree,
-            tree.root,
-            &face,
-            complex.tolerance.cut,
-            &mut |leaf, piece| sink.grow_box(tagged.cell_of_leaf[leaf as usize], piece),
-        );
-    }
-    (sink.pieces, sink.boxes)
+    sink.pieces
 }
 
 /// Returns for each candidate the plane of its surface.

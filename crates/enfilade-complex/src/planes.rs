@@ -1,6 +1,7 @@
 //! A list of distinct planes, shared by the surfaces that lie in them.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasher, Hasher, RandomState};
 
 use enfilade_geom::{DVec3, Plane};
 
@@ -10,12 +11,54 @@ use enfilade_geom::{DVec3, Plane};
 /// two planes of one.
 pub struct PlaneList {
     planes: Vec<Plane>,
-    buckets: HashMap<[i32; 4], Vec<u32>>,
+    buckets: HashMap<[i32; 4], Vec<u32>, Seed>,
     /// Offsets are measured from here, so that they change little with the normal. [Units: wu]
     center: DVec3,
     /// Points this near to a plane lie in it. [Units: wu]
     tolerance: f64,
     n_looked: u64,
+}
+
+/// Hashes in a few steps, since each plane is looked up in sixteen buckets. Its seed is secret, so that no scene can be made
+/// whose planes collide.
+#[derive(Clone, Copy)]
+struct Seed([u64; 2]);
+
+impl Default for Seed {
+    fn default() -> Self {
+        let random = RandomState::new();
+        Self([0, 1].map(|i: u8| random.hash_one(i)))
+    }
+}
+
+impl BuildHasher for Seed {
+    type Hasher = KeyHasher;
+
+    fn build_hasher(&self) -> KeyHasher {
+        let Self([state, factor]) = *self;
+        KeyHasher { state, factor }
+    }
+}
+
+struct KeyHasher {
+    state: u64,
+    factor: u64,
+}
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.state
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for part in bytes.chunks(8) {
+            let mut eight = [0; 8];
+            eight[..part.len()].copy_from_slice(part);
+            let mixed = self.state ^ u64::from_le_bytes(eight);
+            let product = u128::from(mixed) * u128::from(self.factor | 1);
+            self.state = product as u64 ^ (product >> 64) as u64;
+        }
+    }
 }
 
 impl PlaneList {
@@ -25,7 +68,7 @@ impl PlaneList {
     pub fn new(center: DVec3, tolerance: f64) -> Self {
         Self {
             planes: Vec::new(),
-            buckets: HashMap::new(),
+            buckets: HashMap::default(),
             center,
             tolerance,
             n_looked: 0,

@@ -3,7 +3,7 @@
 //! **Errs to "seen":** if a triangle lies nearly in a plane of the tree, both sides see it.
 
 use enfilade_geom::poly::{self, Sides};
-use enfilade_geom::{DVec3, Plane, Purse};
+use enfilade_geom::{DVec3, Plane, Purse, Tab};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
@@ -106,10 +106,13 @@ pub(super) fn cells_of_triangles(
     let lists: Vec<Sides2> = surface_of
         .par_iter()
         .with_min_len(64)
-        .map(|&surface| match surface {
-            Some(surface) => Descent::of(tagged, surface, tolerance, purse),
-            None => Sides2::default(),
-        })
+        .map_init(
+            || Tab::from(purse),
+            |tab, &surface| match surface {
+                Some(surface) => Descent::of(tagged, surface, tolerance, tab),
+                None => Sides2::default(),
+            },
+        )
         .collect();
     let mut out = TriangleCells {
         offsets: Vec::with_capacity(2 * n_triangles + 1),
@@ -123,10 +126,10 @@ pub(super) fn cells_of_triangles(
     out
 }
 
-struct Descent<'a> {
+struct Descent<'a, 'b> {
     tagged: &'a TaggedTree<'a>,
     tolerance: &'a Tolerance,
-    purse: Purse<'a>,
+    tab: &'a mut Tab<'b>,
     plane: u32,
     normal: DVec3,
     /// Narrower parts are the result of rounding.
@@ -134,12 +137,12 @@ struct Descent<'a> {
     found: Sides2,
 }
 
-impl<'a> Descent<'a> {
+impl<'a, 'b> Descent<'a, 'b> {
     fn of(
         tagged: &'a TaggedTree<'a>,
         surface: &Surface,
         tolerance: &'a Tolerance,
-        purse: Purse<'a>,
+        tab: &'a mut Tab<'b>,
     ) -> Sides2 {
         let Some(normal) = poly::area_normal(&surface.points).try_normalize() else {
             return Sides2::default();
@@ -153,7 +156,7 @@ impl<'a> Descent<'a> {
         let mut descent = Self {
             tagged,
             tolerance,
-            purse,
+            tab,
             plane,
             normal,
             min_width,
@@ -169,26 +172,30 @@ impl<'a> Descent<'a> {
     }
 
     /// `side` is set if the points lie in a plane above: 0 for the triangle's front.
-    fn go(&mut self, child: i32, points: &[DVec3], side: Option<usize>) {
-        if !self.purse.spend(1) {
-            return;
-        }
-        let tag = self.tagged.tag(child);
-        if tag != MIXED {
-            if tag != SOLID {
-                for s in 0..2 {
-                    if side.is_none_or(|x| x == s) && self.found[s].last() != Some(&tag) {
-                        self.found[s].push(tag);
-                    }
-                }
+    fn go(&mut self, mut child: i32, points: &[DVec3], side: Option<usize>) {
+        let (node, plane) = loop {
+            if !self.tab.spend(1) {
+                return;
             }
-            return;
-        }
-        let node = self.tagged.tree.nodes[child as usize];
-        let plane = self.tagged.tree.planes[node.plane as usize];
-        if node.plane == self.plane && self.plane != NO_PLANE {
-            return self.both_sides(node.children, &plane, points);
-        }
+            let tag = self.tagged.tag(child);
+            if tag != MIXED {
+                return self.find(tag, side);
+            }
+            let node = &self.tagged.tree.nodes[child as usize];
+            let plane = &self.tagged.tree.planes[node.plane as usize];
+            if node.plane == self.plane && self.plane != NO_PLANE {
+                return self.both_sides(node.children, plane, points);
+            }
+            // Most planes are farther than all tolerances.
+            let far = 2.0 * self.tolerance.plane;
+            if points.iter().all(|&p| plane.signed_distance(p) > far) {
+                child = node.children[0];
+            } else if points.iter().all(|&p| plane.signed_distance(p) < -far) {
+                child = node.children[1];
+            } else {
+                break (*node, *plane);
+            }
+        };
         if self.normal.cross(plane.normal).length_squared() < PARALLEL * PARALLEL {
             // Points within the tolerance of the plane were not cut there: visit both sides.
             let eps = self.tolerance.plane;
@@ -228,8 +235,16 @@ impl<'a> Descent<'a> {
         }
     }
 
+    fn find(&mut self, cell: u32, side: Option<usize>) {
+        for s in (0..2).filter(|&s| cell != SOLID && side.is_none_or(|x| x == s)) {
+            if self.found[s].last() != Some(&cell) {
+                self.found[s].push(cell);
+            }
+        }
+    }
+
     fn go_part(&mut self, child: i32, points: &[DVec3], side: Option<usize>) {
-        if poly::width(points) >= self.min_width {
+        if poly::is_larger(points, 0.0, self.min_width) {
             self.go(child, points, side);
         }
     }

@@ -1,10 +1,13 @@
 //! Surfaces (triangles and candidates) and their shared list of planes.
 
+use std::cmp::Reverse;
 use std::collections::HashSet;
+use std::ops::ControlFlow;
 
 use enfilade_geom::poly::{self, Poly};
-use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Purse, Triangle, plane_tolerance};
+use enfilade_geom::{Bvh, DVec3, Plane, Purse, plane_tolerance};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::planes::{PlaneList, faces_ahead};
 
@@ -31,7 +34,7 @@ pub(super) struct Surface {
 }
 
 /// Vertices of a surface; triangles stay inline.
-pub(super) type SurfacePoints = smallvec::SmallVec<[DVec3; 3]>;
+pub(super) type SurfacePoints = SmallVec<[DVec3; 3]>;
 
 /// Plane of a surface too thin to have one.
 pub(super) const NO_PLANE: u32 = u32::MAX;
@@ -77,7 +80,7 @@ pub(super) struct SurfaceSet {
     /// Surfaces, largest first, then by coordinates: independent of the order of the input.
     pub(super) surfaces: Vec<Surface>,
     /// Distinct planes.
-    pub(super) planes: Vec<Plane>,
+    pub(super) planes: PlaneList,
     /// Triangles left out of `surfaces` as copies of others, with the planes of those.
     pub(super) copies: Vec<Surface>,
 }
@@ -90,25 +93,32 @@ const MOST_COPIES: usize = 4;
 const WORK_A_SURFACE: u64 = 2;
 
 /// Sorts by area, then coordinates, so that the order of the input does not matter.
-fn canonical_order(surfaces: &mut [Surface]) {
+fn canonical_order(surfaces: &mut Vec<Surface>) {
     let key = |s: &Surface| {
-        (
-            poly::area(&s.points),
-            matches!(s.source, Source::Candidate(_)),
-        )
+        let by_area = Reverse(ordered_bits(poly::area(&s.points)));
+        let is_candidate = matches!(s.source, Source::Candidate(_));
+        (is_candidate, by_area, s.points.iter().map(bits).min())
     };
-    surfaces.sort_by_cached_key(|s| {
-        let (area, candidate) = key(s);
-        let mut corners: Vec<[u64; 3]> = s
-            .points
-            .iter()
-            .map(|p| p.to_array().map(ordered_bits))
-            .collect();
-        // Duplicates may start at different vertices or have the opposite orientation.
-        corners.sort_unstable();
-        let by_area = std::cmp::Reverse(ordered_bits(area));
-        (candidate, by_area, corners, s.source)
+    let mut order: Vec<_> = surfaces.par_iter().map(|s| (key(s), s)).collect();
+    order.par_sort_unstable_by(|(p, a), (q, b)| {
+        let by_points = || sorted_points(a).cmp(&sorted_points(b));
+        p.cmp(q)
+            .then_with(by_points)
+            .then_with(|| a.source.cmp(&b.source))
     });
+    *surfaces = order.into_par_iter().map(|(_, s)| s.clone()).collect();
+}
+
+fn bits(p: &DVec3) -> [u64; 3] {
+    p.to_array().map(ordered_bits)
+}
+
+/// Returns the vertices in an order that is the same for duplicates, which may start at different vertices or have the
+/// opposite orientation.
+fn sorted_points(s: &Surface) -> SmallVec<[[u64; 3]; 4]> {
+    let mut points: SmallVec<_> = s.points.iter().map(bits).collect();
+    points.sort_unstable();
+    points
 }
 
 /// Returns bits that compare like the number.
@@ -121,10 +131,14 @@ fn ordered_bits(x: f64) -> u64 {
     }
 }
 
-/// Returns the plane of a polygon; the sign of its normal depends on the normal alone.
+/// Returns the plane of a polygon, unless that is too thin to have one; the sign of its normal depends on the normal
+/// alone.
 ///
 /// Axis-aligned planes are exact: the normal is a unit axis, the offset a vertex's coordinate.
-fn own_plane(points: &[DVec3]) -> Option<Plane> {
+fn own_plane(points: &[DVec3], tolerance: &Tolerance) -> Option<Plane> {
+    if poly::width(points) < tolerance.plane {
+        return None;
+    }
     let n = poly::area_normal(points).try_normalize()?;
     for axis in 0..3 {
         if points.iter().all(|p| p[axis] == points[0][axis]) {
@@ -147,48 +161,50 @@ fn own_plane(points: &[DVec3]) -> Option<Plane> {
 /// splitter within tolerance counts as in it.
 pub(super) fn gather(
     mut surfaces: Vec<Surface>,
-    bounds: &Aabb,
+    center: DVec3,
     tolerance: &Tolerance,
     purse: Purse<'_>,
 ) -> SurfaceSet {
     canonical_order(&mut surfaces);
     let mut copies = take_copies(&mut surfaces);
-    let mut planes = PlaneList::new(bounds.center(), tolerance.plane);
-    for s in surfaces.iter_mut().chain(&mut copies) {
+    let mut planes = PlaneList::new(center, tolerance.plane);
+    let own: Vec<Option<Plane>> = surfaces
+        .par_iter()
+        .chain(&copies)
+        .map(|s| own_plane(&s.points, tolerance))
+        .collect();
+    for (s, own) in surfaces.iter_mut().chain(&mut copies).zip(own) {
         let before = planes.n_looked();
-        s.plane = plane_of(&s.points, &mut planes, tolerance);
+        s.plane = own.map_or(NO_PLANE, |own| planes.find_or_add(&own, &s.points));
         if !purse.spend(WORK_A_SURFACE + (planes.n_looked() - before) / 4) {
             break;
         }
     }
-    for mut seam in seams(&surfaces, planes.planes(), tolerance, purse) {
-        seam.plane = plane_of(&seam.points, &mut planes, tolerance);
-        surfaces.push(seam);
-    }
     SurfaceSet {
         surfaces,
-        planes: planes.into_planes(),
+        planes,
         copies,
+    }
+}
+
+/// Adds the seams. `bvh` is the tree of the input's triangles.
+pub(super) fn add_seams(set: &mut SurfaceSet, bvh: &Bvh, tolerance: &Tolerance, purse: Purse<'_>) {
+    for mut seam in seams(&set.surfaces, set.planes.planes(), bvh, tolerance, purse) {
+        let own = own_plane(&seam.points, tolerance);
+        seam.plane = own.map_or(NO_PLANE, |own| set.planes.find_or_add(&own, &seam.points));
+        set.surfaces.push(seam);
     }
 }
 
 /// Removes and returns triangles with [`MOST_COPIES`] identical ones before them, in canonical order.
 fn take_copies(surfaces: &mut Vec<Surface>) -> Vec<Surface> {
-    let corners = |s: &Surface| {
-        let mut bits: Vec<[u64; 3]> = s
-            .points
-            .iter()
-            .map(|p| p.to_array().map(ordered_bits))
-            .collect();
-        bits.sort_unstable();
-        bits
-    };
     let mut copies = Vec::new();
     let mut kept: Vec<Surface> = Vec::with_capacity(surfaces.len());
     let mut n_alike = 0;
     for surface in surfaces.drain(..) {
         let is_alike = kept.last().is_some_and(|last| {
-            matches!(surface.source, Source::Triangle(_)) && corners(last) == corners(&surface)
+            matches!(surface.source, Source::Triangle(_))
+                && sorted_points(last) == sorted_points(&surface)
         });
         n_alike = if is_alike { n_alike + 1 } else { 0 };
         if n_alike < MOST_COPIES {
@@ -201,14 +217,6 @@ fn take_copies(surfaces: &mut Vec<Surface>) -> Vec<Surface> {
     copies
 }
 
-/// Returns the plane of a polygon in the list; [`NO_PLANE`] if it is too thin to have one.
-fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> u32 {
-    if poly::width(points) < tolerance.plane {
-        return NO_PLANE;
-    }
-    own_plane(points).map_or(NO_PLANE, |plane| planes.find_or_add(&plane, points))
-}
-
 /// Returns seams along the edges that come apart as their triangles move into planes.
 ///
 /// A triangle's vertices move by up to a tolerance into its plane. If another triangle begins at such an edge, in a
@@ -218,13 +226,20 @@ fn plane_of(points: &[DVec3], planes: &mut PlaneList, tolerance: &Tolerance) -> 
 fn seams(
     surfaces: &[Surface],
     planes: &[Plane],
+    bvh: &Bvh,
     tolerance: &Tolerance,
     purse: Purse<'_>,
 ) -> Vec<Surface> {
-    let flat: Vec<&Surface> = surfaces
-        .iter()
-        .filter(|s| s.plane != NO_PLANE && matches!(s.source, Source::Triangle(_)))
-        .collect();
+    let mut of_triangle: Vec<Option<&Surface>> = Vec::new();
+    let mut flat: Vec<&Surface> = Vec::new();
+    for s in surfaces.iter().filter(|s| s.plane != NO_PLANE) {
+        if let Source::Triangle(t) = s.source {
+            let t = t as usize;
+            of_triangle.resize(of_triangle.len().max(t + 1), None);
+            of_triangle[t] = Some(s);
+            flat.push(s);
+        }
+    }
     let is_moved = |s: &Surface| {
         let plane = &planes[s.plane as usize];
         s.points
@@ -234,35 +249,30 @@ fn seams(
     if !flat.iter().any(|s| is_moved(s)) {
         return Vec::new();
     }
-    let triangles: Vec<Triangle> = flat
-        .iter()
-        .map(|s| [s.points[0], s.points[1], s.points[2]])
-        .collect();
-    let bvh = Bvh::build(&triangles);
     let seams: Vec<(EdgeKey, Surface)> = flat
         .par_iter()
         .with_min_len(64)
         .filter(|s| is_moved(s))
         .flat_map_iter(|s| {
             let normal = planes[s.plane as usize].normal;
-            let bvh = &bvh;
-            let flat = &flat;
+            let of_triangle = &of_triangle;
             (0..3).filter_map(move |i| {
                 let (a, b) = (s.points[i], s.points[(i + 1) % 3]);
-                let reach = Aabb::of_points(&[a, b]).expanded(tolerance.width);
-                let (mut is_apart, mut n_looked) = (false, 0);
-                bvh.for_each_in_box(&reach, |t| {
+                let mut n_looked = 0;
+                let is_apart = |other: &Surface| {
+                    let other_normal = || planes[other.plane as usize].normal;
+                    other.plane != s.plane
+                        && other_normal().cross(normal).length_squared() < SHALLOW * SHALLOW
+                        && run_along(&other.points, a, b, tolerance.width)
+                };
+                let found = bvh.for_each_around_segment(a, b, tolerance.width, |t, _| {
                     n_looked += 1;
-                    let other = flat[t as usize];
-                    is_apart |= other.plane != s.plane
-                        && planes[other.plane as usize]
-                            .normal
-                            .cross(normal)
-                            .length_squared()
-                            < SHALLOW * SHALLOW
-                        && run_along(&other.points, a, b, tolerance.width);
+                    match of_triangle.get(t as usize).copied().flatten() {
+                        Some(other) if is_apart(other) => ControlFlow::Break(()),
+                        _ => ControlFlow::Continue(()),
+                    }
                 });
-                let is_wanted = purse.spend(WORK_A_SURFACE + n_looked) && is_apart;
+                let is_wanted = purse.spend(WORK_A_SURFACE + n_looked / 4) && found.is_break();
                 is_wanted.then(|| {
                     let up = normal * (1.5 * tolerance.width);
                     let seam = Surface {

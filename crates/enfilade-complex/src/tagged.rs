@@ -1,6 +1,7 @@
 //! The tree with the cell of each subtree that lies in one.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use enfilade_cpg::{CellId, Locator, LocatorNode};
 
@@ -15,6 +16,8 @@ pub(super) struct TaggedTree<'a> {
     pub(super) tree: &'a Tree,
     pub(super) cell_of_leaf: &'a [u32],
     tags: Vec<u32>,
+    /// The first and the last leaf below each node.
+    leaves: Vec<[u32; 2]>,
 }
 
 impl<'a> TaggedTree<'a> {
@@ -23,13 +26,44 @@ impl<'a> TaggedTree<'a> {
             tree,
             cell_of_leaf,
             tags: vec![MIXED; tree.nodes.len()],
+            leaves: vec![[0; 2]; tree.nodes.len()],
         };
         // Children come after their parents.
         for i in (0..tree.nodes.len()).rev() {
             let [f, b] = tree.nodes[i].children.map(|c| tagged.tag(c));
             tagged.tags[i] = if f == b { f } else { MIXED };
+            let [[first, _], [_, last]] = tree.nodes[i].children.map(|c| tagged.ends(c));
+            tagged.leaves[i] = [first, last];
         }
         tagged
+    }
+
+    fn ends(&self, child: i32) -> [u32; 2] {
+        if child >= 0 {
+            self.leaves[child as usize]
+        } else {
+            [leaf_index(child); 2]
+        }
+    }
+
+    /// Returns the leaves below a child.
+    pub(super) fn leaves(&self, child: i32) -> RangeInclusive<u32> {
+        let [first, last] = self.ends(child);
+        first..=last
+    }
+
+    /// Returns the node in whose plane two leaves meet.
+    pub(super) fn node_between(&self, leaves: [u32; 2]) -> i32 {
+        let mut at = self.tree.root;
+        while at >= 0 {
+            let children = self.tree.nodes[at as usize].children;
+            let is_in = |&c: &i32| leaves.iter().all(|l| self.leaves(c).contains(l));
+            match children.into_iter().find(is_in) {
+                Some(child) => at = child,
+                None => break,
+            }
+        }
+        at
     }
 
     /// Returns the common cell of all leaves below, [`SOLID`], or [`MIXED`].

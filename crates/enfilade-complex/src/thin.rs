@@ -20,10 +20,12 @@
 use std::ops::Range;
 
 use enfilade_geom::poly::{self, Poly, Sides};
-use enfilade_geom::{Aabb, DVec3, Plane, Purse};
+use enfilade_geom::{DVec3, Plane, Purse};
 
-use super::facet::{CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
-use super::surface::Tolerance;
+use rayon::prelude::*;
+
+use super::facet::{Cover, Covers, CutBox, FacetSink, OpenPieces, RawFacet, Visitor};
+use super::surface::{Source, Tolerance};
 use super::tree::{Node, Tree, leaf_index};
 
 /// Most cuts through one leaf; the longest come first.
@@ -58,7 +60,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     visitor.visit(&mut sink);
     let mut edges = sink.found;
     // A stable sort keeps the order of the tree.
-    edges.sort_by_key(|e| e.leaf);
+    edges.par_sort_by_key(|e| e.leaf);
     let tree = visitor.tree;
     let mut cutter = LeafCutter {
         tree,
@@ -71,7 +73,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
         on_plane: Vec::with_capacity(tree.on_plane.len()),
         n_leaves: 0,
     };
-    let root = cutter.copy(tree.root, &CutBox::all(tree.bounds));
+    let root = cutter.copy(tree.root, &mut CutBox::all(tree.bounds));
     let LeafCutter {
         planes,
         nodes,
@@ -98,19 +100,29 @@ struct Edges<'a> {
 }
 
 impl FacetSink for Edges<'_> {
+    fn enter(&mut self, node: i32) -> bool {
+        let on_plane = self.visitor.tree.surfaces_on(node as usize);
+        let is_candidate = |&s: &u32| {
+            let source = self.visitor.surfaces[s as usize].source;
+            matches!(source, Source::Candidate(_))
+        };
+        !on_plane.iter().all(is_candidate)
+    }
+
+    fn wants_under(&self, covers: Covers<'_>) -> bool {
+        covers.has_triangles()
+    }
+
     fn take(&mut self, facet: &RawFacet<'_>) {
-        if facet.covers.iter().all(|c| c.candidate.is_some()) {
-            return;
-        }
         let tolerance = &self.visitor.tolerance;
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
-        let closed: Vec<&Poly> = facet
-            .covers
-            .iter()
-            .filter(|c| c.candidate.is_none())
-            .map(|c| &c.points)
-            .collect();
-        for (piece, _) in OpenPieces::of(facet, normal, tolerance).pieces {
+        let pieces = OpenPieces::of(facet, normal, tolerance).pieces;
+        if pieces.is_empty() {
+            return;
+        }
+        let covers = facet.covers.iter();
+        let closed: Vec<&Cover> = covers.filter(|c| c.candidate.is_none()).collect();
+        for (piece, _) in pieces {
             for (k, &a) in piece.iter().enumerate() {
                 let b = piece[(k + 1) % piece.len()];
                 // Shorter edges leave nothing uncut that is wider than a gap.
@@ -124,7 +136,8 @@ impl FacetSink for Edges<'_> {
                 // there.
                 let is_closed = |t: f64| {
                     let beyond = a.lerp(b, t) + outward * tolerance.width;
-                    closed.iter().any(|c| is_within(c, normal, beyond))
+                    let mut near = closed.iter().filter(|c| c.is_near(beyond, tolerance.width));
+                    near.any(|c| is_within(&c.points, normal, beyond))
                 };
                 if [1.0 / 6.0, 0.5, 5.0 / 6.0].into_iter().any(is_closed) {
                     for (leaf, inward) in [(facet.leaves[0], normal), (facet.leaves[1], -normal)] {
@@ -185,7 +198,7 @@ impl LeafCutter<'_> {
     }
 
     /// Copies a subtree and cuts its leaves; returns its new root.
-    fn copy(&mut self, child: i32, region: &CutBox) -> i32 {
+    fn copy(&mut self, child: i32, region: &mut CutBox) -> i32 {
         if child < 0 {
             let strips = self.strips(leaf_index(child), region);
             return self.split(strips);
@@ -196,11 +209,10 @@ impl LeafCutter<'_> {
             .extend_from_slice(self.tree.surfaces_on(child as usize));
         let is_cut = !self.edges_of(self.tree.leaf_range(child)).is_empty();
         let children = if is_cut {
-            let [front, back] = region.split(&self.planes[node.plane as usize]);
-            [
-                self.copy(node.children[0], &front),
-                self.copy(node.children[1], &back),
-            ]
+            let plane = self.planes[node.plane as usize];
+            [0, 1].map(|side| {
+                region.on_side(&plane, side, |part| self.copy(node.children[side], part))
+            })
         } else {
             // Nothing below is cut, so the region does not matter.
             node.children.map(|c| self.copy(c, region))
@@ -287,13 +299,6 @@ impl LeafCutter<'_> {
 }
 
 impl CutBox {
-    fn all(bounds: Aabb) -> Self {
-        Self {
-            bounds,
-            cuts: smallvec::SmallVec::new(),
-        }
-    }
-
     fn contains(&self, p: DVec3) -> bool {
         self.bounds.contains(p) && self.cuts.iter().all(|c| c.signed_distance(p) >= 0.0)
     }
@@ -311,6 +316,7 @@ impl CutBox {
 mod tests {
     use super::super::{ComplexInput, build_complex};
     use super::*;
+    use enfilade_geom::Aabb;
 
     /// A wall whose triangles miss each other by a millimeter: a sliver between two of them is cut once at the edge
     /// that they share, not at both copies of it.

@@ -8,6 +8,8 @@
 use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 
+use rayon::prelude::*;
+
 use super::surface::{NO_PLANE, SurfaceSet, Tolerance, lies_in};
 
 /// A box with this many fragments or fewer is split by their own planes.
@@ -155,6 +157,8 @@ pub(super) fn build(
     purse: Purse<'_>,
 ) -> Tree {
     let fragments: Vec<Fragment> = (0..set.surfaces.len() as u32)
+        .into_par_iter()
+        .with_min_len(1024)
         .filter_map(|surface| {
             let s = &set.surfaces[surface as usize];
             if s.plane == NO_PLANE {
@@ -166,6 +170,7 @@ pub(super) fn build(
         .collect();
     let axis_of: Vec<Option<u8>> = set
         .planes
+        .planes()
         .iter()
         .map(|p| (0..3).find(|&a| p.normal[a] == 1.0).map(|a| a as u8))
         .collect();
@@ -177,7 +182,7 @@ pub(super) fn build(
     };
     let mut part = Part::default();
     let root = builder.split_box(fragments, bounds, &mut part);
-    let mut planes = set.planes.clone();
+    let mut planes = set.planes.planes().to_vec();
     // Adjacent boxes are often split at the same place; keep each plane once.
     let mut distinct: Vec<(u8, u64)> = part.sides.iter().map(|&(a, x)| (a, x.to_bits())).collect();
     distinct.sort_unstable();
@@ -222,6 +227,39 @@ struct BoxSplit {
     plane: Option<u32>,
 }
 
+/// Counts the intervals on both sides of a place that moves up.
+struct Sweep<'a> {
+    /// Those not yet passed, ascending.
+    mins: &'a [f64],
+    maxs: &'a [f64],
+    /// Number of intervals that begin before the place.
+    n_back: usize,
+    slack: f64,
+}
+
+impl<'a> Sweep<'a> {
+    fn over(mins: &'a [f64], maxs: &'a [f64], slack: f64) -> Self {
+        Self {
+            mins,
+            maxs,
+            n_back: 0,
+            slack,
+        }
+    }
+
+    /// Returns the number of intervals that reach behind a place by more than the slack, and of those that reach in front
+    /// of it. Places must ascend.
+    fn sides(&mut self, at: f64) -> [usize; 2] {
+        let is_back = |x: &&f64| **x < at - self.slack;
+        let n = self.mins.iter().take_while(is_back).count();
+        self.mins = &self.mins[n..];
+        self.n_back += n;
+        let is_behind = |x: &&f64| **x <= at + self.slack;
+        self.maxs = &self.maxs[self.maxs.iter().take_while(is_behind).count()..];
+        [self.n_back, self.maxs.len()]
+    }
+}
+
 impl Builder<'_> {
     fn plane_of(&self, f: &Fragment) -> u32 {
         self.set.surfaces[f.surface as usize].plane
@@ -240,7 +278,7 @@ impl Builder<'_> {
         let Some(split) = split else {
             return self.split_by_planes(fragments, out);
         };
-        let n_surface_planes = self.set.planes.len() as u32;
+        let n_surface_planes = self.set.planes.planes().len() as u32;
         let node = out.nodes.len();
         let plane = split
             .plane
@@ -293,7 +331,7 @@ impl Builder<'_> {
         on_plane: &mut Vec<u32>,
     ) -> (Vec<Fragment>, Vec<Fragment>) {
         let on_start = on_plane.len();
-        let (mut front, mut back) = (Vec::new(), Vec::new());
+        let [mut front, mut back] = [0; 2].map(|_| Vec::with_capacity(fragments.len() / 2 + 1));
         for f in fragments {
             let own = self.plane_of(&f);
             if let Some(id) = plane_id
@@ -301,7 +339,7 @@ impl Builder<'_> {
                     own,
                     &self.set.surfaces[f.surface as usize].points,
                     id,
-                    &self.set.planes,
+                    self.set.planes.planes(),
                     &self.tolerance,
                 )
             {
@@ -359,10 +397,9 @@ impl Builder<'_> {
             maxs.sort_unstable_by(f64::total_cmp);
             let (u, v) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
             let share = |extent: f64| 2.0 * (u * v + extent * (u + v));
-            let cost = |at: f64, slack: f64| {
-                let n_back = mins.partition_point(|&x| x < at - slack) as f64;
-                let n_front = total - maxs.partition_point(|&x| x <= at + slack) as f64;
-                (share(at - lo) * n_back + share(hi - at) * n_front) / share(hi - lo)
+            let cost = |[n_back, n_front]: [usize; 2], at: f64| {
+                let weighed = share(at - lo) * n_back as f64 + share(hi - at) * n_front as f64;
+                weighed / share(hi - lo)
             };
             // The planes of axis-aligned surfaces; those that cover much of the section are preferred.
             let mut flat: Vec<(f64, u32, f64)> = sample
@@ -370,16 +407,21 @@ impl Builder<'_> {
                 .filter(|f| self.axis_of[self.plane_of(f) as usize] == Some(axis as u8))
                 .map(|f| {
                     let id = self.plane_of(f);
-                    (-self.set.planes[id as usize].d, id, poly::area(&f.points))
+                    (
+                        -self.set.planes.planes()[id as usize].d,
+                        id,
+                        poly::area(&f.points),
+                    )
                 })
                 .filter(|&(at, ..)| at > lo + self.tolerance.cut && at < hi - self.tolerance.cut)
                 .collect();
             flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let mut sweep = Sweep::over(&mins, &maxs, self.tolerance.plane);
             for group in flat.chunk_by(|a, b| a.1 == b.1) {
                 let (at, id, _) = group[0];
                 let covered: f64 = group.iter().map(|g| g.2).sum::<f64>() * stride as f64;
                 let coverage = (covered / (u * v)).min(1.0);
-                let c = cost(at, self.tolerance.plane) * (1.0 - 0.3 * coverage);
+                let c = cost(sweep.sides(at), at) * (1.0 - 0.3 * coverage);
                 if best.as_ref().is_none_or(|b| c < b.0) {
                     best = Some((
                         c,
@@ -391,11 +433,15 @@ impl Builder<'_> {
                     ));
                 }
             }
-            let mut ends: Vec<f64> = mins.iter().chain(&maxs).copied().collect();
+            let mut ends: Vec<f64> = Vec::with_capacity(2 * mins.len() + 2);
             ends.push(lo);
+            ends.extend_from_slice(&mins);
+            ends.extend_from_slice(&maxs);
             ends.push(hi);
-            ends.sort_unstable_by(f64::total_cmp);
+            // A stable sort merges what is in order.
+            ends.sort_by(f64::total_cmp);
             let step = (ends.len() / 128).max(1);
+            let mut sweep = Sweep::over(&mins, &maxs, 0.0);
             for pair in ends.windows(2).step_by(step) {
                 let at = 0.5 * (pair[0] + pair[1]);
                 if pair[1] - pair[0] < 2.0 * gap
@@ -404,7 +450,7 @@ impl Builder<'_> {
                 {
                     continue;
                 }
-                let c = cost(at, 0.0);
+                let c = cost(sweep.sides(at), at);
                 if best.as_ref().is_none_or(|b| c < b.0) {
                     best = Some((
                         c,
@@ -466,7 +512,7 @@ impl Builder<'_> {
             on_start: out.on_plane.len() as u32,
             children: [0; 2],
         });
-        let cut = self.set.planes[plane as usize];
+        let cut = self.set.planes.planes()[plane as usize];
         let (front, back) = self.distribute(fragments, Some(plane), &cut, &mut out.on_plane);
         let children = [
             self.split_by_planes(front, out),
@@ -485,7 +531,7 @@ impl Builder<'_> {
         ids.truncate(16);
         let mut best: Option<(i64, u32)> = None;
         for &id in &ids {
-            let plane = &self.set.planes[id as usize];
+            let plane = &self.set.planes.planes()[id as usize];
             let (mut n_front, mut n_back, mut n_cut) = (0i64, 0i64, 0i64);
             for f in fragments {
                 if self.plane_of(f) == id {

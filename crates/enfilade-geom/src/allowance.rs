@@ -185,6 +185,48 @@ impl<'a> Purse<'a> {
     }
 }
 
+/// A purse for one thread's short steps. It pays for many at once, since threads wait for each other when they pay.
+#[derive(Debug)]
+pub struct Tab<'a> {
+    purse: Purse<'a>,
+    owed: u64,
+    is_over: bool,
+}
+
+impl<'a> From<Purse<'a>> for Tab<'a> {
+    fn from(purse: Purse<'a>) -> Self {
+        Self {
+            purse,
+            owed: 0,
+            is_over: false,
+        }
+    }
+}
+
+impl Tab<'_> {
+    /// Spends work; returns `false` once the allowance is over, soon after that.
+    #[inline]
+    pub fn spend(&mut self, work: u64) -> bool {
+        self.owed += work;
+        if self.owed >= LOOK / 4 {
+            self.pay();
+        }
+        !self.is_over
+    }
+
+    #[cold]
+    fn pay(&mut self) {
+        let owed = std::mem::take(&mut self.owed);
+        self.is_over = self.is_over || !self.purse.spend(owed);
+    }
+}
+
+impl Drop for Tab<'_> {
+    fn drop(&mut self) {
+        self.pay();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -228,6 +270,20 @@ mod tests {
         assert!(!some.spend(LOOK));
         cancel.store(false, Ordering::Relaxed);
         assert_eq!(some.end(), Some(End::Cancelled), "it stays");
+    }
+
+    #[test]
+    fn a_tab_pays_for_all_and_ends_with_its_allowance() {
+        let some = Allowance::new(LOOK, None);
+        let mut tab = Tab::from(Purse::from(&some));
+        let n = (0..10 * LOOK).take_while(|_| tab.spend(1)).count() as u64;
+        assert!((LOOK..2 * LOOK).contains(&n), "{n}");
+        assert!(!tab.spend(1));
+        let some = Allowance::default();
+        let mut tab = Tab::from(Purse::from(&some));
+        assert!(tab.spend(3));
+        drop(tab);
+        assert_eq!(some.spent(), 3);
     }
 
     #[test]

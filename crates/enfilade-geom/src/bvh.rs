@@ -12,6 +12,7 @@ mod build;
 use std::ops::ControlFlow;
 
 use glam::Vec4;
+use smallvec::SmallVec;
 
 use crate::ray::{Ray, RayHit, ShearedRay, closest_point_on_triangle, triangle_touches_box};
 use crate::{Aabb, DVec3, Triangle};
@@ -211,23 +212,20 @@ impl Bvh {
             return;
         }
         let (min, max) = (round_down(query.min), round_up(query.max));
-        let mut stack = Stack::new();
-        stack.push(Pending {
-            child: 0,
-            count: 0,
-            near: 0.0,
-        });
-        while let Some(at) = stack.pop() {
-            if at.count > 0 {
-                let first = at.child as usize;
-                for i in first..first + at.count as usize {
+        // Children and their counts. Most queries are small: a large stack takes longer to clear than they do.
+        let mut stack: SmallVec<[(u32, u32); 64]> = SmallVec::new();
+        stack.push((0, 0));
+        while let Some((child, count)) = stack.pop() {
+            if count > 0 {
+                let first = child as usize;
+                for i in first..first + count as usize {
                     if !visit(i) {
                         return;
                     }
                 }
                 continue;
             }
-            let node = &self.nodes[at.child as usize];
+            let node = &self.nodes[child as usize];
             let [low, high] = &node.bounds;
             let meets = low[0].cmple(Vec4::splat(max.x))
                 & low[1].cmple(Vec4::splat(max.y))
@@ -237,11 +235,7 @@ impl Bvh {
                 & high[2].cmpge(Vec4::splat(min.z));
             let mask = meets.bitmask();
             for k in (0..4).rev().filter(|k| mask >> k & 1 == 1) {
-                stack.push(Pending {
-                    child: node.children[k],
-                    count: node.counts[k],
-                    near: 0.0,
-                });
+                stack.push((node.children[k], node.counts[k]));
             }
         }
     }

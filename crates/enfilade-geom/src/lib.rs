@@ -21,7 +21,7 @@ mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
-pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse};
+pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse, Tab};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use flight::{MOST_FLIGHT_PLAN, are_treads, is_flight};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};

@@ -26,32 +26,84 @@ pub enum Sides {
     Both(Poly, Poly),
 }
 
-/// Splits a polygon; vertices within `eps` of the plane belong to both parts unmoved.
+/// Side of a plane on which a polygon lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// In the plane, within the tolerance.
+    On,
+    /// Entirely on the positive side.
+    Front,
+    /// Entirely on the negative side.
+    Back,
+    /// On both.
+    Both,
+}
+
+/// Returns the side on which a polygon lies; vertices within `eps` of the plane have none.
+#[inline]
 #[must_use]
-pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
-    let n = points.len();
-    // Most polygons lie on one side: copy nothing until one does not.
+pub fn side(points: &[DVec3], plane: &Plane, eps: f64) -> Side {
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
     for &p in points {
         let d = plane.signed_distance(p);
-        (least, most) = (least.min(d), most.max(d));
+        if d < least {
+            least = d;
+        }
+        if d > most {
+            most = d;
+        }
     }
     match (most > eps, least < -eps) {
-        (false, false) => return Sides::On,
-        (true, false) => return Sides::Front,
-        (false, true) => return Sides::Back,
-        (true, true) => {}
+        (false, false) => Side::On,
+        (true, false) => Side::Front,
+        (false, true) => Side::Back,
+        (true, true) => Side::Both,
     }
-    let dist: SmallVec<[f64; 12]> = points.iter().map(|&p| plane.signed_distance(p)).collect();
-    let (mut front, mut back) = (Poly::new(), Poly::new());
-    for i in 0..n {
-        let j = if i + 1 == n { 0 } else { i + 1 };
-        let (p, q, dp, dq) = (points[i], points[j], dist[i], dist[j]);
+}
+
+/// Splits a polygon; vertices within `eps` of the plane belong to both parts unmoved.
+#[must_use]
+pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
+    // Most polygons lie on one side: copy nothing until one does not.
+    match side(points, plane, eps) {
+        Side::On => Sides::On,
+        Side::Front => Sides::Front,
+        Side::Back => Sides::Back,
+        Side::Both => {
+            let [mut front, mut back] = [Poly::new(), Poly::new()];
+            add_parts(points, plane, eps, &mut front, &mut back);
+            Sides::Both(front, back)
+        }
+    }
+}
+
+/// Appends the vertices of the positive and the negative part of a polygon on both sides of a plane, as [`split`] does.
+pub fn add_parts(points: &[DVec3], plane: &Plane, eps: f64, front: &mut Poly, back: &mut Poly) {
+    divide(points, plane, eps, |p| front.push(p), |p| back.push(p));
+}
+
+/// Passes on the vertices of both parts, in order.
+#[inline]
+fn divide(
+    points: &[DVec3],
+    plane: &Plane,
+    eps: f64,
+    mut front: impl FnMut(DVec3),
+    mut back: impl FnMut(DVec3),
+) {
+    let Some(&first) = points.first() else { return };
+    let d_first = plane.signed_distance(first);
+    let (mut p, mut dp) = (first, d_first);
+    for i in 0..points.len() {
+        let (q, dq) = match points.get(i + 1) {
+            Some(&q) => (q, plane.signed_distance(q)),
+            None => (first, d_first),
+        };
         if dp >= -eps {
-            front.push(p);
+            front(p);
         }
         if dp <= eps {
-            back.push(p);
+            back(p);
         }
         if (dp > eps && dq < -eps) || (dp < -eps && dq > eps) {
             // Always cut from the front vertex, so that both directions of an edge round alike.
@@ -61,32 +113,38 @@ pub fn split(points: &[DVec3], plane: &Plane, eps: f64) -> Sides {
                 (q, p, dq, dp)
             };
             let cut = a + (b - a) * (da / (da - db));
-            front.push(cut);
-            back.push(cut);
+            front(cut);
+            back(cut);
         }
+        (p, dp) = (q, dq);
     }
-    Sides::Both(front, back)
 }
 
 /// Returns the part on the positive side; `None` if no area is left.
 #[must_use]
 pub fn clip(points: &[DVec3], plane: &Plane, eps: f64) -> Option<Poly> {
-    match split(points, plane, eps) {
-        Sides::Front => Some(points.into()),
-        Sides::Both(front, _) => Some(front),
-        Sides::On | Sides::Back => None,
+    match side(points, plane, eps) {
+        Side::Front => Some(points.into()),
+        Side::Both => Some(front_part(points, plane, eps)),
+        Side::On | Side::Back => None,
     }
 }
 
 /// Keeps the part on the positive side; returns `true` if any is left.
 #[must_use]
 pub fn clip_in_place(points: &mut Poly, plane: &Plane, eps: f64) -> bool {
-    match split(points, plane, eps) {
-        Sides::Front => {}
-        Sides::Both(front, _) => *points = front,
-        Sides::On | Sides::Back => return false,
+    match side(points, plane, eps) {
+        Side::Front => {}
+        Side::Both => *points = front_part(points, plane, eps),
+        Side::On | Side::Back => return false,
     }
     true
+}
+
+fn front_part(points: &[DVec3], plane: &Plane, eps: f64) -> Poly {
+    let mut front = Poly::new();
+    divide(points, plane, eps, |p| front.push(p), |_| {});
+    front
 }
 
 /// Returns the part in a box; `None` if no area is left. A polygon in a face of the box counts as inside.
