@@ -247,3 +247,88 @@ fn fill_triangle(blocked: &mut BitVolume, side: [usize; 2], t: [[f64; 2]; 3]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Wide enough for several words a row.
+        #[test]
+        fn patches_are_the_connected_open_cells_and_grow_along_both_sides(
+            nu in 1usize..200, nv in 1usize..8, seed in any::<u64>(), rare in 2u64..9,
+            starts in prop::collection::vec(any::<[u16; 2]>(), 1..5), reach in 0usize..4,
+        ) {
+            let mut s = seed | 1;
+            let mut next = || {
+                s ^= s << 13;
+                s ^= s >> 7;
+                s ^= s << 17;
+                s >> 33
+            };
+            let plain: Vec<bool> = (0..nu * nv).map(|_| next().is_multiple_of(rare)).collect();
+            let blocked = BitVolume::from_fn([nu, nv, 1], |i| plain[i]);
+            let picture = Picture {
+                origin: DVec3::ZERO,
+                u: DVec3::X,
+                v: DVec3::Y,
+                step: 1.0,
+                side: [nu, nv],
+            };
+            let starts: Vec<[usize; 2]> =
+                starts.iter().map(|s| [usize::from(s[0]) % nu, usize::from(s[1]) % nv]).collect();
+            let points: Vec<DVec3> =
+                starts.iter().map(|s| DVec3::new(s[0] as f64 + 0.5, s[1] as f64 + 0.5, 0.0)).collect();
+            let mut expected: Vec<(Vec<usize>, usize, bool)> = Vec::new();
+            for [i, j] in starts {
+                let start = i + nu * j;
+                if plain[start] {
+                    continue;
+                }
+                if let Some(known) = expected.iter_mut().find(|e| e.0.contains(&start)) {
+                    known.1 += 1;
+                    continue;
+                }
+                let mut cells = vec![start];
+                let mut at = 0;
+                while let Some(&c) = cells.get(at) {
+                    at += 1;
+                    let (i, j) = (c % nu, c / nu);
+                    let beside = [
+                        (i > 0, c.wrapping_sub(1)),
+                        (i + 1 < nu, c + 1),
+                        (j > 0, c.wrapping_sub(nu)),
+                        (j + 1 < nv, c + nu),
+                    ];
+                    for (_, next) in beside.into_iter().filter(|b| b.0) {
+                        if !plain[next] && !cells.contains(&next) {
+                            cells.push(next);
+                        }
+                    }
+                }
+                cells.sort_unstable();
+                let is_rim = |c: &usize| {
+                    let (i, j) = (c % nu, c / nu);
+                    i == 0 || j == 0 || i + 1 == nu || j + 1 == nv
+                };
+                let meets_border = cells.iter().any(is_rim);
+                expected.push((cells, 1, meets_border));
+            }
+            let found: Vec<(Vec<usize>, usize, bool)> = picture
+                .patches(&blocked, &points)
+                .into_iter()
+                .map(|p| (p.cells.iter_set().collect(), p.n_hits, p.meets_border))
+                .collect();
+            prop_assert_eq!(found, expected);
+
+            let grown = picture.grown(&blocked, reach);
+            for c in 0..nu * nv {
+                let (i, j) = (c % nu, c / nu);
+                let near = |at: usize, n: usize| at.saturating_sub(reach)..(at + reach + 1).min(n);
+                let is_near = near(j, nv).any(|j| near(i, nu).any(|i| plain[i + nu * j]));
+                prop_assert_eq!(grown.get_index(c), is_near);
+            }
+        }
+    }
+}
