@@ -110,7 +110,7 @@ fn town_file(name: &str) -> PathBuf {
     let portals = town.graph.portals.iter().map(|portal| PrtPortal {
         clusters: portal.cells,
         flags: 0,
-        points: portal.winding.iter().map(|p| p.to_array()).collect(),
+        points: portal.winding.iter().map(|&p| p.into()).collect(),
     });
     let file = PrtFile {
         format: PrtFormat::Prt1,

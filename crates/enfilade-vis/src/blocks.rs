@@ -28,9 +28,6 @@ const ROUND: usize = 512;
 const MOST_FOR_EXIT: usize = 8;
 const LEAST_EXITS: usize = 64;
 
-/// Most directions in all rows of a part. [Units: 4 bytes]
-const MOST_ENTRIES: usize = 1 << 26;
-
 /// Progress that each block counts as.
 const STEPS: u64 = 1000;
 
@@ -213,6 +210,8 @@ impl VisPlan<'_> {
     ) -> Option<Vec<Vec<u32>>> {
         let dirs = &self.dirs;
         let ground = self.ground();
+        // Rows take no more memory than a table of the directions.
+        let most_entries = self.most_directions * self.most_directions / 32;
         let mut n_entries = 0;
         let mut rows = Vec::with_capacity(sources.len());
         let mut n_round = FIRST_ROUND;
@@ -238,7 +237,7 @@ impl VisPlan<'_> {
                 bits::set(is_here, d as usize);
             }
             n_entries += found.iter().map(Vec::len).sum::<usize>();
-            if bits::count(is_here) > most || n_entries > MOST_ENTRIES {
+            if bits::count(is_here) > most || n_entries > most_entries {
                 return None;
             }
             rows.extend(found);

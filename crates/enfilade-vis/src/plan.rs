@@ -32,7 +32,8 @@ const PER_DIRECTION: u64 = 512;
 /// use enfilade_vis::{VisConfig, VisContext, VisPlan};
 ///
 /// let graph = SightGraph::default();
-/// let plan = VisPlan::new(&graph, &VisConfig::default(), 0)?;
+/// let config = VisConfig::default();
+/// let plan = VisPlan::new(&graph, &config, 0)?;
 /// let mut on_round = |_, _| true;
 /// let mut context = VisContext { on_round: &mut on_round, walls: None, checkpoint: None };
 /// let mut blocks = Vec::new();
