@@ -160,9 +160,8 @@ impl Town {
                 p
             })
             .to_vec();
-        // The normal points from the first cell to the second.
-        let middle = |c: u32| self.cells[c as usize].center()[axis];
-        if middle(a) > middle(b) {
+        // The normal points from the first cell, which is convex, to the second.
+        if self.cells[a as usize].center()[axis] > area.min[axis] {
             winding.reverse();
         }
         self.graph.portals.push(SightPortal {

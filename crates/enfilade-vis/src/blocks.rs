@@ -5,6 +5,7 @@
 //! searching half of the block at a time; if a single cell sees that much, all that its floods reach counts as seen.
 
 use std::ops::Range;
+use std::sync::Mutex;
 
 use enfilade_geom::{Bvh, DVec3, Triangle};
 use rayon::prelude::*;
@@ -213,6 +214,7 @@ impl VisPlan<'_> {
         // Rows take no more memory than a table of the directions.
         let most_entries = self.most_directions * self.most_directions / 32;
         let mut n_entries = 0;
+        let spare: Mutex<Vec<Windows>> = Mutex::new(Vec::new());
         let mut rows = Vec::with_capacity(sources.len());
         let mut n_round = FIRST_ROUND;
         let mut left = sources;
@@ -221,18 +223,25 @@ impl VisPlan<'_> {
             left = rest;
             n_round = (2 * n_round).min(ROUND);
             let here = &*is_here;
-            let found: Option<Vec<Vec<u32>>> = round
-                .par_iter()
-                .with_min_len(16)
-                .map_init(
-                    || Windows::new(dirs),
-                    |windows, &source| {
-                        let allows = |d: usize| grows || bits::get(here, d);
-                        windows.flood(&ground, source as usize, most, allows)
-                    },
-                )
+            let flood = |windows: &mut Windows, source: u32| {
+                let allows = |d: usize| grows || bits::get(here, d);
+                windows.flood(&ground, source as usize, most, allows)
+            };
+            let found: Option<Vec<Vec<Vec<u32>>>> = round
+                .par_chunks(16)
+                .map(|sources| {
+                    // Buffers are as large as the graph.
+                    let kept = spare.lock().ok().and_then(|mut spare| spare.pop());
+                    let mut windows = kept.unwrap_or_else(|| Windows::new(dirs));
+                    let rows = sources.iter().map(|&source| flood(&mut windows, source));
+                    let rows = rows.collect();
+                    if let Ok(mut spare) = spare.lock() {
+                        spare.push(windows);
+                    }
+                    rows
+                })
                 .collect();
-            let found = found?;
+            let found: Vec<Vec<u32>> = found?.into_iter().flatten().collect();
             for &d in found.iter().flatten() {
                 bits::set(is_here, d as usize);
             }

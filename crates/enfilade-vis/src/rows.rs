@@ -17,7 +17,7 @@ use crate::checkpoint::fnv;
 const MAGIC: &[u8; 8] = b"ENFVBLK1";
 
 /// Pairs turned round at a time, which bounds the memory for it. [Units: 4 bytes]
-const MOST_TURNED: usize = 1 << 25;
+const MOST_TURNED: usize = 1 << 23;
 
 /// Cells that might be seen from a cell, as runs: first cell and one past the last, ascending.
 pub(crate) type Runs = Vec<[u32; 2]>;
@@ -180,7 +180,7 @@ impl Numbers<'_> {
 /// Returns the symmetric union of rows, one for each of `n_cells` cells: a cell without a row sees itself if
 /// `is_alone_in`.
 ///
-/// `rows` are ascending by cell. Memory: the result, and 128 MiB.
+/// `rows` are ascending by cell. Memory: the result, and 32 MiB.
 pub(crate) fn united(rows: &[(u32, &Runs)], n_cells: u32, is_alone_in: bool) -> Pvs {
     let n = n_cells as usize;
     // Number of rows that a cell is in, by differences first.

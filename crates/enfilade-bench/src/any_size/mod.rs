@@ -22,7 +22,6 @@ const VILLAGES: &[&str] = &["village-5000"];
 
 pub(crate) const ROWS: &[Row] = &[
     made("pvs: memory", LARGE, pvs::memory_of),
-    made("pvs: memory", VILLAGES, pvs::memory_of),
     made("pvs: rate", LARGE, pvs::rate),
     made("pvs: missed", TOWNS, pvs::missed),
     made("pvs: missed", VILLAGES, pvs::missed),

@@ -40,7 +40,7 @@ pub(super) fn memory_of(scene: &str) -> anyhow::Result<Figure> {
     let number = |name| of(&figures, name);
     Ok(Figure {
         value: number("peak")? / f64::from(1 << 30),
-        most: most_memory(scene) as f64 / f64::from(1 << 30),
+        most: MOST_MEMORY as f64 / f64::from(1 << 30),
         note: format!(
             "GiB; {} cells, {} portals, {} pairs",
             number("cells")?,
