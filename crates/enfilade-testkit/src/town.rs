@@ -332,6 +332,11 @@ mod tests {
     fn faces_fit(town: &Town) {
         assert!((300..1300).contains(&town.cells.len()));
         town.graph.validate().unwrap();
+        for portal in &town.graph.portals {
+            let [p, q, r] = [0, 1, 2].map(|i| portal.winding[i]);
+            let room = town.cells[portal.cells[0] as usize].center();
+            assert!((q - p).cross(r - p).dot(p - room) > 0.0, "{portal:?}");
+        }
         for (cell, holes) in town.holes.iter().enumerate() {
             assert!(!holes.is_empty(), "{cell}");
             for hole in holes {
