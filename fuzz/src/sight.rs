@@ -51,6 +51,7 @@ static KNOWN: LazyLock<Known> = LazyLock::new(|| {
         on_round: &mut |_, _| false,
         walls: None,
         checkpoint: Some(VisCheckpoint {
+            blocks: None,
             resume: None,
             salt: 0,
             every: Duration::MAX,
@@ -86,6 +87,7 @@ fn search(graph: &SightGraph, config: &VisConfig, resume: Option<Vec<u8>>) -> Op
         on_round: &mut |_, _| true,
         walls: None,
         checkpoint: resume.map(|bytes| VisCheckpoint {
+            blocks: None,
             resume: Some(bytes),
             salt: 0,
             every: Duration::MAX,

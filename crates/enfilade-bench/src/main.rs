@@ -4,6 +4,7 @@
 // A program that prints tables, which the workspace's lints forbid.
 #![allow(clippy::print_stdout)]
 
+mod any_size;
 mod bring;
 mod bsp;
 mod builders;
@@ -62,6 +63,15 @@ struct Cli {
 
 #[derive(clap::Subcommand)]
 enum What {
+    /// Inputs of any size: a row per figure, with the value that it must reach.
+    AnySize(Chosen),
+    /// A measurement of `any-size`, in a process of its own.
+    #[command(hide = true)]
+    SizeStep {
+        step: any_size::SizeStep,
+        /// The generated scene, such as `town-1000`.
+        scene: String,
+    },
     /// Value of worlds to programs and modelers: a row per figure, with the value that it must reach.
     Bring(Chosen),
     /// Rooms and doors as architects mean them: a row per figure, with the value that it must reach.
@@ -221,6 +231,8 @@ enum What {
 fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
+        What::AnySize(chosen) => return bench_rows(any_size::ROWS, args.json, chosen),
+        What::SizeStep { step, scene } => return any_size::run_step(*step, scene),
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
         What::Rooms(chosen) => return rooms::bench_rooms(chosen, args.json),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),

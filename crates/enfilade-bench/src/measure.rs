@@ -13,6 +13,14 @@ pub(crate) fn cpu_seconds() -> f64 {
     tasks.filter_map(of_task).sum::<f64>() * 1e-9
 }
 
+/// Returns a size of this process by its name in the system's list; 0 if the system does not have it. [Units: bytes]
+pub(crate) fn memory(name: &str) -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix(name));
+    let kilobytes = line.and_then(|l| l.split_ascii_whitespace().nth(1)?.parse::<u64>().ok());
+    kilobytes.unwrap_or(0) * 1024
+}
+
 /// Returns a file's name without folder and extension.
 pub(crate) fn name(path: &Path) -> String {
     path.file_stem()

@@ -18,6 +18,7 @@ use enfilade::vis::{
 
 use enfilade_verify::structural_triangles;
 
+use self::blocks::BlockFolder;
 use self::statistics::Statistics;
 use crate::formats::Format;
 use crate::limits::watch;
@@ -27,6 +28,8 @@ use crate::screen::{json_text, print_json};
 use enfilade_cli::input::{is_stream, name_of, read};
 use enfilade_cli::values::{bytes, seconds};
 
+mod blocks;
+pub(crate) mod job;
 mod statistics;
 
 /// Computes the potentially visible set of a world or a Quake portal file: for each cell, the cells visible from it,
@@ -58,8 +61,8 @@ pub(crate) struct Pvs {
     /// End without an answer after this long.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
-    /// Refuse a graph whose estimate is larger, before anything is allocated, and end rather than use more memory: a
-    /// number and K, M, G or T.
+    /// Search a graph whose tables would be larger in blocks that fit, refuse one that does not fit itself, and end
+    /// rather than use more memory: a number and K, M, G or T.
     #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = bytes)]
     max_memory: u64,
     /// Treat everything farther than this as hidden.
@@ -73,7 +76,8 @@ pub(crate) struct Pvs {
     #[arg(long, value_name = "N", default_value_t = VisConfig::default().max_specials)]
     max_specials: u32,
     /// Save the search to this file every half minute and when --budget ends it, and continue from it next time;
-    /// refused for another graph or other settings, removed when the search is done.
+    /// refused for another graph or other settings, removed when the search is done. Large graphs do not need it: the
+    /// blocks that are done are kept in OUT.blocks until the answer is written.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
     /// Write statistics for modelers as JSON: the cells, objects and triangles visible from each cell, and the ten
@@ -92,12 +96,22 @@ pub(crate) struct Pvs {
     json: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 enum PvsMode {
     /// Separating planes only.
     Fast,
     /// All that planes and lines can decide.
     Exact,
+}
+
+impl From<PvsMode> for VisMode {
+    fn from(mode: PvsMode) -> Self {
+        match mode {
+            PvsMode::Fast => Self::Fast,
+            PvsMode::Exact => Self::Exact,
+        }
+    }
 }
 
 /// The printed report.
@@ -155,6 +169,12 @@ struct SpecialChains {
 }
 
 pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
+    run_with(args, None)
+}
+
+/// Takes the blocks of a large search from a folder that stays; or from one beside the answer, which goes when that is
+/// written.
+fn run_with(args: &Pvs, kept: Option<BlockFolder>) -> anyhow::Result<()> {
     watch(args.max_time, Some(args.max_memory))?;
     let (outputs, output) = outputs_of(args)?;
     let input = read_input(&args.input)?;
@@ -166,7 +186,10 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         );
     }
     let start = Instant::now();
-    let found = compute(args, &input)?;
+    let is_kept = kept.is_some();
+    let mut blocks = kept.or_else(|| (!is_stream(&output)).then(|| BlockFolder::beside(&output)));
+    let found = compute(args, &input, blocks.as_mut())?;
+    let is_complete = found.vis.is_complete;
     let mut report = report(&input, &found, start.elapsed());
     let WorldVis {
         mut vis, through, ..
@@ -210,6 +233,9 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
         let bytes = encode_glb(&World { pvs, ..world })?;
         write_whole(path, &bytes)?;
     }
+    if let Some(blocks) = blocks.filter(|_| is_complete && !is_kept) {
+        blocks.remove()?;
+    }
     print(outputs.printed(), &report, args.json)
 }
 
@@ -238,13 +264,17 @@ pub(crate) fn read_graph(path: &Path) -> anyhow::Result<(SightGraph, Option<Vec<
 }
 
 fn read_input(path: &Path) -> anyhow::Result<Input> {
-    let bytes = read(path)?;
+    input_of(path, &read(path)?)
+}
+
+/// Returns what the bytes of a file hold; `path` is named in errors.
+fn input_of(path: &Path, bytes: &[u8]) -> anyhow::Result<Input> {
     // FNV-1a: distinguishes files; not safe against forgery.
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     });
     if bytes.starts_with(b"glTF") {
-        let world = decode_glb(&bytes).with_context(|| name_of(path))?;
+        let world = decode_glb(bytes).with_context(|| name_of(path))?;
         let walls: Vec<Triangle> = structural_triangles(&world)
             .into_iter()
             .map(|(triangle, _)| triangle)
@@ -256,7 +286,7 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
             hash,
         });
     }
-    let text = std::str::from_utf8(&bytes)
+    let text = std::str::from_utf8(bytes)
         .ok()
         .with_context(|| format!("{}: not text, so not a portal file", name_of(path)))?;
     let file = read_prt(text).with_context(|| name_of(path))?;
@@ -310,12 +340,13 @@ fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
     Ok((outputs, path))
 }
 
-fn compute(args: &Pvs, input: &Input) -> anyhow::Result<WorldVis> {
+fn compute(
+    args: &Pvs,
+    input: &Input,
+    mut blocks: Option<&mut BlockFolder>,
+) -> anyhow::Result<WorldVis> {
     let config = VisConfig {
-        mode: match args.mode {
-            PvsMode::Fast => VisMode::Fast,
-            PvsMode::Exact => VisMode::Exact,
-        },
+        mode: args.mode.into(),
         far: args.far,
         max_memory: args.max_memory,
         max_specials: args.max_specials,
@@ -340,19 +371,24 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<WorldVis> {
             unsaved = write_whole(path, &bytes).err();
         }
     };
-    let checkpoint = match &args.checkpoint {
-        Some(path) => Some(VisCheckpoint {
-            resume: read_checkpoint(path)?,
-            salt: input.hash,
-            every: Duration::from_secs(30),
-            save: &mut save,
-        }),
-        None => None,
+    let resume = args.checkpoint.as_deref().map(read_checkpoint);
+    let checkpoint = VisCheckpoint {
+        blocks: match &mut blocks {
+            Some(blocks) => Some(&mut **blocks),
+            None => None,
+        },
+        resume: resume.transpose()?.flatten(),
+        salt: input.hash,
+        every: match args.checkpoint {
+            Some(_) => Duration::from_secs(30),
+            None => Duration::MAX,
+        },
+        save: &mut save,
     };
     let mut context = VisContext {
         on_round: &mut on_round,
         walls: input.walls.as_deref(),
-        checkpoint,
+        checkpoint: Some(checkpoint),
     };
     let answer = pool(args)?.install(|| match &input.world {
         Some(world) => see_world(&world.graph, &config, &mut context),
@@ -363,7 +399,8 @@ fn compute(args: &Pvs, input: &Input) -> anyhow::Result<WorldVis> {
         Some(path) => format!("{}, {}", name_of(&args.input), path.display()),
         None => name_of(&args.input),
     })?;
-    if let Some(error) = unsaved {
+    let unkept = blocks.and_then(|blocks| blocks.error.take());
+    if let Some(error) = unsaved.or(unkept) {
         return Err(error.context("cannot save the search"));
     }
     if let Some(path) = &args.checkpoint
@@ -389,8 +426,12 @@ fn add_parts(
 }
 
 fn pool(args: &Pvs) -> anyhow::Result<rayon::ThreadPool> {
+    pool_of(args.threads)
+}
+
+fn pool_of(threads: Option<usize>) -> anyhow::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
+        .num_threads(threads.unwrap_or(0))
         .build()
         .context("cannot start threads; try --threads 1")
 }
@@ -433,7 +474,7 @@ fn report(input: &Input, found: &WorldVis, took: Duration) -> PvsReport {
         undecided,
         base_pairs: vis.n_base,
         complete: vis.is_complete,
-        lines: vis.witnesses.len(),
+        lines: vis.n_lines as usize,
         steps: vis.n_steps,
         specials: has_specials.then(|| SpecialChains {
             pairs: found.through.n_pairs(),

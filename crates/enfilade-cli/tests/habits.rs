@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 24] = [
+const COMMANDS: [(&str, &[&str]); 28] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -29,6 +29,10 @@ const COMMANDS: [(&str, &[&str]); 24] = [
     ),
     ("export world.glb -o graph.graphml", &["file", "bytes"]),
     ("inspect world.glb", &["cells", "portals", "stats"]),
+    ("job plan world.glb -o job", &["shards", "input", "mode"]),
+    ("job run job", &["done", "there", "missing"]),
+    ("job merge job job", &["done", "there", "missing"]),
+    ("job finish job -o j.pvs", &["cells", "pairs", "complete"]),
     ("locate world.glb", &["cells"]),
     (
         "name world.glb --at 2,1,2 Hall --cell outdoors Garden -o n.glb",

@@ -2,7 +2,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::thread;
+
+use enfilade::import::{PrtFile, PrtFormat, PrtPortal, write_prt};
 
 fn enfilade(args: &[&Path]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_enfilade"))
@@ -96,6 +99,138 @@ fn a_search_without_time_is_saved_and_taken_up_again() {
     assert!(!saved.exists());
     let text = fs::read_to_string(&pvs).unwrap();
     assert!(text.contains("\n0: 0-2\n1: 0-3\n"), "{text}");
+}
+
+/// Memory that the tables of [`town_file`] exceed, so that it is searched in blocks.
+const LITTLE: &str = "120M";
+
+/// Writes the portal file of a town of 4,000 cells.
+fn town_file(name: &str) -> PathBuf {
+    let town = enfilade_testkit::town(4000, 1);
+    let portals = town.graph.portals.iter().map(|portal| PrtPortal {
+        clusters: portal.cells,
+        flags: 0,
+        points: portal.winding.iter().map(|&p| p.into()).collect(),
+    });
+    let file = PrtFile {
+        format: PrtFormat::Prt1,
+        faces: Vec::new(),
+        leaf_cluster: Vec::new(),
+        n_clusters: town.graph.n_cells,
+        portals: portals.collect(),
+    };
+    let prt = place(name);
+    fs::write(&prt, write_prt(&file)).unwrap();
+    prt
+}
+
+#[test]
+fn a_large_search_that_is_killed_goes_on_from_its_blocks() {
+    let prt = town_file("town.prt");
+    let command = |pvs: &Path| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+        command.arg("pvs").arg(&prt).arg("-o").arg(pvs);
+        command.args(["--max-memory", LITTLE, "--json"]);
+        command.stdout(Stdio::null());
+        command
+    };
+    let (whole, parts) = (place("town.pvs"), place("town-parts.pvs"));
+    assert!(command(&whole).status().unwrap().success());
+    assert!(!place("town.pvs.blocks").exists());
+    let folder = place("town-parts.pvs.blocks");
+    let n_blocks = || {
+        let entries = fs::read_dir(&folder).into_iter().flatten().flatten();
+        let is_block = |path: &PathBuf| path.extension().is_some_and(|e| e == "block");
+        entries.map(|e| e.path()).filter(is_block).count()
+    };
+    let is_killed = (0..20).any(|_| {
+        let _ = fs::remove_file(&parts);
+        let mut child = command(&parts).spawn().unwrap();
+        while n_blocks() == 0 && child.try_wait().unwrap().is_none() {
+            thread::yield_now();
+        }
+        let _ = child.kill();
+        !child.wait().unwrap().success()
+    });
+    assert!(is_killed && n_blocks() > 0 && !parts.exists());
+    // Files of others stay.
+    fs::write(folder.join("notes.txt"), "mine").unwrap();
+    assert!(command(&parts).status().unwrap().success());
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+    fs::remove_dir_all(&folder).unwrap();
+    assert!(fs::read(&whole).unwrap() == fs::read(&parts).unwrap());
+}
+
+/// Runs a command in words, in the folder of these tests.
+fn said(words: &str) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+    command.current_dir(env!("CARGO_TARGET_TMPDIR"));
+    let done = command.args(words.split(' ')).output().unwrap();
+    let text = [done.stdout, done.stderr].map(|t| String::from_utf8_lossy(&t).into_owned());
+    (done.status.code(), text.concat())
+}
+
+#[test]
+fn shards_from_anywhere_make_the_answer_of_one_machine() {
+    town_file("shared.prt");
+    for folder in ["job-a", "job-b"] {
+        let _ = fs::remove_dir_all(place(folder));
+    }
+    let one = format!("pvs shared.prt --max-memory {LITTLE} -o shared.pvs");
+    assert_eq!(said(&one).0, Some(0));
+    let plan = format!("job plan shared.prt --max-memory {LITTLE} -o");
+    let (code, keys) = said(&format!("{plan} job-a"));
+    assert_eq!(code, Some(0), "{keys}");
+    let keys: Vec<&str> = keys.lines().collect();
+    assert!(keys.len() > 3, "{keys:?}");
+    assert_eq!(said(&format!("{plan} job-b")).0, Some(0));
+    // The same job again is fine, another one an error.
+    assert_eq!(said(&format!("{plan} job-b")).0, Some(0));
+    let (code, error) = said("job plan shared.prt --mode fast -o job-b");
+    assert!(
+        code == Some(1) && error.contains("something else"),
+        "{error}"
+    );
+    let (code, error) = said("job run job-a 00000000000000aa");
+    assert!(code == Some(1) && error.contains("not a shard"), "{error}");
+    // Two machines; both compute the second shard, and one leaves half of the third.
+    assert_eq!(
+        said(&format!("job run job-a {} {}", keys[1], keys[0])).0,
+        Some(0)
+    );
+    let (code, error) = said("job finish job-a -o made.pvs");
+    assert!(code == Some(1) && error.contains("are missing"), "{error}");
+    assert!(!place("made.pvs").exists());
+    let rest = keys[1..].join(" ");
+    assert_eq!(
+        said(&format!("job run job-b {rest} --threads 1")).0,
+        Some(0)
+    );
+    let shard = |folder: &str, key: &str| place(folder).join(format!("shards/{key}.block"));
+    let [a, b] = ["job-a", "job-b"].map(|folder| fs::read(shard(folder, keys[1])).unwrap());
+    assert!(a == b);
+    let third = shard("job-b", keys[2]);
+    let bytes = fs::read(&third).unwrap();
+    fs::write(&third, &bytes[..bytes.len() / 2]).unwrap();
+    let (code, text) = said("job merge job-a job-b");
+    assert!(code == Some(0) && text.contains("1 are missing"), "{text}");
+    let (code, text) = said("job run job-a");
+    assert!(
+        code == Some(0) && text.contains("1 shards computed"),
+        "{text}"
+    );
+    assert!(fs::read(shard("job-a", keys[2])).unwrap() == bytes);
+    assert_eq!(said("job finish job-a -o made.pvs").0, Some(0));
+    let [made, one] = ["made.pvs", "shared.pvs"].map(|name| fs::read(place(name)).unwrap());
+    assert!(made == one);
+    assert!(shard("job-a", keys[0]).exists() && !place("made.pvs.blocks").exists());
+    // A job whose input was changed is refused.
+    fs::write(place("job-b").join("input.prt"), PRT).unwrap();
+    let (code, error) = said("job run job-b");
+    assert!(
+        code == Some(1) && error.contains("plan it again"),
+        "{error}"
+    );
 }
 
 // Covers Q7 and Q9.

@@ -41,8 +41,8 @@ pub struct VisConfig {
     pub max_chains: usize,
     /// Record proofs in [`crate::VisOutput::evidence`]. About doubles the time.
     pub has_evidence: bool,
-    /// Most memory that a graph may be estimated to need. Larger ones are refused before anything is allocated.
-    /// [Units: bytes]
+    /// Most memory that a graph may be estimated to need. A graph whose tables are larger is searched in blocks that
+    /// fit; one that is itself larger, or with evidence, is refused before anything is allocated. [Units: bytes]
     pub max_memory: u64,
 }
 
@@ -116,9 +116,19 @@ pub struct VisContext<'a> {
     pub checkpoint: Option<VisCheckpoint<'a>>,
 }
 
+/// Finished blocks of a search, kept in a folder or elsewhere; see [`VisPlan`](crate::VisPlan).
+pub trait VisBlocks {
+    /// Returns the bytes that were put under a key, if they are there.
+    fn get(&mut self, key: u64) -> Option<Vec<u8>>;
+    /// Keeps bytes under a key. Bytes of a key are always the same.
+    fn put(&mut self, key: u64, bytes: &[u8]);
+}
+
 /// Saves and resumes a search; its result is that of an uninterrupted one.
 pub struct VisCheckpoint<'a> {
-    /// A saved state. Refused if the graph or the settings differ.
+    /// Place of the blocks of a graph that is searched in several.
+    pub blocks: Option<&'a mut (dyn VisBlocks + Send)>,
+    /// A saved state of a search in one piece. Refused if the graph or the settings differ.
     pub resume: Option<Vec<u8>>,
     /// A number that changes with [`VisContext::walls`].
     pub salt: u64,

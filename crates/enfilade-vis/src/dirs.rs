@@ -14,7 +14,7 @@ use crate::bits::{self, BitTable};
 pub(crate) struct Dir {
     pub(crate) from: u32,
     pub(crate) to: u32,
-    /// Number of the direction in [`SightGraph`].
+    /// Number of the direction in the [`SightGraph`] that holds all portals here; see [`Dirs::name`].
     pub(crate) id: u32,
     /// Unit normal, from `from` to `to`; zero if the winding has no area.
     pub(crate) normal: DVec3,
@@ -46,6 +46,8 @@ pub(crate) struct Dirs {
     pub(crate) reverse: Vec<u32>,
     /// For each direction, the number of its portal.
     portals: Vec<u32>,
+    /// For each portal, its number in the whole graph.
+    names: Vec<u32>,
     /// For each direction, the data used most, side by side: the ball around it (center, radius), its plane (normal,
     /// height half way between `low` and `high`), and the range of exits of the cell that it leads into.
     pub(crate) balls: Vec<[f64; 4]>,
@@ -157,6 +159,7 @@ impl Dirs {
             all,
             reverse,
             portals,
+            names: (0..graph.portals.len() as u32).collect(),
             balls,
             planes,
             ahead,
@@ -166,6 +169,28 @@ impl Dirs {
             edges,
             scale,
         }
+    }
+
+    /// Takes only some portals of a graph, ascending. Cells, directions and errors are those of the whole: only what the
+    /// other portals show is missing.
+    pub(crate) fn of_some(graph: &SightGraph, portals: Vec<u32>, scale: f64) -> Self {
+        let some = SightGraph {
+            n_cells: graph.n_cells,
+            portals: (portals.iter())
+                .map(|&i| graph.portals[i as usize].clone())
+                .collect(),
+        };
+        Self {
+            names: portals,
+            scale,
+            ..Self::new(&some)
+        }
+    }
+
+    /// Returns the number of a direction in the whole graph.
+    #[inline]
+    pub(crate) fn name(&self, dir: usize) -> u32 {
+        2 * self.names[self.portals[dir] as usize] + self.all[dir].id % 2
     }
 
     #[inline]
@@ -328,24 +353,29 @@ impl Dirs {
     /// Computes [`Dirs::past_row`] from the balls around openings, and from their vertices where the balls do not
     /// decide.
     fn past_row_alone(&self, d: usize, of_id: &[u32], clearance: f64) -> Vec<u64> {
-        let dir = &self.all[d];
-        let slack = 1e-12 * self.scale;
         let mut row = vec![0; (of_id.len() / 2).div_ceil(64)];
         for (k, pair) in of_id.chunks_exact(2).enumerate() {
-            let other = pair[0] as usize;
-            let [x, y, z, radius] = self.balls[other];
-            let height = dir.normal.dot(DVec3::new(x, y, z)) - dir.low;
-            let is_past = dir.normal == DVec3::ZERO
-                || height > clearance + slack
-                || height + radius > -slack && {
-                    let corners = self.winding(other).iter().map(|&p| dir.normal.dot(p));
-                    let reach = corners.fold(f64::NEG_INFINITY, f64::max) - dir.low;
-                    reach > clearance
-                        || reach > 0.0 && reach > clearance * sine(dir.normal, self.all[other].turn)
-                };
+            let is_past = self.is_past(d, pair[0] as usize, clearance);
             row[k / 64] |= u64::from(is_past) << (k % 64);
         }
         row
+    }
+
+    /// Returns `true` if an opening reaches far enough in front of another's plane to let lines with clearance through.
+    #[inline]
+    pub(crate) fn is_past(&self, d: usize, other: usize, clearance: f64) -> bool {
+        let dir = &self.all[d];
+        let slack = 1e-12 * self.scale;
+        let [x, y, z, radius] = self.balls[other];
+        let height = dir.normal.dot(DVec3::new(x, y, z)) - dir.low;
+        dir.normal == DVec3::ZERO
+            || height > clearance + slack
+            || height + radius > -slack && {
+                let corners = self.winding(other).iter().map(|&p| dir.normal.dot(p));
+                let reach = corners.fold(f64::NEG_INFINITY, f64::max) - dir.low;
+                reach > clearance
+                    || reach > 0.0 && reach > clearance * sine(dir.normal, self.all[other].turn)
+            }
     }
 
     fn past_row(&self, d: usize, heights: &[[f64; 2]], of_id: &[u32], clearance: f64) -> Vec<u64> {
@@ -379,7 +409,7 @@ impl Dirs {
     /// Returns `true` if the balls around two openings are within the far plane's distance of each other. A line from
     /// the first cell to behind `next` crosses both openings.
     #[inline]
-    fn is_near(&self, first: usize, next: usize, far: Option<f64>) -> bool {
+    pub(crate) fn is_near(&self, first: usize, next: usize, far: Option<f64>) -> bool {
         let (a, b) = (&self.all[first], &self.all[next]);
         far.is_none_or(|far| a.center.distance(b.center) - a.radius - b.radius <= far)
     }
@@ -486,101 +516,4 @@ fn unit_normal(winding: &[DVec3]) -> DVec3 {
 }
 
 #[cfg(test)]
-mod tests {
-    use enfilade_cpg::SightPortal;
-
-    use super::*;
-    use crate::rng::Rng;
-
-    /// A chain of cells joined by random triangles, or as many cells around one. Some triangles lie in one plane,
-    /// some a hair from another's.
-    fn random_dirs(seed: u64, n_portals: usize, is_star: bool) -> Dirs {
-        let mut rng = Rng::new(seed);
-        let mut portals = Vec::new();
-        for cell in 0..n_portals {
-            let mut point = || DVec3::new(rng.unit(), rng.unit(), rng.unit()) * 8.0;
-            let mut winding = vec![point(), point(), point()];
-            if cell % 3 == 0 {
-                winding.iter_mut().for_each(|p| p.z = p.z.round());
-            }
-            if cell % 4 == 1 {
-                let last: &SightPortal = &portals[cell - 1];
-                let shift = [0.0, 1e-8, 1e-7, -1e-7][rng.below(4)];
-                winding = last.winding.iter().map(|&p| p + DVec3::Z * shift).collect();
-            }
-            portals.push(SightPortal {
-                cells: [if is_star { 0 } else { cell as u32 }, cell as u32 + 1],
-                winding,
-                pieces: Vec::new(),
-            });
-        }
-        Dirs::new(&SightGraph {
-            n_cells: n_portals as u32 + 1,
-            portals,
-        })
-    }
-
-    #[test]
-    fn balls_say_of_sides_what_corners_say() {
-        for seed in 0..50 {
-            let dirs = random_dirs(seed, 40, false);
-            let mut of_id = vec![0u32; dirs.len()];
-            for (d, dir) in dirs.all.iter().enumerate() {
-                of_id[dir.id as usize] = d as u32;
-            }
-            for d in 0..dirs.len() {
-                let turn = dirs.all[d].turn;
-                let heights: Vec<[f64; 2]> = (0..dirs.len() / 2)
-                    .map(|i| dirs.extent(of_id[2 * i] as usize, turn))
-                    .collect();
-                let clearance = 1e-7;
-                assert_eq!(
-                    dirs.past_row_alone(d, &of_id, clearance),
-                    dirs.past_row(d, &heights, &of_id, clearance),
-                    "{seed} {d}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn exits_at_hand_are_those_of_the_table() {
-        for seed in 0..20 {
-            // Every other time, use more exits than a mask holds.
-            let dirs = random_dirs(seed, 80, seed % 2 == 0);
-            let n = dirs.len();
-            let mut rng = Rng::new(seed + 100);
-            let mut might = BitTable::new(n, n);
-            for a in 0..n {
-                for b in 0..n {
-                    if rng.unit() < 0.7 {
-                        might.set(a, b);
-                    }
-                }
-            }
-            let mut next = Next::new(&dirs, &might);
-            for source in 0..n {
-                let mut hidden = vec![0; might.n_words()];
-                for _ in 0..n / 4 {
-                    bits::set(&mut hidden, rng.below(n));
-                }
-                let mut expected = might.clone();
-                for t in bits::ones(&hidden) {
-                    expected.clear(source, t);
-                    expected.clear(dirs.reverse[t] as usize, dirs.reverse[source] as usize);
-                }
-                next.hide(&dirs, &mut might, source, &hidden);
-                assert!(might == expected, "{seed} {source}");
-            }
-            for d in 0..n {
-                let exits = dirs.after(d);
-                let windows = exits.clone().step_by(64);
-                let at_hand = windows.flat_map(|start| {
-                    bits::ones_from(start, next.window((&might, d), &exits, start))
-                });
-                let of_table = exits.clone().filter(|&q| might.get(d, q));
-                assert!(at_hand.eq(of_table), "{seed} {d}");
-            }
-        }
-    }
-}
+mod tests;

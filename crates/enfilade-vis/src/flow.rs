@@ -115,11 +115,13 @@ impl Flow {
             source,
             ..Found::default()
         };
+        self.wanted.clear();
         self.wanted.resize(n_words, 0);
-        dirs.entries_of(shared.seen.row(dir.from as usize), &mut self.wanted);
-        for (w, &m) in self.wanted.iter_mut().zip(shared.might.row(source)) {
-            *w = m & !*w;
-        }
+        let seen = shared.seen.row(dir.from as usize);
+        let might = bits::ones(shared.might.row(source));
+        might
+            .filter(|&q| !bits::get(seen, dirs.all[q].to as usize))
+            .for_each(|q| bits::set(&mut self.wanted, q));
         let poly = self.begin(shared, source);
         self.set_reach(0, shared.might.row(source));
         if self.wanted.iter().any(|&w| w != 0) {

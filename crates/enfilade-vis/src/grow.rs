@@ -62,7 +62,7 @@ impl Search<'_> {
                 .into_par_iter()
                 .with_max_len(1)
                 .map(|a| {
-                    let unseen = bits::ones(visible.row(a)).filter(|&b| b > a);
+                    let unseen = bits::ones(visible.row(a)).filter(|&b| self.is_first(a, b));
                     let unseen = unseen.filter(|&b| !self.seen.get(a, b));
                     let mut rng =
                         Rng::new(round * dirs.n_all_cells as u64 + u64::from(dirs.cells[a]));

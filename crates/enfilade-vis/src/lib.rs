@@ -12,6 +12,10 @@
 //!
 //! `search` runs the stages in rounds, so that results do not depend on threads.
 //!
+//! A large graph is searched block by block ([`VisPlan`]): `plan` divides it, `windows` finds the part of the graph that a
+//! block's cells might see, with bounds that take the place of stages 1 and 2, `blocks` runs the others there, and `rows`
+//! puts the rows of all blocks together.
+//!
 //! [`see_world`] does the same for a world's graph, special portals included: it searches the graph unfolded at them
 //! (`specials`, `unfold`).
 //!
@@ -24,6 +28,7 @@
 //! settles counts as visible and appears in [`VisOutput::undecided`].
 
 mod bits;
+mod blocks;
 mod checkpoint;
 mod clip;
 mod config;
@@ -37,12 +42,14 @@ mod narrow;
 mod occlude;
 mod output;
 mod parts;
+mod plan;
 mod planes;
 mod polytope;
 mod prove;
 mod rays;
 mod recheck;
 mod rng;
+mod rows;
 mod search;
 mod shade;
 mod sheets;
@@ -51,6 +58,7 @@ mod stabbing;
 mod tolerance;
 mod unfold;
 mod volumes;
+mod windows;
 
 use std::time::Instant;
 
@@ -58,58 +66,51 @@ use enfilade_cpg::{Pvs, SightGraph};
 use enfilade_geom::{Bvh, DVec3};
 
 use config::KEPT;
-use dirs::Dirs;
 use rays::Blocker;
 use search::{Rest, Search};
 use sheets::Sheets;
 
-pub use config::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
+pub use config::{VisBlocks, VisCheckpoint, VisConfig, VisContext, VisError, VisMode};
 pub use hourglass::{Hourglass, Hourglasses};
 pub use output::{VisOutput, Witness};
 pub use parts::{see_parts, see_parts_through};
-pub use specials::{WorldVis, see_world};
+pub use plan::VisPlan;
+pub use specials::{WorldVis, plain_sight, see_world};
 pub use volumes::piece_faces;
-
-/// Lines tried between each two cells that only walls may hide from each other, and rounds of that, before beams.
-const INSIST_LINES: usize = 50;
-const INSIST_ROUNDS: u64 = 2;
 
 /// Finds the cells that can be seen from every cell.
 ///
-/// Memory: three bits for each pair of directions, for a short time; cells without a portal take none. Time grows
-/// with the pairs to decide: a map of 3,000 portals takes a second, one of 10,000 a minute.
+/// A graph of up to 10,000 portals is searched in one piece. Memory: three bits for each pair of directions, for a short
+/// time; cells without a portal take none. Time grows with the pairs to decide: a map of 3,000 portals takes a second,
+/// one of 10,000 a minute. A larger graph is searched block by block ([`VisPlan`]): memory goes with what the cells of a
+/// block might see, within [`VisConfig::max_memory`], and time with the cells if each sees about as much.
 ///
 /// # Errors
 ///
-/// A broken graph, one whose tables would exceed [`VisConfig::max_memory`], a setting that is negative or not a
-/// number, or a checkpoint that does not fit.
+/// As [`VisPlan::new`], or a checkpoint that does not fit.
 pub fn see_all(
     graph: &SightGraph,
     config: &VisConfig,
     context: &mut VisContext<'_>,
 ) -> Result<VisOutput, VisError> {
-    graph.validate()?;
-    check("clearance", config.clearance)?;
-    check("the far plane", config.far)?;
-    let dirs = Dirs::new(graph);
-    let estimate = estimate(&dirs, config.has_evidence);
-    if estimate > config.max_memory {
-        return Err(VisError::TooLarge {
-            n_portals: graph.portals.len(),
-            estimate,
-            limit: config.max_memory,
-        });
+    let salt = context.checkpoint.as_ref().map_or(0, |c| c.salt);
+    let plan = VisPlan::new(graph, config, salt)?;
+    if !plan.is_whole {
+        return see_blocks(&plan, context);
     }
-    let clearance = config.clearance.unwrap_or(1e-8 * dirs.scale);
-    // The search keeps more than it promises, so that a checker that rounds differently still closes every chain.
+    if let Some(found) = kept_whole(&plan, context) {
+        return plan.finish(&[found]);
+    }
+    let dirs = &plan.dirs;
     let bvh = context.walls.map(Bvh::build);
     let is_blocked = bvh
         .as_ref()
         .map(|bvh| move |a: DVec3, b: DVec3| bvh.any_hit(a, b, |_| false));
     let blocker = is_blocked.as_ref().map(|f| f as Blocker<'_>);
-    let mut search = Search::new(&dirs, KEPT * clearance, config.far, blocker);
-    let n_base = search.visible().count_all() + dirs.n_alone();
-    let salt = context.checkpoint.as_ref().map_or(0, |c| c.salt);
+    // The search keeps more than it promises, so that a checker that rounds differently still closes every chain.
+    let kept = KEPT * plan.clearance;
+    let mut search = Search::new(dirs, kept, config.far, blocker);
+    let n_base = search.n_pairs() + dirs.n_alone();
     let key = checkpoint::key(graph, config, salt);
     let resumed = match &context.checkpoint {
         Some(VisCheckpoint {
@@ -124,12 +125,7 @@ pub fn see_all(
         _ => None,
     };
     if resumed.is_none() {
-        narrow::narrow_might(
-            &dirs,
-            &mut search.might,
-            &mut search.settled,
-            &search.tolerance,
-        );
+        search.narrow();
     }
     let is_complete = match (config.mode, resumed) {
         (VisMode::Fast, _) => {
@@ -149,9 +145,8 @@ pub fn see_all(
         && is_complete
         && let (Some(walls), Some(bvh)) = (context.walls, &bvh)
     {
-        search.insist(INSIST_LINES, INSIST_ROUNDS, &mut *context.on_round);
         let sheets = Sheets::new(walls, bvh);
-        search.settle_by_walls(&sheets, clearance, &mut *context.on_round);
+        search.settle_inside(&sheets, plan.clearance, &mut *context.on_round);
     }
     let evidence = config
         .has_evidence
@@ -163,12 +158,47 @@ pub fn see_all(
     })
 }
 
-/// Returns the estimated memory of a search's tables. [Units: bytes]
-fn estimate(dirs: &Dirs, has_evidence: bool) -> u64 {
-    let square = |n: usize| (n as u64).saturating_mul(n as u64);
-    let n_tables = if has_evidence { 5 } else { 3 };
-    let bits = square(dirs.len()).saturating_mul(n_tables);
-    bits.saturating_add(square(dirs.n_cells).saturating_mul(4)) / 8
+/// Returns the bytes of a graph in one piece that are kept as a block.
+fn kept_whole(plan: &VisPlan<'_>, context: &mut VisContext<'_>) -> Option<Vec<u8>> {
+    if plan.config.has_evidence || plan.n_blocks() != 1 {
+        return None;
+    }
+    let store = context.checkpoint.as_mut()?.blocks.as_deref_mut()?;
+    let found = store.get(plan.key(0));
+    found.filter(|bytes| plan.is_block(0, bytes))
+}
+
+/// Searches a graph block by block; takes those that are kept, and keeps those that are done.
+fn see_blocks(plan: &VisPlan<'_>, context: &mut VisContext<'_>) -> Result<VisOutput, VisError> {
+    let mut checkpoint = context.checkpoint.take();
+    if let Some(VisCheckpoint {
+        resume: Some(_), ..
+    }) = &checkpoint
+    {
+        let problem = "it is of a search in one piece";
+        return Err(VisError::Checkpoint { problem });
+    }
+    let mut store = checkpoint.as_mut().and_then(|c| c.blocks.as_deref_mut());
+    let mut found = Vec::new();
+    let mut left = Vec::new();
+    for block in 0..plan.n_blocks() {
+        let kept = store.as_mut().and_then(|s| s.get(plan.key(block)));
+        match kept.filter(|bytes| plan.is_block(block, bytes)) {
+            Some(bytes) => found.push(bytes),
+            None => left.push(block),
+        }
+    }
+    let is_complete = plan.search(&left, context, &mut |block, bytes, is_complete| {
+        if let Some(store) = store.as_mut().filter(|_| is_complete) {
+            store.put(plan.key(block), &bytes);
+        }
+        found.push(bytes);
+    });
+    context.checkpoint = checkpoint;
+    Ok(VisOutput {
+        is_complete,
+        ..plan.finish(&found)?
+    })
 }
 
 /// Runs the search; saves its state from time to time and when `on_round` stops it. Returns `true` if it is complete.
@@ -197,13 +227,6 @@ fn run(
     })
 }
 
-fn check(name: &'static str, value: Option<f64>) -> Result<(), VisError> {
-    match value {
-        Some(value) if value.is_nan() || value < 0.0 => Err(VisError::Setting { name, value }),
-        _ => Ok(()),
-    }
-}
-
 fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
     let visible = search.visible();
     let names = &search.dirs.cells;
@@ -225,6 +248,7 @@ fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
     let cells = rows(true, &|_, _| true);
     let undecided = rows(false, &is_undecided);
     let n_steps = search.effort.steps;
+    let n_lines = search.lines.len() as u64;
     let id = |d: u32| search.dirs.all[d as usize].id;
     let witnesses = search
         .lines
@@ -242,6 +266,7 @@ fn output(search: Search<'_>, n_base: u64, is_complete: bool) -> VisOutput {
         is_complete,
         n_base,
         n_steps,
+        n_lines,
         evidence: None,
     }
 }

@@ -12,6 +12,7 @@ use crate::clip::Arena;
 use crate::dirs::{Dirs, Next};
 use crate::flow::{back_of, facing, front_of};
 use crate::planes::{Four, admits, pack, separators};
+use crate::search::Search;
 use crate::tolerance::Tolerance;
 
 /// Openings per round; see [`crate::search`].
@@ -46,6 +47,18 @@ pub(crate) fn narrow_might(
             next.hide(dirs, might, source, &gone);
             bits::unite(settled.row_mut(source), &gone);
         }
+    }
+}
+
+impl Search<'_> {
+    /// Does [`narrow_might`] for the search's own tables.
+    pub(crate) fn narrow(&mut self) {
+        narrow_might(
+            self.dirs,
+            &mut self.might,
+            &mut self.settled,
+            &self.tolerance,
+        );
     }
 }
 

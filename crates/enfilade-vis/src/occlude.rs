@@ -21,6 +21,10 @@ use crate::rays::{Line, walk};
 use crate::search::{Closed, Search};
 use crate::sheets::{Beam, Hull, Part, Sheets, cut, halves, inner_point, size, write_tree};
 
+/// Lines tried between each two cells that only walls may hide from each other, and rounds of that, before beams.
+const INSIST_LINES: usize = 50;
+const INSIST_ROUNDS: u64 = 2;
+
 /// Most pieces that the lines between two openings are cut into: in the first pass, in which a line that is easily
 /// found saves the rest, and in the second.
 const FEW_BEAMS: usize = 300;
@@ -86,10 +90,21 @@ impl Dirs {
 }
 
 impl Search<'_> {
+    /// Settles pairs of cells that only walls inside other cells may hide from each other: random lines first.
+    pub(crate) fn settle_inside(
+        &mut self,
+        sheets: &Sheets<'_>,
+        inset: f64,
+        on_round: &mut (dyn FnMut(u64, u64) -> bool + Send),
+    ) {
+        self.insist(INSIST_LINES, INSIST_ROUNDS, &mut *on_round);
+        self.settle_by_walls(sheets, inset, &mut *on_round);
+    }
+
     /// Settles pairs of cells that only walls inside other cells can hide from each other: by a line, or by beams
     /// that sheets of triangles close. Near pairs come first, as their results help those beyond. Stops when
     /// `on_round` returns `false`.
-    pub(crate) fn settle_by_walls(
+    fn settle_by_walls(
         &mut self,
         sheets: &Sheets<'_>,
         inset: f64,
@@ -100,7 +115,7 @@ impl Search<'_> {
         let mut pairs = Vec::new();
         for a in 0..n {
             let unseen: Vec<usize> = bits::ones(visible.row(a))
-                .filter(|&b| b > a && !self.seen.get(a, b))
+                .filter(|&b| self.is_first(a, b) && !self.seen.get(a, b))
                 .collect();
             if !unseen.is_empty() {
                 let steps = self.steps_from(a);

@@ -22,11 +22,14 @@ pub struct VisOutput {
     pub cells: Pvs,
     /// For each cell, those of `cells` that no line proves. All others are certain.
     pub undecided: Pvs,
-    /// Lines that together prove everything else in `cells`.
+    /// Lines that together prove everything else in `cells`; none if the graph was searched in several blocks.
     pub witnesses: Vec<Witness>,
+    /// Number of lines that prove it, kept or not.
+    pub n_lines: u64,
     /// `true` if the search ended by itself; otherwise the answer is larger than necessary.
     pub is_complete: bool,
-    /// Number of pairs left by sides of planes alone, an upper bound for comparison.
+    /// Number of pairs left by sides of planes alone, or by the floods of several blocks: an upper bound for
+    /// comparison.
     pub n_base: u64,
     /// Number of chains searched.
     pub n_steps: u64,

@@ -38,8 +38,28 @@ pub(crate) struct Closed {
     pub(crate) tree: Vec<u8>,
 }
 
+/// The part of an answer that a search is asked for: pairs of a source and a target. Sets of cells, as bits.
+#[derive(Clone, Debug)]
+pub(crate) struct Scope {
+    /// Cells whose rows are asked for; targets, too.
+    pub(crate) sources: Vec<u64>,
+    pub(crate) targets: Vec<u64>,
+}
+
+impl Scope {
+    /// Returns the cells that are asked for with another one; `None` if there are none.
+    fn asked(&self, cell: usize) -> Option<&[u64]> {
+        if bits::get(&self.sources, cell) {
+            return Some(&self.targets);
+        }
+        bits::get(&self.targets, cell).then_some(&self.sources)
+    }
+}
+
 pub(crate) struct Search<'a> {
     pub(crate) dirs: &'a Dirs,
+    /// `None` if everything is asked for.
+    pub(crate) scope: Option<Scope>,
     pub(crate) might: BitTable,
     /// Pairs of cells proved visible.
     pub(crate) seen: BitTable,
@@ -59,20 +79,47 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
+    /// Starts from the sides of planes.
     pub(crate) fn new(
         dirs: &'a Dirs,
         clearance: f64,
         far: Option<f64>,
         blocker: Option<Blocker<'a>>,
     ) -> Self {
+        let might = dirs.might_see(clearance, far);
+        Self::within(dirs, (might, None), clearance, far, blocker)
+    }
+
+    /// Starts from openings that each opening might see, for the part of the answer that is asked for.
+    pub(crate) fn within(
+        dirs: &'a Dirs,
+        (might, scope): (BitTable, Option<Scope>),
+        clearance: f64,
+        far: Option<f64>,
+        blocker: Option<Blocker<'a>>,
+    ) -> Self {
         let n = dirs.n_cells;
         let mut seen = BitTable::new(n, n);
+        if let Some(scope) = &scope {
+            // Nothing looks for pairs that count as seen.
+            let mut all = vec![0; n.div_ceil(64)];
+            (0..n).for_each(|c| bits::set(&mut all, c));
+            for cell in 0..n {
+                let row = seen.row_mut(cell);
+                row.copy_from_slice(&all);
+                let asked = scope.asked(cell).into_iter().flatten();
+                row.iter_mut()
+                    .zip(asked)
+                    .for_each(|(word, asked)| *word &= !asked);
+            }
+        }
         for c in 0..n {
             seen.set(c, c);
         }
         Self {
             dirs,
-            might: dirs.might_see(clearance, far),
+            scope,
+            might,
             seen,
             undecided: BitTable::new(n, n),
             settled: BitTable::new(dirs.len(), dirs.len()),
@@ -102,7 +149,7 @@ impl<'a> Search<'a> {
 
     fn cast_from(&self, opening: usize, n_rays: usize) -> Vec<Line> {
         let dirs = self.dirs;
-        let mut rng = Rng::new(u64::from(dirs.all[opening].id));
+        let mut rng = Rng::new(u64::from(dirs.name(opening)));
         let mut lines = Vec::new();
         let mut wanted = [Vec::new(), Vec::new()];
         let both = [opening, dirs.reverse[opening] as usize];
@@ -269,9 +316,20 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Returns all openings, those that might see least first.
+    /// Returns `true` if the row of a cell is asked for.
+    pub(crate) fn is_source(&self, cell: usize) -> bool {
+        (self.scope.as_ref()).is_none_or(|scope| bits::get(&scope.sources, cell))
+    }
+
+    /// Returns `true` for one of the two orders of a pair of cells, of which the first is a source.
+    pub(crate) fn is_first(&self, a: usize, b: usize) -> bool {
+        a < b || !self.is_source(b)
+    }
+
+    /// Returns all openings out of cells whose rows are asked for, those that might see least first.
     pub(crate) fn all_openings(&self) -> Rest {
         let mut order: Vec<(usize, usize)> = (0..self.dirs.len())
+            .filter(|&d| self.is_source(self.dirs.all[d].from as usize))
             .map(|d| (bits::count(self.might.row(d)), d))
             .collect();
         order.sort_unstable();
@@ -383,7 +441,22 @@ impl<'a> Search<'a> {
         self.effort.add(&found.effort);
     }
 
-    /// Returns the pairs of cells that may see each other.
+    /// Returns the number of pairs that may see each other, in both orders. Of those that are asked for, pairs of two
+    /// sources come up in both rows.
+    pub(crate) fn n_pairs(&self) -> u64 {
+        let visible = self.visible();
+        let Some(scope) = &self.scope else {
+            return visible.count_all();
+        };
+        let count = |a: usize| {
+            let row = visible.row(a).iter().zip(&scope.sources);
+            let twice = row.map(|(row, sources)| (row & !sources).count_ones() as usize);
+            bits::count(visible.row(a)) + twice.sum::<usize>()
+        };
+        bits::ones(&scope.sources).map(|a| count(a) as u64).sum()
+    }
+
+    /// Returns the pairs of cells that may see each other, in the rows and of the pairs that are asked for.
     pub(crate) fn visible(&self) -> BitTable {
         let n = self.dirs.n_cells;
         let mut visible = BitTable::new(n, n);
@@ -391,11 +464,18 @@ impl<'a> Search<'a> {
         let rows = visible.words_mut().par_chunks_mut(n_words);
         rows.enumerate().with_min_len(16).for_each(|(cell, row)| {
             bits::set(row, cell);
+            if !self.is_source(cell) {
+                return;
+            }
             for d in self.dirs.exits(cell as u32) {
                 bits::set(row, self.dirs.all[d].to as usize);
                 for t in bits::ones(self.might.row(d)) {
                     bits::set(row, self.dirs.all[t].to as usize);
                 }
+            }
+            if let Some(scope) = &self.scope {
+                let targets = row.iter_mut().zip(&scope.targets);
+                targets.for_each(|(word, &targets)| *word &= targets);
             }
         });
         visible

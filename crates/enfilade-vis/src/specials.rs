@@ -22,11 +22,11 @@ use enfilade_cpg::{CellId, CellPortalGraph, Pvs, SightGraph};
 use crate::bits;
 use crate::config::{KEPT, VisConfig, VisContext, VisError, VisMode};
 use crate::dirs::Dirs;
-use crate::narrow::narrow_might;
 use crate::output::VisOutput;
+use crate::plan::memory;
 use crate::search::{Rest, Search};
+use crate::see_all;
 use crate::unfold::{Goal, Node, Unfolded};
-use crate::{estimate, see_all};
 
 /// Precomputed visibility of a world's graph, special portals included.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +93,7 @@ pub fn see_world(
             break;
         }
         let dirs = Dirs::new(&sight);
-        if estimate(&dirs, false) > config.max_memory {
+        if memory(dirs.len() as u64, false) > config.max_memory {
             break;
         }
         let clearance = KEPT * clearance * unfolded.least_scale();
@@ -119,6 +119,16 @@ pub fn see_world(
     }
     vis.is_complete = is_complete;
     Ok(rows.output(&unfolded, vis, context.walls.is_some()))
+}
+
+/// Returns the graph that [`see_world`] searches first, and in blocks if it is large: that of the doorways that are open
+/// from both sides. For [`VisPlan`](crate::VisPlan).
+#[must_use]
+pub fn plain_sight(graph: &CellPortalGraph) -> SightGraph {
+    if graph.specials.is_empty() {
+        return SightGraph::of_graph(graph);
+    }
+    Unfolded::new(graph).plain_graph().0
 }
 
 /// Cells seen from those of the first layer that see a special portal.
@@ -201,12 +211,7 @@ impl<'a> Rows<'a> {
                 search.seen.set(a, c);
             }
         }
-        narrow_might(
-            dirs,
-            &mut search.might,
-            &mut search.settled,
-            &search.tolerance,
-        );
+        search.narrow();
         search.cast(config.n_rays);
         search.grow();
         let mut is_complete = true;
@@ -263,12 +268,17 @@ impl<'a> Rows<'a> {
 
     fn output(&self, unfolded: &Unfolded, vis: VisOutput, has_walls: bool) -> WorldVis {
         let n = self.plain.n_cells();
-        let mut through = bits::BitTable::new(n, n);
-        let mut proved = bits::BitTable::new(n, n);
-        // Cells that see what the cameras in which cells see.
+        // Only cells with a row see anything through special portals. Rows ascend.
+        let place = |cell: usize| {
+            self.all
+                .binary_search_by_key(&(cell as u32), |row| row.cell)
+                .ok()
+        };
+        let mut through = bits::BitTable::new(self.all.len(), n);
+        let mut proved = bits::BitTable::new(self.all.len(), n);
+        // Rows that see what the cameras in which cells see.
         let mut watched: BTreeSet<(usize, usize)> = BTreeSet::new();
-        for row in &self.all {
-            let a = row.cell as usize;
+        for (a, row) in self.all.iter().enumerate() {
             for &(layer, cell) in row.seen.iter().filter(|node| node.0 != 0) {
                 match unfolded.goal(layer) {
                     Some(Goal::Cameras(cells)) => {
@@ -290,8 +300,10 @@ impl<'a> Rows<'a> {
             has_changed = false;
             for &(a, camera) in &watched {
                 let before = bits::count(through.row(a));
-                let seen = through.row(camera).to_vec();
-                bits::unite(through.row_mut(a), &seen);
+                if let Some(camera) = place(camera) {
+                    let seen = through.row(camera).to_vec();
+                    bits::unite(through.row_mut(a), &seen);
+                }
                 for c in self.plain.visible_from(CellId(camera as u32)) {
                     through.set(a, c.idx());
                 }
@@ -299,20 +311,26 @@ impl<'a> Rows<'a> {
             }
         }
         let ids = || (0..n as u32).map(CellId);
-        let is_seen = |a: CellId, b: CellId| through.get(a.idx(), b.idx());
+        let seen_through = |a: CellId| {
+            let row = place(a.idx()).map(|row| through.row(row));
+            row.into_iter().flat_map(bits::ones).map(|b| b as u32)
+        };
         let row = |a: CellId| {
-            let seen = ids().filter(move |&b| self.plain.sees(a, b) || is_seen(a, b));
-            seen.map(|b| b.0)
+            let plain = self.plain.visible_from(a).map(|b| b.0);
+            let all: BTreeSet<u32> = plain.chain(seen_through(a)).collect();
+            all
         };
         let cells = Pvs::of_ascending(ids().map(row));
         let is_undecided = |a: CellId, b: CellId| {
             let is_plain = self.plain.sees(a, b) && !vis.undecided.sees(a, b);
-            cells.sees(a, b) && !is_plain && !proved.get(a.idx(), b.idx())
+            !is_plain && place(a.idx()).is_none_or(|row| !proved.get(row, b.idx()))
         };
-        let row = |a: CellId| ids().filter(move |&b| is_undecided(a, b)).map(|b| b.0);
+        let row = |a: CellId| {
+            let seen = cells.visible_from(a);
+            seen.filter(move |&b| is_undecided(a, b)).map(|b| b.0)
+        };
         let undecided = Pvs::of_ascending(ids().map(row));
-        let row = |a: CellId| bits::ones(through.row(a.idx())).map(|b| b as u32);
-        let through_rows = Pvs::of_ascending(ids().map(row));
+        let through_rows = Pvs::of_ascending(ids().map(seen_through));
         WorldVis {
             n_chains: unfolded.n_open_specials(),
             n_cut: self.closed_layers(unfolded).len() as u64,

@@ -217,6 +217,7 @@ fn see_in_parts(
         },
         walls: None,
         checkpoint: Some(VisCheckpoint {
+            blocks: None,
             resume,
             salt: 7,
             every: Duration::from_secs(3600),

@@ -22,6 +22,7 @@ use super::first::furnished;
 use super::replay::frame_of;
 use super::settled::draw_stands;
 use super::site::{FRAME, Recorder, Streamed, offices, route, visible_sets};
+use crate::measure::memory;
 use crate::process::target_dir;
 use crate::rows::Figure;
 
@@ -241,14 +242,6 @@ fn walk(dir: &Path) -> anyhow::Result<Value> {
         "peakOfHead": before,
         "peak": memory("VmHWM"),
     }))
-}
-
-/// Returns a size of this process by its name in the system's list; 0 if the system does not have it. [Units: bytes]
-fn memory(name: &str) -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix(name));
-    let kilobytes = line.and_then(|l| l.split_ascii_whitespace().nth(1)?.parse::<u64>().ok());
-    kilobytes.unwrap_or(0) * 1024
 }
 
 /// Returns the figures of the walk through a town, made once.

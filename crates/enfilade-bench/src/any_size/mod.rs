@@ -1,0 +1,58 @@
+//! `bench any-size`: what holds for inputs of any size, each figure with its bar.
+//!
+//! To add rows, add a file for their family beside this one and lines in [`ROWS`]. What is measured in a process of its
+//! own is a [`SizeStep`].
+
+mod pvs;
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, ensure};
+use serde_json::Value;
+
+use crate::living::made;
+use crate::rows::Row;
+
+/// Generated towns, and the largest of them.
+const TOWNS: &[&str] = &["town-1000", "town-10000", "town-100000"];
+const LARGE: &[&str] = &["town-100000"];
+/// Houses in one outdoor cell, into which thousands of windows look.
+const VILLAGES: &[&str] = &["village-5000"];
+
+pub(crate) const ROWS: &[Row] = &[
+    made("pvs: memory", LARGE, pvs::memory_of),
+    made("pvs: rate", LARGE, pvs::rate),
+    made("pvs: missed", TOWNS, pvs::missed),
+    made("pvs: missed", VILLAGES, pvs::missed),
+];
+
+/// Measurements that need a process of their own, as its memory counts.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum SizeStep {
+    /// Compute what is visible in a generated town, and follow lines through it.
+    Pvs,
+}
+
+/// Runs a step on a scene; prints its figures as a line of JSON.
+pub(crate) fn run_step(step: SizeStep, scene: &str) -> anyhow::Result<()> {
+    let figures = match step {
+        SizeStep::Pvs => pvs::measure(scene)?,
+    };
+    println!("{figures}");
+    Ok(())
+}
+
+/// Runs a step in a process of its own; returns its figures.
+fn in_process(step: &str, scene: &str) -> anyhow::Result<Value> {
+    let program: PathBuf = std::env::current_exe().context("this program has no path")?;
+    let mut command = Command::new(program);
+    command.args(["size-step", step, scene]);
+    let output = command.output().context("cannot start this program")?;
+    ensure!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Ok(serde_json::from_slice(&output.stdout)?)
+}
