@@ -176,6 +176,7 @@ fn shards_from_anywhere_make_the_answer_of_one_machine() {
     for folder in ["job-a", "job-b"] {
         let _ = fs::remove_dir_all(place(folder));
     }
+    let _ = fs::remove_file(place("made.pvs"));
     let one = format!("pvs shared.prt --max-memory {LITTLE} -o shared.pvs");
     assert_eq!(said(&one).0, Some(0));
     let plan = format!("job plan shared.prt --max-memory {LITTLE} -o");
