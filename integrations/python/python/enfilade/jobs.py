@@ -1,0 +1,99 @@
+"""Visibility on many machines: the shards of a job, handed to Dask, to Ray, or to a pool of the standard library.
+
+The command ``enfilade`` does the work: it must be on every machine, and the folder of the job where all of them see it. A
+shard computed twice has the same bytes, so nothing is lost or spoilt if a machine dies or is slow:
+
+>>> from dask.distributed import Client
+>>> from enfilade import jobs
+>>> jobs.plan("town.glb", "job")
+>>> jobs.run("job", Client("scheduler:8786"))
+>>> jobs.finish("job", "town.pvs", into="town.glb")
+"""
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from ._native import EnfiladeError
+
+__all__ = ["JobError", "finish", "missing", "plan", "run"]
+
+
+class JobError(EnfiladeError):
+    """A step of a job failed; the message is the command's."""
+
+
+def plan(source, folder, *, mode="exact", far=None, max_memory=None, command="enfilade"):
+    """Divide the work for a world, or a Quake portal file, into shards; return their keys.
+
+    ``max_memory`` is the most memory of a process that computes a shard, in bytes or as the command takes it ("8G"). Less makes
+    more shards; a graph of up to 10,000 portals is a single one unless this is less than its tables. ``far`` is a distance in
+    meters beyond which everything is treated as hidden. The same plan again leaves the folder as it is.
+    """
+    options = ["--mode", mode]
+    if far is not None:
+        options += ["--far", str(far)]
+    if max_memory is not None:
+        options += ["--max-memory", str(max_memory)]
+    _call(command, "plan", os.fspath(source), "-o", os.fspath(folder), *options)
+    return _shards(folder)
+
+
+def missing(folder):
+    """Return the keys of the shards that are not there yet."""
+    done = {path.stem for path in Path(folder, "shards").glob("*.block")}
+    return [key for key in _shards(folder) if key not in done]
+
+
+def run(folder, pool, *, threads=1, retries=3, command="enfilade"):
+    """Compute the missing shards, and wait until all are there; run it again to resume.
+
+    ``pool`` is a ``dask.distributed.Client``, the module ``ray`` after ``ray.init()``, or an executor of
+    ``concurrent.futures``. Dask and Ray compute the shards of workers that die elsewhere, ``retries`` times at most. ``threads`` is
+    the number of threads for a shard; Ray reserves as many processors.
+    """
+    folder = os.path.abspath(os.fspath(folder))
+    keys = missing(folder)
+    arguments = [(command, folder, key, threads) for key in keys]
+    if hasattr(pool, "remote") and hasattr(pool, "get"):
+        shard = pool.remote(_shard).options(num_cpus=threads, max_retries=retries)
+        pool.get([shard.remote(*a) for a in arguments])
+    elif hasattr(pool, "scheduler_info"):
+        futures = [pool.submit(_shard, *a, pure=False, retries=retries) for a in arguments]
+        pool.gather(futures)
+    else:
+        for future in [pool.submit(_shard, *a) for a in arguments]:
+            future.result()
+
+
+def finish(folder, output, *, into=None, command="enfilade"):
+    """Put all shards together: write what ``enfilade pvs`` writes on one machine.
+
+    ``into`` is a file for the world with the answer in it.
+    """
+    options = [] if into is None else ["--into", os.fspath(into)]
+    _call(command, "finish", os.fspath(folder), "-o", os.fspath(output), *options)
+
+
+def _shards(folder):
+    manifest = Path(folder, "manifest.json")
+    try:
+        return json.loads(manifest.read_text(encoding="utf-8"))["shards"]
+    except FileNotFoundError:
+        raise JobError(f"{manifest} is not there: make the job first, with jobs.plan") from None
+
+
+def _shard(command, folder, key, threads):
+    _call(command, "run", folder, key, "--threads", str(threads))
+    return key
+
+
+def _call(command, step, *arguments):
+    program = shutil.which(command)
+    if program is None:
+        raise JobError(f"no program {command!r}: install enfilade's command on this machine, or pass command=PATH")
+    done = subprocess.run([program, "job", step, *arguments], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise JobError(done.stderr.strip() or f"enfilade job {step} ended with code {done.returncode}")
