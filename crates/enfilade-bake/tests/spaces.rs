@@ -2,7 +2,7 @@
 
 use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::{CellId, CellPortalGraph};
-use enfilade_geom::scene::{Material, Mesh, Object, Role, Scene};
+use enfilade_geom::scene::{Material, Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 use enfilade_testkit::solid::{MeshBuilder, aabb};
 
@@ -305,4 +305,57 @@ by! {
         a_beam_across_a_hall_parts_nothing,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
+}
+
+/// Hills of 1 km × 1 km that begin 40 m from the origin, and level land there.
+fn land() -> Mesh {
+    const N: u32 = 100;
+    let mut primitive = Primitive::default();
+    for z in 0..=N {
+        for x in 0..=N {
+            let [x, z] = [x, z].map(|k| 10.0 * (f64::from(k) - f64::from(N) / 2.0));
+            let hill = ((x.hypot(z) - 40.0) / 60.0).clamp(0.0, 1.0);
+            let y = -0.2 + 15.0 * hill * (x / 70.0).sin() * (z / 50.0).cos();
+            primitive.positions.push([x as f32, y as f32, z as f32]);
+        }
+    }
+    for z in 0..N {
+        for x in 0..N {
+            let a = x + z * (N + 1);
+            let [b, c, d] = [a + 1, a + N + 1, a + N + 2];
+            primitive.indices.extend([a, c, d, a, d, b]);
+        }
+    }
+    Mesh {
+        name: String::new(),
+        primitives: vec![primitive],
+    }
+}
+
+#[test]
+fn a_house_on_wide_land_has_the_rooms_of_the_house_at_the_default_voxels() {
+    let air = [
+        ([0.0, 0.0, 0.0], [4.0, 2.6, 4.0]),
+        ([4.2, 0.0, 0.0], [9.0, 2.6, 4.0]),
+        ([4.0, 0.0, 1.0], [4.2, 2.1, 2.0]),
+    ];
+    let alone = baked(Method::Watershed, &air, vec![]);
+    let there = baked(Method::Watershed, &air, vec![land()]);
+    for graph in [&alone, &there] {
+        assert_eq!((graph.cells.len(), graph.portals.len()), (3, 1));
+        let voxel = graph.statistics.counts["voxel_size"];
+        assert!((voxel - 0.1).abs() < 1e-12, "{voxel}");
+    }
+    let counts = [&alone, &there].map(|graph| graph.statistics.counts["voxels"]);
+    assert!(counts[1] < 30.0 * counts[0], "{counts:?}");
+    // Far land is outdoors.
+    let outdoors = there.locator.locate(DVec3::new(-30.0, 1.0, 0.0));
+    assert!(outdoors.is_some());
+    for far in [
+        [400.0, 40.0, 300.0],
+        [-450.0, 30.0, 20.0],
+        [20.0, 3.0, -490.0],
+    ] {
+        assert_eq!(there.locator.locate(far.into()), outdoors, "{far:?}");
+    }
 }
