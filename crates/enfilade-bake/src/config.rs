@@ -244,7 +244,7 @@ fn positive(name: &'static str, value: f64) -> Result<f64, BakeError> {
 }
 
 /// Peak memory of a bake, rounded from `docs/benchmarks/growth.md`.
-pub(crate) const BYTES_A_VOXEL: f64 = 3.0;
+pub(crate) const BYTES_A_VOXEL: f64 = 3.6;
 
 fn n_voxels(bounds: &Aabb, voxel: f64) -> f64 {
     let n = (bounds.size() / voxel).ceil() + 2.0 * PADDING as f64;
@@ -280,7 +280,7 @@ mod tests {
         let error = config.grid(&bounds, 100_000).unwrap_err();
         assert!(matches!(error, BakeError::TooLarge { .. }), "{error}");
         let said = error.to_string();
-        for word in ["200 x 30 x 200 m", "--unit", "max_voxels", "4 GB"] {
+        for word in ["200 x 30 x 200 m", "--unit", "max_voxels", "5 GB"] {
             assert!(said.contains(word), "{word}: {said}");
         }
         config.min_opening = 10.0;

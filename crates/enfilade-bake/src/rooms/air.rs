@@ -21,7 +21,7 @@ pub(crate) struct VoxelAir {
 
 /// Measures the air of a structure in voxels.
 ///
-/// Time is linear in voxels and about linear in triangles; memory about 3 bytes a voxel plus the scene.
+/// Time is linear in voxels and about linear in triangles; memory about 3.6 bytes a voxel plus the scene.
 ///
 /// # Errors
 /// If a setting is invalid, the scene is too large for the voxel budget, or the caller cancels.

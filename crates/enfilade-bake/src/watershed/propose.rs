@@ -10,7 +10,7 @@ use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// Finds rooms by a flood of the distance field.
 ///
-/// Time is linear in voxels and about linear in triangles; memory about 3 bytes a voxel plus the scene.
+/// Time is linear in voxels and about linear in triangles; memory about 3.6 bytes a voxel plus the scene.
 ///
 /// # Errors
 /// If a setting is invalid, the scene is too large for the voxel budget, or the caller cancels.
