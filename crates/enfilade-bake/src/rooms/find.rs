@@ -31,7 +31,7 @@ pub(crate) fn propose(
 ) -> Result<Proposal, BakeError> {
     let allowance = context.allowance();
     basins.refill(&grid, &solid.occupied);
-    let slabs = structure.slabs();
+    let slabs = structure.slabs(&grid.aabb());
     basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
     let mut notes = solid.lids.notes(&grid);

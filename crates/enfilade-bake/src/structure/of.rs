@@ -144,9 +144,11 @@ impl<'a> Structure<'a> {
         built_up(&self.walls, &self.bounds(), opening, self.allowance)
     }
 
-    /// Returns the heights at which storeys end, ascending. [Units: wu]
-    pub(crate) fn slabs(&self) -> Vec<f64> {
-        slab_heights(&self.walls)
+    /// Returns the heights at which storeys end in a box, ascending: beside wide land, no slab would be large. [Units: wu]
+    pub(crate) fn slabs(&self, within: &Aabb) -> Vec<f64> {
+        let is_in = |t: &&Triangle| t.iter().all(|&p| within.contains(p));
+        let walls: Vec<Triangle> = self.walls.iter().filter(is_in).copied().collect();
+        slab_heights(&walls)
     }
 
     /// Returns the triangles of detail objects that may close an opening, in frame coordinates: shut door leaves,
