@@ -208,7 +208,8 @@ mod tests {
 
     #[test]
     fn stage_times_are_told_from_other_lines() {
-        let said = "read a.glb: 12 triangles\n  fit screens     0.25 s\nflood 1.50 s\n about s\n";
+        let said = "read a.glb: 12 triangles\n  fit screens     0.25 s     1.2 M of work\n\
+                    flood  1.50 s  3 of work\n about s\nannounced 2 s of work\n";
         let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
         assert_eq!(
             stage_times(said),
