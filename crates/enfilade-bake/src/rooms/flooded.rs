@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
-use crate::structure::OUTDOORS;
 use crate::voxel::{BitVolume, Grid, Labels};
 
 /// Faces through which two cells touch: voxel index × 4 + axis, for the face between the voxel and the next one
@@ -29,52 +28,35 @@ pub(crate) struct Flooded<'a> {
     pub(crate) allowance: &'a Allowance,
 }
 
-/// Collects the faces between voxels of different labels, by pair, ascending.
+/// Collects the faces between air voxels of different labels, by pair, ascending.
 ///
-/// Linear in voxels; dozens at a time within the outdoors.
+/// Linear in voxels; dozens at a time within a basin.
 pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
-    let layer = dims[0] * dims[1];
-    let per_slab: Vec<BTreeMap<(u32, u32), Faces>> = (0..dims[2])
-        .into_par_iter()
-        .map(|z| {
-            let mut found: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
-            labels.for_runs(z * layer..(z + 1) * layer, |voxels, label| {
-                if label > OUTDOORS {
-                    for i in voxels {
-                        add_faces(dims, labels, i, &mut found);
-                    }
-                }
-            });
-            found
-        })
-        .collect();
-    let mut all: BTreeMap<(u32, u32), Faces> = BTreeMap::new();
-    for slab in per_slab {
-        for (pair, faces) in slab {
-            all.entry(pair).or_default().extend(faces);
-        }
-    }
-    all.values_mut().for_each(|faces| faces.sort_unstable());
-    all
-}
-
-/// Adds the faces of a voxel that is not outdoors: those to the next voxels, and those from outdoor voxels before it,
-/// since outdoor voxels themselves are skipped.
-fn add_faces(dims: [usize; 3], labels: &Labels, i: usize, found: &mut BTreeMap<(u32, u32), Faces>) {
-    let [nx, ny, nz] = dims;
-    let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
-    let label = labels.get(i);
-    let mut add = |other: u32, of: usize, axis: u64| {
-        let pair = (label.min(other), label.max(other));
-        found.entry(pair).or_default().push(of as u64 * 4 + axis);
+    type Contacts = BTreeMap<(u32, u32), Faces>;
+    let of_layer = |z: usize| {
+        let mut found = Contacts::new();
+        // Faces of the pair that was met last: most often, the next one is of it, too.
+        let (mut last, mut faces) = ((0, 0), Faces::new());
+        labels.for_faces(dims, z, |i, axis, [a, b]| {
+            if a == 0 || b == 0 {
+                return;
+            }
+            let pair = (a.min(b), a.max(b));
+            if pair != last {
+                found.entry(last).or_default().append(&mut faces);
+                last = pair;
+            }
+            faces.push((4 * i + axis) as u64);
+        });
+        found.entry(last).or_default().append(&mut faces);
+        found
     };
-    for (at, n, step, axis) in [(x, nx, 1, 0), (y, ny, nx, 1), (z, nz, nx * ny, 2)] {
-        let next = if at + 1 < n { labels.get(i + step) } else { 0 };
-        if next != 0 && next != label {
-            add(next, i, axis);
-        }
-        if at > 0 && labels.get(i - step) == OUTDOORS {
-            add(OUTDOORS, i - step, axis);
-        }
+    let of_layers: Vec<Contacts> = (0..dims[2]).into_par_iter().map(of_layer).collect();
+    let mut all = Contacts::new();
+    for (pair, mut faces) in of_layers.into_iter().flatten() {
+        all.entry(pair).or_default().append(&mut faces);
     }
+    all.remove(&(0, 0)); // before the first pair of a layer
+    all.par_iter_mut().for_each(|(_, faces)| faces.sort_unstable());
+    all
 }

@@ -21,6 +21,7 @@
 //! Cost: 14 rays from up to 32 points of each region, each through everything that it hits.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets};
 use rayon::prelude::*;
@@ -28,6 +29,7 @@ use rayon::prelude::*;
 use crate::voxel::{Grid, Labels};
 
 use super::regions::Regions;
+use super::slabs::LAYERS;
 use crate::structure::{BACKS, OUTDOORS, POINTS, is_crevice, rays_from};
 
 /// Least share of the rays from inside matter that leave it: all but those that slip through a crack or
@@ -388,29 +390,55 @@ fn sample_points(
     for &r in wanted {
         is_wanted[r as usize] = true;
     }
-    let mut count: BTreeMap<u32, usize> = BTreeMap::new();
     let region_of = |label: u32| regions.region_of_basin[label as usize];
-    labels.for_runs(0..labels.len(), |voxels, label| {
-        if is_wanted[region_of(label) as usize] {
-            *count.entry(region_of(label)).or_default() += voxels.len();
-        }
-    });
-    let mut seen: BTreeMap<u32, usize> = BTreeMap::new();
+    let layer = grid.dims[0] * grid.dims[1];
+    let slabs: Vec<Range<usize>> = (0..grid.dims[2])
+        .step_by(LAYERS)
+        .map(|z| z * layer..(z + LAYERS).min(grid.dims[2]) * layer)
+        .collect();
+    let count = |slab: &Range<usize>| {
+        let mut count: BTreeMap<u32, usize> = BTreeMap::new();
+        labels.for_runs(slab.clone(), |voxels, label| {
+            if is_wanted[region_of(label) as usize] {
+                *count.entry(region_of(label)).or_default() += voxels.len();
+            }
+        });
+        count
+    };
+    let counts: Vec<BTreeMap<u32, usize>> = slabs.par_iter().map(count).collect();
+    let mut total: BTreeMap<u32, usize> = BTreeMap::new();
+    // Numbers of voxels in the slabs before.
+    let before = |count: BTreeMap<u32, usize>| {
+        let mut add = |(region, n): (u32, usize)| {
+            let sum = total.entry(region).or_default();
+            *sum += n;
+            (region, *sum - n)
+        };
+        count.into_iter().map(&mut add).collect()
+    };
+    let before: Vec<BTreeMap<u32, usize>> = counts.into_iter().map(before).collect();
+    let sample = |(slab, mut seen): (&Range<usize>, BTreeMap<u32, usize>)| {
+        let mut points: Vec<(u32, DVec3)> = Vec::new();
+        labels.for_runs(slab.clone(), |voxels, label| {
+            let region = region_of(label);
+            let Some(k) = seen.get_mut(&region) else {
+                return;
+            };
+            // Every `step`-th of the region's voxels, from the middle of the first `step`.
+            let step = total[&region].div_ceil(POINTS);
+            let first = (step / 2 + step - *k % step) % step;
+            for i in voxels.clone().skip(first).step_by(step) {
+                let [x, y, z] = grid.coords(i);
+                points.push((region, grid.center(x, y, z)));
+            }
+            *k += voxels.len();
+        });
+        points
+    };
+    let sampled: Vec<Vec<(u32, DVec3)>> = slabs.par_iter().zip(before).map(sample).collect();
     let mut points: BTreeMap<u32, Vec<DVec3>> = BTreeMap::new();
-    labels.for_runs(0..labels.len(), |voxels, label| {
-        let region = region_of(label);
-        if !is_wanted[region as usize] {
-            return;
-        }
-        // Every `step`-th of the region's voxels, from the middle of the first `step`.
-        let step = count[&region].div_ceil(POINTS);
-        let k = seen.entry(region).or_default();
-        let first = (step / 2 + step - *k % step) % step;
-        for i in voxels.clone().skip(first).step_by(step) {
-            let [x, y, z] = grid.coords(i);
-            points.entry(region).or_default().push(grid.center(x, y, z));
-        }
-        *k += voxels.len();
-    });
+    for (region, point) in sampled.into_iter().flatten() {
+        points.entry(region).or_default().push(point);
+    }
     points
 }

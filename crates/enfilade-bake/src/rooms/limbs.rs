@@ -28,6 +28,7 @@ use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
 use super::regions::Regions;
 use super::sections::section_of;
+use super::slabs::LAYERS;
 use crate::MergeSettings;
 use crate::structure::OUTDOORS;
 
@@ -202,23 +203,47 @@ impl Layer {
         *greatest = [greatest[0].max(along.end - 1), greatest[1].max(z)];
         self.n_voxels += along.len();
     }
+
+    fn unite(&mut self, other: &Self) {
+        for k in 0..2 {
+            let [least, greatest] = &mut self.columns;
+            least[k] = least[k].min(other.columns[0][k]);
+            greatest[k] = greatest[k].max(other.columns[1][k]);
+        }
+        self.n_voxels += other.n_voxels;
+    }
 }
 
 /// Returns the plan of each region except the outdoors.
 fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
-    let [nx, ny, _] = grid.dims;
-    let mut layers: BTreeMap<u32, Vec<Layer>> = BTreeMap::new();
-    for row in 0..labels.len() / nx {
-        labels.for_runs(row * nx..(row + 1) * nx, |run, label| {
-            let region = regions.region_of_basin[label as usize];
-            if region > OUTDOORS {
-                let of = layers
-                    .entry(region)
-                    .or_insert_with(|| vec![Layer::EMPTY; ny]);
-                of[row % ny].add(run.start - row * nx..run.end - row * nx, row / ny);
-            }
-        });
-    }
+    type Layers = BTreeMap<u32, Vec<Layer>>;
+    let [nx, ny, nz] = grid.dims;
+    let add = |mut layers: Layers, z: usize| {
+        for y in 0..ny {
+            let from = grid.index(0, y, z);
+            labels.for_runs(from..from + nx, |run, label| {
+                let region = regions.region_of_basin[label as usize];
+                if region > OUTDOORS {
+                    let of = layers.entry(region);
+                    let of = of.or_insert_with(|| vec![Layer::EMPTY; ny]);
+                    of[y].add(run.start - from..run.end - from, z);
+                }
+            });
+        }
+        layers
+    };
+    let unite = |mut all: Layers, part: Layers| {
+        for (region, layers) in part {
+            let of = all.entry(region);
+            let of = of.or_insert_with(|| vec![Layer::EMPTY; ny]);
+            of.iter_mut().zip(&layers).for_each(|(of, l)| of.unite(l));
+        }
+        all
+    };
+    let layers = (0..nz).into_par_iter().with_min_len(LAYERS);
+    let layers = layers
+        .fold(Layers::new, add)
+        .reduce(Layers::new, unite);
     let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
     layers
         .into_par_iter()

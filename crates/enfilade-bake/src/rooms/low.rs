@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use super::flooded::Faces;
 use super::regions::Regions;
+use super::slabs::LAYERS;
 use crate::structure::OUTDOORS;
 use crate::void::{DOORWAY, STANDING, STEP, WIDTH};
 use crate::voxel::{Grid, Labels};
@@ -65,25 +66,34 @@ fn low_regions(
     }
 }
 
-/// Returns the greatest number of voxels one above the other in each region.
+/// Returns the greatest number of voxels one above the other in each region but the outdoors.
 fn headroom(grid: &Grid, labels: &Labels, regions: &Regions, allowance: &Allowance) -> Vec<usize> {
     let [nx, ny, nz] = grid.dims;
     let region_of = |label: u32| regions.region_of_basin[label as usize];
     let n = regions.region_of_basin.len();
-    let of_slab = |z: usize| {
-        let mut most = vec![0_usize; n];
+    let zero = || vec![0_usize; n];
+    let of_layer = |mut most: Vec<usize>, z: usize| {
         // The region of each column so far, and for how many voxels.
         let mut column = vec![(0_u32, 0_usize); nx];
         for y in 0..ny {
             if !allowance.spend(1 + nx as u64 / 16) {
                 break;
             }
-            for (x, (region, height)) in column.iter_mut().enumerate() {
-                let here = region_of(labels.get(grid.index(x, y, z)));
-                *height = if here == *region { *height + 1 } else { 1 };
-                *region = here;
-                most[here as usize] = most[here as usize].max(*height);
-            }
+            let from = grid.index(0, y, z);
+            labels.for_runs(from..from + nx, |run, label| {
+                let here = region_of(label);
+                let columns = &mut column[run.start - from..run.end - from];
+                if here <= OUTDOORS {
+                    columns.fill((here, 0));
+                    return;
+                }
+                let most = &mut most[here as usize];
+                for (region, height) in columns {
+                    *height = if here == *region { *height + 1 } else { 1 };
+                    *region = here;
+                    *most = (*most).max(*height);
+                }
+            });
         }
         most
     };
@@ -93,8 +103,8 @@ fn headroom(grid: &Grid, labels: &Labels, regions: &Regions, allowance: &Allowan
         }
         a
     };
-    let slabs = (0..nz).into_par_iter().map(of_slab);
-    slabs.reduce(|| vec![0; n], greater)
+    let layers = (0..nz).into_par_iter().with_min_len(LAYERS);
+    layers.fold(zero, of_layer).reduce(zero, greater)
 }
 
 /// Returns `true` if an upright opening among `faces` begins at the floor of both its sides and is large enough.

@@ -1,5 +1,7 @@
 //! Labels voxels that only door leaves and panes fill: walls to the flood, but air.
 
+use rayon::prelude::*;
+
 use crate::voxel::{BitVolume, Labels};
 
 /// Labels the voxels that only closures fill: walls to the flood, but air. The basins
@@ -11,7 +13,10 @@ pub(crate) fn flood_closures(dims: [usize; 3], labels: &mut Labels, occupied: &B
     }
 }
 
-fn grow<T: Copy + Default + PartialEq>(dims: [usize; 3], labels: &mut [T], occupied: &BitVolume) {
+fn grow<T>(dims: [usize; 3], labels: &mut [T], occupied: &BitVolume)
+where
+    T: Copy + Default + PartialEq + Send + Sync,
+{
     let [nx, ny, nz] = dims;
     let layer = nx * ny;
     let each_neighbor = |i: usize, visit: &mut dyn FnMut(usize)| {
@@ -31,20 +36,24 @@ fn grow<T: Copy + Default + PartialEq>(dims: [usize; 3], labels: &mut [T], occup
     };
     let solid = T::default();
     // First round: air voxels without a label that touch a labelled one, in index order.
-    let mut front: Vec<(usize, T)> = Vec::new();
-    for i in 0..labels.len() {
-        if labels[i] == solid && !occupied.get_index(i) {
-            let mut first = None;
-            each_neighbor(i, &mut |j| {
-                if first.is_none() && labels[j] != solid {
-                    first = Some(labels[j]);
-                }
-            });
-            if let Some(l) = first {
-                front.push((i, l));
+    let before = &*labels;
+    let first_of = &|i: usize| {
+        let mut first = None;
+        each_neighbor(i, &mut |j| {
+            if first.is_none() && before[j] != solid {
+                first = Some((i, before[j]));
             }
-        }
-    }
+        });
+        first
+    };
+    let of_row = |row: usize| {
+        let bits = occupied.row(row);
+        let is_free = move |x: usize| bits[x / 64] >> (x % 64) & 1 == 0;
+        let waiting = (0..nx).filter(move |&x| before[row * nx + x] == solid && is_free(x));
+        waiting.filter_map(move |x| first_of(row * nx + x))
+    };
+    let rows = (0..ny * nz).into_par_iter().with_min_len(64);
+    let mut front: Vec<(usize, T)> = rows.flat_map_iter(of_row).collect();
     while !front.is_empty() {
         for &(i, l) in &front {
             labels[i] = l;

@@ -29,6 +29,7 @@ use super::flooded::{Flooded, contact_faces};
 use super::fronts::{Faces, group_faces, is_in};
 use super::judge::{OpeningFacts, judge};
 use super::sections::section_of;
+use super::slabs::{LAYERS, sum};
 use crate::MergeSettings;
 use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms, lies_in_slab};
 
@@ -175,7 +176,7 @@ impl BasinMerger<'_> {
                 let open = neighbors.map(|&n| (open[&(c.min(n), c.max(n))], Reverse(n)));
                 let (all, most) =
                     open.fold((0, None), |(all, most), o| (all + o.0, most.max(Some(o))));
-                let share = all as f64 / sides[c as usize].max(1) as f64;
+                let share = all as f64 / f64::from(sides[c as usize].max(1));
                 let Reverse(home) = most?.1;
                 (share >= self.settings.bay_share).then_some((share, Reverse(c), home))
             });
@@ -188,7 +189,7 @@ impl BasinMerger<'_> {
             let pair = (bay.min(home), bay.max(home));
             let shared = self.contacts[&pair].iter().filter(is_upright).count();
             // The sides of the outdoors are not counted, and not needed.
-            let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared);
+            let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared as u32);
             self.join(pair);
             let whole = self.cell[bay as usize];
             sides[whole as usize] = rest;
@@ -213,43 +214,21 @@ impl BasinMerger<'_> {
             .filter(move |&&f| !closures.is_some_and(|bits| is_in(grid, bits, f)))
     }
 
-    /// Returns the number of upright faces around each cell.
-    fn side_faces(&self) -> Vec<usize> {
-        let [nx, ny, nz] = self.flooded.grid.dims;
-        let labels = self.flooded.labels;
-        let cell_of = &self.cell;
-        let layer = nx * ny;
-        let count = |z: usize| {
-            let mut sides = vec![0usize; cell_of.len()];
-            labels.for_runs(z * layer..(z + 1) * layer, |voxels, label| {
-                let cell = cell_of[label as usize];
-                if cell <= OUTDOORS {
-                    return;
-                }
-                for i in voxels {
-                    let x = i % nx;
-                    let nexts = [
-                        (x > 0, i.wrapping_sub(1)),
-                        (x + 1 < nx, i + 1),
-                        (z > 0, i.wrapping_sub(layer)),
-                        (z + 1 < nz, i + layer),
-                    ];
-                    let is_side = |&(exists, next): &(bool, usize)| {
-                        !exists || cell_of[labels.get(next) as usize] != cell
-                    };
-                    sides[cell as usize] += nexts.iter().filter(|n| is_side(n)).count();
+    /// Returns the number of upright faces around each cell but the outdoors, which is all around.
+    fn side_faces(&self) -> Vec<u32> {
+        let Flooded { grid, labels, .. } = self.flooded;
+        let zero = || vec![0_u32; self.cell.len()];
+        let count = |mut sides: Vec<u32>, z: usize| {
+            labels.for_faces(grid.dims, z, |_, axis, pair| {
+                let cells = pair.map(|l| self.cell[l as usize]);
+                if axis != 1 && cells[0] != cells[1] {
+                    cells.iter().for_each(|&c| sides[c as usize] += 1);
                 }
             });
             sides
         };
-        let add = |mut sum: Vec<usize>, part: Vec<usize>| {
-            for (s, p) in sum.iter_mut().zip(part) {
-                *s += p;
-            }
-            sum
-        };
-        let zero = || vec![0; cell_of.len()];
-        (0..nz).into_par_iter().map(count).reduce(zero, add)
+        let layers = (0..grid.dims[2]).into_par_iter().with_min_len(LAYERS);
+        layers.fold(zero, count).reduce(zero, sum)
     }
 
     fn finish(self) -> Regions {

@@ -31,10 +31,7 @@ pub(crate) fn cut_at_slabs(
     };
     let storeys: Vec<usize> = (0..grid.dims[1]).map(storey_of_row).collect();
     let n_storeys = heights.len() + 1;
-    let count = match labels {
-        Labels::U16(v) => count_by_storey(grid.dims, v, n_labels, &storeys, n_storeys),
-        Labels::U32(v) => count_by_storey(grid.dims, v, n_labels, &storeys, n_storeys),
-    };
+    let count = count_by_storey(grid.dims, labels, n_labels, &storeys, n_storeys);
     let enough = (MIN_VOLUME / grid.voxel.powi(3)).ceil() as u32;
     let mut parents = Vec::new();
     let mut new_label = vec![0_u32; n_labels * n_storeys];
@@ -56,59 +53,48 @@ pub(crate) fn cut_at_slabs(
     if parents.is_empty() {
         return parents;
     }
-    if n_labels + parents.len() > usize::from(u16::MAX)
-        && let Labels::U16(v) = labels
-    {
-        *labels = Labels::U32(v.iter().map(|&l| l.into()).collect());
-    }
-    match labels {
-        Labels::U16(v) => relabel(grid.dims, v, |l, y| {
-            new_label[usize::from(l) * n_storeys + storeys[y]] as u16
-        }),
-        Labels::U32(v) => {
-            relabel(grid.dims, v, |l, y| {
-                new_label[l as usize * n_storeys + storeys[y]]
-            });
+    labels.make_room_for(n_labels + parents.len());
+    labels.relabel(grid.dims, |l, y| {
+        if l > OUTDOORS {
+            new_label[l as usize * n_storeys + storeys[y]]
+        } else {
+            l
         }
-    }
+    });
     parents
 }
 
 /// Counts the voxels of each basin in each storey, `[basin][storey]`, without the outdoors.
-fn count_by_storey<T: Copy + Into<u32> + Sync>(
-    dims: [usize; 3],
-    labels: &[T],
+fn count_by_storey(
+    [nx, ny, nz]: [usize; 3],
+    labels: &Labels,
     n_labels: usize,
     storeys: &[usize],
     n_storeys: usize,
 ) -> Vec<u32> {
-    let mut count = vec![0_u32; n_labels * n_storeys];
-    for slice in labels.chunks(dims[0] * dims[1]) {
-        for (y, row) in slice.chunks(dims[0]).enumerate() {
-            for &l in row {
-                let l: u32 = l.into();
-                if l > OUTDOORS {
-                    count[l as usize * n_storeys + storeys[y]] += 1;
+    let zero = || vec![0_u32; n_labels * n_storeys];
+    let count = |mut count: Vec<u32>, z: usize| {
+        for y in 0..ny {
+            let from = (z * ny + y) * nx;
+            labels.for_runs(from..from + nx, |run, label| {
+                if label > OUTDOORS {
+                    count[label as usize * n_storeys + storeys[y]] += run.len() as u32;
                 }
-            }
+            });
         }
-    }
-    count
+        count
+    };
+    let layers = (0..nz).into_par_iter().with_min_len(LAYERS);
+    layers.fold(zero, count).reduce(zero, sum)
 }
 
-/// Replaces every label except solid and outdoors, given the label and the row (y).
-fn relabel<T: Copy + Into<u32> + Send>(
-    dims: [usize; 3],
-    labels: &mut [T],
-    new: impl Fn(T, usize) -> T + Sync,
-) {
-    labels.par_chunks_mut(dims[0] * dims[1]).for_each(|slice| {
-        for (y, row) in slice.chunks_mut(dims[0]).enumerate() {
-            for l in row {
-                if (*l).into() > OUTDOORS {
-                    *l = new(*l, y);
-                }
-            }
-        }
-    });
+/// Least number of layers that are counted one after the other.
+pub(super) const LAYERS: usize = 32;
+
+/// Adds up counts.
+pub(super) fn sum(mut sum: Vec<u32>, part: Vec<u32>) -> Vec<u32> {
+    for (s, p) in sum.iter_mut().zip(part) {
+        *s += p;
+    }
+    sum
 }

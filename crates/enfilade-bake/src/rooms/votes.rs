@@ -57,9 +57,7 @@ impl Ballots {
                     |k: usize| at[k].saturating_sub(reach)..(at[k] + reach + 1).min(grid.dims[k]);
                 for z in range(2) {
                     for y in range(1) {
-                        for x in range(0) {
-                            unsure.set(x, y, z, true);
-                        }
+                        unsure.fill_row(y + grid.dims[1] * z, range(0));
                     }
                 }
             }

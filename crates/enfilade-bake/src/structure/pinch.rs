@@ -38,6 +38,9 @@ pub(crate) trait Mergeable: Sync {
     fn join(&mut self, pair: Pair) -> Vec<Pair>;
 }
 
+/// Number of pairs that are weighed again side by side.
+const BATCH: usize = 64;
+
 /// A pair waiting to be joined; the most open comes first, ties by number.
 struct Waiting {
     openness: f64,
@@ -79,7 +82,14 @@ pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
             continue; // one of them was joined to a third; that pair has its own entry
         }
         if cells.ages(top.pair) != top.ages {
-            queue.extend(weighed(cells, &[top.pair]));
+            let mut stale = vec![top.pair];
+            while stale.len() < BATCH
+                && let Some(next) = queue.peek()
+                && cells.ages(next.pair) != next.ages
+            {
+                stale.extend(queue.pop().map(|w| w.pair).filter(|&p| cells.is_pair(p)));
+            }
+            queue.extend(weighed(cells, &stale));
             continue;
         }
         let changed = cells.join(top.pair);

@@ -2,6 +2,8 @@
 
 use std::ops::{BitOr, BitXor, Range};
 
+use rayon::prelude::*;
+
 /// Levels per voxel of distance.
 pub(super) const STEPS: u32 = 64;
 
@@ -66,6 +68,28 @@ impl Labels {
         }
     }
 
+    /// Calls `face(voxel, axis, labels)` for each face between voxels of different labels, given the lesser voxel, for
+    /// those in layer `z` of a box of `dims` and above it.
+    ///
+    /// Compares some dozen voxels at a time where labels are alike.
+    ///
+    /// # Panics
+    /// If the layer is outside the box, or the box is not of the size of the labels.
+    pub fn for_faces(&self, dims: [usize; 3], z: usize, face: impl FnMut(usize, usize, [u32; 2])) {
+        match self {
+            Self::U16(v) => for_faces(v, dims, z, face),
+            Self::U32(v) => for_faces(v, dims, z, face),
+        }
+    }
+
+    /// Replaces each label by `new(label, y)`; see [`Self::make_room_for`]. Threads share the work.
+    pub fn relabel(&mut self, dims: [usize; 3], new: impl Fn(u32, usize) -> u32 + Sync) {
+        match self {
+            Self::U16(v) => relabel(v, dims, |l, y| new(l, y) as u16),
+            Self::U32(v) => relabel(v, dims, new),
+        }
+    }
+
     /// Returns all labels in index order.
     pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.len()).map(|i| self.get(i))
@@ -91,6 +115,54 @@ where
         run(from..to, label.into());
         from = to;
     }
+}
+
+fn for_faces<T>(
+    labels: &[T],
+    [nx, ny, nz]: [usize; 3],
+    z: usize,
+    mut face: impl FnMut(usize, usize, [u32; 2]),
+) where
+    T: Copy + PartialEq + Into<u32> + BitXor<Output = T> + BitOr<Output = T> + Default,
+{
+    for y in 0..ny {
+        let from = (z * ny + y) * nx;
+        let row = &labels[from..from + nx];
+        let mut compare = |axis: usize, next: &[T]| {
+            let chunks = row.chunks(CHUNK).zip(next.chunks(CHUNK));
+            for (at, (a, b)) in (from..).step_by(CHUNK).zip(chunks) {
+                let pairs = || a.iter().zip(b);
+                if pairs().fold(T::default(), |d, (&a, &b)| d | (a ^ b)) == T::default() {
+                    continue;
+                }
+                for (x, (&a, &b)) in pairs().enumerate().filter(|(_, (a, b))| a != b) {
+                    face(at + x, axis, [a.into(), b.into()]);
+                }
+            }
+        };
+        compare(0, &row[1..]);
+        if y + 1 < ny {
+            compare(1, &labels[from + nx..from + 2 * nx]);
+        }
+        if z + 1 < nz {
+            compare(2, &labels[from + nx * ny..from + nx * ny + nx]);
+        }
+    }
+}
+
+fn relabel<T>(labels: &mut [T], [nx, ny, _]: [usize; 3], new: impl Fn(u32, usize) -> T + Sync)
+where
+    T: Copy + PartialEq + Into<u32> + Send,
+{
+    let rows = labels.par_chunks_mut(nx.max(1)).enumerate();
+    rows.with_min_len(64).for_each(|(row, labels)| {
+        for run in labels.chunk_by_mut(|a, b| a == b) {
+            let label = new(run[0].into(), row % ny);
+            if label != run[0] {
+                run.fill(label);
+            }
+        }
+    });
 }
 
 /// A basin of the distance field.
