@@ -66,11 +66,13 @@ fn low_regions(
     }
 }
 
-/// Returns the greatest number of voxels one above the other in each region but the outdoors.
+/// Returns the greatest number of voxels one above the other in each region but the outdoors, or about as many as are
+/// enough to stand.
 fn headroom(grid: &Grid, labels: &Labels, regions: &Regions, allowance: &Allowance) -> Vec<usize> {
     let [nx, ny, nz] = grid.dims;
     let region_of = |label: u32| regions.region_of_basin[label as usize];
     let n = regions.region_of_basin.len();
+    let enough = (STANDING / grid.voxel).ceil() as usize;
     let zero = || vec![0_usize; n];
     let of_layer = |mut most: Vec<usize>, z: usize| {
         // The region of each column so far, and for how many voxels.
@@ -83,11 +85,11 @@ fn headroom(grid: &Grid, labels: &Labels, regions: &Regions, allowance: &Allowan
             labels.for_runs(from..from + nx, |run, label| {
                 let here = region_of(label);
                 let columns = &mut column[run.start - from..run.end - from];
-                if here <= OUTDOORS {
+                let most = &mut most[here as usize];
+                if here <= OUTDOORS || *most >= enough {
                     columns.fill((here, 0));
                     return;
                 }
-                let most = &mut most[here as usize];
                 for (region, height) in columns {
                     *height = if here == *region { *height + 1 } else { 1 };
                     *region = here;
