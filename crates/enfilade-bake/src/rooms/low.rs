@@ -45,7 +45,7 @@ fn low_regions(
     let all = 0..headroom.len() as u32;
     let mut low: BTreeSet<u32> = all
         .filter(|&r| r > OUTDOORS && headroom[r as usize] > 0)
-        .filter(|&r| (headroom[r as usize] as f64) * grid.voxel < STANDING)
+        .filter(|&r| !is_high(grid, headroom[r as usize]))
         .collect();
     let leads_in = |(&(a, b), faces): (&(u32, u32), &Faces)| {
         let is_any_low = low.contains(&a) || low.contains(&b);
@@ -66,13 +66,17 @@ fn low_regions(
     }
 }
 
-/// Returns the greatest number of voxels one above the other in each region but the outdoors, or about as many as are
-/// enough to stand.
+/// Returns `true` if one can stand in so many voxels one above the other.
+fn is_high(grid: &Grid, n_voxels: usize) -> bool {
+    n_voxels as f64 * grid.voxel >= STANDING
+}
+
+/// Returns the greatest number of voxels one above the other in each region but the outdoors, at least of those that are not
+/// high.
 fn headroom(grid: &Grid, labels: &Labels, regions: &Regions, allowance: &Allowance) -> Vec<usize> {
     let [nx, ny, nz] = grid.dims;
     let region_of = |label: u32| regions.region_of_basin[label as usize];
     let n = regions.region_of_basin.len();
-    let enough = (STANDING / grid.voxel).ceil() as usize;
     let zero = || vec![0_usize; n];
     let of_layer = |mut most: Vec<usize>, z: usize| {
         // The region of each column so far, and for how many voxels.
@@ -86,7 +90,7 @@ fn headroom(grid: &Grid, labels: &Labels, regions: &Regions, allowance: &Allowan
                 let here = region_of(label);
                 let columns = &mut column[run.start - from..run.end - from];
                 let most = &mut most[here as usize];
-                if here <= OUTDOORS || *most >= enough {
+                if here <= OUTDOORS || is_high(grid, *most) {
                     columns.fill((here, 0));
                     return;
                 }
