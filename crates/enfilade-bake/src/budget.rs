@@ -140,8 +140,8 @@ mod tests {
             )
         };
         let edge = |resolution| match resolution {
-            Resolution::Voxels { edge, dims } => {
-                assert!(dims.iter().product::<usize>() > 0);
+            Resolution::Voxels { edge, n_voxels, .. } => {
+                assert!(n_voxels > 0);
                 edge
             }
             other => panic!("{other:?}"),

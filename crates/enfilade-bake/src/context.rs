@@ -139,8 +139,8 @@ impl<'a> BakeContext<'a> {
     pub(crate) fn tell(&self, resolution: Resolution, memory: f64) {
         // Memory bounds the voxels; the open space between them grows with their number, not with that of the
         // triangles.
-        if let Resolution::Voxels { dims, .. } = resolution {
-            self.grant_voxels(dims.iter().map(|&n| n as u64).product());
+        if let Resolution::Voxels { n_voxels, .. } = resolution {
+            self.grant_voxels(n_voxels);
         }
         // Memory held by now, above all for the scene, stays; leaves of the complex follow when the voxels are freed.
         let held = self.probe.and_then(|probe| probe()).unwrap_or(0) as f64;
@@ -166,9 +166,18 @@ impl<'a> BakeContext<'a> {
     pub(crate) fn end_stage(&self) {
         let mut stages = self.stages();
         if let Some((stage, start, before)) = stages.running.take() {
-            stages.times.push((stage, start.elapsed()));
             let work = self.allowance.spent().saturating_sub(before);
-            stages.work.push((stage, work));
+            // A stage that is begun again, for another building, has one time.
+            match stages.times.iter().position(|t| t.0 == stage) {
+                Some(at) => {
+                    stages.times[at].1 += start.elapsed();
+                    stages.work[at].1 += work;
+                }
+                None => {
+                    stages.times.push((stage, start.elapsed()));
+                    stages.work.push((stage, work));
+                }
+            }
         }
     }
 
@@ -206,7 +215,13 @@ mod tests {
         let work = 500_000_000;
         assert!(!of_triangles.spend(work) && of_triangles.is_over());
         let dims = [700, 240, 880];
-        context.tell(Resolution::Voxels { edge: 0.1, dims }, 0.0);
+        let resolution = Resolution::Voxels {
+            edge: 0.1,
+            dims,
+            n_grids: 1,
+            n_voxels: dims.iter().product::<usize>() as u64,
+        };
+        context.tell(resolution, 0.0);
         context.allowance().spend(work);
         assert!(context.check().is_ok());
     }

@@ -41,8 +41,12 @@ pub enum Resolution {
     Voxels {
         /// Edge of a voxel. [Units: wu]
         edge: f64,
-        /// Voxels along each axis.
+        /// Voxels along each axis of the largest grid.
         dims: [usize; 3],
+        /// Number of grids: one for each building of a site.
+        n_grids: usize,
+        /// Voxels of all grids.
+        n_voxels: u64,
     },
     /// The binary space partition: planes of the model, exactly.
     Planes,

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_geom::{Aabb, DVec3};
 
 use crate::Resolution;
-use crate::complex::{LabelSettings, Vote};
-use crate::structure::Candidate;
+use crate::complex::{Label, LabelSettings, Vote};
+use crate::structure::{Candidate, OUTDOORS};
 
 /// Rooms and openings that a builder found, in scene coordinates.
 pub(crate) struct Proposal {
@@ -46,5 +46,70 @@ impl Proposal {
             settings: BTreeMap::new(),
             resolution: Resolution::Planes,
         }
+    }
+
+    /// Adds the proposal for another part of the scene that nothing but the outdoors connects with this one.
+    pub(crate) fn beside(mut self, mut other: Self) -> Self {
+        let region = |label: &Label| label.region().unwrap_or(OUTDOORS);
+        let votes = self.votes.iter().map(|v| region(&v.label));
+        let last = votes.chain(self.voids.iter().map(|v| v.1)).max();
+        let after = last.unwrap_or(OUTDOORS);
+        let moved = |region: u32| match region {
+            0 | OUTDOORS => region,
+            _ => after + region - OUTDOORS,
+        };
+        for vote in &mut other.votes {
+            vote.label = match vote.label {
+                Label::Region(region) => Label::Region(moved(region)),
+                Label::Void(region) => Label::Void(moved(region)),
+                Label::Solid => Label::Solid,
+            };
+        }
+        other.voids.iter_mut().for_each(|v| v.1 = moved(v.1));
+        self.bounds = self.bounds.union(other.bounds);
+        self.candidates.append(&mut other.candidates);
+        self.votes.append(&mut other.votes);
+        self.voids.append(&mut other.voids);
+        for ((name, count), (_, more)) in self.counts.iter_mut().zip(other.counts) {
+            match *name {
+                "grid_turn_degrees" => {}
+                "voxel_size" => *count = count.max(more),
+                _ => *count += more,
+            }
+        }
+        other.notes.retain(|note| !self.notes.contains(note));
+        self.notes.append(&mut other.notes);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn proposal(regions: &[u32]) -> Proposal {
+        let vote = |&region: &u32| Vote {
+            point: DVec3::splat(f64::from(region)),
+            label: Label::Region(region),
+            weight: 1.0,
+        };
+        let voids = vec![(DVec3::ZERO, *regions.last().unwrap())];
+        let counts = vec![("voxels", 10.0), ("voxel_size", 0.1)];
+        Proposal {
+            voids,
+            counts,
+            notes: vec!["one".to_owned()],
+            ..Proposal::new(Aabb::EMPTY, regions.iter().map(vote).collect())
+        }
+    }
+
+    #[test]
+    fn regions_of_two_parts_keep_apart_and_both_have_the_same_outdoors() {
+        let both = proposal(&[1, 2, 5]).beside(proposal(&[1, 3, 2]));
+        let regions: Vec<_> = both.votes.iter().filter_map(|v| v.label.region()).collect();
+        assert_eq!(regions, [1, 2, 5, 1, 7, 6]);
+        assert_eq!([both.voids[0].1, both.voids[1].1], [5, 6]);
+        assert_eq!(both.counts, [("voxels", 20.0), ("voxel_size", 0.1)]);
+        assert_eq!(both.notes.len(), 1);
     }
 }

@@ -1,7 +1,9 @@
 //! Openings and surfaces that part no rooms, in small buildings. Covers V9.
 
+use std::collections::BTreeSet;
+
 use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
-use enfilade_cpg::{CellId, CellPortalGraph};
+use enfilade_cpg::{CellId, CellPortalGraph, Portal};
 use enfilade_geom::scene::{Material, Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 use enfilade_testkit::solid::{MeshBuilder, aabb};
@@ -307,14 +309,16 @@ by! {
         the_inside_of_a_massive_flight_belongs_to_its_room;
 }
 
-/// Hills of 1 km × 1 km that begin 40 m from the origin, and level land there.
-fn land() -> Mesh {
+/// Hills of 1 km × 1 km that begin 40 m from the given places (x, z), and level land there.
+fn land(places: &[[f64; 2]]) -> Mesh {
     const N: u32 = 100;
     let mut primitive = Primitive::default();
     for z in 0..=N {
         for x in 0..=N {
             let [x, z] = [x, z].map(|k| 10.0 * (f64::from(k) - f64::from(N) / 2.0));
-            let hill = ((x.hypot(z) - 40.0) / 60.0).clamp(0.0, 1.0);
+            let distances = places.iter().map(|[a, b]| (x - a).hypot(z - b));
+            let nearest = distances.fold(f64::INFINITY, f64::min);
+            let hill = ((nearest - 40.0) / 60.0).clamp(0.0, 1.0);
             let y = -0.2 + 15.0 * hill * (x / 70.0).sin() * (z / 50.0).cos();
             primitive.positions.push([x as f32, y as f32, z as f32]);
         }
@@ -340,7 +344,7 @@ fn a_house_on_wide_land_has_the_rooms_of_the_house_at_the_default_voxels() {
         ([4.0, 0.0, 1.0], [4.2, 2.1, 2.0]),
     ];
     let alone = baked(Method::Watershed, &air, vec![]);
-    let there = baked(Method::Watershed, &air, vec![land()]);
+    let there = baked(Method::Watershed, &air, vec![land(&[[0.0; 2]])]);
     for graph in [&alone, &there] {
         assert_eq!((graph.cells.len(), graph.portals.len()), (3, 1));
         let voxel = graph.statistics.counts["voxel_size"];
@@ -358,4 +362,41 @@ fn a_house_on_wide_land_has_the_rooms_of_the_house_at_the_default_voxels() {
     ] {
         assert_eq!(there.locator.locate(far.into()), outdoors, "{far:?}");
     }
+}
+
+#[test]
+fn houses_far_apart_on_wide_land_have_the_rooms_that_each_has_alone() {
+    let places = [[0.0, 0.0], [300.0, -150.0], [-200.0, 350.0]];
+    let house = |[x, z]: [f64; 2]| {
+        let air = [
+            ([0.0, 0.0, 0.0], [4.0, 2.6, 4.0]),
+            ([4.2, 0.0, 0.0], [9.0, 2.6, 4.0]),
+            ([4.0, 0.0, 1.0], [4.2, 2.1, 2.0]),
+        ];
+        air.map(|(lo, hi): ([f64; 3], [f64; 3])| {
+            let moved = |[a, b, c]: [f64; 3]| [a + x, b, c + z];
+            (moved(lo), moved(hi))
+        })
+    };
+    let mut others = vec![land(&places)];
+    for at in &places[1..] {
+        let air = boxes(&house(*at));
+        let mut mesh = MeshBuilder::new(0);
+        mesh.carved(&[air[0].union(air[1]).expanded(0.3)], &air);
+        others.push(mesh.build("", &[]));
+    }
+    let town = baked(Method::Watershed, &house(places[0]), others);
+    assert_eq!((town.cells.len(), town.portals.len()), (7, 3));
+    let counts = &town.statistics.counts;
+    let [voxel, n] = ["voxel_size", "voxels"].map(|name| counts[name]);
+    assert!((voxel - 0.1).abs() < 1e-12 && n < 3e7, "{n} of {voxel}");
+    let mut rooms = BTreeSet::new();
+    for [x, z] in places {
+        let room = |at: f64| town.locator.locate(DVec3::new(x + at, 1.0, z + 2.0));
+        let pair = [room(2.0), room(6.0)].map(Option::unwrap);
+        let meets = |p: &&Portal| pair.iter().all(|c| p.cells.contains(c));
+        assert_eq!(town.portals.iter().filter(meets).count(), 1);
+        rooms.extend(pair);
+    }
+    assert_eq!(rooms.len(), 6);
 }

@@ -339,28 +339,40 @@ impl Progress for BakeBar {
     }
 
     fn resolution(&self, resolution: Resolution, memory: f64) {
-        let Resolution::Voxels { edge, dims } = resolution else {
+        let Resolution::Voxels { edge, n_voxels, .. } = resolution else {
             return;
         };
-        let n_voxels = dims.map(|n| n as f64).iter().product::<f64>();
         let seconds = {
             let mut clock = self.state.lock().expect("no panic holds it");
-            clock.left = TimeLeft::new(clock.stages, n_voxels, self.work.1);
+            clock.left = TimeLeft::new(clock.stages, n_voxels as f64, self.work.1);
             clock.left.expected.iter().sum::<f64>()
         };
         self.bar.suspend(|| {
-            let _ = write!(Told, "{}", plan(edge, dims, memory, seconds));
+            let _ = write!(Told, "{}", plan(resolution, memory, seconds));
             let _ = write!(Warned, "{}", coarser(edge, self.wanted));
         });
     }
 }
 
-/// The work ahead, as a line.
-fn plan(edge: f64, [nx, ny, nz]: [usize; 3], memory: f64, seconds: f64) -> String {
-    let n = (nx * ny * nz) as f64 / 1e6;
-    let memory = memory / 1e6;
+/// The work ahead, as a line; empty without voxels.
+fn plan(resolution: Resolution, memory: f64, seconds: f64) -> String {
+    let Resolution::Voxels {
+        edge,
+        dims: [nx, ny, nz],
+        n_grids,
+        n_voxels,
+    } = resolution
+    else {
+        return String::new();
+    };
+    let grids = if n_grids == 1 {
+        format!("{nx} × {ny} × {nz}")
+    } else {
+        format!("{n_grids} buildings, at most {nx} × {ny} × {nz}")
+    };
+    let (n, memory) = (n_voxels as f64 / 1e6, memory / 1e6);
     format!(
-        "voxels of {edge:.3} m, {nx} × {ny} × {nz}: {n:.1} million, about {memory:.0} MB and {}\n",
+        "voxels of {edge:.3} m, {grids}: {n:.1} million, about {memory:.0} MB and {}\n",
         in_words(seconds)
     )
 }

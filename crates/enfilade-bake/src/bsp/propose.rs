@@ -10,7 +10,7 @@ use crate::complex::region::RegionShape;
 use crate::complex::{Label, LabelSettings, Vote};
 use crate::config::BspConfig;
 use crate::proposal::Proposal;
-use crate::rooms::{self, Basins, VoxelAir};
+use crate::rooms::{self, Basins};
 use crate::structure::{Candidate, OUTDOORS, Structure, grown};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
@@ -71,8 +71,7 @@ fn rooms_of(
         Some(cell_of_leaf[leaf as usize]).filter(|&cell| cell != NO_CELL)
     };
     let basins = Basins::of_parts(&air, cell_at, context.allowance());
-    let VoxelAir { grid, solid, .. } = air;
-    let mut proposal = rooms::propose(structure, (grid, solid, basins), config, context)?;
+    let mut proposal = rooms::propose(structure, air, basins, config, context)?;
     proposal.label = label_settings(structure.scene);
     if !bsp.is_open[bsp.outer_leaf() as usize] {
         // The void around a level.

@@ -5,7 +5,7 @@ use enfilade_geom::Allowance;
 use super::lids::{Lids, find_lids};
 use super::rims::rim_caps;
 use crate::config::BYTES_A_VOXEL;
-use crate::structure::Structure;
+use crate::structure::{Site, Structure};
 use crate::voxel::{BitVolume, Grid, distance_squared_near, far_outdoors, voxelize};
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
@@ -17,40 +17,110 @@ pub(crate) struct VoxelAir {
     pub(crate) distances: Vec<u16>,
     /// Outdoor voxels so far from everything that their distances do not matter.
     pub(crate) far: BitVolume,
+    /// Heights at which storeys end, ascending. [Units: wu]
+    pub(crate) slabs: Vec<f64>,
+    /// Share of all voxels of the scene.
+    pub(crate) share: f64,
+    /// Resolution of the whole scene.
+    pub(crate) resolution: Resolution,
 }
 
-/// Measures the air of a structure in voxels.
-///
-/// Time is linear in voxels and about linear in triangles; memory about 3.6 bytes a voxel plus the scene.
+/// A grid over a part of a scene.
+#[derive(Clone, Copy)]
+pub(crate) struct Plot {
+    site: Site,
+    grid: Grid,
+    /// Share of all voxels of the scene.
+    share: f64,
+    /// Resolution of the whole scene.
+    resolution: Resolution,
+}
+
+/// Lays grids over parts of a structure, and reports the work ahead.
 ///
 /// # Errors
-/// If a setting is invalid, the scene is too large for the voxel budget, or the caller cancels.
+/// If a setting is invalid, or the scene is too large for the voxel budget.
+pub(crate) fn plots(
+    structure: &Structure<'_>,
+    sites: Vec<Site>,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Vec<Plot>, BakeError> {
+    config.check_opening()?;
+    let grid = |site: Site| {
+        let grid = config.grid(&site.bounds, structure.triangles.len())?;
+        Ok::<_, BakeError>((site, grid))
+    };
+    let grids: Vec<(Site, Grid)> = sites
+        .into_iter()
+        .map(grid)
+        .collect::<Result<_, BakeError>>()?;
+    let n_voxels: usize = grids.iter().map(|(_, grid)| grid.n_voxels()).sum();
+    let largest = grids.iter().map(|g| &g.1).max_by_key(|g| g.n_voxels());
+    let resolution = Resolution::Voxels {
+        edge: grids.iter().map(|g| g.1.voxel).fold(0.0, f64::max),
+        dims: largest.map_or([0; 3], |grid| grid.dims),
+        n_grids: grids.len(),
+        n_voxels: n_voxels as u64,
+    };
+    // Grids are held one after the other.
+    let memory = BYTES_A_VOXEL * largest.map_or(0, Grid::n_voxels) as f64;
+    context.tell(resolution, memory);
+    let plot = |(site, grid): (Site, Grid)| Plot {
+        site,
+        share: grid.n_voxels() as f64 / n_voxels as f64,
+        grid,
+        resolution,
+    };
+    Ok(grids.into_iter().map(plot).collect())
+}
+
+/// Measures the air of a structure in voxels, all its sites in one grid.
+///
+/// # Errors
+/// As [`plots`] and [`measure`].
 pub(crate) fn prepare(
     structure: &Structure<'_>,
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<VoxelAir, BakeError> {
-    config.check_opening()?;
-    let bounds = structure.built_up(config.min_opening);
-    let grid = config.grid(&bounds, structure.triangles.len())?;
-    context.tell(resolution_of(&grid), BYTES_A_VOXEL * grid.n_voxels() as f64);
+    let sites = structure.sites(config.min_opening);
+    let all = sites.into_iter().reduce(Site::union);
+    let mut plots = plots(structure, all.into_iter().collect(), config, context)?;
+    measure(structure, plots.swap_remove(0), config, context)
+}
+
+/// Measures the air of a part of a structure in voxels.
+///
+/// Time is linear in voxels and about linear in triangles; memory about 3.6 bytes a voxel plus the scene.
+///
+/// # Errors
+/// If the caller cancels.
+pub(crate) fn measure(
+    structure: &Structure<'_>,
+    plot: Plot,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<VoxelAir, BakeError> {
+    let Plot {
+        site,
+        grid,
+        share,
+        resolution,
+    } = plot;
     context.begin(Stage::Voxelize)?;
     let solid = Solid::of(structure, &grid, config);
     context.begin(Stage::Distance)?;
     let (distances, far) = solid.distances(context.allowance());
     Ok(VoxelAir {
+        slabs: structure.slabs(&site.core),
         grid,
         solid,
         distances,
         far,
+        share,
+        resolution,
     })
-}
-
-pub(super) fn resolution_of(grid: &Grid) -> Resolution {
-    Resolution::Voxels {
-        edge: grid.voxel,
-        dims: grid.dims,
-    }
 }
 
 /// Voxels that are not air, or are closed to the flood.

@@ -5,7 +5,7 @@
 
 use enfilade_geom::{Allowance, DVec3};
 
-use super::air::{Solid, resolution_of};
+use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
 use super::candidates::fit_candidates;
 use super::hollow::{Matter, find_matter};
@@ -25,13 +25,21 @@ use crate::{BakeConfig, BakeContext, BakeError, Stage};
 /// If the caller cancels.
 pub(crate) fn propose(
     structure: &Structure<'_>,
-    (grid, solid, mut basins): (Grid, Solid, Basins),
+    air: VoxelAir,
+    mut basins: Basins,
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Proposal, BakeError> {
     let allowance = context.allowance();
+    let VoxelAir {
+        grid,
+        solid,
+        slabs,
+        share,
+        resolution,
+        ..
+    } = air;
     basins.refill(&grid, &solid.occupied);
-    let slabs = structure.slabs(&grid.aabb());
     basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
     let mut notes = solid.lids.notes(&grid);
@@ -82,7 +90,7 @@ pub(crate) fn propose(
     drop((closures, lids));
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh, allowance);
     let not_air = (&matter.regions[..], &stairs);
-    let ballots = Ballots::cast(&grid, &labels, &regions, not_air, allowance);
+    let ballots = Ballots::cast(&grid, &labels, &regions, not_air, share, allowance);
     drop(stairs);
     let region_at = |p| region_at(&grid, &labels, &regions, p);
     let voids = voids_of(structure, &matter, &region_at, allowance);
@@ -102,7 +110,7 @@ pub(crate) fn propose(
         counts,
         notes,
         settings: config.voxel_settings(),
-        resolution: resolution_of(&grid),
+        resolution,
         ..Proposal::new(
             frame.aabb_to_scene(&grid.aabb()),
             ballots.count(&grid, frame),

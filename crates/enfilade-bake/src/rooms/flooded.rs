@@ -57,6 +57,7 @@ pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32,
         all.entry(pair).or_default().append(&mut faces);
     }
     all.remove(&(0, 0)); // before the first pair of a layer
-    all.par_iter_mut().for_each(|(_, faces)| faces.sort_unstable());
+    all.par_iter_mut()
+        .for_each(|(_, faces)| faces.sort_unstable());
     all
 }

@@ -241,9 +241,7 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
         all
     };
     let layers = (0..nz).into_par_iter().with_min_len(LAYERS);
-    let layers = layers
-        .fold(Layers::new, add)
-        .reduce(Layers::new, unite);
+    let layers = layers.fold(Layers::new, add).reduce(Layers::new, unite);
     let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
     layers
         .into_par_iter()

@@ -189,7 +189,8 @@ impl BasinMerger<'_> {
             let pair = (bay.min(home), bay.max(home));
             let shared = self.contacts[&pair].iter().filter(is_upright).count();
             // The sides of the outdoors are not counted, and not needed.
-            let rest = (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared as u32);
+            let rest =
+                (sides[bay as usize] + sides[home as usize]).saturating_sub(2 * shared as u32);
             self.join(pair);
             let whole = self.cell[bay as usize];
             sides[whole as usize] = rest;

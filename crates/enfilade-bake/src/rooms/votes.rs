@@ -31,12 +31,13 @@ pub(super) struct Ballots {
 }
 
 impl Ballots {
-    /// Casts votes: one voxel of each block of `block`³ votes for its region.
+    /// Casts this `share` of all votes: one voxel of each block of `block`³ votes for its region.
     pub(super) fn cast(
         grid: &Grid,
         labels: &Labels,
         regions: &Regions,
         (hollow, solid): (&[u32], &BitVolume),
+        share: f64,
         allowance: &Allowance,
     ) -> Self {
         let mut unsure = BitVolume::new(grid.dims);
@@ -63,7 +64,8 @@ impl Ballots {
             }
         }
         let mut block = 1;
-        while grid.n_voxels() / (block * block * block) > MAX_VOTES {
+        let most = (share * MAX_VOTES as f64) as usize;
+        while grid.n_voxels() / (block * block * block) > most {
             block += 1;
         }
         let dims = grid.dims.map(|n| n.div_ceil(block));

@@ -5,7 +5,7 @@
 //! | which triangles bound rooms, which are stairs, along which axes | `of`, `stairs`, `frame` |
 //! | surfaces that close openings: door leaves and panes | `blockers` |
 //! | where storeys end | `slabs` |
-//! | which part of a site is built up, and which is open land | `site` |
+//! | which parts of a site are built up, and what is open land | `site` |
 //! | how badly triangles fit together, and how to make them fit | `misfit`, `settle`, `weld`, `sheets` |
 //! | where surfaces end, which triangles are missing | `rims` |
 //! | which side of a surface is matter | `backs` |
@@ -41,4 +41,5 @@ pub(crate) use of::{
 pub(crate) use outline::grown;
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};
 pub(crate) use rims::{RimVertex, Rims};
+pub(crate) use site::Site;
 pub(crate) use slabs::lies_in_slab;

@@ -8,7 +8,7 @@ use super::frame::Frame;
 use super::misfit::misfit;
 use super::rims::Rims;
 use super::settle::settle;
-use super::site::built_up;
+use super::site::{Site, sites};
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
 use crate::{BakeConfig, BakeError, Method, SmallestHole};
@@ -18,6 +18,9 @@ pub(crate) const OUTDOORS: u32 = 1;
 
 /// Cost of sorting a triangle, in units of [`Allowance`].
 const WORK_A_TRIANGLE: u64 = 20;
+
+/// Triangles that lie in the border of a box are in it. [Units: wu]
+const ON_BORDER: f64 = 1e-3;
 
 /// The structure of a scene.
 ///
@@ -139,13 +142,14 @@ impl<'a> Structure<'a> {
         bounds_of(&self.walls).union(bounds_of(&self.stairs))
     }
 
-    /// Returns the box around all that can bound rooms, in frame coordinates: without open land.
-    pub(crate) fn built_up(&self, opening: f64) -> Aabb {
-        built_up(&self.walls, &self.bounds(), opening, self.allowance)
+    /// Returns the parts in which anything can bound rooms, in frame coordinates: without open land.
+    pub(crate) fn sites(&self, opening: f64) -> Vec<Site> {
+        sites(&self.walls, &self.bounds(), opening, self.allowance)
     }
 
     /// Returns the heights at which storeys end in a box, ascending: beside wide land, no slab would be large. [Units: wu]
     pub(crate) fn slabs(&self, within: &Aabb) -> Vec<f64> {
+        let within = within.expanded(ON_BORDER);
         let is_in = |t: &&Triangle| t.iter().all(|&p| within.contains(p));
         let walls: Vec<Triangle> = self.walls.iter().filter(is_in).copied().collect();
         slab_heights(&walls)

@@ -1,14 +1,16 @@
-//! The built-up part of a site: the box outside of which there is nothing but open land.
+//! The built-up parts of a site: the boxes outside of which there is nothing but open land.
 //!
 //! A house on a square kilometer of terrain takes a millionth of the site's volume, but voxels small enough for its doors
 //! would have to fill all of it. Open land bounds no rooms, and shows it in plan: it is one surface, with nothing above it, and
 //! not steep. So the plan is divided into squares; those with a wall, or with space between two surfaces in which something
-//! could be, are built up.
+//! could be, are built up. Built-up squares with nothing but land between them are buildings of their own.
 //!
-//! Cost: linear in the squares that triangles touch, at most [`MOST`]; scenes with more are not searched. Errs towards
-//! too much: cliffs, bridges and caves count as built up.
+//! Cost: linear in the squares that triangles touch, at most [`MOST`], and quadratic in the buildings, at most
+//! [`MOST_BUILDINGS`]; scenes with more are not divided. Errs towards too much: cliffs, bridges and caves count as built up.
 
-use enfilade_geom::{Aabb, Allowance, DVec3, Triangle, triangle_area_normal};
+use std::collections::BTreeMap;
+
+use enfilade_geom::{Aabb, Allowance, DVec3, Sets, Triangle, triangle_area_normal};
 
 /// Edge of a square. [Units: wu]
 const SQUARE: f64 = 2.0;
@@ -22,8 +24,35 @@ const MARGIN: f64 = 8.0;
 const STEEP: f64 = 0.25;
 /// … if they are as high as this within a square. [Units: wu]
 const WALL: f64 = 1.0;
-/// The built-up part must be smaller than the whole by this factor, in volume: otherwise nothing is gained.
+/// Most buildings of a site.
+const MOST_BUILDINGS: usize = 1 << 12;
+/// Parts must be smaller than the whole by this factor, in volume: otherwise nothing is gained.
 const GAIN: f64 = 4.0;
+
+/// A built-up part of a site.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Site {
+    /// All that is built; the whole box if nothing is told apart.
+    pub(crate) core: Aabb,
+    /// The core with the land around it, as high as all that is in its plan.
+    pub(crate) bounds: Aabb,
+}
+
+impl Site {
+    /// Returns the box around two sites and what is between them.
+    pub(crate) fn union(self, other: Self) -> Self {
+        Self {
+            core: self.core.union(other.core),
+            bounds: self.bounds.union(other.bounds),
+        }
+    }
+
+    fn whole(bounds: &Aabb) -> Self {
+        let bounds = *bounds;
+        let core = bounds;
+        Self { core, bounds }
+    }
+}
 
 /// A triangle in a square of the plan.
 struct Patch {
@@ -34,63 +63,156 @@ struct Patch {
     is_wall: bool,
 }
 
-/// Returns the part of `bounds` that is built up: all of it if nothing is, or if that is not much smaller. Space between two
-/// surfaces counts if it is higher than `opening`. The box is as high as all that is in its plan.
-pub(crate) fn built_up(
+/// Returns the buildings within `bounds`: all of it if nothing is built, or if they are not much smaller; one for all if
+/// that is hardly larger. Space between two surfaces counts if it is higher than `opening`.
+///
+/// The boxes do not overlap in plan.
+pub(crate) fn sites(
     triangles: &[Triangle],
     bounds: &Aabb,
     opening: f64,
     allowance: &Allowance,
-) -> Aabb {
+) -> Vec<Site> {
     let size = bounds.size();
     let square = SQUARE.max(size.x.max(size.z) / MOST_ALONG);
     let n = [size.x, size.z].map(|s| (s / square).ceil().max(1.0) as usize);
+    let whole = vec![Site::whole(bounds)];
     let Some(mut patches) = patches_of(triangles, bounds, square, n, allowance) else {
-        return *bounds;
+        return whole;
     };
     patches.sort_unstable_by(|a, b| a.square.cmp(&b.square).then(a.low.total_cmp(&b.low)));
-    let mut built = Aabb::EMPTY;
-    for here in patches.chunk_by(|a, b| a.square == b.square) {
-        let mut top = here[0].high;
-        let is_covered = here.iter().any(|patch| {
-            let is_above = f64::from(patch.low - top) > opening;
-            top = top.max(patch.high);
-            is_above
-        });
-        if is_covered || here.iter().any(|patch| patch.is_wall) {
-            let at = here[0].square as usize;
-            let [x, z] = [at % n[0], at / n[0]].map(|k| k as f64 * square);
-            let corner = bounds.min + DVec3::new(x, 0.0, z);
-            built = built.including(corner);
-            built = built.including(corner + DVec3::new(square, 0.0, square));
+    let built: Vec<u32> = patches
+        .chunk_by(|a, b| a.square == b.square)
+        .filter(|here| is_built(here, opening))
+        .map(|here| here[0].square)
+        .collect();
+    let corner = |at: u32| {
+        let [x, z] = [at as usize % n[0], at as usize / n[0]].map(|k| k as f64 * square);
+        bounds.min + DVec3::new(x, 0.0, z)
+    };
+    let cores = connected(&built, n[0]).into_iter().map(|squares| {
+        squares.iter().fold(Aabb::EMPTY, |b, &at| {
+            b.including(corner(at))
+                .including(corner(at) + DVec3::new(square, 0.0, square))
+        })
+    });
+    let Some(cores) = apart(cores.collect(), allowance) else {
+        return whole;
+    };
+    let site = |core: &Aabb| {
+        let wide = core.expanded(MARGIN);
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for patch in &patches {
+            let middle = corner(patch.square) + 0.5 * square;
+            if (wide.min.x..=wide.max.x).contains(&middle.x)
+                && (wide.min.z..=wide.max.z).contains(&middle.z)
+            {
+                low = low.min(patch.low.into());
+                high = high.max(patch.high.into());
+            }
+        }
+        let part = |b: &Aabb| {
+            Aabb::new(
+                DVec3::new(b.min.x, low, b.min.z).max(bounds.min),
+                DVec3::new(b.max.x, high, b.max.z).min(bounds.max),
+            )
+        };
+        Site {
+            core: part(core),
+            bounds: part(&wide),
+        }
+    };
+    let volume = |sites: &[Site]| -> f64 {
+        let volume = |s: &Site| (s.bounds.size() + 2.0 * MARGIN).element_product();
+        sites.iter().map(volume).sum()
+    };
+    let all = cores.iter().fold(Aabb::EMPTY, |b, core| b.union(*core));
+    let together = vec![site(&all)];
+    let each: Vec<Site> = if cores.len() > 1 {
+        cores.iter().map(site).collect()
+    } else {
+        together.clone()
+    };
+    let sites = if GAIN * volume(&each) <= volume(&together) {
+        each
+    } else {
+        together
+    };
+    if GAIN * volume(&sites) <= volume(&whole) {
+        sites
+    } else {
+        whole
+    }
+}
+
+/// Returns `true` if there is a wall in a square, or space between two surfaces, given what is there from below.
+fn is_built(here: &[Patch], opening: f64) -> bool {
+    let mut top = here[0].high;
+    let is_covered = here.iter().any(|patch| {
+        let is_above = f64::from(patch.low - top) > opening;
+        top = top.max(patch.high);
+        is_above
+    });
+    is_covered || here.iter().any(|patch| patch.is_wall)
+}
+
+/// Returns the sets of squares, ascending, that share edges or vertices, in a plan of `nx` columns.
+fn connected(squares: &[u32], nx: usize) -> Vec<Vec<u32>> {
+    let nx = nx as u32;
+    let mut sets = Sets::new(squares.len());
+    for (i, &at) in squares.iter().enumerate() {
+        let before = [
+            (at % nx > 0).then(|| at.wrapping_sub(1)),
+            at.checked_sub(nx + 1).filter(|_| at % nx > 0),
+            at.checked_sub(nx),
+            at.checked_sub(nx - 1).filter(|_| at % nx + 1 < nx),
+        ];
+        for next in before.into_iter().flatten() {
+            if let Ok(j) = squares.binary_search(&next) {
+                sets.join(i as u32, j as u32);
+            }
         }
     }
-    if built.is_empty() {
-        return *bounds;
+    let mut of: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (&at, set) in squares.iter().zip(sets.into_least()) {
+        of.entry(set).or_default().push(at);
     }
-    let wide = built.expanded(MARGIN);
-    let is_in = |patch: &Patch| {
-        let at = patch.square as usize;
-        let [x, z] = [at % n[0], at / n[0]].map(|k| (k as f64 + 0.5) * square);
-        let middle = bounds.min + DVec3::new(x, 0.0, z);
-        (wide.min.x..=wide.max.x).contains(&middle.x)
-            && (wide.min.z..=wide.max.z).contains(&middle.z)
+    of.into_values().collect()
+}
+
+/// Unites boxes whose margins overlap in plan, until none do; `None` if there are none, or too many.
+fn apart(mut cores: Vec<Aabb>, allowance: &Allowance) -> Option<Vec<Aabb>> {
+    let meet = |a: &Aabb, b: &Aabb| {
+        let [a, b] = [a, b].map(|c| c.expanded(MARGIN));
+        a.min.x <= b.max.x && b.min.x <= a.max.x && a.min.z <= b.max.z && b.min.z <= a.max.z
     };
-    let (mut low, mut high) = (f64::MAX, f64::MIN);
-    for patch in patches.iter().filter(|p| is_in(p)) {
-        low = low.min(patch.low.into());
-        high = high.max(patch.high.into());
+    // Fence posts and trees would be thousands of buildings, most of them near others.
+    let mut apart: Vec<Aabb> = Vec::new();
+    while let Some(mut core) = cores.pop() {
+        if apart.len() > MOST_BUILDINGS || !allowance.spend(1 + apart.len() as u64 / 16) {
+            return None;
+        }
+        let n = apart.len();
+        apart.retain(|other| {
+            let is_met = meet(&core, other);
+            if is_met {
+                core = core.union(*other);
+            }
+            !is_met
+        });
+        if apart.len() < n {
+            cores.push(core); // it has grown, and may meet others
+        } else {
+            apart.push(core);
+        }
     }
-    let part = Aabb::new(
-        DVec3::new(wide.min.x, low, wide.min.z).max(bounds.min),
-        DVec3::new(wide.max.x, high, wide.max.z).min(bounds.max),
-    );
-    let volume = |b: &Aabb| (b.size() + 2.0 * MARGIN).element_product();
-    if GAIN * volume(&part) <= volume(bounds) {
-        part
-    } else {
-        *bounds
-    }
+    apart.sort_by(|a, b| {
+        a.min
+            .z
+            .total_cmp(&b.min.z)
+            .then(a.min.x.total_cmp(&b.min.x))
+    });
+    (!apart.is_empty()).then_some(apart)
 }
 
 /// Returns the squares that each triangle touches in plan; `None` if they are too many.
@@ -188,10 +310,16 @@ mod tests {
         land
     }
 
-    fn part_of(triangles: &[Triangle]) -> (Aabb, Aabb) {
+    fn sites_of(triangles: &[Triangle]) -> (Aabb, Vec<Site>) {
         let bounds = Aabb::of_points(triangles.as_flattened());
-        let part = built_up(triangles, &bounds, 0.6, &Allowance::default());
-        (bounds, part)
+        let sites = sites(triangles, &bounds, 0.6, &Allowance::default());
+        (bounds, sites)
+    }
+
+    fn part_of(triangles: &[Triangle]) -> (Aabb, Aabb) {
+        let (bounds, sites) = sites_of(triangles);
+        assert_eq!(sites.len(), 1);
+        (bounds, sites[0].bounds)
     }
 
     #[test]
@@ -233,12 +361,36 @@ mod tests {
         let land = hills(60);
         let (bounds, part) = part_of(&land);
         assert_eq!(part, bounds);
-        let mut town = land;
-        for x in [-250.0, 0.0, 250.0] {
-            let house = Aabb::new(DVec3::new(x, -2.0, -x), DVec3::new(x + 9.0, 7.0, 9.0 - x));
-            town.extend(house.triangles());
-        }
-        let (bounds, part) = part_of(&town);
+        let mut pit = land;
+        let hall = Aabb::new(DVec3::splat(-280.0), DVec3::splat(280.0));
+        pit.extend(hall.triangles());
+        let (bounds, part) = part_of(&pit);
         assert_eq!(part, bounds);
+    }
+
+    #[test]
+    fn houses_far_apart_are_sites_of_their_own_and_those_close_by_are_one() {
+        let mut town = hills(60);
+        let house = |x: f64| Aabb::new(DVec3::new(x, -2.0, -x), DVec3::new(x + 9.0, 7.0, 9.0 - x));
+        for x in [-250.0, 0.0, 250.0] {
+            // A shed 5 m beside each.
+            let main = house(x);
+            let shed = Aabb::new(main.min + DVec3::X * 14.0, main.max + DVec3::X * 14.0);
+            town.extend([main, shed].iter().flat_map(Aabb::triangles));
+        }
+        let (bounds, sites) = sites_of(&town);
+        assert_eq!(sites.len(), 3, "{sites:?}");
+        for (site, x) in sites.iter().zip([250.0, 0.0, -250.0]) {
+            let is_in = |b: &Aabb, p: DVec3| b.contains(p) && bounds.contains(p);
+            let (first, last) = (house(x).min, house(x).max + DVec3::X * 14.0);
+            assert!(is_in(&site.core, first) && is_in(&site.core, last));
+            assert!(is_in(&site.bounds, site.core.min) && is_in(&site.bounds, site.core.max));
+            assert!(site.bounds.size().x < 23.0 + 2.0 * (MARGIN + SQUARE) + 1.0);
+        }
+        // Two of three houses next to each other: one grid for all would not be much larger.
+        let mut pair = hills(60);
+        pair.extend(house(0.0).triangles());
+        pair.extend(house(40.0).triangles());
+        assert_eq!(sites_of(&pair).1.len(), 1);
     }
 }

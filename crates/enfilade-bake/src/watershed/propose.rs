@@ -5,7 +5,7 @@ use enfilade_geom::Allowance;
 use crate::proposal::Proposal;
 use crate::rooms::{self, Basins, VoxelAir};
 use crate::structure::Structure;
-use crate::voxel::{BitVolume, Grid, WatershedOptions, border, watershed};
+use crate::voxel::{WatershedOptions, border, watershed};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// Finds rooms by a flood of the distance field.
@@ -19,32 +19,34 @@ pub(crate) fn propose(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Proposal, BakeError> {
-    let VoxelAir {
-        grid,
-        solid,
-        distances,
-        far,
-    } = rooms::prepare(structure, config, context)?;
-    context.begin(Stage::Flood)?;
-    let basins = flood(&grid, distances, &far, config, context.allowance());
-    context.check()?;
-    drop(far);
-    let mut proposal = rooms::propose(structure, (grid, solid, basins), config, context)?;
+    let sites = structure.sites(config.min_opening);
+    let mut proposal: Option<Proposal> = None;
+    // One after the other: each has a grid of its own, and threads share the work on it.
+    for plot in rooms::plots(structure, sites, config, context)? {
+        let mut air = rooms::measure(structure, plot, config, context)?;
+        context.begin(Stage::Flood)?;
+        let basins = flood(&mut air, config, context.allowance());
+        context.check()?;
+        let here = rooms::propose(structure, air, basins, config, context)?;
+        proposal = Some(match proposal {
+            Some(before) => before.beside(here),
+            None => here,
+        });
+    }
+    let mut proposal = proposal.ok_or(BakeError::NothingStructural {
+        n_objects: structure.scene.objects.len(),
+    })?;
     let noise = ("noise".to_owned(), config.noise.to_string());
     proposal.settings.extend([noise]);
     Ok(proposal)
 }
 
-/// Floods the air. Air that is `far` from everything is known to be outdoors.
-fn flood(
-    grid: &Grid,
-    distances: Vec<u16>,
-    far: &BitVolume,
-    config: &BakeConfig,
-    allowance: &Allowance,
-) -> Basins {
+/// Floods the air, which its distances become. Air that is far from everything is known to be outdoors.
+fn flood(air: &mut VoxelAir, config: &BakeConfig, allowance: &Allowance) -> Basins {
+    let grid = &air.grid;
     let mut outdoors = border(grid.dims); // the padding keeps it empty
-    outdoors.union_with(far);
+    outdoors.union_with(&air.far);
+    let distances = std::mem::take(&mut air.distances);
     let options = WatershedOptions {
         h: config.noise / grid.voxel,
         outdoors: Some(outdoors),
