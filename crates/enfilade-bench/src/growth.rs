@@ -103,20 +103,20 @@ fn growth() -> anyhow::Result<String> {
 }
 
 /// The bake of a tower.
-struct Tower {
+pub(crate) struct Tower {
     /// From the generator's truth; it makes whole storeys.
-    n_rooms: usize,
+    pub(crate) n_rooms: usize,
     /// Cells indoors.
     n_cells: usize,
     triangles: f64,
     voxels: f64,
-    occupied: f64,
-    used: Used,
+    pub(crate) occupied: f64,
+    pub(crate) used: Used,
     /// Name and seconds, in order.
     stages: Vec<(String, String)>,
 }
 
-fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
+pub(crate) fn bake_tower(rooms: usize) -> anyhow::Result<Tower> {
     let dir = target_dir().join(format!("tower-{rooms}"));
     let mut generate = Command::new(binary("examples/generate"));
     output_of(
@@ -162,19 +162,19 @@ fn stage_times(said: &str) -> Vec<(String, String)> {
 }
 
 /// Resources used by a command.
-struct Used {
+pub(crate) struct Used {
     /// Standard error.
     said: String,
     /// Wall time. [Units: s]
-    wall: f64,
+    pub(crate) wall: f64,
     /// User time of all threads. [Units: s]
-    user: f64,
+    pub(crate) user: f64,
     /// Largest resident memory. [Units: bytes]
-    peak: f64,
+    pub(crate) peak: f64,
 }
 
 /// Runs a command under GNU time.
-fn used_by(command: &Command) -> anyhow::Result<Used> {
+pub(crate) fn used_by(command: &Command) -> anyhow::Result<Used> {
     let mut timed = Command::new("/usr/bin/time");
     timed
         .arg("-v")

@@ -3,6 +3,7 @@
 //! To add rows, add a file for their family beside this one and lines in [`ROWS`]. What is measured in a process of its
 //! own is a [`SizeStep`].
 
+mod bakes;
 mod pvs;
 
 use std::path::PathBuf;
@@ -11,7 +12,7 @@ use std::process::Command;
 use anyhow::{Context, ensure};
 use serde_json::Value;
 
-use crate::living::made;
+use crate::living::{made, named};
 use crate::rows::Row;
 
 /// Generated towns, and the largest of them.
@@ -20,7 +21,22 @@ const LARGE: &[&str] = &["town-100000"];
 /// Houses in one outdoor cell, into which thousands of windows look.
 const VILLAGES: &[&str] = &["village-5000"];
 
+/// Office towers, shared buildings, and those of them that are put on land.
+const TOWER: &[&str] = &["tower-1024"];
+const TOWERS: &[&str] = &["tower-1024", "tower-10240"];
+const HIGH_TOWER: &[&str] = &["tower-10240"];
+const CLINIC: &[&str] = &["clinic"];
+const HOUSE: &[&str] = &["fzk-haus"];
+const BUILDINGS: &[&str] = &["fzk-haus", "jasmin-sun", "institute", "duplex"];
+
 pub(crate) const ROWS: &[Row] = &[
+    made("bake: growth", TOWER, bakes::growth),
+    made("bake: seconds", TOWERS, bakes::seconds),
+    named("bake: seconds", CLINIC, bakes::seconds_shared),
+    made("bake: memory", HIGH_TOWER, bakes::memory),
+    named("land: seconds", HOUSE, bakes::seconds_on_land),
+    named("land: rooms lost", BUILDINGS, bakes::lost_on_land),
+    named("land: rooms lost of three", BUILDINGS, bakes::lost_on_site),
     made("pvs: memory", LARGE, pvs::memory_of),
     made("pvs: rate", LARGE, pvs::rate),
     made("pvs: missed", TOWNS, pvs::missed),
