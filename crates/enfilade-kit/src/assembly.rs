@@ -346,13 +346,20 @@ impl Assembly {
 
     /// Returns the attachments that lead outdoors, in the order of instances.
     pub fn open_ends(&self) -> impl Iterator<Item = End> {
-        self.instances().flat_map(|(instance, own)| {
-            let numbered = own.links.iter().enumerate();
-            let open = numbered.filter(|(_, link)| **link == Link::Open);
-            open.map(move |(attachment, _)| End {
-                instance,
-                attachment,
-            })
+        self.instances().flat_map(|(id, _)| self.open_ends_of(id))
+    }
+
+    /// Returns the attachments of an instance that lead outdoors.
+    ///
+    /// # Panics
+    ///
+    /// If there never was such an instance, as [`Assembly::piece`].
+    pub fn open_ends_of(&self, instance: InstanceId) -> impl Iterator<Item = End> {
+        let links = self.instances.get(instance).links.iter().enumerate();
+        let open = links.filter(|(_, link)| **link == Link::Open);
+        open.map(move |(attachment, _)| End {
+            instance,
+            attachment,
         })
     }
 

@@ -65,13 +65,13 @@ pub enum PlaceError {
     },
     /// The instance would overlap another.
     #[error(
-        "it would overlap {} by {by:.3} m around {:.2},{:.2},{:.2}; it must move by that much, or overlaps be allowed",
+        "it would overlap {} by at least {by:.3} m around {:.2},{:.2},{:.2}; place it elsewhere, or allow overlaps",
         shown(.with), .at[0], .at[1], .at[2]
     )]
     Overlaps {
         /// The other instance.
         with: String,
-        /// Distance by which the deepest part of one is in the other. [Units: wu]
+        /// Depth of the convex part of one that is deepest in a part of the other. [Units: wu]
         by: f64,
         /// Middle of that part. [Units: wu]
         at: [f64; 3],

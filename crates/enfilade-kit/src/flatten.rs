@@ -7,7 +7,7 @@ use enfilade_cpg::{
     PortalKind, Provenance, SourceRuns, World, shifted_textures,
 };
 use enfilade_geom::scene::{Fixture, Primitive, SourceNode};
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, Triangle};
 use enfilade_world::Pose;
 
 use crate::assembly::Assembly;
@@ -216,8 +216,8 @@ impl<'a> Flat<'a> {
             let mut detail = detail.clone();
             let transform = pose.matrix() * detail.placement();
             detail.transform = transform.to_cols_array().map(|x| x as f32);
-            detail.mesh += first_mesh;
             detail.cells = cells(&detail.cells);
+            detail.mesh += first_mesh;
             detail.source = detail.source.map(|s| s + first_source);
             detail.part_of = detail.part_of.map(|d| d + first_detail);
             details.push(detail);
@@ -237,20 +237,7 @@ impl<'a> Flat<'a> {
         let mut groups: BTreeMap<Vec<CellId>, Vec<usize>> = BTreeMap::new();
         for (k, t) in batch.primitive.triangles().enumerate() {
             let mut cells = batch.cells.clone();
-            for &other in beside {
-                let piece = self.level.piece(other);
-                let own = t.map(|p| self.level.instance(other).pose.point_back(p));
-                if !Aabb::of_points(&own).overlaps(&piece.shape.air_bounds.expanded(BESIDE)) {
-                    continue;
-                }
-                let mut touched = Vec::new();
-                piece
-                    .world()
-                    .graph
-                    .locator
-                    .cells_touching(&own, &mut touched);
-                cells.extend(touched.into_iter().map(|c| self.cell(other, c)));
-            }
+            self.add_cells_beside(beside, &t, &mut cells);
             cells.sort_unstable();
             cells.dedup();
             groups.entry(cells).or_default().push(k);
@@ -263,6 +250,21 @@ impl<'a> Flat<'a> {
             ..part_of(&batch, |k| members.binary_search(&k).is_ok())
         };
         groups.into_iter().map(part).collect()
+    }
+
+    /// Adds the cells of instances that a triangle touches.
+    fn add_cells_beside(&self, beside: &[InstanceId], t: &Triangle, cells: &mut Vec<CellId>) {
+        for &other in beside {
+            let piece = self.level.piece(other);
+            let own = t.map(|p| self.level.instance(other).pose.point_back(p));
+            if !Aabb::of_points(&own).overlaps(&piece.shape.air_bounds.expanded(BESIDE)) {
+                continue;
+            }
+            let mut touched = Vec::new();
+            let locator = &piece.world().graph.locator;
+            locator.cells_touching(&own, &mut touched);
+            cells.extend(touched.into_iter().map(|c| self.cell(other, c)));
+        }
     }
 
     /// Adds the portals of an instance. Of openings that meet, the instance placed first has the portal.
@@ -360,9 +362,28 @@ impl<'a> Flat<'a> {
             world.graph.locator = grown(bounds.expanded(AROUND), OUTDOORS, &planted);
         }
         world.graph.locator.outside = Some(OUTDOORS);
+        list_objects(&mut world);
         (world.graph.provenance, world.graph.statistics.counts) = origin(level, &world.graph);
         measure(&mut world);
         world
+    }
+}
+
+/// Lists objects that were outdoors in the cells where they are now: leaves and frames of doors that lead to others, and what
+/// sticks out of one instance into another.
+fn list_objects(world: &mut World) {
+    let locator = &world.graph.locator;
+    for detail in (world.details.iter_mut()).filter(|d| d.cells.contains(&OUTDOORS)) {
+        let placement = detail.placement();
+        let mesh = &world.detail_meshes[detail.mesh as usize].primitives;
+        let mut cells = Vec::new();
+        for t in mesh.iter().flat_map(|p| p.placed_triangles(placement)) {
+            locator.cells_touching(&t, &mut cells);
+        }
+        // Within a wall, it keeps those around it.
+        if !cells.is_empty() {
+            detail.cells = cells;
+        }
     }
 }
 

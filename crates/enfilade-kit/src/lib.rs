@@ -44,6 +44,7 @@ mod body;
 mod error;
 mod fit;
 mod flatten;
+pub mod generate;
 mod instance;
 mod kit;
 mod meet;

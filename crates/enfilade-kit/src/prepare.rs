@@ -1,6 +1,8 @@
 //! From a bake to a piece: portals of attachments move to the outer faces of their walls, and the space it takes up is
 //! collected.
 
+use std::collections::BTreeSet;
+
 use enfilade_cpg::{Batch, CellId, Locator, LocatorNode, World};
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, DVec3, Plane, Triangle};
@@ -271,7 +273,17 @@ fn sheets(world: &World, outdoors: CellId) -> Vec<Body> {
             }
         }
     }
-    for detail in world.details.iter().filter(|d| d.cells.contains(&outdoors)) {
+    // Leaves and frames of doors may stick out of their walls, and into the next piece.
+    let portals = world.graph.portals.iter();
+    let fittings: BTreeSet<u32> = portals
+        .flat_map(|p| &p.fittings)
+        .map(|f| f.detail)
+        .collect();
+    let numbered = (0..).zip(&world.details);
+    for (number, detail) in numbered.filter(|(_, d)| d.cells.contains(&outdoors)) {
+        if fittings.contains(&number) {
+            continue;
+        }
         let placement = detail.placement();
         let primitives = &world.detail_meshes[detail.mesh as usize].primitives;
         let vertices = primitives

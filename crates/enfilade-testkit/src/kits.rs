@@ -158,7 +158,7 @@ pub fn office_kit() -> Vec<PieceScene> {
             &doorways(size, "s"),
             desk,
         ),
-        plain("meeting", [0.85, 0.75, 0.65], [8.0, 5.0], 2.7, "s"),
+        plain("meeting", [0.85, 0.75, 0.65], [4.0, 8.0], 2.7, "s"),
         plain("corridor", white, [4.0, 2.4], 2.7, "eswn"),
         plain("lobby", [0.8, 0.7, 0.5], [8.0, 8.0], 3.6, "eswn"),
     ]
