@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 20] = [
+const FENCES: [Fence; 21] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -110,6 +110,12 @@ const FENCES: [Fence; 20] = [
         words: &["std::fs", "std::thread", "std::time"],
     },
     Fence {
+        name: "enfilade-kit",
+        siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-world"],
+        not: &["rayon", "anyhow", "serde_json", "toml"],
+        words: &["std::fs", "std::thread", "std::time"],
+    },
+    Fence {
         name: "enfilade-stream",
         siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-runtime"],
         not: &["rayon", "anyhow"],
@@ -145,6 +151,7 @@ const FENCES: [Fence; 20] = [
             "enfilade-cpg",
             "enfilade-import",
             "enfilade-bake",
+            "enfilade-kit",
             "enfilade-runtime",
             "enfilade-render",
             "enfilade-stream",

@@ -6,6 +6,7 @@
 //!
 //! Exit code 0: done; 1: failed, or a promise is broken (the message says why and what to do); 2: wrong usage.
 
+mod assemble;
 mod bake;
 mod decimate;
 mod demo;
@@ -13,7 +14,9 @@ mod edit;
 mod exact;
 mod export;
 mod formats;
+mod generate;
 mod inspect;
+mod kit;
 mod limits;
 mod living;
 mod locate;
@@ -63,14 +66,17 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Assemble(assemble::Assemble),
     Bake(bake::Bake),
     Completions(manual::Completions),
     Decimate(decimate::Decimate),
     Demo(demo::Demo),
     Edit(edit::Edit),
     Export(export::Export),
+    Generate(generate::Generate),
     Inspect(inspect::Inspect),
     Job(pvs::job::Job),
+    Kit(kit::KitCheck),
     Locate(locate::Locate),
     Man(manual::Man),
     Name(name::Name),
@@ -96,14 +102,17 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         be_quiet();
     }
     match cli.command {
+        Command::Assemble(args) => assemble::run(&args),
         Command::Bake(args) => bake::run(&args),
         Command::Completions(args) => manual::completions(&args, Cli::command()),
         Command::Decimate(args) => decimate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Edit(args) => edit::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Generate(args) => generate::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Job(args) => pvs::job::run(&args),
+        Command::Kit(args) => kit::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),
         Command::Name(args) => name::run(&args),

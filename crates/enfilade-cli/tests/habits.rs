@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 28] = [
+const COMMANDS: [(&str, &[&str]); 31] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -28,6 +28,15 @@ const COMMANDS: [(&str, &[&str]); 28] = [
         &["file", "cells", "portals", "costs"],
     ),
     ("export world.glb -o graph.graphml", &["file", "bytes"]),
+    (
+        "generate maze --rooms 4 --pieces tiles -o m.glb",
+        &["file", "instances", "joined"],
+    ),
+    ("kit tiles -o k.html", &["pieces", "groups", "palette"]),
+    (
+        "assemble level.toml -o a.glb",
+        &["file", "instances", "open"],
+    ),
     ("inspect world.glb", &["cells", "portals", "stats"]),
     ("job plan world.glb -o job", &["shards", "input", "mode"]),
     ("job run job", &["done", "there", "missing"]),
@@ -91,6 +100,8 @@ fn folder(name: &str) -> PathBuf {
     fs::create_dir_all(&dir).unwrap();
     let rooms = gjorup_rooms(Variant::Optimised, [0.0; 3]).scene;
     fs::write(dir.join("rooms.glb"), export_glb(&rooms)).unwrap();
+    let level = "kit = \"tiles\"\nplace = [{ piece = \"crossing\" }]";
+    fs::write(dir.join("level.toml"), level).unwrap();
     dir
 }
 

@@ -256,7 +256,7 @@ fn files_that_nobody_named_are_not_written_over() {
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         (done.status.code(), said)
     };
-    let n_pages = if cfg!(feature = "view") { 26 } else { 25 };
+    let n_pages = if cfg!(feature = "view") { 29 } else { 28 };
     for (line, file, n_files) in [
         ("demo -o d", "house.glb", 3),
         ("demo -o d", "world.glb", 3),

@@ -198,6 +198,35 @@ pub fn used_textures(material: &str) -> Vec<u32> {
     out
 }
 
+/// Returns a material, a JSON object, whose references to textures are greater by `by`, for a world put together from several.
+#[must_use]
+pub fn shifted_textures(material: &str, by: u32) -> String {
+    fn shift(value: &mut Value, by: u32) {
+        match value {
+            Value::Object(map) => {
+                for (key, inner) in map.iter_mut().filter(|(key, _)| *key != "extras") {
+                    if key.ends_with("Texture")
+                        && let Some(index) = inner.get("index").and_then(Value::as_u64)
+                    {
+                        inner["index"] = json!(index + u64::from(by));
+                    }
+                    shift(inner, by);
+                }
+            }
+            Value::Array(items) => items.iter_mut().for_each(|v| shift(v, by)),
+            _ => {}
+        }
+    }
+    match object(material) {
+        Ok(object) if by > 0 => {
+            let mut value = Value::Object(object);
+            shift(&mut value, by);
+            value.to_string()
+        }
+        _ => material.to_owned(),
+    }
+}
+
 /// Calls `visit` with the index of every texture reference: glTF, its extensions included, keeps them in objects
 /// whose key ends in `Texture`. `None` if the index is not an integer.
 fn each_texture_reference(value: &Value, visit: &mut dyn FnMut(Option<u64>)) {
@@ -223,6 +252,15 @@ fn each_texture_reference(value: &Value, visit: &mut dyn FnMut(Option<u64>)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn references_to_textures_are_shifted_wherever_they_are() {
+        let text = r#"{"extras":{"aTexture":{"index":1}},"pbr":{"baseColorTexture":{"index":1}}}"#;
+        let shifted = shifted_textures(text, 2);
+        assert_eq!(used_textures(&shifted), [3]);
+        assert!(shifted.contains(r#""aTexture":{"index":1}"#), "{shifted}");
+        assert_eq!(shifted_textures("", 2), "");
+    }
 
     #[test]
     fn texture_coordinate_sets_are_counted_wherever_a_texture_is_read() {

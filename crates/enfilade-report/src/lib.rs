@@ -22,6 +22,7 @@ mod html;
 mod label;
 mod marks;
 mod matrix;
+mod palette_page;
 #[cfg(feature = "print")]
 mod pdf;
 mod plain;
@@ -40,6 +41,7 @@ mod walk;
 
 pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
+pub use palette_page::{PaletteEntry, palette_html};
 #[cfg(feature = "print")]
 pub use pdf::{PAPERS, Paper, PaperError, to_pdf};
 pub use plain::{

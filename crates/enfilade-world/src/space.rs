@@ -12,13 +12,12 @@
 use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, LooseGrid};
 use enfilade_runtime::{DetailId, Sight, SightError, SightState};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
 use changes::Changes;
-use neighbors::Neighbors;
 use walls::Walls;
 
 pub(crate) use changes::Change;
@@ -43,7 +42,6 @@ mod images;
 mod joined;
 mod look;
 mod meet;
-mod neighbors;
 mod seen;
 mod sweep;
 mod trace;
@@ -85,11 +83,12 @@ pub enum SpaceError {
 /// A world that stands in another.
 pub(crate) struct Part {
     pub(crate) world: Arc<World>,
-    pub(crate) layout: Layout,
-    pub(crate) sight: Sight,
-    pub(crate) state: SightState,
+    // Copies of a part share these.
+    pub(crate) layout: Arc<Layout>,
+    pub(crate) sight: Arc<Sight>,
     /// Made by the first query of contacts.
-    walls: OnceLock<Box<Walls>>,
+    walls: Arc<OnceLock<Walls>>,
+    pub(crate) state: SightState,
     /// The cell that stands for the surroundings.
     pub(crate) border: Option<CellId>,
     pub(crate) host: PartId,
@@ -111,6 +110,16 @@ pub(crate) struct Part {
 }
 
 impl Part {
+    fn model(&self) -> Model {
+        Model {
+            world: Arc::clone(&self.world),
+            layout: Arc::clone(&self.layout),
+            sight: Arc::clone(&self.sight),
+            walls: Arc::clone(&self.walls),
+            hull: self.hull,
+        }
+    }
+
     /// Returns its box in the root's frame, with the tolerance of its geometry.
     fn bounds(&self) -> Aabb {
         if self.hull.is_empty() {
@@ -118,6 +127,28 @@ impl Part {
         }
         let corners = self.hull.corners().map(|p| self.pose.point(p));
         Aabb::of_points(&corners).expanded(self.layout.tolerance())
+    }
+}
+
+/// The world that copies of a part share, and everything prepared from it.
+struct Model {
+    world: Arc<World>,
+    layout: Arc<Layout>,
+    sight: Arc<Sight>,
+    walls: Arc<OnceLock<Walls>>,
+    hull: Aabb,
+}
+
+impl Model {
+    fn new(world: Arc<World>, sight: Sight) -> Self {
+        let layout = Layout::new(&world);
+        Self {
+            hull: hull_of(&world, &sight, &layout),
+            layout: Arc::new(layout),
+            sight: Arc::new(sight),
+            walls: Arc::default(),
+            world,
+        }
     }
 }
 
@@ -140,7 +171,7 @@ pub struct Space {
     pub(crate) parts: Vec<Part>,
     n_cells: usize,
     /// The boxes of all parts but the root.
-    neighbors: Neighbors,
+    neighbors: LooseGrid,
     pub(crate) docking: Docking,
     changes: Changes,
     buffers: Buffers,
@@ -175,12 +206,16 @@ impl Space {
         let mut space = Self {
             parts: Vec::new(),
             n_cells: 0,
-            neighbors: Neighbors::default(),
+            neighbors: LooseGrid::default(),
             docking: Docking::default(),
             changes: Changes::default(),
             buffers: Buffers::default(),
         };
-        space.push(world.into(), sight, PartId::ROOT, Pose::IDENTITY);
+        space.push(
+            Model::new(world.into(), sight),
+            PartId::ROOT,
+            Pose::IDENTITY,
+        );
         space
     }
 
@@ -203,15 +238,48 @@ impl Space {
         }
         let world = world.into();
         let sight = sight_of(&world, part)?;
-        self.push(world, sight, host, pose);
-        self.parts[host.idx()].children.push(PartId(part));
-        self.set_pose(PartId(part), pose)?;
-        Ok(PartId(part))
+        self.add_model(Model::new(world, sight), host, pose)
     }
 
-    fn push(&mut self, world: Arc<World>, sight: Sight, host: PartId, local: Pose) {
+    /// Adds another part with the world of `part`, with doors of its own, all open. Copies share the world and everything
+    /// prepared from it. O(cells and portals).
+    ///
+    /// # Errors
+    ///
+    /// If a part does not exist, or the pose is not a rigid motion.
+    pub fn add_copy(
+        &mut self,
+        part: PartId,
+        host: PartId,
+        pose: Pose,
+    ) -> Result<PartId, SpaceError> {
+        self.check(part)?;
+        self.check(host)?;
+        if !pose.is_rigid() {
+            let part = self.parts.len() as u32;
+            return Err(SpaceError::NotRigid { part });
+        }
+        let model = self.parts[part.idx()].model();
+        self.add_model(model, host, pose)
+    }
+
+    fn add_model(&mut self, model: Model, host: PartId, pose: Pose) -> Result<PartId, SpaceError> {
+        let part = PartId(self.parts.len() as u32);
+        self.push(model, host, pose);
+        self.parts[host.idx()].children.push(part);
+        self.set_pose(part, pose)?;
+        Ok(part)
+    }
+
+    fn push(&mut self, model: Model, host: PartId, local: Pose) {
         let part = self.parts.len() as u32;
-        let layout = Layout::new(&world);
+        let Model {
+            world,
+            layout,
+            sight,
+            walls,
+            hull,
+        } = model;
         let n_cells = layout.n_cells();
         let border = layout.outdoors().filter(|_| part > 0);
         let exits = border.map_or(&[][..], |cell| layout.exits(cell));
@@ -225,7 +293,7 @@ impl Space {
             })
             .collect();
         self.parts.push(Part {
-            hull: hull_of(&world, &sight, &layout),
+            hull,
             state: SightState::new(&sight),
             sight,
             border,
@@ -238,7 +306,7 @@ impl Space {
             guests: vec![Vec::new(); n_cells],
             has_guests: vec![false; n_cells],
             first_cell: self.n_cells as u32,
-            walls: OnceLock::new(),
+            walls,
             layout,
             world,
         });
@@ -273,7 +341,7 @@ impl Space {
             own.pose = host_pose.after(&own.local);
             buffers.order.extend_from_slice(&own.children);
             let bounds = own.bounds();
-            self.neighbors.set(moved, bounds);
+            self.neighbors.set(moved.0, bounds);
             let own = &self.parts[moved.idx()];
             // Parts that stand entirely within their host have moved with it.
             let is_within = own.stands_in.iter().all(|p| p.part == host);
@@ -405,7 +473,7 @@ impl Space {
     /// Returns what bodies can hit in a part.
     pub(crate) fn walls(&self, part: PartId) -> &Walls {
         let part = &self.parts[part.idx()];
-        (part.walls).get_or_init(|| Box::new(Walls::new(&part.world, &part.sight, &part.layout)))
+        (part.walls).get_or_init(|| Walls::new(&part.world, &part.sight, &part.layout))
     }
 
     /// Returns the state of a part's doors.

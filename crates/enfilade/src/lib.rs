@@ -114,6 +114,7 @@
 //! | `render` | `render` | pictures of a world with wgpu |
 //! | `verify` | `verify` | checks the promises of a world |
 //! | `stream` | `stream` | worlds in pieces, fetched as they come into view and kept within a budget |
+//! | `kit` | `kit` | levels put together from baked pieces |
 //! | `world` | `world` | queries of a living world: things, paths, sound, contacts, moving rooms |
 //!
 //! None is on by default: a game that only loads and queries worlds links neither importers nor builders.
@@ -140,6 +141,8 @@ pub use enfilade_runtime as runtime;
 pub use enfilade_bake as bake;
 #[cfg(feature = "import")]
 pub use enfilade_import as import;
+#[cfg(feature = "kit")]
+pub use enfilade_kit as kit;
 #[cfg(feature = "render")]
 pub use enfilade_render as render;
 #[cfg(feature = "stream")]

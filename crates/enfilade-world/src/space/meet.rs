@@ -87,8 +87,9 @@ impl Space {
         self.part_from_all(id);
         let near = &mut buffers.near;
         near.clear();
-        let bounds = self.neighbors.bounds(id).expanded(self.docking.gap);
-        self.neighbors.near(&bounds, near);
+        let bounds = self.neighbors.bounds(id.0).expanded(self.docking.gap);
+        self.neighbors
+            .for_each_near(&bounds, |part| near.push(PartId(part)));
         // In the order of their numbers, so that equal poses give equal answers.
         near.sort_unstable();
         for &other in near.iter().filter(|p| **p != id) {

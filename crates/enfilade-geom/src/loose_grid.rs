@@ -1,13 +1,11 @@
-//! Parts by their boxes: finds those near a box in time that does not grow with the number of parts.
+//! Boxes that move, by their places: finds those near a box in time that does not grow with their number.
 //!
 //! A loose grid in levels (Ulrich, "Loose octrees", Game Programming Gems, 2000): each box is listed once, by its center, in the
 //! level whose cells are as wide as its longest side, hence sticks out of its cell by half a cell at most. The lists are chains
 //! through one table of buckets, so that moving a box allocates nothing. A query that covers more cells of a level than there
 //! are boxes in it tests these boxes instead.
 
-use enfilade_geom::{Aabb, DVec3};
-
-use super::id::PartId;
+use crate::{Aabb, DVec3};
 
 const NONE: u32 = u32::MAX;
 
@@ -15,17 +13,18 @@ const NONE: u32 = u32::MAX;
 /// one cell. [Units: wu, as an exponent]
 const LEVELS: [f64; 2] = [-10.0, 50.0];
 
-/// The boxes of all parts, in the root's frame.
-#[derive(Default)]
-pub(super) struct Neighbors {
-    /// Per part.
+/// Boxes with numbers from 0 on, in a loose grid.
+#[derive(Clone, Debug, Default)]
+pub struct LooseGrid {
+    /// Per box.
     entries: Vec<BoxEntry>,
-    /// First part of each bucket; a power of two.
+    /// First box of each bucket; a power of two.
     heads: Vec<u32>,
     /// Each level in use with the number of its boxes.
     levels: Vec<(i32, u32)>,
 }
 
+#[derive(Clone, Debug)]
 struct BoxEntry {
     bounds: Aabb,
     /// `None` for an empty box.
@@ -34,7 +33,7 @@ struct BoxEntry {
     next: u32,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Key {
     level: i32,
     at: [i64; 3],
@@ -67,43 +66,56 @@ fn cell_of(p: DVec3, side: f64) -> [i64; 3] {
     (p / side).floor().to_array().map(|x| x as i64)
 }
 
-impl Neighbors {
-    /// Adds the box of the next part.
-    pub(super) fn push(&mut self, bounds: Aabb) {
+impl LooseGrid {
+    /// Adds the next box; an empty one is near to none. O(1) on average.
+    pub fn push(&mut self, bounds: Aabb) {
         self.entries.push(BoxEntry {
             bounds: Aabb::EMPTY,
             key: None,
             before: NONE,
             next: NONE,
         });
-        let part = self.entries.len() as u32 - 1;
+        let last = self.entries.len() as u32 - 1;
         if self.entries.len() * 2 > self.heads.len() {
             let n = (self.entries.len() * 4).next_power_of_two();
             self.heads.clear();
             self.heads.resize(n, NONE);
-            for at in 0..part {
+            for at in 0..last {
                 self.link(at);
             }
         }
-        self.set(PartId(part), bounds);
+        self.set(last, bounds);
     }
 
-    /// Returns the box of a part.
-    pub(super) fn bounds(&self, part: PartId) -> &Aabb {
-        &self.entries[part.idx()].bounds
+    /// Removes the last box.
+    pub fn pop(&mut self) {
+        if let Some(last) = self.entries.len().checked_sub(1) {
+            self.set(last as u32, Aabb::EMPTY);
+            self.entries.pop();
+        }
     }
 
-    /// Moves the box of a part.
-    pub(super) fn set(&mut self, part: PartId, bounds: Aabb) {
+    /// Returns a box.
+    ///
+    /// # Panics
+    ///
+    /// If there is no box of this number, as [`LooseGrid::set`] does.
+    #[must_use]
+    pub fn bounds(&self, number: u32) -> &Aabb {
+        &self.entries[number as usize].bounds
+    }
+
+    /// Moves a box. O(1).
+    pub fn set(&mut self, number: u32, bounds: Aabb) {
         let key = Key::of(&bounds);
-        let entry = &mut self.entries[part.idx()];
+        let entry = &mut self.entries[number as usize];
         entry.bounds = bounds;
         if entry.key == key {
             return;
         }
-        self.unlink(part.0);
-        self.entries[part.idx()].key = key;
-        self.link(part.0);
+        self.unlink(number);
+        self.entries[number as usize].key = key;
+        self.link(number);
         let Some(key) = key else { return };
         match self.levels.iter_mut().find(|l| l.0 == key.level) {
             Some(level) => level.1 += 1,
@@ -143,8 +155,8 @@ impl Neighbors {
         }
     }
 
-    /// Appends the parts whose boxes overlap `bounds`, each once, in no order.
-    pub(super) fn near(&self, bounds: &Aabb, into: &mut Vec<PartId>) {
+    /// Calls `visit` with the boxes that overlap `bounds`, each once, in no order.
+    pub fn for_each_near(&self, bounds: &Aabb, mut visit: impl FnMut(u32)) {
         if bounds.is_empty() {
             return;
         }
@@ -154,35 +166,35 @@ impl Neighbors {
             let [low, high] = [reach.min, reach.max].map(|p| cell_of(p, side));
             let n_cells = [0, 1, 2].map(|k| high[k] as f64 - low[k] as f64 + 1.0);
             if n_cells.iter().product::<f64>() > 8.0 + f64::from(n_boxes) {
-                self.near_in_level(level, bounds, into);
+                self.near_in_level(level, bounds, &mut visit);
                 continue;
             }
             for x in low[0]..=high[0] {
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
                         let at = [x, y, z];
-                        self.near_in_cell(Key { level, at }, bounds, into);
+                        self.near_in_cell(Key { level, at }, bounds, &mut visit);
                     }
                 }
             }
         }
     }
 
-    fn near_in_cell(&self, key: Key, bounds: &Aabb, into: &mut Vec<PartId>) {
+    fn near_in_cell(&self, key: Key, bounds: &Aabb, visit: &mut impl FnMut(u32)) {
         let mut at = self.heads[key.bucket(self.heads.len())];
         while let Some(entry) = self.entries.get(at as usize) {
             if entry.key == Some(key) && entry.bounds.overlaps(bounds) {
-                into.push(PartId(at));
+                visit(at);
             }
             at = entry.next;
         }
     }
 
-    fn near_in_level(&self, level: i32, bounds: &Aabb, into: &mut Vec<PartId>) {
-        for (part, entry) in (0..).map(PartId).zip(&self.entries) {
+    fn near_in_level(&self, level: i32, bounds: &Aabb, visit: &mut impl FnMut(u32)) {
+        for (number, entry) in (0..).zip(&self.entries) {
             let is_of_level = entry.key.is_some_and(|key| key.level == level);
             if is_of_level && entry.bounds.overlaps(bounds) {
-                into.push(part);
+                visit(number);
             }
         }
     }
@@ -207,24 +219,24 @@ mod tests {
     #[test]
     fn boxes_that_overlap_are_found_once_wherever_they_moved() {
         let mut rng = Rng::new(8);
-        let mut neighbors = Neighbors::default();
+        let mut grid = LooseGrid::default();
         let mut all: Vec<Aabb> = (0..150).map(|_| random_box(&mut rng)).collect();
         for bounds in &all {
-            neighbors.push(*bounds);
+            grid.push(*bounds);
         }
         let mut n_found = 0;
         for _ in 0..2000 {
             let moved = rng.below(all.len());
             all[moved] = random_box(&mut rng);
-            neighbors.set(PartId(moved as u32), all[moved]);
+            grid.set(moved as u32, all[moved]);
             let asked = random_box(&mut rng);
             let mut found = Vec::new();
-            neighbors.near(&asked, &mut found);
+            grid.for_each_near(&asked, |k| found.push(k));
             found.sort_unstable();
             let overlapping = (0_u32..).zip(&all).filter(|(_, b)| b.overlaps(&asked));
             let known: Vec<_> = overlapping
                 .filter(|(_, b)| !b.is_empty() && !asked.is_empty())
-                .map(|(k, _)| PartId(k))
+                .map(|(k, _)| k)
                 .collect();
             assert_eq!(found, known);
             n_found += known.len();
