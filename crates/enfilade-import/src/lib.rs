@@ -54,7 +54,7 @@ pub use enfilade_prepare::{
 };
 pub use error::ImportError;
 pub use export::export_glb;
-pub use options::{IfcConverter, ImportOptions, Limits, Up};
+pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
@@ -62,7 +62,8 @@ pub use report::{FileReport, ImportReport, Note, SurfaceReport, UpDoubt, cleanin
 
 use builder::Builder;
 use enfilade_geom::scene::Scene;
-use enfilade_source::ImplicitScene;
+pub use enfilade_source::AirSide;
+use enfilade_source::{ImplicitScene, Volume};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -158,6 +159,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Stl => stl::read(bytes, builder),
         Format::Ifc => ifc::read(bytes, builder),
         Format::Implicit => sources::read_implicit(bytes, builder),
+        Format::Volume => sources::read_volume(bytes, builder),
     }
 }
 
@@ -171,6 +173,7 @@ enum Format {
     Stl,
     Ifc,
     Implicit,
+    Volume,
 }
 
 impl Format {
@@ -180,7 +183,9 @@ impl Format {
             // One byte more than allowed shows that the input is too large.
             Self::Gltf => gltf::length(head).unwrap_or(limits.max_json_bytes.saturating_add(1)),
             Self::Stl => stl::length(head).unwrap_or(u64::MAX),
-            Self::Ply | Self::Obj | Self::Map | Self::Ifc | Self::Implicit => u64::MAX,
+            Self::Ply | Self::Obj | Self::Map | Self::Ifc | Self::Implicit | Self::Volume => {
+                u64::MAX
+            }
         }
     }
 }
@@ -207,6 +212,8 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         Format::Ifc
     } else if let Some(error) = foreign::unsupported(bytes, path) {
         return Err(error);
+    } else if Volume::is_one(bytes) {
+        Format::Volume
     } else if ImplicitScene::is_one(bytes) {
         Format::Implicit
     } else if gltf::is_gltf(bytes) {
@@ -240,6 +247,15 @@ pub fn decode_gltf(bytes: &[u8], options: &ImportOptions) -> Result<Imported, Im
 /// As [`import`].
 pub fn decode_implicit(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.json", options, sources::read_implicit)
+}
+
+/// Reads a volume of samples from memory: NIfTI or NRRD, in one file.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_volume(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.nii", options, sources::read_volume)
 }
 
 /// Reads an OBJ file from memory, without its material libraries.

@@ -64,7 +64,7 @@ pub struct UpDoubt {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map` or `implicit`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `implicit`, `NIfTI`, `NRRD` or `raw volume`.
     pub format: &'static str,
     /// Objects read from it.
     pub n_objects: u64,
@@ -81,6 +81,10 @@ pub struct SurfaceReport {
     pub step: f64,
     /// Largest distance found between surface and source. [Units: wu]
     pub distance: f64,
+    /// Factor by which it was enlarged beyond its unit, if it was.
+    pub enlarged: Option<f64>,
+    /// Further assumptions, for people; may be empty.
+    pub text: String,
 }
 
 /// One observation.

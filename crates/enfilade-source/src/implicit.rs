@@ -11,6 +11,7 @@ use std::sync::Arc;
 use enfilade_geom::{Aabb, DVec3};
 
 use crate::{ExtractOptions, Field, Interval, SourceError, SourceLimits, Surface, extract};
+pub(crate) use parse::unit;
 use shape::Shape;
 
 /// Steps along the longest edge of a scene that does not give its step.
@@ -35,9 +36,7 @@ impl ImplicitScene {
     /// Returns `true` if a file looks like an implicit scene.
     #[must_use]
     pub fn is_one(bytes: &[u8]) -> bool {
-        let head = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
-        let packed: String = head.split_ascii_whitespace().collect();
-        packed.starts_with('{') && packed.contains("\"enfilade\":\"implicit\"")
+        crate::is_json_of(bytes, "implicit")
     }
 
     /// Parses a scene; `docs/sources.md` explains the language.

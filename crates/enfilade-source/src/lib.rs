@@ -20,13 +20,20 @@ mod blocks;
 mod error;
 mod field;
 mod implicit;
+mod json;
 mod patches;
 mod qef;
+mod scan;
 mod simplify;
 mod surface;
+mod volume;
 
 pub use blocks::Lattice;
 pub use error::{SourceError, SourceLimits};
 pub use field::{Field, Interval};
 pub use implicit::ImplicitScene;
+pub use scan::{Scan, ScanOptions};
 pub use surface::{ExtractOptions, Surface, extract};
+pub use volume::{AirSide, Beside, Level, SampleKind, Volume, VolumeSummary, gunzip, is_gzip};
+
+use json::{is_json_of, known_keys, shortened};

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_geom::{Aabb, DMat4, DVec3, Sets};
 
 use crate::blocks::{BLOCK, Lattice, Spent, for_blocks};
 use crate::patches::{EDGES, NONE, Pieces};
@@ -23,14 +23,16 @@ pub struct ExtractOptions {
     pub placement: DMat4,
     /// Largest distance of the simplified surface from the extracted one, in the space of the surface; 0 simplifies nothing.
     pub tolerance: f64,
+    /// Pieces of surface whose box is smaller than this along all axes are left out, as noise; in the space of the surface.
+    pub least_piece: f64,
 }
 
 /// Steps of air or matter around the box of a field, and a fraction, so that planes at round coordinates do not pass
 /// through points of the lattice.
 const MARGIN: f64 = 2.372;
-/// Largest distance of the simplified surface from the extracted one, in steps: half of what separates two surfaces that the
-/// lattice tells apart, and half again.
-pub(crate) const TOLERANCE: f64 = 0.25;
+/// Largest distance of the simplified surface from the extracted one, in steps. Much less than what separates two surfaces that
+/// the lattice tells apart, and so little that a tube of six steps across does not become a prism.
+pub(crate) const TOLERANCE: f64 = 0.1;
 
 impl ExtractOptions {
     /// Returns the usual options for a field with its surface in a box.
@@ -45,6 +47,7 @@ impl ExtractOptions {
             },
             placement: DMat4::IDENTITY,
             tolerance: step * TOLERANCE,
+            least_piece: 0.0,
         }
     }
 }
@@ -63,6 +66,8 @@ pub struct Surface {
     pub n_samples: u64,
     /// Triangles before it was simplified.
     pub n_extracted: u64,
+    /// Pieces left out because they are as small as noise.
+    pub n_dropped: u64,
 }
 
 /// Extracts the surface of a field.
@@ -93,6 +98,17 @@ pub fn extract(
     let distance = net.distance(field, &mut spent)?;
     let mut surface = net.finish();
     surface.n_samples = spent.n_samples;
+    if options.least_piece > 0.0 {
+        surface.n_dropped = drop_small(
+            &mut surface.triangles,
+            &surface.positions,
+            options.least_piece,
+        );
+        if surface.triangles.is_empty() {
+            let problem = "all pieces are as small as noise; check the level";
+            return Err(SourceError::new("surface", problem));
+        }
+    }
     surface.n_extracted = surface.triangles.len() as u64;
     surface.distance = distance;
     if options.tolerance > 0.0 {
@@ -343,6 +359,25 @@ impl<'o> Net<'o> {
             ..Surface::default()
         }
     }
+}
+
+/// Drops pieces whose box is smaller than `least` along all axes, and returns how many.
+fn drop_small(triangles: &mut Vec<[u32; 3]>, positions: &[DVec3], least: f64) -> u64 {
+    let mut pieces = Sets::new(positions.len());
+    for [a, b, c] in &*triangles {
+        pieces.join(*a, *b);
+        pieces.join(*a, *c);
+    }
+    let mut boxes: HashMap<u32, Aabb> = HashMap::new();
+    for [a, b, c] in &*triangles {
+        let bounds = boxes.entry(pieces.find(*a)).or_insert(Aabb::EMPTY);
+        *bounds = [a, b, c]
+            .iter()
+            .fold(*bounds, |t, &&i| t.including(positions[i as usize]));
+    }
+    let is_small = |b: &Aabb| b.size().max_element() < least;
+    triangles.retain(|t| !boxes.get(&pieces.find(t[0])).is_some_and(is_small));
+    boxes.values().filter(|b| is_small(b)).count() as u64
 }
 
 /// Returns the place where a field changes its sign between two points.

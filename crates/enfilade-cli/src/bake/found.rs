@@ -20,15 +20,15 @@ pub(super) fn report_import(
     let mut err = Told;
     for file in &report.files {
         if let Some(surface) = &file.surface {
+            let path = shown(file.path.display());
+            if !surface.text.is_empty() {
+                writeln!(err, "{path}: {}", surface.text)?;
+            }
             writeln!(
                 err,
-                "{}: {}, a surface of {} triangles in steps of {:.3} m; it is at most {:.1e} m from its source, and what follows \
-                 holds for it",
-                shown(file.path.display()),
-                file.format,
-                file.n_triangles,
-                surface.step,
-                surface.distance
+                "{path}: {}, a surface of {} triangles in steps of {:.3} m; it is at most {:.3} m from its source, and all \
+                 promises hold for it",
+                file.format, file.n_triangles, surface.step, surface.distance
             )?;
         }
     }

@@ -6,7 +6,7 @@ use enfilade_geom::{Aabb, DMat3, DVec3};
 use serde_json::{Map, Value};
 
 use super::shape::Shape;
-use crate::{SourceError, SourceLimits};
+use crate::{SourceError, SourceLimits, known_keys, shortened};
 
 /// Largest coordinate or length: beyond, numbers are no longer exact to a thousandth.
 const MAX_LENGTH: f64 = 1e9;
@@ -33,7 +33,7 @@ pub(super) fn scene(bytes: &[u8], limits: &SourceLimits) -> Result<Read, SourceE
     let Some(map) = value.as_object() else {
         return Err(SourceError::new("scene", "must be an object in braces"));
     };
-    known(
+    known_keys(
         map,
         "scene",
         &[
@@ -103,7 +103,7 @@ pub(super) fn scene(bytes: &[u8], limits: &SourceLimits) -> Result<Read, SourceE
 }
 
 /// Returns meters per unit.
-fn unit(value: &Value) -> Result<f64, SourceError> {
+pub(crate) fn unit(value: &Value) -> Result<f64, SourceError> {
     let found = match value.as_str() {
         Some("m") => Some(1.0),
         Some("cm") => Some(0.01),
@@ -344,7 +344,7 @@ impl Fields<'_> {
     }
 
     fn only(&self, keys: &[&str]) -> Result<(), SourceError> {
-        known(self.map, self.place, keys)
+        known_keys(self.map, self.place, keys)
     }
 
     fn get(&self, key: &str) -> Result<&Value, SourceError> {
@@ -364,20 +364,6 @@ impl Fields<'_> {
         let place = self.at(key);
         let direction = point(self.get(key)?, &place)?.try_normalize();
         direction.ok_or_else(|| SourceError::new(place, "must not be zero"))
-    }
-}
-
-fn known(map: &Map<String, Value>, place: &str, keys: &[&str]) -> Result<(), SourceError> {
-    match map.keys().find(|k| !keys.contains(&k.as_str())) {
-        None => Ok(()),
-        Some(key) => {
-            let problem = format!(
-                "'{}' is unknown; known are {}",
-                shortened(key),
-                keys.join(", ")
-            );
-            Err(SourceError::new(place, problem))
-        }
     }
 }
 
@@ -410,13 +396,4 @@ fn points_box(value: &Value, place: &str) -> Result<Aabb, SourceError> {
         ));
     };
     Ok(Aabb::new(point(min, place)?, point(max, place)?))
-}
-
-/// Returns a word short enough for a message.
-fn shortened(word: &str) -> String {
-    if word.chars().count() <= 40 {
-        word.to_owned()
-    } else {
-        word.chars().take(37).chain("...".chars()).collect()
-    }
 }
