@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 21] = [
+const FENCES: [Fence; 22] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -57,10 +57,16 @@ const FENCES: [Fence; 21] = [
     },
     Fence {
         name: "enfilade-import",
-        siblings: &["enfilade-geom", "enfilade-prepare"],
+        siblings: &["enfilade-geom", "enfilade-prepare", "enfilade-source"],
         not: &["rayon", "anyhow"],
         // Waits for a converter, and so may sleep.
         words: &["thread::spawn", "thread::scope", "thread::Builder"],
+    },
+    Fence {
+        name: "enfilade-source",
+        siblings: &["enfilade-geom"],
+        not: &["rayon", "anyhow", "clap"],
+        words: &["std::fs", "std::thread"],
     },
     Fence {
         name: "enfilade-voxel",

@@ -17,6 +17,9 @@ const OPEN: f64 = 0.05;
 /// Largest length of the sum of all area normals ÷ area. A closed surface has 0, a vessel the share of its open ends, a
 /// terrain 0.7 and more.
 const HOLES: f64 = 0.1;
+/// Cosine of the angle between triangles at an edge of a wall. Surfaces of volumes with few samples bend by 30 degrees from one
+/// triangle to the next, so that each may be a hundredth of all; walls meet at 90.
+const SHARP: f64 = 0.5;
 /// Cosine of the angle between two triangles of one patch: a tenth of a degree, the single precision error of a
 /// plane in a large scene.
 const ONE_PATCH: f64 = 0.999_998_5;
@@ -47,20 +50,31 @@ pub(crate) fn is_vessel(scene: &Scene) -> bool {
     let unit = |t: usize| normals[t].normalize_or_zero();
     let mut patches = Sets::new(triangles.len());
     let mut n_open = 0;
+    let mut is_wall = vec![false; triangles.len()];
     for around in sides.values() {
         n_open += around.len() % 2;
         // Sheets that touch along an edge are not planes that continue there.
         let &[a, b] = &around[..] else { continue };
-        if unit(a).dot(unit(b)) > ONE_PATCH {
+        let bend = unit(a).dot(unit(b));
+        if bend > ONE_PATCH {
             patches.join(a as u32, b as u32);
+        }
+        // A patch of several triangles is flat, too.
+        if !(SHARP..=ONE_PATCH).contains(&bend) {
+            is_wall[a] = true;
+            is_wall[b] = true;
         }
     }
     let mut areas = vec![0.0; triangles.len()];
     for (t, normal) in (0..).zip(&normals) {
-        areas[patches.find(t) as usize] += normal.length();
+        let patch = patches.find(t) as usize;
+        areas[patch] += normal.length();
+        is_wall[patch] |= is_wall[t as usize];
     }
     let all: f64 = areas.iter().sum();
-    let planes: f64 = areas.iter().filter(|&&a| a >= PLANE * all).sum();
+    let of_wall = areas.iter().zip(&is_wall);
+    let planes = of_wall.filter(|&(&a, &is_wall)| is_wall && a >= PLANE * all);
+    let planes: f64 = planes.map(|(a, _)| a).sum();
     // The area normals of the holes and of the surface add up to zero.
     let holes = normals.iter().sum::<DVec3>().length();
     planes <= FLAT * all && holes <= HOLES * all && n_open as f64 <= OPEN * sides.len() as f64
@@ -85,6 +99,9 @@ mod tests {
             0.12,
         );
         assert!(is_vessel(&vessel.scene));
+        // However few triangles it has.
+        let pipe = along(1.0, DVec3::new(4.0, 0.3, 0.2));
+        assert!(is_vessel(&tubes(&[pipe], 0.5).scene));
         assert!(is_vessel(&cave(1).scene));
         for variant in [Variant::Optimised, Variant::Tessellated, Variant::Distorted] {
             assert!(!is_vessel(&gjorup_rooms(variant, [0.0; 3]).scene));

@@ -38,7 +38,7 @@ use enfilade_report::{Verdict, is_empty, why_empty};
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
 pub(crate) struct Bake {
-    /// Scene files: GLB, glTF, OBJ, PLY, STL, Quake MAP, or IFC, which needs ifcopenshell (`pip install ifcopenshell`) or
+    /// Scene files: GLB, glTF, OBJ, PLY, STL, Quake MAP, implicit scenes in JSON, volumes (NIfTI, NRRD), or IFC, which needs ifcopenshell (`pip install ifcopenshell`) or
     /// web-ifc (`npm install web-ifc`). Several become one scene; `-` is standard input.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,
@@ -103,11 +103,8 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     } else if baked.n_indoors() == 0 {
         leak_path = Some(leak_path::look_unasked(scene, config, options.threads)?);
     }
-    if let Some(repair) = settings.import.repair {
-        let told = &mut baked.world.graph.provenance.settings;
-        told.insert("repair.weld".into(), repair.weld.to_string());
-        told.insert("repair.hole".into(), repair.hole.to_string());
-    }
+    let told = &mut baked.world.graph.provenance.settings;
+    told.extend(found::settings_of(&imported.report, settings.import.repair));
     if is_empty(&baked.world) {
         let why = why_empty(&baked.world);
         // Whoever asks for the way out wants to see it.

@@ -25,7 +25,7 @@ pub use aabb::Aabb;
 pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse, Tab};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use flight::{MOST_FLIGHT_PLAN, are_treads, is_flight};
-pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
+pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
 pub use loose_grid::LooseGrid;
 pub use plane::Plane;
 pub use ray::{Ray, RayHit, closest_point_on_segment, closest_point_on_triangle};

@@ -1,4 +1,4 @@
-//! Reads glTF, GLB, OBJ, PLY, STL, IFC and Quake maps into one [`Scene`].
+//! Reads glTF, GLB, OBJ, PLY, STL, IFC, Quake maps and implicit scenes into one [`Scene`].
 //!
 //! [`import`] reads any number of files into one scene, in meters and +Y up, with a role for each object and a report
 //! of everything skipped or repaired. Input is not trusted: each count, offset and index is checked before use,
@@ -43,6 +43,7 @@ mod pvs_text;
 mod report;
 mod rooms;
 mod soup;
+mod sources;
 mod stl;
 mod textures;
 
@@ -53,14 +54,16 @@ pub use enfilade_prepare::{
 };
 pub use error::ImportError;
 pub use export::export_glb;
-pub use options::{IfcConverter, ImportOptions, Limits, Up};
+pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
-pub use report::{FileReport, ImportReport, Note, UpDoubt, cleaning_report};
+pub use report::{FileReport, ImportReport, Note, SurfaceReport, UpDoubt, cleaning_report};
 
 use builder::Builder;
 use enfilade_geom::scene::Scene;
+pub use enfilade_source::AirSide;
+use enfilade_source::{ImplicitScene, Volume};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -155,6 +158,8 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Map => map::read(bytes, builder),
         Format::Stl => stl::read(bytes, builder),
         Format::Ifc => ifc::read(bytes, builder),
+        Format::Implicit => sources::read_implicit(bytes, builder),
+        Format::Volume => sources::read_volume(bytes, builder),
     }
 }
 
@@ -167,6 +172,8 @@ enum Format {
     Map,
     Stl,
     Ifc,
+    Implicit,
+    Volume,
 }
 
 impl Format {
@@ -176,7 +183,9 @@ impl Format {
             // One byte more than allowed shows that the input is too large.
             Self::Gltf => gltf::length(head).unwrap_or(limits.max_json_bytes.saturating_add(1)),
             Self::Stl => stl::length(head).unwrap_or(u64::MAX),
-            Self::Ply | Self::Obj | Self::Map | Self::Ifc => u64::MAX,
+            Self::Ply | Self::Obj | Self::Map | Self::Ifc | Self::Implicit | Self::Volume => {
+                u64::MAX
+            }
         }
     }
 }
@@ -203,6 +212,10 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         Format::Ifc
     } else if let Some(error) = foreign::unsupported(bytes, path) {
         return Err(error);
+    } else if Volume::is_one(bytes) {
+        Format::Volume
+    } else if ImplicitScene::is_one(bytes) {
+        Format::Implicit
     } else if gltf::is_gltf(bytes) {
         Format::Gltf
     } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
@@ -225,6 +238,24 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
 /// As [`import`].
 pub fn decode_gltf(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.glb", options, gltf::read)
+}
+
+/// Reads a scene of implicit shapes from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_implicit(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.json", options, sources::read_implicit)
+}
+
+/// Reads a volume of samples from memory: NIfTI or NRRD, in one file.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_volume(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.nii", options, sources::read_volume)
 }
 
 /// Reads an OBJ file from memory, without its material libraries.

@@ -2,6 +2,7 @@
 
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_prepare::{BadOption, RepairOptions, RoleRules};
+use enfilade_source::AirSide;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -15,6 +16,19 @@ pub enum Up {
 }
 
 impl Up {
+    /// Returns the rotation that turns this axis up.
+    pub(crate) fn axes(self) -> DMat4 {
+        match self {
+            Self::Y => DMat4::IDENTITY,
+            Self::Z => DMat4::from_cols_array_2d(&[
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 0.0, -1.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 0.0, 1.0],
+            ]),
+        }
+    }
+
     /// Returns the option of the command, as typed.
     #[must_use]
     pub fn option(self) -> &'static str {
@@ -30,7 +44,7 @@ impl Up {
 pub struct ImportOptions {
     /// Meters per input unit, from 1e-9 to 1e9; `None` is 1.
     pub unit: Option<f64>,
-    /// The input's up axis; `None` is [`Up::Y`] for every format.
+    /// The input's up axis; `None` is [`Up::Y`] for every format but volumes and scans that say which way is up.
     pub up: Option<Up>,
     /// Point of the scaled, Y-up scene that becomes the origin. [Units: wu]
     ///
@@ -50,8 +64,19 @@ pub struct ImportOptions {
     /// Leaves objects called `mirror` or `portal:NAME` as they are, so that [`Scene::marks`](enfilade_geom::scene::Scene::marks)
     /// stays empty.
     pub ignores_marks: bool,
+    /// Where the surface of a volume lies.
+    pub volume: VolumeOptions,
     /// Repairs of structural triangles; `None` repairs nothing.
     pub repair: Option<RepairOptions>,
+}
+
+/// Settings of volumes of samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VolumeOptions {
+    /// The value between matter and air; `None` is the middle of a mask, and an error for other volumes.
+    pub level: Option<f64>,
+    /// The side of it on which air is; `None` is below a given level, and above the middle of a mask.
+    pub air: Option<AirSide>,
 }
 
 /// Programs that read IFC, and their limits.
@@ -174,15 +199,7 @@ impl ImportOptions {
                 problem: format!("{} is not a point", self.origin),
             });
         }
-        let axes = match self.up.unwrap_or(Up::Y) {
-            Up::Y => DMat4::IDENTITY,
-            Up::Z => DMat4::from_cols_array_2d(&[
-                [1.0, 0.0, 0.0, 0.0],
-                [0.0, 0.0, -1.0, 0.0],
-                [0.0, 1.0, 0.0, 0.0],
-                [0.0, 0.0, 0.0, 1.0],
-            ]),
-        };
+        let axes = self.up.unwrap_or(Up::Y).axes();
         // A product with an identity would turn some 0 into -0; keep plain input unchanged.
         Ok(DMat4::from_translation(-self.origin) * DMat4::from_scale(DVec3::splat(unit)) * axes)
     }

@@ -64,12 +64,27 @@ pub struct UpDoubt {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC` or `Quake map`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `implicit`, `NIfTI`, `NRRD` or `raw volume`.
     pub format: &'static str,
     /// Objects read from it.
     pub n_objects: u64,
     /// Triangles of these objects.
     pub n_triangles: u64,
+    /// The surface made of it, if it has no triangles of its own.
+    pub surface: Option<SurfaceReport>,
+}
+
+/// A surface made of a source that is not triangles. All promises hold for the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceReport {
+    /// Distance between the points at which the source was evaluated; details thinner than this may be lost. [Units: wu]
+    pub step: f64,
+    /// Largest distance found between surface and source. [Units: wu]
+    pub distance: f64,
+    /// Factor by which it was enlarged beyond its unit, if it was.
+    pub enlarged: Option<f64>,
+    /// Further assumptions, for people; may be empty.
+    pub text: String,
 }
 
 /// One observation.

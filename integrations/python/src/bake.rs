@@ -140,10 +140,12 @@ fn work(
     }
     let told = Told::new(watcher, &config);
     let context = BakeContext::new(&told, Some(watcher.cancel.clone()));
-    let baked = bake(&imported.scene, &config, &context).map_err(|e| match e {
+    let mut baked = bake(&imported.scene, &config, &context).map_err(|e| match e {
         enfilade::bake::BakeError::Cancelled => PyKeyboardInterrupt::new_err(()),
         other => of_bake(&other),
     })?;
+    let told = &mut baked.world.graph.provenance.settings;
+    told.extend(report.surface_settings());
     warnings.extend(baked.notes);
     if is_empty(&baked.world) {
         let why = format!("no room was found: {}", why_empty(&baked.world));

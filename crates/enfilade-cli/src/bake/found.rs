@@ -1,13 +1,13 @@
 //! Report on the scene before the work: files, role of each object, faults of the model.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::Write;
 
 use anyhow::bail;
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::shown;
-use enfilade::import::{CleaningOptions, ImportReport, cleaning_report};
+use enfilade::import::{CleaningOptions, ImportReport, RepairOptions, cleaning_report};
 
 use crate::screen::{At, Told, Warned, write_lines};
 
@@ -18,6 +18,20 @@ pub(super) fn report_import(
     verbose: bool,
 ) -> anyhow::Result<()> {
     let mut err = Told;
+    for file in &report.files {
+        if let Some(surface) = &file.surface {
+            let path = shown(file.path.display());
+            if !surface.text.is_empty() {
+                writeln!(err, "{path}: {}", surface.text)?;
+            }
+            writeln!(
+                err,
+                "{path}: {}, a surface of {} triangles in steps of {:.3} m; it is at most {:.3} m from its source, and all \
+                 promises hold for it",
+                file.format, file.n_triangles, surface.step, surface.distance
+            )?;
+        }
+    }
     if verbose {
         write_lines(&mut err, report)?;
         write_lines(&mut err, &roles(scene))?;
@@ -46,6 +60,19 @@ pub(super) fn report_import(
         )?;
     }
     Ok(())
+}
+
+/// Returns what the world tells about its input: surfaces extracted from sources, and repairs.
+pub(super) fn settings_of(
+    report: &ImportReport,
+    repair: Option<RepairOptions>,
+) -> BTreeMap<String, String> {
+    let mut told = report.surface_settings();
+    if let Some(repair) = repair {
+        told.insert("repair.weld".into(), repair.weld.to_string());
+        told.insert("repair.hole".into(), repair.hole.to_string());
+    }
+    told
 }
 
 /// Returns the doubts about unit and axis, for the verdict. They are reported; the bake ends if the files state neither,

@@ -8,7 +8,7 @@ use std::time::Duration;
 use anyhow::Context;
 use enfilade::bake::Method;
 use enfilade::geom::DVec3;
-use enfilade::import::{IfcConverter, ImportOptions};
+use enfilade::import::{AirSide, IfcConverter, ImportOptions, VolumeOptions};
 use enfilade_settings::{
     Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit, parse_weld,
 };
@@ -39,6 +39,12 @@ pub(crate) struct SceneOptions {
     /// Point of the scene that becomes the origin, in meters with y up.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
+    /// Volumes: the value between matter and air; -400 in computed tomography [default: the middle of a mask].
+    #[arg(long, value_name = "VALUE", value_parser = parse_level, allow_hyphen_values = true)]
+    level: Option<f64>,
+    /// Volumes: the side of the level on which air is [default: below a given level, above that of a mask].
+    #[arg(long, value_enum)]
+    air: Option<AirName>,
     /// Also read files outside the scene's folder that the scene refers to (buffers, pictures, materials); unsafe for
     /// scenes from strangers.
     #[arg(long)]
@@ -123,6 +129,18 @@ pub(crate) struct BakeOptions {
 enum Axis {
     Y,
     Z,
+}
+
+/// Sides of a level by their names, which clap lists.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum AirName {
+    Below,
+    Above,
+}
+
+fn parse_level(text: &str) -> Result<f64, String> {
+    let level = text.parse::<f64>().ok().filter(|x| x.is_finite());
+    level.ok_or_else(|| "must be a number".to_owned())
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -244,6 +262,13 @@ impl SceneOptions {
         ImportOptions {
             allow_outside: self.allow_outside,
             ifc: Some(ifc),
+            volume: VolumeOptions {
+                level: self.level,
+                air: self.air.map(|air| match air {
+                    AirName::Below => AirSide::Below,
+                    AirName::Above => AirSide::Above,
+                }),
+            },
             ..settings.import_options()
         }
     }

@@ -1,0 +1,121 @@
+//! Scans: points on surfaces, each seen from a station, and the surface of the air that the stations saw.
+//!
+//! The way from a station to a point is free; what no way crosses is unknown, and counts as matter. Near points the field is the
+//! distance from the planes through them (Kolluri, "Provably good moving least squares", 2005), which averages the noise of
+//! the scanner.
+
+mod carve;
+mod cells;
+mod planes;
+
+use enfilade_geom::{Aabb, DMat4, DVec3};
+
+use crate::volume::Volume;
+use crate::{AirSide, Level, SourceError, SourceLimits, Surface};
+
+/// Points that a scanner saw.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scan {
+    /// Points.
+    pub points: Vec<DVec3>,
+    /// For each point, the station that saw it, as an index into `stations`.
+    pub station_of: Vec<u16>,
+    /// Places of the scanner.
+    pub stations: Vec<DVec3>,
+}
+
+/// How a scan becomes a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScanOptions {
+    /// Edge of the voxels. [Units: those of the scan]
+    pub step: f64,
+    /// Pieces of surface smaller than this along all axes are left out.
+    pub least_piece: f64,
+}
+
+/// Reach of a plane through points. [Units: voxels]
+pub(crate) const REACH: f64 = 2.0;
+/// Rounding of the sides of the box, so that air ends before them. [Units: voxels]
+const MARGIN: f64 = 4.0;
+
+impl Scan {
+    /// Returns the box of points and stations.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of_points(&self.points).union(Aabb::of_points(&self.stations))
+    }
+
+    /// Extracts the surface between the air that the stations saw and everything else.
+    ///
+    /// # Errors
+    ///
+    /// If a number is not finite, a point has no station, a limit is exceeded, or the stations saw no air.
+    pub fn surface(
+        &self,
+        options: &ScanOptions,
+        limits: &SourceLimits,
+    ) -> Result<Surface, SourceError> {
+        let volume = self.volume(options, limits)?;
+        let level = Level {
+            value: 0.0,
+            air: AirSide::Above,
+        };
+        volume.surface_of_pieces(level, options.least_piece, limits)
+    }
+
+    /// Returns the field at the vertices of a lattice: positive in air, at most [`REACH`] steps.
+    fn volume(&self, options: &ScanOptions, limits: &SourceLimits) -> Result<Volume, SourceError> {
+        self.check()?;
+        let step = options.step;
+        let bounds = self.bounds().expanded(MARGIN * step);
+        let size = (bounds.size() / step)
+            .ceil()
+            .to_array()
+            .map(|n| n as usize + 1);
+        let n = Volume::check_size(size, limits)?;
+        let grid = cells::ScanGrid {
+            origin: bounds.min,
+            step,
+            size,
+        };
+        let found = planes::of_scan(self, &grid);
+        let mut free = vec![false; n];
+        carve::carve(self, &grid, &mut free);
+        carve::close_specks(&grid, &mut free);
+        let reach = (REACH * step) as f32;
+        let start = |is_free: &bool| if *is_free { reach } else { -reach };
+        let mut values: Vec<f32> = free.iter().map(start).collect();
+        planes::blend(&found, &grid, &free, &mut values);
+        Ok(Volume {
+            size,
+            values,
+            placement: DMat4::from_translation(bounds.min) * DMat4::from_scale(DVec3::splat(step)),
+            unit: None,
+            is_z_up: false,
+        })
+    }
+
+    fn check(&self) -> Result<(), SourceError> {
+        let bad = |place: String, problem: &str| Err(SourceError::new(place, problem));
+        if self.stations.is_empty() {
+            return bad(
+                "scan".into(),
+                "has no station: the place of the scanner is needed to tell air from matter",
+            );
+        }
+        if let Some(i) = self.stations.iter().position(|p| !p.is_finite()) {
+            return bad(format!("station {i}"), "is not finite");
+        }
+        if let Some(i) = self.points.iter().position(|p| !p.is_finite()) {
+            return bad(format!("point {i}"), "is not finite");
+        }
+        let n = self.stations.len();
+        if let Some(i) = self.station_of.iter().position(|&s| usize::from(s) >= n) {
+            return bad(format!("point {i}"), "names a station that does not exist");
+        }
+        if self.points.is_empty() || self.points.len() != self.station_of.len() {
+            return bad("scan".into(), "needs points, each with a station");
+        }
+        Ok(())
+    }
+}
