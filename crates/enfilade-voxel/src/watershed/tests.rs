@@ -484,3 +484,39 @@ proptest! {
         prop_assert_eq!(next, to);
     }
 }
+
+proptest! {
+    #[test]
+    fn faces_and_new_labels_are_those_of_single_voxels(
+        [nx, ny, nz] in [1_usize..150, 1_usize..4, 1_usize..4],
+        seed in any::<u64>(),
+        is_wide in any::<bool>(),
+    ) {
+        // Runs of a few dozen voxels.
+        let label = |i: usize| (seed >> (i / 37 % 61) & 3) as u32;
+        let labels: Vec<u32> = (0..nx * ny * nz).map(label).collect();
+        let mut found = Vec::new();
+        let mut all = if is_wide {
+            Labels::U32(labels.clone())
+        } else {
+            Labels::U16(labels.iter().map(|&l| l as u16).collect())
+        };
+        for z in 0..nz {
+            all.for_faces([nx, ny, nz], z, |i, axis, pair| found.push((i, axis, pair)));
+        }
+        let mut expected = Vec::new();
+        for (i, &label) in labels.iter().enumerate() {
+            let at = [i % nx, i / nx % ny, i / (nx * ny)];
+            for (axis, step) in [1, nx, nx * ny].into_iter().enumerate() {
+                if at[axis] + 1 < [nx, ny, nz][axis] && labels[i + step] != label {
+                    expected.push((i, axis, [label, labels[i + step]]));
+                }
+            }
+        }
+        found.sort_unstable();
+        prop_assert_eq!(found, expected);
+        all.relabel([nx, ny, nz], |label, y| 10 * label + y as u32);
+        let new = labels.iter().enumerate().map(|(i, l)| 10 * l + (i / nx % ny) as u32);
+        prop_assert!(all.iter().eq(new));
+    }
+}
