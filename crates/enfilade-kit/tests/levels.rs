@@ -76,7 +76,8 @@ fn grow(level: &mut Assembly, rng: &mut Rng, n: usize) {
         }
         let ends: Vec<End> = level.open_ends().collect();
         let onto = ends[rng.below(ends.len())];
-        let number = rng.below(level.kit().pieces().len());
+        // Without the last two, which end it.
+        let number = rng.below(level.kit().pieces().len() - 2);
         let attachment = rng.below(level.kit().pieces()[number].attachments().len());
         let _ = level.place(number, attachment, onto, &PlaceOptions::default());
     }
@@ -313,6 +314,60 @@ fn openings_are_walled_up_as_a_whole_or_not_at_all() {
         matches!(refused, PlaceError::PartlyBlocked { .. }),
         "{refused}"
     );
+}
+
+#[test]
+fn openings_that_differ_are_refused_with_both_measures() {
+    let chamber = || baked(&dungeon_kit()[0]);
+    let mut wide = chamber();
+    for portal in &mut wide.graph.portals {
+        let across = usize::from(portal.normal[0].abs() > 0.5) * 2;
+        let pieces = portal.pieces.iter_mut().flatten();
+        for p in pieces.chain(&mut portal.outline) {
+            p[across] += 0.05 * p[across].signum();
+        }
+        portal.area = 1.3 * 2.1;
+    }
+    let piece = |name: &str, world| Piece::new(name, world, &Choice::Doorways).unwrap();
+    let kit = Kit::new(vec![piece("chamber", chamber()), piece("wide", wide)]).unwrap();
+    assert_eq!(kit.groups(1e-3).len(), 2);
+    let mut level = Assembly::new(kit);
+    let first = start(&mut level, "chamber", Pose::IDENTITY);
+    let refused = place(&mut level, ["wide", "north"], (first, "south")).unwrap_err();
+    let PlaceError::DoesNotFit {
+        size,
+        onto_size,
+        by,
+        ..
+    } = refused
+    else {
+        panic!("{refused}");
+    };
+    assert!((by - 0.05).abs() < 1e-4, "{by}");
+    assert!((size[0] - onto_size[0] - 0.1).abs() < 1e-4);
+    level.set_tolerance(0.06);
+    assert!(
+        level
+            .pose_onto(1, 0, end(&level, first, "south"), 0.0)
+            .is_ok()
+    );
+}
+
+/// Covers W14: a piece without rooms closes a doorway (Gjørup 1999, figure 3.9).
+#[test]
+fn a_wall_closes_the_doorway_in_front_of_which_it_is_put() {
+    let mut level = Assembly::new(dungeon());
+    let chamber = start(&mut level, "chamber", Pose::IDENTITY);
+    let east = end(&level, chamber, "east");
+    let frame = level.piece(chamber).attachments()[east.attachment]
+        .mouth
+        .frame;
+    let plug = start(&mut level, "plug", frame);
+    let link = level.standing(chamber).unwrap().links[east.attachment];
+    assert_eq!(link, Link::Blocked(plug));
+    assert_eq!(level.flattened().unwrap().graph.portals.len(), 3);
+    level.remove(plug).unwrap();
+    assert_eq!(level.open_ends().count(), 4);
 }
 
 #[test]

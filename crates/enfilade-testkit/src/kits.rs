@@ -191,7 +191,21 @@ fn between_pillars() -> Vec<Aabb> {
     air
 }
 
-/// Returns the kit of a dungeon: halls, corridors, a stair, and a niche that closes what is left open.
+/// Returns a wall that closes a doorway from outside: the middle of its sill is at the origin, and the way out is +z.
+fn plug(color: [f32; 3]) -> PieceScene {
+    let mut site = Site::new("plug");
+    let mut wall = MeshBuilder::new(site.material("plug", color));
+    let [half, height] = [DOORWAY[0] * 0.5 + WALL, DOORWAY[1] + SLAB];
+    wall.cuboid(aabb([-half, -SLAB, 0.0], [half, height, WALL]));
+    site.structure("plug", wall);
+    let scene = site.finish().scene;
+    PieceScene {
+        name: "plug",
+        scene,
+    }
+}
+
+/// Returns the kit of a dungeon: halls, corridors, a stair, and a niche and a wall that close what is left open.
 #[must_use]
 pub fn dungeon_kit() -> Vec<PieceScene> {
     let stone = [0.55, 0.53, 0.5];
@@ -210,6 +224,7 @@ pub fn dungeon_kit() -> Vec<PieceScene> {
         bend("bend", stone, 2.0, 3.0),
         stair("stair", [0.5, 0.55, 0.6]),
         plain("niche", [0.45, 0.5, 0.45], [2.0, 1.6], 2.6, "s"),
+        plug(stone),
     ]
 }
 
