@@ -8,6 +8,7 @@ mod any_size;
 mod bring;
 mod bsp;
 mod builders;
+mod constructive;
 mod facade;
 mod floors;
 mod growth;
@@ -70,6 +71,16 @@ enum What {
     SizeStep {
         step: any_size::SizeStep,
         /// The generated scene, such as `town-1000`.
+        scene: String,
+    },
+    /// Levels put together from pieces: a row per figure, with the value that it must reach. Rows: stitched, speed, memory, city,
+    /// bad input.
+    Constructive(Chosen),
+    /// A measurement of `constructive`, in a process of its own.
+    #[command(hide = true)]
+    LevelStep {
+        step: constructive::LevelStep,
+        /// The generated level, such as `dungeon-380`.
         scene: String,
     },
     /// Value of worlds to programs and modelers: a row per figure, with the value that it must reach.
@@ -233,6 +244,8 @@ fn run(args: &Cli) -> anyhow::Result<()> {
     match &args.what {
         What::AnySize(chosen) => return bench_rows(any_size::ROWS, args.json, chosen),
         What::SizeStep { step, scene } => return any_size::run_step(*step, scene),
+        What::Constructive(chosen) => return bench_rows(constructive::ROWS, args.json, chosen),
+        What::LevelStep { step, scene } => return constructive::run_step(*step, scene),
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
         What::Rooms(chosen) => return rooms::bench_rooms(chosen, args.json),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),

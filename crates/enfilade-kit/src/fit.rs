@@ -62,8 +62,8 @@ impl Mouth {
     }
 
     /// Returns how far its outline is from that of `other` when both face each other, `other` turned by `spin` about its normal:
-    /// the largest distance of a vertex of either from the other polygon, or the width of a strip along its longer side of as much area
-    /// as is open in one only. [Units: wu, rad]
+    /// the largest distance of a vertex of either from the other polygon, or the width of a strip along its longer side of the area
+    /// within the outline that is closed in one only. [Units: wu, rad]
     #[must_use]
     pub fn misfit(&self, other: &Self, spin: f64) -> f64 {
         let turn = DVec2::from_angle(spin);
@@ -76,7 +76,8 @@ impl Mouth {
         };
         let outline = far(&self.outline, &its).max(far(&its, &self.outline));
         let longer = self.size().into_iter().fold(1e-9, f64::max);
-        outline.max((self.area - other.area).abs() / longer)
+        let closed = [self, other].map(|m| signed_area(&m.outline) - m.area);
+        outline.max((closed[0] - closed[1]).abs() / longer)
     }
 
     /// Returns the pose, in this mouth's piece, of a piece whose mouth `other` meets this one, turned by `spin` about its normal.
@@ -175,7 +176,10 @@ mod tests {
         let door = doorway([1.2, 2.1], 0.0);
         assert!(door.misfit(&doorway([1.2, 2.1], 5.0), 0.0) < 1e-6);
         let off = door.misfit(&doorway([1.0, 2.1], 0.0), 0.0);
-        assert!((off - 0.2).abs() < 1e-6, "{off}");
+        assert!((off - 0.1).abs() < 1e-6, "{off}");
+        let mut arched = door.clone();
+        arched.area -= 0.21;
+        assert!((door.misfit(&arched, 0.0) - 0.1).abs() < 1e-6);
         assert!(door.misfit(&doorway([1.2, 2.2], 0.0), 0.0) > 0.09);
         // Turned by a quarter, only a square hatch fits.
         assert!(door.misfit(&door, FRAC_PI_2) > 0.8);

@@ -61,9 +61,10 @@ fn attach(
 }
 
 /// Grows a dungeon of `n_rooms` chambers and halls, each at the end of a corridor, stair or crossing, and closes what is left open
-/// by niches where they fit. Returns the number of rooms, less than requested if nothing more fits.
+/// by niches where they fit, or by plugs. Returns the number of rooms, less than requested if nothing more fits.
 ///
-/// The kit needs the pieces `hall`, `chamber`, `corridor`, `bend`, `cross`, `stair` and `niche`.
+/// The kit needs the pieces `hall`, `chamber`, `corridor`, `bend`, `cross`, `stair` and `niche`, and may have a `plug`: a wall in front of
+/// a doorway, with the middle of the sill at its origin and the way out along +z.
 ///
 /// # Errors
 ///
@@ -104,9 +105,20 @@ pub fn dungeon(level: &mut Assembly, n_rooms: usize, seed: u64) -> Result<usize,
     }
     let left: Vec<End> = level.open_ends().collect();
     for end in left {
-        attach(level, &mut chance, niche, end);
+        if attach(level, &mut chance, niche, end).is_none() {
+            wall_up(level, end);
+        }
     }
     Ok(n)
+}
+
+/// Puts a wall in front of an open attachment, if the kit has one, and it fits.
+fn wall_up(level: &mut Assembly, end: End) {
+    if let (Some(plug), Ok(host)) = (level.kit().named("plug"), level.standing(end.instance)) {
+        let mouth = &level.piece(end.instance).attachments()[end.attachment].mouth;
+        let pose = host.pose.after(&mouth.frame);
+        let _ = level.put(plug, pose, &PlaceOptions::default());
+    }
 }
 
 /// Builds an office of `n_rooms` rooms: wings of corridor segments with offices and meeting rooms on both sides, which start at

@@ -25,7 +25,7 @@ pub struct PieceNamedTwice(pub String);
 /// A fault of a kit, which does not keep it from being used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KitFault {
-    /// A piece has no attachment.
+    /// A piece with rooms has no attachment. Walls and other pieces without rooms need none.
     Detached {
         /// Name of the piece.
         piece: String,
@@ -135,7 +135,7 @@ impl Kit {
             own.map(move |a| (p, a))
         });
         for piece in &self.pieces {
-            if piece.attachments().is_empty() {
+            if piece.attachments().is_empty() && piece.world().graph.rooms().next().is_some() {
                 let piece = piece.name().to_owned();
                 faults.push(KitFault::Detached { piece });
             }

@@ -6,8 +6,7 @@ use enfilade_cpg::{Cell, CellId, Locator, World};
 use enfilade_world::{PartId, Space, SpaceError};
 
 use crate::assembly::Assembly;
-use crate::instance::{Instance, InstanceId};
-use crate::kit::Kit;
+use crate::instance::{InstanceId, Link};
 
 /// A level as a space: each instance is a part in an empty world that is all outdoors.
 pub struct LevelSpace {
@@ -43,27 +42,41 @@ impl LevelSpace {
         })
     }
 
-    /// Adds an instance. The first one of a piece prepares it; others take O(cells and portals of the piece).
+    /// Adds an instance of a level. The first one of a piece prepares it; others take O(cells and portals of the piece). Doorways in
+    /// front of walls are closed.
     ///
     /// # Errors
     ///
     /// As [`Space::add_part`].
-    pub fn add(
-        &mut self,
-        kit: &Kit,
-        id: InstanceId,
-        instance: &Instance,
-    ) -> Result<PartId, SpaceError> {
+    ///
+    /// # Panics
+    ///
+    /// If there never was such an instance.
+    pub fn add(&mut self, level: &Assembly, id: InstanceId) -> Result<PartId, SpaceError> {
+        let instance = level.instance(id);
         let part = match self.first.get(&instance.piece) {
-            Some(&first) => self.space.add_copy(first, PartId::ROOT, instance.pose)?,
+            Some(&first) => (self.space).add_copy(first, PartId::ROOT, instance.pose)?,
             None => {
-                let world = kit.pieces()[instance.piece].world().clone();
+                let world = level.piece(id).world().clone();
                 let part = self.space.add_part(world, PartId::ROOT, instance.pose)?;
                 self.first.insert(instance.piece, part);
                 part
             }
         };
         self.parts.insert(id, part);
+        for other in level.beside(id).into_iter().chain([id]) {
+            let Some(&part) = self.parts.get(&other) else {
+                continue;
+            };
+            let links = level
+                .piece(other)
+                .attachments()
+                .iter()
+                .zip(&level.instance(other).links);
+            for (attachment, _) in links.filter(|l| matches!(l.1, Link::Blocked(_))) {
+                self.space.close(part, attachment.portal);
+            }
+        }
         Ok(part)
     }
 }
@@ -76,8 +89,8 @@ impl Assembly {
     /// As [`Space::add_part`].
     pub fn space(&self) -> Result<LevelSpace, SpaceError> {
         let mut level = LevelSpace::new()?;
-        for (id, instance) in self.instances() {
-            level.add(self.kit(), id, instance)?;
+        for (id, _) in self.instances() {
+            level.add(self, id)?;
         }
         Ok(level)
     }

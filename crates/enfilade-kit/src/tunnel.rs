@@ -139,7 +139,12 @@ mod tests {
     fn a_tunnel_ends_where_its_wall_does() {
         let (mouth, mut walls) = wall();
         assert!((depth(&mouth, &walls) - 0.2).abs() < 1e-6);
-        // A step in it ends it sooner.
+        // Anything in it ends it sooner, here where no ray to its sides passes.
+        let low = DVec3::new(0.38, 1.5, 0.2);
+        let thing = Aabb::new(low, low + DVec3::splat(0.04)).triangles();
+        let with_thing = [&walls[..], &thing].concat();
+        assert!((depth(&mouth, &with_thing) - 0.1).abs() < 1e-6);
+        // So does a step.
         let step = Aabb::new(DVec3::new(0.0, 0.0, 0.2), DVec3::new(1.0, 0.1, 0.3));
         walls.extend(step.triangles());
         assert!((depth(&mouth, &walls) - 0.1).abs() < 1e-6);

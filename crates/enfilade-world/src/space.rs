@@ -40,6 +40,7 @@ mod follow;
 mod id;
 mod images;
 mod joined;
+mod locate;
 mod look;
 mod meet;
 mod seen;
@@ -161,6 +162,8 @@ pub(crate) struct BorderDoor {
     pub(crate) leads_to: Vec<Place>,
     /// Doors of other parts that it meets.
     pub(crate) meets: Vec<(PartId, PortalId)>,
+    /// True if one of them covers all of its opening without a gap: nothing of the surroundings is seen through it.
+    pub(crate) is_covered: bool,
 }
 
 /// A world and the worlds that move in it: the model of all queries.
@@ -290,6 +293,7 @@ impl Space {
                 inner: exit.to,
                 leads_to: Vec::new(),
                 meets: Vec::new(),
+                is_covered: false,
             })
             .collect();
         self.parts.push(Part {
@@ -530,40 +534,6 @@ impl Space {
         let doors = &self.parts[part.idx()].doors;
         let door = doors.iter().find(|d| d.portal == portal);
         door.map_or(&[], |d| &d.leads_to)
-    }
-
-    /// Returns the place of a point of a part's frame: a cell of the innermost part that contains it; `None` in solid matter of
-    /// all. O(depth of the locators), for each part at the point. A point in the walls of a part counts as in that part's
-    /// surroundings.
-    #[must_use]
-    pub fn locate(&self, frame: PartId, p: DVec3) -> Option<Place> {
-        let p = if frame == PartId::ROOT {
-            p
-        } else {
-            self.pose(frame).point(p)
-        };
-        self.locate_within(PartId::ROOT, p, p)
-    }
-
-    /// Locates a point in a part or in parts that stand in it. `own` is `p`, of the root's frame, in the part's frame.
-    fn locate_within(&self, id: PartId, p: DVec3, own: DVec3) -> Option<Place> {
-        let part = &self.parts[id.idx()];
-        let cell = part.layout.locate(own).filter(|c| part.border != Some(*c));
-        let guests = match cell {
-            Some(cell) if part.has_guests[cell.idx()] => &part.guests[cell.idx()],
-            Some(_) => &[][..],
-            None => &part.children,
-        };
-        for &guest in guests {
-            let its = &self.parts[guest.idx()];
-            let q = its.pose.point_back(p);
-            if its.hull.contains(q)
-                && let Some(place) = self.locate_within(guest, p, q)
-            {
-                return Some(place);
-            }
-        }
-        cell.map(|cell| Place { part: id, cell })
     }
 }
 

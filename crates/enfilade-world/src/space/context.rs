@@ -236,7 +236,8 @@ fn hand_on(space: &Space, from: PartId, buffers: &mut ViewBuffers) {
         }
         let is_way = |portal| crossing.via.is_none_or(|via| via == portal);
         for door in own.doors.iter().filter(|d| is_way(d.portal)) {
-            for place in &door.leads_to {
+            let around = door.leads_to.iter().filter(|_| !door.is_covered);
+            for place in around {
                 add(place.part, place.cell, window);
             }
             for &(other, portal) in &door.meets {

@@ -116,10 +116,13 @@ impl Space {
                     ) {
                         continue;
                     }
+                    let covers = covers([own, its], portals, &to_own, &to_other);
                     let doors = &mut self.parts[id.idx()].doors;
                     doors[a].meets.push((other, portals[1]));
+                    doors[a].is_covered |= covers[0];
                     let doors = &mut self.parts[other.idx()].doors;
                     doors[b].meets.push((id, portals[0]));
+                    doors[b].is_covered |= covers[1];
                 }
             }
         }
@@ -133,11 +136,27 @@ impl Space {
                 let mut doors = self.parts[other.idx()].doors.iter_mut();
                 if let Some(door) = doors.find(|d| d.portal == portal) {
                     door.meets.retain(|m| m.0 != id);
+                    // Met by others, it may still be covered by one; that is found when either moves.
+                    door.is_covered = false;
                 }
             }
-            self.parts[id.idx()].doors[a].meets = meets;
+            let door = &mut self.parts[id.idx()].doors[a];
+            (door.meets, door.is_covered) = (meets, false);
         }
     }
+}
+
+/// Returns whether the opening of each of two parts is covered by that of the other, without a gap that tolerances leave.
+fn covers(parts: [&Part; 2], portals: [PortalId; 2], to_own: &Pose, to_other: &Pose) -> [bool; 2] {
+    let margin = parts[0].layout.tolerance() + parts[1].layout.tolerance();
+    let openings = [0, 1].map(|k| parts[k].layout.opening(portals[k]));
+    [(0, 1, to_other), (1, 0, to_own)].map(|(own, its, map)| {
+        // Several pieces have bars between them, and those of two parts need not agree.
+        let is_one = openings[its].pieces().len() == 1;
+        let mut vertices = openings[own].pieces().flatten().map(|p| map.point(*p));
+        let its = openings[its];
+        is_one && vertices.all(|p| its.height_of(p).abs() <= margin && its.is_over(p, margin))
+    })
 }
 
 /// Returns `true` if openings of two parts touch or dock; `between` maps points of the second to the frame of the first.

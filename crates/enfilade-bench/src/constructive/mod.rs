@@ -1,0 +1,73 @@
+//! `bench constructive`: levels put together from pieces, each figure with its bar.
+
+mod bad;
+mod city;
+mod memory;
+mod scenes;
+mod speed;
+mod stitched;
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, ensure};
+
+use crate::living::made;
+use crate::rows::Row;
+
+/// Levels compared with bakes of their merged meshes, by kind and number of rooms.
+const STITCHED: &[&str] = &[
+    "dungeon-4",
+    "dungeon-40",
+    "office-60",
+    "maze-100",
+    "maze-1000",
+];
+/// A level of 1,500 instances, and one of a tenth, as those of Gjørup 1999.
+const CITY: &[&str] = &["maze-1500"];
+
+pub(crate) const ROWS: &[Row] = &[
+    made("stitched: cells", STITCHED, stitched::cells),
+    made("stitched: portals", STITCHED, stitched::portals),
+    made("stitched: promises", STITCHED, stitched::promises),
+    made("stitched: pixels", STITCHED, stitched::pixels),
+    made("speed: place", &["dungeon-380"], speed::place),
+    made("speed: flatten", CITY, speed::flatten),
+    made(
+        "memory: instances",
+        &["dungeon-380", "maze-1500"],
+        memory::instances,
+    ),
+    made("city: visible", CITY, city::visible),
+    made("city: frame", CITY, city::frame),
+    made("city: frame of instances", CITY, city::frame_of_instances),
+    made("bad input", &["pieces"], bad::taken),
+];
+
+/// Measurements that need a process of their own, as its memory counts.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum LevelStep {
+    /// Hold levels as instances.
+    Instances,
+    /// Hold levels as worlds in one piece.
+    Flattened,
+}
+
+/// Runs a step on a scene; prints its figure.
+pub(crate) fn run_step(step: LevelStep, scene: &str) -> anyhow::Result<()> {
+    println!("{}", memory::measure(step, scene)?);
+    Ok(())
+}
+
+/// Runs a step in a process of its own; returns its figure.
+fn in_process(step: &str, scene: &str) -> anyhow::Result<f64> {
+    let program: PathBuf = std::env::current_exe().context("this program has no path")?;
+    let mut command = Command::new(program);
+    let output = command.args(["level-step", step, scene]).output()?;
+    ensure!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Ok(String::from_utf8(output.stdout)?.trim().parse()?)
+}
