@@ -66,6 +66,8 @@ pub struct ImportOptions {
     pub ignores_marks: bool,
     /// Where the surface of a volume lies.
     pub volume: VolumeOptions,
+    /// Places of the scanner, for clouds of points that do not tell them; in meters, +Y up. [Units: wu]
+    pub stations: Vec<DVec3>,
     /// Repairs of structural triangles; `None` repairs nothing.
     pub repair: Option<RepairOptions>,
 }

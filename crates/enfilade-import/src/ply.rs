@@ -6,7 +6,7 @@
 use crate::builder::Builder;
 use crate::polygon::Splitter;
 use crate::soup::shortened;
-use crate::{ImportError, soup};
+use crate::{ImportError, soup, sources};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};
 
@@ -27,6 +27,10 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     let mut cloud = Cloud::default();
     for element in &header.elements {
         read_element(element, &mut source, &mut cloud, builder)?;
+    }
+    if cloud.ends.is_empty() && cloud.strips.is_empty() && !cloud.positions.is_empty() {
+        let points = cloud.positions.into_iter().map(DVec3::from_array).collect();
+        return sources::read_points(points, cloud.station_of, header.stations, builder);
     }
     cloud.finish(builder)
 }
@@ -114,12 +118,15 @@ struct Element {
 
 struct Header {
     encoding: Encoding,
+    /// Places of a scanner, from comments.
+    stations: Vec<DVec3>,
     elements: Vec<Element>,
 }
 
 /// Returns the header, and the offset of the body.
 fn read_header(bytes: &[u8], builder: &Builder<'_>) -> Result<(Header, usize), ImportError> {
     let mut encoding = None;
+    let mut stations = Vec::new();
     let mut elements: Vec<Element> = Vec::new();
     let mut at = 0;
     let mut number = 0;
@@ -136,7 +143,12 @@ fn read_header(bytes: &[u8], builder: &Builder<'_>) -> Result<(Header, usize), I
         match words.as_slice() {
             ["end_header"] => {
                 let encoding = encoding.ok_or_else(|| bad("no format line".into()))?;
-                return Ok((Header { encoding, elements }, at));
+                let header = Header {
+                    encoding,
+                    stations,
+                    elements,
+                };
+                return Ok((header, at));
             }
             ["format", kind, _] => {
                 encoding = Some(match *kind {
@@ -162,6 +174,15 @@ fn read_header(bytes: &[u8], builder: &Builder<'_>) -> Result<(Header, usize), I
             }
             ["property", kind, name] => {
                 push_property(&mut elements, kind, name, None).map_err(bad)?;
+            }
+            ["comment" | "obj_info", "station", x, y, z] => {
+                let number = |w: &str| w.parse().ok().filter(|x: &f64| x.is_finite());
+                let (Some(x), Some(y), Some(z)) = (number(x), number(y), number(z)) else {
+                    return Err(bad(
+                        "a station needs three numbers: comment station X Y Z".into()
+                    ));
+                };
+                stations.push(DVec3::new(x, y, z));
             }
             [] | ["ply" | "comment" | "obj_info", ..] => {}
             _ => return Err(bad(format!("'{}' is not a header line", shortened(&line)))),
@@ -235,6 +256,8 @@ impl Source<'_> {
 #[derive(Default)]
 struct Cloud {
     positions: Vec<[f64; 3]>,
+    /// Number of the station that saw each point, or empty.
+    station_of: Vec<u16>,
     normals: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     colors: Vec<[f32; 4]>,
@@ -252,6 +275,7 @@ enum Slot {
     Normal(usize),
     Uv(usize),
     Color(usize, f64),
+    Station,
     Other,
 }
 
@@ -269,6 +293,7 @@ fn slot(property: &Property) -> Slot {
         "red" | "r" | "diffuse_red" => Slot::Color(0, property.kind.most()),
         "green" | "g" | "diffuse_green" => Slot::Color(1, property.kind.most()),
         "blue" | "b" | "diffuse_blue" => Slot::Color(2, property.kind.most()),
+        "station" | "scan" | "scan_index" => Slot::Station,
         "alpha" | "a" | "diffuse_alpha" => Slot::Color(3, property.kind.most()),
         _ => Slot::Other,
     }
@@ -366,6 +391,7 @@ fn read_vertices(
         }
     }
     let has_normals = has(|s| matches!(s, Slot::Normal(_)));
+    let has_stations = has(|s| matches!(s, Slot::Station));
     let has_uvs = has(|s| matches!(s, Slot::Uv(_)));
     let has_colors = has(|s| matches!(s, Slot::Color(..)));
     if has(|s| matches!(s, Slot::Other)) {
@@ -379,6 +405,7 @@ fn read_vertices(
         let mut normal = [0.0; 3];
         let mut uv = [0.0; 2];
         let mut color = [0.0, 0.0, 0.0, 1.0];
+        let mut station = 0;
         for (property, slot) in element.properties.iter().zip(&slots) {
             let place = || format!("vertex {i}");
             read_property(property, source, builder, &place, |value| match *slot {
@@ -386,10 +413,15 @@ fn read_vertices(
                 Slot::Normal(k) => normal[k] = finite(value),
                 Slot::Uv(k) => uv[k] = finite(value),
                 Slot::Color(k, most) => color[k] = finite(value / most).clamp(0.0, 1.0),
+                // Beyond 65,535 it is none of the file's, and refused as such.
+                Slot::Station => station = value.clamp(0.0, 65_535.0) as u16,
                 Slot::Other => {}
             })?;
         }
         cloud.positions.push(position);
+        if has_stations {
+            cloud.station_of.push(station);
+        }
         if has_normals {
             let n = DVec3::from_array(normal.map(f64::from));
             let n = n.try_normalize().unwrap_or(DVec3::Y);

@@ -6,7 +6,8 @@ use std::fmt::Write as _;
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_source::{
-    AirSide, ImplicitScene, Level, SourceError, SourceLimits, Surface, Volume, VolumeSummary,
+    AirSide, ImplicitScene, Level, Scan, ScanOptions, SourceError, SourceLimits, Surface, Volume,
+    VolumeSummary,
 };
 
 use crate::builder::Builder;
@@ -139,6 +140,69 @@ fn level(found: &VolumeSummary, builder: &Builder<'_>) -> Result<Level, ImportEr
     })
 }
 
+/// Edge of the voxels of a scan: walls are at least two of them thick. [Units: wu]
+const SCAN_STEP: f64 = 0.05;
+/// Farthest points from the stations that matter, along an axis. [Units: wu]
+const SCAN_REACH: f64 = 12.0;
+/// Pieces of surface smaller than this are noise: half the width of the narrowest doorway. [Units: wu]
+const SCAN_PIECE: f64 = 0.3;
+
+/// Reads the points of a scan. Without a place of the scanner, the file has no surface, and this is noted.
+///
+/// `station_of` is empty if the file does not say which station saw which point.
+pub(crate) fn read_points(
+    points: Vec<DVec3>,
+    station_of: Vec<u16>,
+    mut stations: Vec<DVec3>,
+    builder: &mut Builder<'_>,
+) -> Result<(), ImportError> {
+    // Options are in meters of the scene, with y up.
+    let from_scene = builder.base.inverse();
+    let given = builder.options.stations.iter();
+    stations.extend(given.map(|p| from_scene.transform_point3(*p)));
+    if stations.is_empty() {
+        let text = "a cloud of points without faces; give the place of the scanner as --station X,Y,Z, so that its surface can be \
+                    made";
+        builder.note("element vertex", text);
+        return Ok(());
+    }
+    if stations.len() > 1 && station_of.is_empty() {
+        let problem = format!(
+            "{} stations, and no property 'station' of the points that tells which saw each; give each scan a file of its own",
+            stations.len()
+        );
+        return Err(builder.malformed("element vertex", problem));
+    }
+    let scan = Scan {
+        station_of: match station_of.is_empty() {
+            true => vec![0; points.len()],
+            false => station_of,
+        },
+        points,
+        stations,
+    };
+    let meters = builder.base.transform_vector3(DVec3::X).length();
+    let options = ScanOptions {
+        step: SCAN_STEP / meters,
+        reach: SCAN_REACH / meters,
+        least_piece: SCAN_PIECE / meters,
+    };
+    let limits = limits(builder);
+    let step = scan.step(&options, &limits);
+    let surface = scan.surface(&options, &limits);
+    let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
+    let text = format!(
+        "a scan of {} points from {} stations; what no station saw is matter",
+        scan.points.len(),
+        scan.stations.len()
+    );
+    let told = Told {
+        text,
+        enlarged: None,
+    };
+    add(builder, surface, DMat4::IDENTITY, step, told)
+}
+
 /// Returns the limits of sources that follow from those of the import.
 fn limits(builder: &Builder<'_>) -> SourceLimits {
     let (most, usual) = (builder.limits(), SourceLimits::default());
@@ -146,6 +210,7 @@ fn limits(builder: &Builder<'_>) -> SourceLimits {
         max_triangles: usual.max_triangles.min(most.max_triangles),
         // Fuzzing has limits of its own.
         max_work: usual.max_work.min(most.max_file_bytes.saturating_mul(8)),
+        max_voxels: usual.max_voxels.min(most.max_file_bytes / 16),
         max_samples: usual.max_samples.min(most.max_file_bytes / 4),
         max_nodes: usual.max_nodes.min(most.max_objects),
         ..usual

@@ -1,8 +1,8 @@
 //! Sources that are not triangles become surfaces, alone or beside models. Covers S3.
 
-use enfilade_geom::Aabb;
 use enfilade_geom::scene::Role;
-use enfilade_import::{ImportOptions, SceneSource, decode_implicit, import_sources};
+use enfilade_geom::{Aabb, DVec3};
+use enfilade_import::{ImportOptions, SceneSource, decode_implicit, decode_ply, import_sources};
 
 const BALL: &str = r#"{ "enfilade": "implicit", "unit": "cm", "air": { "ball": { "at": [100, 0, 0], "radius": 200 } } }"#;
 
@@ -66,4 +66,49 @@ fn a_broken_source_names_its_file_and_place() {
         error.to_string(),
         "memory.json: air.ball: \"radius\" is missing"
     );
+}
+
+/// A PLY file of the walls of a room of 4 by 2.5 by 3 m around the origin.
+fn room_ply(head: &str) -> Vec<u8> {
+    let n = 40_000;
+    let mut text = format!(
+        "ply\nformat ascii 1.0\n{head}element vertex {n}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    );
+    for i in 0..n {
+        let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n);
+        let (turn, r) = (f64::from(i) * 2.399_963, (1.0 - y * y).sqrt());
+        let d = DVec3::new(r * turn.cos(), y, r * turn.sin());
+        let p = d * (DVec3::new(2.0, 1.25, 1.5) / d.abs()).min_element();
+        text += &format!("{} {} {}\n", p.x, p.y, p.z);
+    }
+    text.into_bytes()
+}
+
+#[test]
+fn a_cloud_of_points_is_a_scan_if_its_station_is_known() {
+    let plain = ImportOptions::default();
+    let error = decode_ply(&room_ply(""), &plain).unwrap_err().to_string();
+    assert!(error.contains("--station"), "{error}");
+    let given = ImportOptions {
+        stations: vec![DVec3::ZERO],
+        ..plain.clone()
+    };
+    let by_option = decode_ply(&room_ply(""), &given).unwrap();
+    let by_file = decode_ply(&room_ply("comment station 0 0 0\n"), &plain).unwrap();
+    assert_eq!(
+        by_option.report.files[0].n_triangles,
+        by_file.report.files[0].n_triangles
+    );
+    let text = &by_file.report.files[0].surface.as_ref().unwrap().text;
+    assert_eq!(
+        text,
+        "a scan of 40000 points from 1 stations; what no station saw is matter"
+    );
+    let two = "comment station 0 0 0\ncomment station 1 0 0\n";
+    let error = decode_ply(&room_ply(two), &plain).unwrap_err().to_string();
+    assert!(error.contains("property 'station'"), "{error}");
+    let error = decode_ply(&room_ply("comment station 0 x 0\n"), &plain)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("line 3"), "{error}");
 }

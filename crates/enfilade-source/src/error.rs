@@ -26,6 +26,8 @@ impl SourceError {
 pub struct SourceLimits {
     /// Most samples of a volume, and lattice points of an extraction that are not pruned.
     pub max_samples: u64,
+    /// Most voxels of a scan; where more would be needed, they are larger.
+    pub max_voxels: u64,
     /// Most triangles of an extracted surface, before it is simplified.
     pub max_triangles: u64,
     /// Most nodes of an implicit scene.
@@ -40,6 +42,7 @@ impl Default for SourceLimits {
     fn default() -> Self {
         Self {
             max_samples: 1 << 30,
+            max_voxels: 200_000_000,
             max_triangles: 20_000_000,
             max_nodes: 100_000,
             max_depth: 64,
@@ -54,6 +57,7 @@ impl SourceLimits {
     pub fn tiny() -> Self {
         Self {
             max_samples: 1 << 16,
+            max_voxels: 1 << 15,
             max_triangles: 20_000,
             max_nodes: 100,
             max_depth: 16,

@@ -10,7 +10,7 @@ mod planes;
 
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
-use crate::volume::Volume;
+use crate::volume::{Ends, Volume};
 use crate::{AirSide, Level, SourceError, SourceLimits, Surface};
 
 /// Points that a scanner saw.
@@ -24,25 +24,39 @@ pub struct Scan {
     pub stations: Vec<DVec3>,
 }
 
-/// How a scan becomes a field.
+/// How a scan becomes a field. [Units: those of the scan]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanOptions {
-    /// Edge of the voxels. [Units: those of the scan]
+    /// Edge of the voxels; larger if there would be more than [`SourceLimits::max_voxels`].
     pub step: f64,
+    /// Points farther from all stations than this along an axis are left out; ways to them end there.
+    pub reach: f64,
     /// Pieces of surface smaller than this along all axes are left out.
     pub least_piece: f64,
 }
 
 /// Reach of a plane through points. [Units: voxels]
 pub(crate) const REACH: f64 = 2.0;
-/// Rounding of the sides of the box, so that air ends before them. [Units: voxels]
+/// Voxels around the points, so that planes end before the sides. [Units: voxels]
 const MARGIN: f64 = 4.0;
 
 impl Scan {
-    /// Returns the box of points and stations.
+    /// Returns the box of points and stations that matters.
     #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        Aabb::of_points(&self.points).union(Aabb::of_points(&self.stations))
+    pub fn bounds(&self, options: &ScanOptions) -> Aabb {
+        let stations = Aabb::of_points(&self.stations);
+        let near = stations.expanded(options.reach);
+        Aabb::of_points(&self.points)
+            .union(stations)
+            .intersection(near)
+    }
+
+    /// Returns the edge of the voxels that keeps their number within the limits.
+    #[must_use]
+    pub fn step(&self, options: &ScanOptions, limits: &SourceLimits) -> f64 {
+        let size = self.bounds(options).size() + 2.0 * MARGIN * options.step;
+        let least = (size.element_product() / limits.max_voxels as f64).cbrt();
+        options.step.max(least)
     }
 
     /// Extracts the surface between the air that the stations saw and everything else.
@@ -60,14 +74,15 @@ impl Scan {
             value: 0.0,
             air: AirSide::Above,
         };
-        volume.surface_of_pieces(level, options.least_piece, limits)
+        // Air that reaches a side is outdoors.
+        volume.surface_of_pieces(level, Ends::Air, options.least_piece, limits)
     }
 
     /// Returns the field at the vertices of a lattice: positive in air, at most [`REACH`] steps.
     fn volume(&self, options: &ScanOptions, limits: &SourceLimits) -> Result<Volume, SourceError> {
         self.check()?;
-        let step = options.step;
-        let bounds = self.bounds().expanded(MARGIN * step);
+        let step = self.step(options, limits);
+        let bounds = self.bounds(options).expanded(MARGIN * step);
         let size = (bounds.size() / step)
             .ceil()
             .to_array()
@@ -81,7 +96,7 @@ impl Scan {
         let found = planes::of_scan(self, &grid);
         let mut free = vec![false; n];
         carve::carve(self, &grid, &mut free);
-        carve::close_specks(&grid, &mut free);
+        carve::close_gaps(&grid, &mut free);
         let reach = (REACH * step) as f32;
         let start = |is_free: &bool| if *is_free { reach } else { -reach };
         let mut values: Vec<f32> = free.iter().map(start).collect();

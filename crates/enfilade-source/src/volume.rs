@@ -55,6 +55,13 @@ pub struct Level {
     pub air: AirSide,
 }
 
+/// The other side of the sides of a volume.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ends {
+    Matter,
+    Air,
+}
+
 /// Most samples along an axis.
 const MAX_EDGE: usize = 1 << 20;
 /// Pieces of surface that are smaller than this along all axes, in samples, are noise.
@@ -170,17 +177,18 @@ impl Volume {
     ///
     /// If it exceeds a limit, or nothing of a surface is found.
     pub fn surface(&self, level: Level, limits: &SourceLimits) -> Result<Surface, SourceError> {
-        self.surface_of_pieces(level, NOISE * self.least_step(), limits)
+        self.surface_of_pieces(level, Ends::Matter, NOISE * self.least_step(), limits)
     }
 
     /// Works as [`Volume::surface`], without pieces smaller than `least_piece` along all axes.
     pub(crate) fn surface_of_pieces(
         &self,
         level: Level,
+        ends: Ends,
         least_piece: f64,
         limits: &SourceLimits,
     ) -> Result<Surface, SourceError> {
-        let field = VolumeField::new(self, level);
+        let field = VolumeField::new(self, level, ends);
         let step = self.least_step();
         let options = ExtractOptions {
             lattice: Lattice {
@@ -258,6 +266,7 @@ struct VolumeField<'v> {
     volume: &'v Volume,
     sign: f64,
     level: f64,
+    ends: Ends,
     /// Value of samples without one.
     missing: f64,
     /// Least and largest value in blocks of [`BLOCK`] samples, then of twice as many, and so on; each block includes the
@@ -266,7 +275,7 @@ struct VolumeField<'v> {
 }
 
 impl<'v> VolumeField<'v> {
-    fn new(volume: &'v Volume, level: Level) -> Self {
+    fn new(volume: &'v Volume, level: Level, ends: Ends) -> Self {
         let sign = match level.air {
             AirSide::Above => 1.0,
             AirSide::Below => -1.0,
@@ -277,6 +286,7 @@ impl<'v> VolumeField<'v> {
             volume,
             sign,
             level: level.value,
+            ends,
             missing: -reach[0].max(reach[1]).max(f64::MIN_POSITIVE),
             bounds: Vec::new(),
         };
@@ -313,7 +323,7 @@ impl<'v> VolumeField<'v> {
         (BLOCK, n, all)
     }
 
-    /// Returns the value of a sample, or beyond the sides that of the nearest one as matter.
+    /// Returns the value of a sample, or beyond the sides that of the nearest one, as it ends there.
     fn node(&self, at: [i64; 3]) -> f64 {
         let size = self.volume.size;
         let inner = [0, 1, 2].map(|a| at[a].clamp(0, size[a] as i64 - 1) as usize);
@@ -327,7 +337,11 @@ impl<'v> VolumeField<'v> {
             value
         } else {
             // Not zero, so that the surface does not run between equal zeros.
-            -value.abs().max(f64::from(f32::MIN_POSITIVE))
+            let beyond = value.abs().max(f64::from(f32::MIN_POSITIVE));
+            match self.ends {
+                Ends::Matter => -beyond,
+                Ends::Air => beyond,
+            }
         }
     }
 }

@@ -45,6 +45,9 @@ pub(crate) struct SceneOptions {
     /// Volumes: the side of the level on which air is [default: below a given level, above that of a mask].
     #[arg(long, value_enum)]
     air: Option<AirName>,
+    /// Scans (clouds of points in PLY): a place of the scanner, in meters with y up, if the file does not tell it; repeatable.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    station: Vec<DVec3>,
     /// Also read files outside the scene's folder that the scene refers to (buffers, pictures, materials); unsafe for
     /// scenes from strangers.
     #[arg(long)]
@@ -262,6 +265,7 @@ impl SceneOptions {
         ImportOptions {
             allow_outside: self.allow_outside,
             ifc: Some(ifc),
+            stations: self.station.clone(),
             volume: VolumeOptions {
                 level: self.level,
                 air: self.air.map(|air| match air {

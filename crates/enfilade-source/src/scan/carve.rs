@@ -9,8 +9,9 @@ use super::{REACH, Scan};
 
 /// Ways followed from one station to the points of one voxel: neighbors on a surface cross nearly the same air.
 const WAYS: u8 = 3;
-/// Free voxels among the 26 around an unknown one that make it free: a gap between ways, not a thing.
-const SPECK: usize = 16;
+/// Half the width of unknown space that is a gap between ways, not a thing: less than the thinnest walls and the air in front of them
+/// that is left to planes. [Units: voxels]
+const BETWEEN: usize = 3;
 
 /// Marks the vertices whose voxel a way crosses, except near its point.
 pub(super) fn carve(scan: &Scan, grid: &ScanGrid, free: &mut [bool]) {
@@ -67,27 +68,48 @@ fn walk(grid: &ScanGrid, from: DVec3, to: DVec3, free: &mut [bool]) {
     }
 }
 
-/// Makes voxels free that lie between ways.
-pub(super) fn close_specks(grid: &ScanGrid, free: &mut [bool]) {
-    let [nx, ny, nz] = grid.size;
-    let mut specks = Vec::new();
-    for z in 1..nz.saturating_sub(1) {
-        for y in 1..ny.saturating_sub(1) {
-            for x in 1..nx.saturating_sub(1) {
-                if free[grid.index([x, y, z])] {
-                    continue;
-                }
-                let around = (0..27).filter(|k| {
-                    let other = [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1];
-                    free[grid.index(other)]
-                });
-                if around.count() >= SPECK {
-                    specks.push(grid.index([x, y, z]));
-                }
+/// Makes voxels free that lie between ways: all unknown space that is at most `2 * BETWEEN` voxels wide along each axis.
+///
+/// Space behind seen points is matter all the same: see [`super::planes::blend`].
+pub(super) fn close_gaps(grid: &ScanGrid, free: &mut [bool]) {
+    for (is_grown, axis) in [
+        (true, 0),
+        (true, 1),
+        (true, 2),
+        (false, 0),
+        (false, 1),
+        (false, 2),
+    ] {
+        spread(grid, free, axis, is_grown);
+    }
+}
+
+/// Sets to `value` all voxels within [`BETWEEN`] of one that has it, along an axis.
+fn spread(grid: &ScanGrid, free: &mut [bool], axis: usize, value: bool) {
+    let n = grid.size[axis];
+    let stride = grid.size[..axis].iter().product::<usize>();
+    let mut row = vec![false; n];
+    for start in 0..free.len() / n {
+        let first = start % stride + start / stride * stride * n;
+        for (i, cell) in row.iter_mut().enumerate() {
+            *cell = free[first + i * stride];
+        }
+        // The last voxel with the value, in both directions.
+        let mut last = None;
+        for i in 0..n {
+            if row[i] == value {
+                last = Some(i);
+            } else if last.is_some_and(|l| i - l <= BETWEEN) {
+                free[first + i * stride] = value;
             }
         }
-    }
-    for i in specks {
-        free[i] = true;
+        let mut last = None;
+        for i in (0..n).rev() {
+            if row[i] == value {
+                last = Some(i);
+            } else if last.is_some_and(|l| l - i <= BETWEEN) {
+                free[first + i * stride] = value;
+            }
+        }
     }
 }

@@ -25,6 +25,13 @@ impl ScanGrid {
         [0, 1, 2].map(|a| (q[a].max(0.0) as usize).min(self.size[a] - 1))
     }
 
+    /// Returns the indices of the vertex nearest to a point; `None` beyond the box.
+    pub(super) fn voxel(&self, p: DVec3) -> Option<[usize; 3]> {
+        let q = self.scaled(p).round().to_array();
+        let is_in = (0..3).all(|a| q[a] >= 0.0 && q[a] < self.size[a] as f64);
+        is_in.then(|| q.map(|c| c as usize))
+    }
+
     pub(super) fn index(&self, at: [usize; 3]) -> usize {
         at[0] + self.size[0] * (at[1] + self.size[1] * at[2])
     }

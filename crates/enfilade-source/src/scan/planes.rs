@@ -1,6 +1,6 @@
 //! Planes through the points of a voxel and of those around it.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 use enfilade_geom::{DMat3, DVec3};
 
@@ -12,6 +12,9 @@ use crate::qef::eigen;
 const LEAST_POINTS: f64 = 4.0;
 /// Smallest sum of weights of planes at a vertex for their distance to count.
 const LEAST_WEIGHT: f64 = 0.05;
+
+/// Sum of weights at which planes make air of what was not crossed: several of them nearby.
+const SURE_WEIGHT: f64 = 0.5;
 
 /// Sums over the points of a voxel, relative to its vertex.
 #[derive(Clone, Copy)]
@@ -36,15 +39,15 @@ impl Sums {
 pub(super) struct PointPlane {
     at: DVec3,
     normal: DVec3,
-    /// Index of the voxel.
-    voxel: usize,
 }
 
 /// Returns a plane for each voxel with enough points.
 pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
-    let mut sums: BTreeMap<usize, Sums> = BTreeMap::new();
+    let mut sums: HashMap<usize, Sums> = HashMap::new();
     for (p, s) in scan.points.iter().zip(&scan.station_of) {
-        let at = grid.nearest(*p);
+        let Some(at) = grid.voxel(*p) else {
+            continue;
+        };
         let d = *p - grid.point(at);
         let sum = sums.entry(grid.index(at)).or_insert(Sums::ZERO);
         sum.n += 1.0;
@@ -53,7 +56,10 @@ pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
         sum.up += (scan.stations[usize::from(*s)] - *p).normalize_or_zero();
     }
     let mut found = Vec::new();
-    for (&voxel, own) in &sums {
+    let mut voxels: Vec<usize> = sums.keys().copied().collect();
+    voxels.sort_unstable();
+    for voxel in voxels {
+        let own = &sums[&voxel];
         let at = grid.at(voxel);
         let (mut n, mut p, mut pp, mut up) = (0.0, DVec3::ZERO, DMat3::ZERO, DVec3::ZERO);
         for k in 0..27 {
@@ -97,42 +103,77 @@ pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
         found.push(PointPlane {
             at: middle + normal * lift * 0.5,
             normal,
-            voxel,
         });
     }
     found
 }
 
+/// Edge of a block of sums. [Units: voxels]
+const BLOCK: usize = 8;
+/// Sums of weighted distances, and of weights, of the vertices in a block.
+type BlockSums = Box<[[f32; 2]; BLOCK * BLOCK * BLOCK]>;
+
 /// Replaces the values near planes by the distance from them.
 pub(super) fn blend(planes: &[PointPlane], grid: &ScanGrid, free: &[bool], values: &mut [f32]) {
-    let reach = REACH as usize + 1;
-    let mut sums: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
+    let mut blocks: HashMap<[usize; 3], BlockSums> = HashMap::new();
     for plane in planes {
-        let at = grid.at(plane.voxel);
-        let from = at.map(|c| c.saturating_sub(reach));
-        let to = [0, 1, 2].map(|a| (at[a] + reach).min(grid.size[a] - 1));
-        for z in from[2]..=to[2] {
-            for y in from[1]..=to[1] {
-                for x in from[0]..=to[0] {
-                    let d = (grid.point([x, y, z]) - plane.at) / grid.step;
-                    let near = 1.0 - d.length_squared() / (REACH * REACH);
-                    if near <= 0.0 {
-                        continue;
-                    }
-                    let weight = near.powi(4);
-                    let sum = sums.entry(grid.index([x, y, z])).or_insert([0.0; 2]);
-                    sum[0] += weight * plane.normal.dot(d);
-                    sum[1] += weight;
+        let near = |a: usize, by: f64| {
+            let at = grid.scaled(plane.at).to_array()[a] + by;
+            (at.max(0.0) as usize).min(grid.size[a] - 1)
+        };
+        let (from, to) = (
+            [0, 1, 2].map(|a| near(a, 1.0 - REACH)),
+            [0, 1, 2].map(|a| near(a, REACH)),
+        );
+        for z in from[2] / BLOCK..=to[2] / BLOCK {
+            for y in from[1] / BLOCK..=to[1] / BLOCK {
+                for x in from[0] / BLOCK..=to[0] / BLOCK {
+                    let block = [x, y, z];
+                    let new = || Box::new([[0.0; 2]; BLOCK * BLOCK * BLOCK]);
+                    let sums = blocks.entry(block).or_insert_with(new);
+                    let first = block.map(|b| b * BLOCK);
+                    add_plane(plane, grid, first, [from, to], sums);
                 }
             }
         }
     }
-    for (i, [sum, weight]) in sums {
-        if weight >= LEAST_WEIGHT {
-            let d = (sum / weight).clamp(-REACH, REACH) * grid.step;
-            // Beyond the edges of what was seen, planes go on; the unknown does not become air.
-            if d < 0.0 || free[i] || weight >= 0.5 {
-                values[i] = d as f32;
+    for (block, sums) in blocks {
+        for (i, [sum, weight]) in sums.into_iter().enumerate() {
+            if f64::from(weight) < LEAST_WEIGHT {
+                continue;
+            }
+            let at = [i % BLOCK, i / BLOCK % BLOCK, i / (BLOCK * BLOCK)];
+            let index = grid.index([0, 1, 2].map(|a| block[a] * BLOCK + at[a]));
+            let d = (f64::from(sum / weight)).clamp(-REACH, REACH) * grid.step;
+            // Planes go on beyond the edges of what was seen; the unknown does not become air there.
+            if d < 0.0 || free[index] || f64::from(weight) >= SURE_WEIGHT {
+                values[index] = d as f32;
+            }
+        }
+    }
+}
+
+/// Adds a plane to the sums of the vertices of a block that lie within two limits.
+fn add_plane(
+    plane: &PointPlane,
+    grid: &ScanGrid,
+    first: [usize; 3],
+    [from, to]: [[usize; 3]; 2],
+    sums: &mut BlockSums,
+) {
+    let range = |a: usize| from[a].max(first[a])..=to[a].min(first[a] + BLOCK - 1);
+    for z in range(2) {
+        for y in range(1) {
+            for x in range(0) {
+                let d = (grid.point([x, y, z]) - plane.at) / grid.step;
+                let near = 1.0 - d.length_squared() / (REACH * REACH);
+                if near > 0.0 {
+                    let weight = near.powi(4);
+                    let [i, j, k] = [x - first[0], y - first[1], z - first[2]];
+                    let sum = &mut sums[i + BLOCK * (j + BLOCK * k)];
+                    sum[0] += (weight * plane.normal.dot(d)) as f32;
+                    sum[1] += weight as f32;
+                }
             }
         }
     }

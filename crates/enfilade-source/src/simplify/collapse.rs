@@ -8,7 +8,9 @@ use enfilade_geom::{DVec3, closest_point_on_triangle};
 use super::quadric::Quadric;
 
 /// Most triangles around a vertex after a collapse; more take longer to check than they save.
-const MAX_FAN: usize = 40;
+const MAX_FAN: usize = 16;
+/// Longest edge after a collapse, in tolerances: a triangle has to be checked against all vertices of the input near it.
+const MAX_EDGE: f64 = 500.0;
 /// Least cosine between the normals of a triangle before and after a collapse: far from a fold.
 const LEAST_TURN: f64 = 0.3;
 /// Least height of a triangle after a collapse, in its longest edge.
@@ -210,16 +212,24 @@ impl Mesh {
                     before[i]
                 }
             });
-            if !is_sound(before, after) {
+            if !is_sound(before, after, self.tolerance * MAX_EDGE) {
                 return false;
             }
             moved.push(after);
         }
         let near = self.tolerance * self.tolerance;
         let mut assigned: Vec<Vec<u32>> = vec![Vec::new(); stay.len()];
-        for &t in stay.iter().chain(gone) {
+        for (own, &t) in stay.iter().chain(gone).enumerate() {
             for &o in &self.carried[t as usize] {
                 let p = self.originals[o as usize];
+                // Mostly the triangle that had it before is near enough.
+                if let Some(corners) = moved.get(own) {
+                    let d = closest_point_on_triangle(p, corners).distance_squared(p);
+                    if d <= near * 0.25 {
+                        assigned[own].push(o);
+                        continue;
+                    }
+                }
                 let mut best = (f64::INFINITY, 0);
                 for (i, corners) in moved.iter().enumerate() {
                     let d = closest_point_on_triangle(p, corners).distance_squared(p);
@@ -299,13 +309,13 @@ impl Mesh {
     }
 }
 
-/// Returns `true` if a triangle neither turns over nor degenerates.
-fn is_sound(before: [DVec3; 3], after: [DVec3; 3]) -> bool {
+/// Returns `true` if a triangle neither turns over nor degenerates, nor becomes longer than some length.
+fn is_sound(before: [DVec3; 3], after: [DVec3; 3], most: f64) -> bool {
     let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
     let (n, m) = (normal(before), normal(after));
     let edges = [0, 1, 2].map(|i| after[i].distance_squared(after[(i + 1) % 3]));
     let longest = edges.into_iter().fold(0.0, f64::max);
-    if m.length() < LEAST_HEIGHT * longest {
+    if m.length() < LEAST_HEIGHT * longest || longest > most * most {
         return false;
     }
     // A sliver of rounding has no direction to keep.
