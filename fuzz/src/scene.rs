@@ -1,9 +1,10 @@
 //! Importers of scenes.
 
+use enfilade_geom::DVec3;
 use enfilade_geom::scene::Role;
 use enfilade_import::{
-    CleaningOptions, ImportError, ImportOptions, Imported, Limits, cleaning_report, decode_gltf,
-    decode_map, decode_obj, decode_ply, decode_stl, export_glb, read_prt, read_pvs_text, write_prt,
+    CleaningOptions, ImportError, ImportOptions, Imported, Limits, VolumeOptions, cleaning_report, decode_gltf,
+    decode_e57, decode_implicit, decode_map, decode_obj, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
     write_pvs_text,
 };
 
@@ -25,6 +26,37 @@ pub fn map(data: &[u8]) {
 /// PLY.
 pub fn ply(data: &[u8]) {
     check(decode_ply(data, &options()));
+}
+
+/// Implicit scenes.
+pub fn implicit(data: &[u8]) {
+    check(decode_implicit(data, &options()));
+}
+
+/// Volumes: NIfTI, NRRD and headers of raw samples, at a level that most values are not on.
+pub fn volume(data: &[u8]) {
+    let options = ImportOptions {
+        volume: VolumeOptions {
+            level: Some(0.5),
+            air: None,
+        },
+        ..options()
+    };
+    check(decode_volume(data, &options));
+}
+
+/// Clouds of points in PLY, with a place of the scanner.
+pub fn scan(data: &[u8]) {
+    let options = ImportOptions {
+        stations: vec![DVec3::new(0.5, 0.5, 0.5)],
+        ..options()
+    };
+    check(decode_ply(data, &options));
+}
+
+/// Scans in E57.
+pub fn e57(data: &[u8]) {
+    check(decode_e57(data, &options()));
 }
 
 /// STL.

@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout)]
 
 mod any_size;
+mod any_source;
 mod bring;
 mod bsp;
 mod builders;
@@ -83,6 +84,8 @@ enum What {
         /// The generated level, such as `dungeon-380`.
         scene: String,
     },
+    /// Rooms of sources that are not triangles: a row per figure, with the value that it must reach.
+    AnySource(Chosen),
     /// Value of worlds to programs and modelers: a row per figure, with the value that it must reach.
     Bring(Chosen),
     /// Rooms and doors as architects mean them: a row per figure, with the value that it must reach.
@@ -243,6 +246,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
         What::AnySize(chosen) => return bench_rows(any_size::ROWS, args.json, chosen),
+        What::AnySource(chosen) => return bench_rows(any_source::ROWS, args.json, chosen),
         What::SizeStep { step, scene } => return any_size::run_step(*step, scene),
         What::Constructive(chosen) => return bench_rows(constructive::ROWS, args.json, chosen),
         What::LevelStep { step, scene } => return constructive::run_step(*step, scene),

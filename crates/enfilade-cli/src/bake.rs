@@ -38,7 +38,7 @@ use enfilade_report::{Verdict, is_empty, why_empty};
 /// Finds the rooms and doorways of a scene and writes them as a world.
 #[derive(clap::Args)]
 pub(crate) struct Bake {
-    /// Scene files: GLB, glTF, OBJ, PLY, STL, Quake MAP, implicit scenes in JSON, volumes (NIfTI, NRRD), or IFC, which needs ifcopenshell (`pip install ifcopenshell`) or
+    /// Scene files: GLB, glTF, OBJ, PLY, STL, Quake MAP, implicit scenes in JSON, volumes (NIfTI, NRRD), scans (E57, PLY), or IFC, which needs ifcopenshell (`pip install ifcopenshell`) or
     /// web-ifc (`npm install web-ifc`). Several become one scene; `-` is standard input.
     #[arg(required = true, value_name = "IN")]
     inputs: Vec<PathBuf>,

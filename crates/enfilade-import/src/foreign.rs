@@ -58,9 +58,9 @@ const FOREIGN: [Foreign; 10] = [
         advice: "give its .map, or convert it: bsputil --decompile {in}",
     },
     Foreign {
-        name: "a point cloud (E57, LAS)",
-        magic: &[b"ASTM-E57", b"LASF"],
-        endings: &["e57", "las", "laz"],
+        name: "a point cloud (LAS)",
+        magic: &[b"LASF"],
+        endings: &["las", "laz"],
         advice: "it has no surfaces; make some: pdal translate {in} {out}.ply normal poisson --writers.ply.faces=true",
     },
     Foreign {
@@ -136,7 +136,6 @@ mod tests {
                 "point cloud",
                 "pdal translate a.laz a.ply",
             ),
-            (b"ASTM-E57", "a", "point cloud", "pdal translate a a.ply"),
             (b"AC1032", "a.dwg", "DWG", "STLOUT"),
             (b"BLENDER", "a.blend", "Blender", "blender -b a.blend"),
         ] {

@@ -160,6 +160,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Ifc => ifc::read(bytes, builder),
         Format::Implicit => sources::read_implicit(bytes, builder),
         Format::Volume => sources::read_volume(bytes, builder),
+        Format::E57 => sources::read_e57(bytes, builder),
     }
 }
 
@@ -174,6 +175,7 @@ enum Format {
     Ifc,
     Implicit,
     Volume,
+    E57,
 }
 
 impl Format {
@@ -183,9 +185,13 @@ impl Format {
             // One byte more than allowed shows that the input is too large.
             Self::Gltf => gltf::length(head).unwrap_or(limits.max_json_bytes.saturating_add(1)),
             Self::Stl => stl::length(head).unwrap_or(u64::MAX),
-            Self::Ply | Self::Obj | Self::Map | Self::Ifc | Self::Implicit | Self::Volume => {
-                u64::MAX
-            }
+            Self::Ply
+            | Self::Obj
+            | Self::Map
+            | Self::Ifc
+            | Self::Implicit
+            | Self::Volume
+            | Self::E57 => u64::MAX,
         }
     }
 }
@@ -212,6 +218,8 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         Format::Ifc
     } else if let Some(error) = foreign::unsupported(bytes, path) {
         return Err(error);
+    } else if bytes.starts_with(b"ASTM-E57") {
+        Format::E57
     } else if Volume::is_one(bytes) {
         Format::Volume
     } else if ImplicitScene::is_one(bytes) {
@@ -256,6 +264,15 @@ pub fn decode_implicit(bytes: &[u8], options: &ImportOptions) -> Result<Imported
 /// As [`import`].
 pub fn decode_volume(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.nii", options, sources::read_volume)
+}
+
+/// Reads scans in E57 from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_e57(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.e57", options, sources::read_e57)
 }
 
 /// Reads an OBJ file from memory, without its material libraries.

@@ -64,7 +64,7 @@ pub struct UpDoubt {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `implicit`, `NIfTI`, `NRRD` or `raw volume`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `implicit`, `NIfTI`, `NRRD`, `raw volume` or `E57`.
     pub format: &'static str,
     /// Objects read from it.
     pub n_objects: u64,
@@ -81,6 +81,8 @@ pub struct SurfaceReport {
     pub step: f64,
     /// Largest distance found between surface and source. [Units: wu]
     pub distance: f64,
+    /// Points at which the source was evaluated.
+    pub n_samples: u64,
     /// Factor by which it was enlarged beyond its unit, if it was.
     pub enlarged: Option<f64>,
     /// Further assumptions, for people; may be empty.

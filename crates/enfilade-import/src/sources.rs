@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::io::Cursor;
+
+use e57::{CartesianCoordinate, E57Reader};
 
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
@@ -147,6 +150,58 @@ const SCAN_REACH: f64 = 12.0;
 /// Pieces of surface smaller than this are noise: half the width of the narrowest doorway. [Units: wu]
 const SCAN_PIECE: f64 = 0.3;
 
+/// Reads the scans of an E57 file, each with the pose of its scanner. The third axis is up.
+pub(crate) fn read_e57(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    builder.set_format("E57");
+    let file = Cursor::new(bytes);
+    let mut reader = E57Reader::new(file).map_err(|e| damaged(builder, "file", &e))?;
+    let (mut points, mut station_of, mut stations) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, cloud) in reader.pointclouds().iter().enumerate() {
+        let place = format!("scan {i}");
+        builder.charge_vertices(&place, cloud.records)?;
+        let Some(pose) = &cloud.transform else {
+            builder.note(
+                place,
+                "a scan without a pose, so that its station is not known; left out",
+            );
+            continue;
+        };
+        let Ok(station) = u16::try_from(stations.len()) else {
+            return Err(builder.malformed(place, "more than 65,535 scans; split the file"));
+        };
+        let at = &pose.translation;
+        stations.push(DVec3::new(at.x, at.y, at.z));
+        let all = reader
+            .pointcloud_simple(cloud)
+            .map_err(|e| damaged(builder, &place, &e))?;
+        for point in all {
+            let point = point.map_err(|e| damaged(builder, &place, &e))?;
+            // A direction alone met nothing: the sky, or a surface as black as it.
+            if let CartesianCoordinate::Valid { x, y, z } = point.cartesian {
+                points.push(DVec3::new(x, y, z));
+                station_of.push(station);
+            }
+        }
+    }
+    if builder.options.up.is_none() {
+        let turn = |p: &mut DVec3| *p = DVec3::new(p.x, p.z, -p.y);
+        points.iter_mut().chain(&mut stations).for_each(turn);
+    }
+    if stations.is_empty() {
+        return Ok(());
+    }
+    let cloud = Scan {
+        points,
+        station_of,
+        stations,
+    };
+    add_scan(&cloud, builder)
+}
+
+fn damaged(builder: &Builder<'_>, place: &str, e: &e57::Error) -> ImportError {
+    builder.malformed(place, format!("{e}; is the file cut off?"))
+}
+
 /// Reads the points of a scan. Without a place of the scanner, the file has no surface, and this is noted.
 ///
 /// `station_of` is empty if the file does not say which station saw which point.
@@ -181,6 +236,11 @@ pub(crate) fn read_points(
         points,
         stations,
     };
+    add_scan(&scan, builder)
+}
+
+/// Adds the surface of a scan in the space of the input.
+fn add_scan(scan: &Scan, builder: &mut Builder<'_>) -> Result<(), ImportError> {
     let meters = builder.base.transform_vector3(DVec3::X).length();
     let options = ScanOptions {
         step: SCAN_STEP / meters,
@@ -192,7 +252,7 @@ pub(crate) fn read_points(
     let surface = scan.surface(&options, &limits);
     let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
     let text = format!(
-        "a scan of {} points from {} stations; what no station saw is matter",
+        "a scan of {} points, stations: {}; what no station saw is matter",
         scan.points.len(),
         scan.stations.len()
     );
@@ -268,6 +328,7 @@ fn add(
         file.surface = Some(SurfaceReport {
             step: step * meters,
             distance: surface.distance * meters * scale,
+            n_samples: surface.n_samples,
             enlarged: told.enlarged,
             text: told.text,
         });

@@ -1,8 +1,13 @@
 //! Sources that are not triangles become surfaces, alone or beside models. Covers S3.
 
 use enfilade_geom::scene::Role;
+use std::io::Cursor;
+
+use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use enfilade_geom::{Aabb, DVec3};
-use enfilade_import::{ImportOptions, SceneSource, decode_implicit, decode_ply, import_sources};
+use enfilade_import::{
+    ImportOptions, SceneSource, decode_e57, decode_implicit, decode_ply, import_sources,
+};
 
 const BALL: &str = r#"{ "enfilade": "implicit", "unit": "cm", "air": { "ball": { "at": [100, 0, 0], "radius": 200 } } }"#;
 
@@ -102,7 +107,7 @@ fn a_cloud_of_points_is_a_scan_if_its_station_is_known() {
     let text = &by_file.report.files[0].surface.as_ref().unwrap().text;
     assert_eq!(
         text,
-        "a scan of 40000 points from 1 stations; what no station saw is matter"
+        "a scan of 40000 points, stations: 1; what no station saw is matter"
     );
     let two = "comment station 0 0 0\ncomment station 1 0 0\n";
     let error = decode_ply(&room_ply(two), &plain).unwrap_err().to_string();
@@ -111,4 +116,68 @@ fn a_cloud_of_points_is_a_scan_if_its_station_is_known() {
         .unwrap_err()
         .to_string();
     assert!(error.contains("line 3"), "{error}");
+}
+
+/// An E57 file with one scan of a room of 4 by 3 by 2.5 m, z up, 10 m east of the origin.
+fn room_e57(has_pose: bool) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
+    let records = vec![
+        Record::CARTESIAN_X_F64,
+        Record::CARTESIAN_Y_F64,
+        Record::CARTESIAN_Z_F64,
+    ];
+    let mut cloud = writer.add_pointcloud("scan", records).unwrap();
+    let translation = Translation {
+        x: 10.0,
+        y: 0.0,
+        z: 0.0,
+    };
+    let rotation = Quaternion::default();
+    cloud.set_transform(has_pose.then_some(Transform {
+        rotation,
+        translation,
+    }));
+    let n = 40_000;
+    for i in 0..n {
+        let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n);
+        let (turn, r) = (f64::from(i) * 2.399_963, (1.0 - y * y).sqrt());
+        let d = DVec3::new(r * turn.cos(), r * turn.sin(), y);
+        let p = d * (DVec3::new(2.0, 1.5, 1.25) / d.abs()).min_element();
+        cloud
+            .add_point(p.to_array().map(RecordValue::Double).to_vec())
+            .unwrap();
+    }
+    cloud.finalize().unwrap();
+    writer.finalize().unwrap();
+    drop(writer);
+    bytes.into_inner()
+}
+
+#[test]
+fn scans_in_e57_stand_where_their_poses_say_with_z_up() {
+    let plain = ImportOptions::default();
+    let imported = decode_e57(&room_e57(true), &plain).unwrap();
+    let bounds = imported.scene.object_aabb(0);
+    let middle = (bounds.min + bounds.max) * 0.5;
+    assert!(
+        middle.distance(DVec3::new(10.0, 0.0, 0.0)) < 0.1,
+        "{bounds:?}"
+    );
+    // A block of matter around the room, with its height along y.
+    let size = bounds.size();
+    assert!(size.x > size.z + 0.9 && size.z > size.y + 0.4, "{size}");
+    let error = decode_e57(&room_e57(false), &plain)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("without a pose"), "{error}");
+    let whole = room_e57(true);
+    for n in [10, 48, 500, whole.len() / 2, whole.len() - 1] {
+        assert!(decode_e57(&whole[..n], &plain).is_err(), "{n}");
+    }
+    let mut broken = whole.clone();
+    let at = broken.len() / 2;
+    broken[at] ^= 0xff;
+    let error = decode_e57(&broken, &plain).unwrap_err().to_string();
+    assert!(error.contains("scan 0"), "{error}");
 }

@@ -1,0 +1,47 @@
+//! `bench any-source`: rooms of sources that are not triangles, each figure with its bar.
+//!
+//! To add rows, add a file for their family beside this one and lines in [`ROWS`].
+
+mod implicit;
+mod volume;
+
+use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
+use enfilade::cpg::World;
+use enfilade::geom::scene::Scene;
+
+use crate::living::made;
+use crate::rows::{Measure, Row};
+
+/// Implicit scenes with as many rooms and openings as they were made with.
+const SHAPES: &[&str] = &["balls", "cavern", "house", "gyroid"];
+const AORTA: &[&str] = &["aorta"];
+/// Airway trees of 15 branches, with the noise of computed tomography in its units.
+const AIRWAYS: &[&str] = &["airway-noise-0", "airway-noise-40", "airway-noise-80"];
+
+const fn of_aorta(
+    name: &'static str,
+    measure: fn(&World, &str) -> anyhow::Result<crate::rows::Figure>,
+) -> Row {
+    let measure = Measure::Named(measure);
+    Row {
+        name,
+        scenes: AORTA,
+        measure,
+    }
+}
+
+pub(crate) const ROWS: &[Row] = &[
+    of_aorta("volume: cells, 0.5 mm", |w, s| volume::cells(w, s, 0.5)),
+    of_aorta("volume: cells, 0.8 mm", |w, s| volume::cells(w, s, 0.8)),
+    of_aorta("volume: cells, 1.2 mm", |w, s| volume::cells(w, s, 1.2)),
+    made("volume: branches missed", AIRWAYS, volume::missed),
+    made("implicit: cells", SHAPES, implicit::cells),
+    made("implicit: portals", SHAPES, implicit::portals),
+    made("implicit: samples by volume", &["balls"], implicit::samples),
+];
+
+/// Bakes with default settings.
+fn baked(scene: &Scene) -> anyhow::Result<World> {
+    let context = BakeContext::new(&Silent, None);
+    Ok(bake(scene, &BakeConfig::default(), &context)?.world)
+}
