@@ -10,7 +10,7 @@ use super::quadric::Quadric;
 /// Most triangles around a vertex after a collapse; more take longer to check than they save.
 const MAX_FAN: usize = 16;
 /// Longest edge after a collapse, in tolerances: a triangle has to be checked against all vertices of the input near it.
-const MAX_EDGE: f64 = 500.0;
+const MAX_EDGE: f64 = 2000.0;
 /// Least cosine between the normals of a triangle before and after a collapse: far from a fold.
 const LEAST_TURN: f64 = 0.3;
 /// Least height of a triangle after a collapse, in its longest edge.
