@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use enfilade_bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade_cpg::{CellId, CellPortalGraph, Portal};
-use enfilade_geom::scene::{Material, Mesh, Object, Primitive, Role, Scene};
+use enfilade_geom::scene::{Material, Mesh, Object, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_testkit::hills;
 use enfilade_testkit::solid::{MeshBuilder, aabb};
 
 /// A box as its minimum and maximum.
@@ -309,31 +310,10 @@ by! {
         the_inside_of_a_massive_flight_belongs_to_its_room;
 }
 
-/// Hills of 1 km × 1 km that begin 40 m from the given places (x, z), and level land there.
+/// Makes land with level ground 40 m around the given places (x, z).
 fn land(places: &[[f64; 2]]) -> Mesh {
-    const N: u32 = 100;
-    let mut primitive = Primitive::default();
-    for z in 0..=N {
-        for x in 0..=N {
-            let [x, z] = [x, z].map(|k| 10.0 * (f64::from(k) - f64::from(N) / 2.0));
-            let distances = places.iter().map(|[a, b]| (x - a).hypot(z - b));
-            let nearest = distances.fold(f64::INFINITY, f64::min);
-            let hill = ((nearest - 40.0) / 60.0).clamp(0.0, 1.0);
-            let y = -0.2 + 15.0 * hill * (x / 70.0).sin() * (z / 50.0).cos();
-            primitive.positions.push([x as f32, y as f32, z as f32]);
-        }
-    }
-    for z in 0..N {
-        for x in 0..N {
-            let a = x + z * (N + 1);
-            let [b, c, d] = [a + 1, a + N + 1, a + N + 2];
-            primitive.indices.extend([a, c, d, a, d, b]);
-        }
-    }
-    Mesh {
-        name: String::new(),
-        primitives: vec![primitive],
-    }
+    let places = places.iter().map(|&[x, z]| DVec3::new(x, 0.0, z));
+    hills(&places.collect::<Vec<_>>(), -0.2, 40.0, 10.0)
 }
 
 #[test]

@@ -26,6 +26,7 @@ mod house;
 mod impossible;
 mod interior;
 mod kits;
+mod land;
 mod lift_tower;
 mod maze;
 pub mod mixed;
@@ -59,6 +60,7 @@ pub use graphs::{
 pub use house::furnished_house;
 pub use impossible::{ImpossibleHouse, impossible_house};
 pub use kits::{PieceScene, dungeon_kit, maze_kit, office_kit};
+pub use land::hills;
 pub use lift_tower::{LiftTower, lift_tower};
 pub use maze::dirkse_maze;
 pub use rng::Rng;

@@ -5,9 +5,10 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::{Cell, World};
-use enfilade::geom::scene::{Mesh, Object, Primitive, Role, Scene};
+use enfilade::geom::scene::{Object, Role, Scene};
 use enfilade::geom::{Aabb, DMat4, DVec3};
 use enfilade::import::{ImportOptions, import};
+use enfilade_testkit::hills;
 
 use crate::growth::{Used, bake_tower, used_by};
 use crate::measure::files_of;
@@ -20,8 +21,7 @@ const SECONDS_ON_LAND: f64 = 10.0;
 const MOST_MEMORY: f64 = 2.0 * (1 << 30) as f64;
 /// Tower whose growth towards larger ones is measured.
 const SMALL_TOWER: usize = 64;
-/// Side of the land, of its squares, and distance between buildings. [Units: wu]
-const LAND: f64 = 1000.0;
+/// Side of the land's squares, and distance between buildings. [Units: wu]
 const SQUARE: f64 = 4.0;
 const APART: f64 = 300.0;
 /// Rooms of the same place whose volumes differ by a smaller share are the same.
@@ -172,7 +172,7 @@ fn on_land(alone: &World, name: &str, places: &[DVec3]) -> anyhow::Result<Scene>
     let middles: Vec<DVec3> = places.iter().map(|&p| p + bounds.center()).collect();
     let ground = bounds.min.y - 0.5;
     let level = 0.7 * bounds.size().x.max(bounds.size().z) + 10.0;
-    scene.meshes.push(land(&middles, ground, level));
+    scene.meshes.push(hills(&middles, ground, level, SQUARE));
     scene.objects.push(Object {
         name: "land".to_owned(),
         mesh: scene.meshes.len() as u32 - 1,
@@ -183,31 +183,4 @@ fn on_land(alone: &World, name: &str, places: &[DVec3]) -> anyhow::Result<Scene>
         node: None,
     });
     Ok(scene)
-}
-
-/// Makes hills around places that are level as far as `level`.
-fn land(places: &[DVec3], ground: f64, level: f64) -> Mesh {
-    let n = (LAND / SQUARE) as u32;
-    let mut primitive = Primitive::default();
-    for k in 0..=n {
-        for i in 0..=n {
-            let [x, z] = [i, k].map(|v| f64::from(v) * SQUARE - 0.5 * LAND);
-            let distances = places.iter().map(|p| (p.x - x).hypot(p.z - z));
-            let nearest = distances.fold(f64::INFINITY, f64::min);
-            let hill = ((nearest - level) / 60.0).clamp(0.0, 1.0);
-            let y = ground + 15.0 * hill * (x / 70.0).sin() * (z / 50.0).cos();
-            primitive.positions.push([x as f32, y as f32, z as f32]);
-        }
-    }
-    for k in 0..n {
-        for i in 0..n {
-            let a = i + k * (n + 1);
-            let [b, c, d] = [a + 1, a + n + 1, a + n + 2];
-            primitive.indices.extend([a, c, d, a, d, b]);
-        }
-    }
-    Mesh {
-        name: "land".to_owned(),
-        primitives: vec![primitive],
-    }
 }
