@@ -1,4 +1,4 @@
-//! Kernels on dense voxel grids: surface voxelization, exact distances, connected components, the
+//! Kernels on voxel grids: surface voxelization, exact distances, connected components, the
 //! watershed of the distance field and the widest path in it.
 //!
 //! **Layout, everywhere:** x runs fastest, then y, then z: voxel `(i, j, k)` of a box of
@@ -14,6 +14,7 @@ mod edt;
 mod enclosure;
 mod far;
 mod grid;
+mod labels;
 mod voxelize;
 mod watershed;
 mod widest;
@@ -23,6 +24,7 @@ pub use edt::{distance, distance_squared, distance_squared_near};
 pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use far::far_outdoors;
 pub use grid::{BitVolume, Grid, for_runs, set_bits};
+pub use labels::Labels;
 pub use voxelize::voxelize;
-pub use watershed::{Basin, Labels, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
+pub use watershed::{Basin, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
 pub use widest::{WidestPath, border, widest_path};

@@ -16,7 +16,7 @@
 //! voxels are further apart than that, so only wider spaces lose any order.
 //!
 //! **Memory:** works in place, in the array of squared distances: a word holds a voxel's level, then its basin's position
-//! among those of the slab, and then its label.
+//! among those of the slab.
 //!
 //! | stage | file |
 //! | --- | --- |
@@ -33,9 +33,10 @@ use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::grid::BitVolume;
+use super::labels::Labels;
 use crests::{Crests, Shape, to_levels};
 
-pub use basins::{Basin, Labels, Saddle, Watershed};
+pub use basins::{Basin, Saddle, Watershed};
 
 /// Options of [`watershed`].
 #[derive(Clone, Debug, Default)]
@@ -50,10 +51,10 @@ pub struct WatershedOptions {
 /// Divides a field of squared distances among the basins around its peaks.
 ///
 /// `squared` is the result of [`distance_squared`](super::distance_squared) for a box of `dims`; 0 is
-/// occupied, and distances of 256 voxels and more count as one level. Its memory becomes the labels.
+/// occupied, and distances of 256 voxels and more count as one level.
 ///
 /// Linear in the voxels. In addition to the 2 bytes per voxel it takes an eighth of a byte per voxel, 9 bytes for each
-/// voxel that no neighbor exceeds, and 24 MiB per thread. If more than 65,535 basins are left, labels take 4 bytes per voxel.
+/// voxel that no neighbor exceeds, and 24 MiB per thread; and [`Labels`] take what their surfaces need.
 ///
 /// # Panics
 /// If `squared` or `outdoors` is not of size `dims`, there are 2³² voxels or more, or `h` is negative or
@@ -96,7 +97,7 @@ fn watershed_by(
         options.h
     );
     if n == 0 {
-        return Watershed::unflooded(n);
+        return Watershed::unflooded(dims);
     }
     let shape = Shape { dims };
     let mut words = squared;
@@ -105,11 +106,11 @@ fn watershed_by(
     let crests = Crests::of(shape, &words, allowance);
     let (roots, contacts) = slabs::label(shape, &mut words, &crests, thick, allowance);
     if allowance.is_over() {
-        return Watershed::unflooded(n);
+        return Watershed::unflooded(dims);
     }
     let tree = join::Merged::of(&crests.peaks, contacts, options.h, first_outdoors);
     drop(crests);
-    tree.finish(words, &roots, thick * shape.layer())
+    tree.finish(shape, &words, &roots, thick)
 }
 
 /// Marks the dams between basins, one voxel thick: each voxel that shares a face with one of a lesser
@@ -119,64 +120,44 @@ fn watershed_by(
 /// If `labels` is not of size `dims`.
 #[must_use]
 pub fn mark_dams(dims: [usize; 3], labels: &Labels) -> BitVolume {
-    assert_eq!(
-        labels.len(),
-        dims.iter().product::<usize>(),
-        "a label for each voxel"
-    );
-    match labels {
-        Labels::U16(v) => dams(dims, v),
-        Labels::U32(v) => dams(dims, v),
-    }
-}
-
-fn dams<T: Copy + Ord + Default + Sync>(dims: [usize; 3], labels: &[T]) -> BitVolume {
-    let [nx, ny, _] = dims;
+    assert_eq!(labels.dims(), dims, "a label for each voxel");
+    let [nx, ny, nz] = dims;
     let mut out = BitVolume::new(dims);
     if labels.is_empty() {
         return out;
     }
     let per_row = out.row_words();
-    out.words_mut()
-        .par_chunks_mut(per_row)
-        .enumerate()
-        .with_min_len(16)
-        .for_each(|(row, words)| {
-            let rows = Neighbors::of(labels, dims, row, ny);
+    let rows = out.words_mut().par_chunks_mut(per_row).enumerate();
+    rows.with_min_len(16)
+        .for_each_init(Vec::new, |buffer: &mut Vec<u32>, (row, words)| {
+            let (y, z) = (row % ny, row / ny);
+            let near = [
+                (true, row),
+                (y > 0, row.wrapping_sub(1)),
+                (z > 0, row.wrapping_sub(ny)),
+                (y + 1 < ny, row + 1),
+                (z + 1 < nz, row + ny),
+            ];
+            buffer.clear();
+            buffer.resize(near.len() * nx, 0);
+            let rows: Vec<&mut [u32]> = buffer.chunks_exact_mut(nx).collect();
+            for ((is_in, row), to) in near.into_iter().zip(rows) {
+                if is_in {
+                    labels.write_row(row, to);
+                }
+            }
+            let (here, around) = buffer.split_at(nx);
             for x in 0..nx {
-                let here = rows.here[x];
-                let dam = |other: T| other != T::default() && other < here;
-                if (x > 0 && dam(rows.here[x - 1]))
-                    || (x + 1 < nx && dam(rows.here[x + 1]))
-                    || rows.around.iter().flatten().any(|r| dam(r[x]))
+                let dam = |other: u32| other != 0 && other < here[x];
+                if (x > 0 && dam(here[x - 1]))
+                    || (x + 1 < nx && dam(here[x + 1]))
+                    || around.chunks_exact(nx).any(|row| dam(row[x]))
                 {
                     words[x / 64] |= 1 << (x % 64);
                 }
             }
         });
     out
-}
-
-/// A row and the four that share faces with it: y - 1, z - 1, y + 1, z + 1.
-struct Neighbors<'a, T> {
-    here: &'a [T],
-    around: [Option<&'a [T]>; 4],
-}
-
-impl<'a, T> Neighbors<'a, T> {
-    fn of(values: &'a [T], [nx, _, nz]: [usize; 3], row: usize, ny: usize) -> Self {
-        let (y, z) = (row % ny, row / ny);
-        let at = |row: usize| &values[row * nx..(row + 1) * nx];
-        Self {
-            here: at(row),
-            around: [
-                (y > 0).then(|| at(row - 1)),
-                (z > 0).then(|| at(row - ny)),
-                (y + 1 < ny).then(|| at(row + 1)),
-                (z + 1 < nz).then(|| at(row + ny)),
-            ],
-        }
-    }
 }
 
 #[cfg(test)]

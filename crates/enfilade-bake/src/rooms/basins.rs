@@ -66,11 +66,7 @@ impl Basins {
         let radius = |squared: u16| f32::from(squared).sqrt();
         let mut peaks: Vec<f32> = peaks.into_iter().map(radius).collect();
         peaks[OUTDOORS as usize] = f32::INFINITY;
-        let labels = if n > usize::from(u16::MAX) {
-            Labels::U32(labels)
-        } else {
-            Labels::U16(labels.into_iter().map(|l| l as u16).collect())
-        };
+        let labels = Labels::of(dims, &labels);
         let [nx, ny, _] = dims;
         let saddle = |faces: &Vec<u64>| {
             let distance = |&face: &u64| {
@@ -79,7 +75,7 @@ impl Basins {
             };
             radius(faces.iter().map(distance).max().unwrap_or(0))
         };
-        let contacts = contact_faces(dims, &labels);
+        let contacts = contact_faces(&labels);
         Self {
             saddles: contacts
                 .iter()
@@ -92,8 +88,8 @@ impl Basins {
     }
 
     /// Gives the air inside closures to the basins beside it.
-    pub(super) fn refill(&mut self, grid: &Grid, occupied: &BitVolume) {
-        flood_closures(grid.dims, &mut self.labels, occupied);
+    pub(super) fn refill(&mut self, occupied: &BitVolume) {
+        flood_closures(&mut self.labels, occupied);
     }
 
     /// Cuts basins where a slab ends a storey.

@@ -39,7 +39,7 @@ pub(crate) fn propose(
         resolution,
         ..
     } = air;
-    basins.refill(&grid, &solid.occupied);
+    basins.refill(&solid.occupied);
     basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
     let mut notes = solid.lids.notes(&grid);
@@ -152,7 +152,6 @@ fn counts_of(
 
 /// Returns the region of a point, 0 if there is none.
 fn region_at(grid: &Grid, labels: &Labels, regions: &Regions, p: DVec3) -> u32 {
-    grid.voxel_at(p).map_or(0, |[x, y, z]| {
-        regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize]
-    })
+    grid.voxel_at(p)
+        .map_or(0, |at| regions.region_of_basin[labels.at(at) as usize])
 }

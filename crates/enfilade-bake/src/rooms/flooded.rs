@@ -30,14 +30,14 @@ pub(crate) struct Flooded<'a> {
 
 /// Collects the faces between air voxels of different labels, by pair, ascending.
 ///
-/// Linear in voxels; dozens at a time within a basin.
-pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
+/// Linear in voxels; 64 at a time within a basin.
+pub(super) fn contact_faces(labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
     type Contacts = BTreeMap<(u32, u32), Faces>;
-    let of_layer = |z: usize| {
+    let of_layer = |layer: usize| {
         let mut found = Contacts::new();
         // Faces of the pair that was met last: most often, the next one is of it, too.
         let (mut last, mut faces) = ((0, 0), Faces::new());
-        labels.for_faces(dims, z, |i, axis, [a, b]| {
+        labels.for_faces(layer, |i, axis, [a, b]| {
             if a == 0 || b == 0 {
                 return;
             }
@@ -51,7 +51,8 @@ pub(super) fn contact_faces(dims: [usize; 3], labels: &Labels) -> BTreeMap<(u32,
         found.entry(last).or_default().append(&mut faces);
         found
     };
-    let of_layers: Vec<Contacts> = (0..dims[2]).into_par_iter().map(of_layer).collect();
+    let layers = (0..labels.n_layers()).into_par_iter();
+    let of_layers: Vec<Contacts> = layers.map(of_layer).collect();
     let mut all = Contacts::new();
     for (pair, mut faces) in of_layers.into_iter().flatten() {
         all.entry(pair).or_default().append(&mut faces);

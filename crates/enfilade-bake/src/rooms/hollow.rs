@@ -311,35 +311,33 @@ fn are_all_there_is(
     allowance: &Allowance,
 ) -> bool {
     let members: BTreeSet<u32> = shells.iter().flatten().copied().collect();
-    let is_inside = |i: usize| {
-        let region = regions.region_of_basin[labels.get(i) as usize];
-        members.contains(&region).then_some(region)
-    };
+    let region_of = |label: u32| regions.region_of_basin[label as usize];
+    let is_inside = |at: [usize; 3]| members.contains(&region_of(labels.at(at)));
     // Surfaces are at most three voxels thick.
     const REACH: usize = 3;
-    let [nx, ny, nz] = grid.dims;
-    let strides = [1, nx, nx * ny];
+    let near = |at: [usize; 3]| {
+        (0..3).any(|k| {
+            let from = at[k].saturating_sub(REACH);
+            let to = grid.dims[k].min(at[k] + REACH + 1);
+            (from..to).any(|c| is_inside(std::array::from_fn(|a| if a == k { c } else { at[a] })))
+        })
+    };
     let mut bounds: BTreeMap<u32, Aabb> = BTreeMap::new();
     let (mut n_solid, mut n_bounding) = (0_usize, 0_usize);
-    for i in (0..labels.len()).filter(allowance.each(1)) {
-        if labels.get(i) != 0 {
-            if let Some(region) = is_inside(i) {
-                let [x, y, z] = grid.coords(i);
-                let b = bounds.entry(region).or_insert(Aabb::EMPTY);
+    labels.for_runs(0..labels.len(), |run, label| {
+        let [x, y, z] = grid.coords(run.start);
+        let along = x..x + run.len();
+        if label == 0 {
+            n_solid += run.len();
+            let solid = along.filter(allowance.each(1));
+            n_bounding += solid.filter(|&x| near([x, y, z])).count();
+        } else if members.contains(&region_of(label)) {
+            let b = bounds.entry(region_of(label)).or_insert(Aabb::EMPTY);
+            for x in [along.start, along.end - 1] {
                 *b = b.including(grid.center(x, y, z));
             }
-            continue;
         }
-        n_solid += 1;
-        let at = grid.coords(i);
-        let near = (0..3).any(|k| {
-            (1..=REACH).any(|d| {
-                (at[k] >= d && is_inside(i - d * strides[k]).is_some())
-                    || (at[k] + d < [nx, ny, nz][k] && is_inside(i + d * strides[k]).is_some())
-            })
-        });
-        n_bounding += usize::from(near);
-    }
+    });
     if (n_bounding as f64) < ALL_THERE_IS * n_solid as f64 {
         return false;
     }

@@ -76,15 +76,14 @@ pub(crate) fn split_limbs(
     if limbs.is_empty() {
         return;
     }
-    labels.make_room_for(n + limbs.len());
     for (k, (region, row, columns)) in limbs.into_iter().enumerate() {
-        let of = |labels: &Labels, i: usize| {
+        let of = |labels: &Labels, at: [usize; 3]| {
             // Basins from `n` on are limbs that were split off before.
-            let basin = labels.get(i) as usize;
+            let basin = labels.at(at) as usize;
             basin < n && regions.region_of_basin[basin] == region
         };
         for [x, z] in columns {
-            let at = |y: usize| grid.index(x, y, z);
+            let at = |y: usize| [x, y, z];
             let down = (0..=row).rev().take_while(|&y| of(labels, at(y))).count();
             let up = (row + 1..grid.dims[1])
                 .take_while(|&y| of(labels, at(y)))
@@ -95,7 +94,7 @@ pub(crate) fn split_limbs(
         }
     }
     regions.region_of_basin.extend(n as u32..peaks.len() as u32);
-    let by_basin = contact_faces(grid.dims, labels);
+    let by_basin = contact_faces(labels);
     regions.contacts = contacts_of(regions, &by_basin);
     let flooded = Flooded {
         grid,
@@ -242,13 +241,13 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
     };
     let layers = (0..nz).into_par_iter().with_min_len(LAYERS);
     let layers = layers.fold(Layers::new, add).reduce(Layers::new, unite);
-    let region_at = |i: usize| regions.region_of_basin[labels.get(i) as usize];
+    let region_at = |at| regions.region_of_basin[labels.at(at) as usize];
     layers
         .into_par_iter()
         .map(|(region, of)| {
             let most = of.iter().map(|l| l.n_voxels).max().unwrap_or(0);
             let row = of.iter().position(|l| l.n_voxels == most).unwrap_or(0);
-            let is_free = |x: usize, z: usize| region_at(grid.index(x, row, z)) == region;
+            let is_free = |x: usize, z: usize| region_at([x, row, z]) == region;
             (region, Plan::of(row, of[row].columns, &is_free))
         })
         .collect()

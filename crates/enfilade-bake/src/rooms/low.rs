@@ -123,13 +123,13 @@ fn is_doorway(grid: &Grid, labels: &Labels, faces: &Faces) -> bool {
             columns.entry([axis, x, z]).or_default().push(y);
         }
     }
-    let [nx, ny, _] = grid.dims;
     let has_floor = |[axis, x, z]: [usize; 3], y: usize| {
         let below = (STEP / grid.voxel).round() as usize + 1;
-        let beside = [0, [1, nx, nx * ny][axis]];
-        beside
+        let mut beside = [x, z];
+        beside[axis / 2] += 1;
+        [[x, z], beside]
             .iter()
-            .all(|step| (1..=below.min(y)).any(|d| labels.get(grid.index(x, y - d, z) + step) == 0))
+            .all(|&[x, z]| (1..=below.min(y)).any(|d| labels.at([x, y - d, z]) == 0))
     };
     let least = (DOORWAY / grid.voxel).round() as usize;
     let is_wide = |(at, heights): (&[usize; 3], &mut Vec<usize>)| {

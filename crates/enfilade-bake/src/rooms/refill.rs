@@ -6,65 +6,51 @@ use crate::voxel::{BitVolume, Labels};
 
 /// Labels the voxels that only closures fill: walls to the flood, but air. The basins
 /// on both sides grow into them at the same pace and meet in the middle of the leaf or pane.
-pub(crate) fn flood_closures(dims: [usize; 3], labels: &mut Labels, occupied: &BitVolume) {
-    match labels {
-        Labels::U16(v) => grow(dims, v, occupied),
-        Labels::U32(v) => grow(dims, v, occupied),
-    }
-}
-
-fn grow<T>(dims: [usize; 3], labels: &mut [T], occupied: &BitVolume)
-where
-    T: Copy + Default + PartialEq + Send + Sync,
-{
-    let [nx, ny, nz] = dims;
-    let layer = nx * ny;
-    let each_neighbor = |i: usize, visit: &mut dyn FnMut(usize)| {
-        let (x, y, z) = (i % nx, i / nx % ny, i / layer);
-        for (exists, next) in [
-            (x > 0, i.wrapping_sub(1)),
-            (x + 1 < nx, i + 1),
-            (y > 0, i.wrapping_sub(nx)),
-            (y + 1 < ny, i + nx),
-            (z > 0, i.wrapping_sub(layer)),
-            (z + 1 < nz, i + layer),
-        ] {
-            if exists {
-                visit(next);
-            }
-        }
+pub(crate) fn flood_closures(labels: &mut Labels, occupied: &BitVolume) {
+    let [nx, ny, nz] = labels.dims();
+    let neighbors = |[x, y, z]: [usize; 3]| {
+        [
+            (x > 0, [x.wrapping_sub(1), y, z]),
+            (x + 1 < nx, [x + 1, y, z]),
+            (y > 0, [x, y.wrapping_sub(1), z]),
+            (y + 1 < ny, [x, y + 1, z]),
+            (z > 0, [x, y, z.wrapping_sub(1)]),
+            (z + 1 < nz, [x, y, z + 1]),
+        ]
+        .into_iter()
+        .filter(|n| n.0)
+        .map(|n| n.1)
     };
-    let solid = T::default();
     // First round: air voxels without a label that touch a labelled one, in index order.
     let before = &*labels;
-    let first_of = &|i: usize| {
-        let mut first = None;
-        each_neighbor(i, &mut |j| {
-            if first.is_none() && before[j] != solid {
-                first = Some((i, before[j]));
+    let of_row = |row: usize| {
+        let (y, z) = (row % ny, row / ny);
+        let bits = occupied.row(row);
+        let mut waiting: Vec<usize> = Vec::new();
+        before.for_runs(row * nx..(row + 1) * nx, |run, label| {
+            if label == 0 {
+                let run = run.start - row * nx..run.end - row * nx;
+                waiting.extend(run.filter(|x| bits[x / 64] >> (x % 64) & 1 == 0));
             }
         });
-        first
-    };
-    let of_row = |row: usize| {
-        let bits = occupied.row(row);
-        let is_free = move |x: usize| bits[x / 64] >> (x % 64) & 1 == 0;
-        let waiting = (0..nx).filter(move |&x| before[row * nx + x] == solid && is_free(x));
-        waiting.filter_map(move |x| first_of(row * nx + x))
+        waiting.into_iter().filter_map(move |x| {
+            let around = neighbors([x, y, z]).map(|at| before.at(at));
+            let first = around.into_iter().find(|&label| label != 0);
+            first.map(|label| ([z, y, x], label))
+        })
     };
     let rows = (0..ny * nz).into_par_iter().with_min_len(64);
-    let mut front: Vec<(usize, T)> = rows.flat_map_iter(of_row).collect();
+    let mut front: Vec<([usize; 3], u32)> = rows.flat_map_iter(of_row).collect();
     while !front.is_empty() {
-        for &(i, l) in &front {
-            labels[i] = l;
+        for &([z, y, x], label) in &front {
+            labels.set([x, y, z], label);
         }
-        let mut next: Vec<(usize, T)> = Vec::new();
-        for &(i, l) in &front {
-            each_neighbor(i, &mut |j| {
-                if labels[j] == solid && !occupied.get_index(j) {
-                    next.push((j, l));
-                }
-            });
+        let mut next: Vec<([usize; 3], u32)> = Vec::new();
+        for &([z, y, x], label) in &front {
+            let is_waiting =
+                |&[x, y, z]: &[usize; 3]| labels.at([x, y, z]) == 0 && !occupied.get(x, y, z);
+            let around = neighbors([x, y, z]).filter(is_waiting);
+            next.extend(around.map(|[x, y, z]| ([z, y, x], label)));
         }
         next.sort_by_key(|e| e.0);
         next.dedup_by_key(|e| e.0);

@@ -76,7 +76,7 @@ pub(crate) fn merge_basins(
         peak: flooded.peaks.to_vec(),
         version: vec![0; n],
         neighbors: vec![BTreeSet::new(); n],
-        contacts: contact_faces(flooded.grid.dims, flooded.labels),
+        contacts: contact_faces(flooded.labels),
         saddles: saddles.clone(),
         storeys_apart: true,
     };
@@ -217,10 +217,10 @@ impl BasinMerger<'_> {
 
     /// Returns the number of upright faces around each cell but the outdoors, which is all around.
     fn side_faces(&self) -> Vec<u32> {
-        let Flooded { grid, labels, .. } = self.flooded;
+        let labels = self.flooded.labels;
         let zero = || vec![0_u32; self.cell.len()];
-        let count = |mut sides: Vec<u32>, z: usize| {
-            labels.for_faces(grid.dims, z, |_, axis, pair| {
+        let count = |mut sides: Vec<u32>, layer: usize| {
+            labels.for_faces(layer, |_, axis, pair| {
                 let cells = pair.map(|l| self.cell[l as usize]);
                 if axis != 1 && cells[0] != cells[1] {
                     cells.iter().for_each(|&c| sides[c as usize] += 1);
@@ -228,7 +228,7 @@ impl BasinMerger<'_> {
             });
             sides
         };
-        let layers = (0..grid.dims[2]).into_par_iter().with_min_len(LAYERS);
+        let layers = (0..labels.n_layers()).into_par_iter().with_min_len(LAYERS / 4);
         layers.fold(zero, count).reduce(zero, sum)
     }
 

@@ -7,7 +7,7 @@ use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
 use crate::MergeSettings;
 use crate::structure::{Jambs, OUTDOORS, Opening, connected_count, rim_share};
-use crate::voxel::{Grid, Labels};
+use crate::voxel::Grid;
 
 /// Least share of a front that leaves hold if it stands between them.
 const LEAVES: f64 = 0.2;
@@ -244,7 +244,7 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
     /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
     ///
     /// Visits none once the allowance is used up.
-    fn visit(&self, s: i64, point: impl FnMut(usize, u32)) {
+    fn visit(&self, s: i64, mut point: impl FnMut(usize, u32)) {
         if !self
             .flooded
             .allowance
@@ -252,24 +252,11 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
         {
             return;
         }
-        match self.flooded.labels {
-            Labels::U16(labels) => self.visit_in(labels, s, point),
-            Labels::U32(labels) => self.visit_in(labels, s, point),
-        }
-    }
-
-    fn visit_in<T>(&self, labels: &[T], s: i64, mut point: impl FnMut(usize, u32))
-    where
-        T: Copy + Into<u32>,
-    {
-        let grid = self.flooded.grid;
+        let Flooded { grid, labels, .. } = self.flooded;
         let end = DVec3::from(grid.dims.map(|n| n as f64));
         let is_in = |p: DVec3| p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
         // Positive, so the cast rounds down; and 32 bits are half the work of 64.
-        let label_at = |p: DVec3| {
-            let [x, y, z] = [p.x as i32, p.y as i32, p.z as i32].map(|c| c as usize);
-            labels[grid.index(x, y, z)].into()
-        };
+        let label_at = |p: DVec3| labels.at([p.x, p.y, p.z].map(|c| c as i32 as usize));
         let [du, dv, dn] = self.along;
         // In voxel coordinates, so that a lattice point costs an addition and a look-up.
         let base = self.base + dn * s as f64;
@@ -281,7 +268,7 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             let all_in = is_in(at(0)) && is_in(at(self.side[0] - 1));
             for i in 0..self.side[0] {
                 let p = at(i);
-                let label: u32 = if all_in || is_in(p) { label_at(p) } else { 0 };
+                let label = if all_in || is_in(p) { label_at(p) } else { 0 };
                 if label != last.0 {
                     last = (label, if label == 0 { 0 } else { (self.cell_of)(label) });
                 }

@@ -53,8 +53,7 @@ pub(crate) fn cut_at_slabs(
     if parents.is_empty() {
         return parents;
     }
-    labels.make_room_for(n_labels + parents.len());
-    labels.relabel(grid.dims, |l, y| {
+    labels.relabel(|l, y| {
         if l > OUTDOORS {
             new_label[l as usize * n_storeys + storeys[y]]
         } else {

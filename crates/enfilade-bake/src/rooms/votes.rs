@@ -77,7 +77,7 @@ impl Ballots {
             voter: vec![0; n_blocks],
         };
         let region_of = |[x, y, z]: [usize; 3]| {
-            let region = regions.region_of_basin[labels.get(grid.index(x, y, z)) as usize];
+            let region = regions.region_of_basin[labels.at([x, y, z]) as usize];
             let votes = region != 0
                 && !unsure.get(x, y, z)
                 && !solid.get(x, y, z)

@@ -3,8 +3,9 @@
 use enfilade_geom::Sets;
 use rayon::prelude::*;
 
-use super::basins::{Basin, Labels, STEPS, Saddle, Watershed};
-use super::crests::Peak;
+use super::super::labels::Labels;
+use super::basins::{Basin, STEPS, Saddle, Watershed};
+use super::crests::{Peak, Shape};
 use super::slabs::{Contact, OUTER, Roots, merged};
 
 /// Basins after shallow ones have joined deeper ones.
@@ -76,15 +77,38 @@ impl Merged {
         }
     }
 
-    /// Writes the labels into `words`, whose slabs of `n_slab` voxels hold what `roots` tells.
-    pub(super) fn finish(mut self, words: Vec<u16>, roots: &[Roots], n_slab: usize) -> Watershed {
+    /// Labels the voxels, given `words` whose slabs of `thick` layers hold what `roots` tells.
+    pub(super) fn finish(
+        mut self,
+        shape: Shape,
+        words: &[u16],
+        roots: &[Roots],
+        thick: usize,
+    ) -> Watershed {
+        let [nx, ny, _] = shape.dims;
         let of_root = |root: u32| self.labels.get(root as usize).copied().unwrap_or(0);
-        let labels = if self.basins.len() <= usize::from(u16::MAX) {
-            Labels::U16(relabeled(words, roots, n_slab, |root| of_root(root) as u16))
-        } else {
-            let wide = words.par_iter().map(|&w| u32::from(w)).collect();
-            Labels::U32(relabeled(wide, roots, n_slab, of_root))
-        };
+        let lists: Vec<Vec<u32>> = roots
+            .par_iter()
+            .map(|roots| match roots {
+                Roots::Palette(list) | Roots::Each(list) => {
+                    list.iter().map(|&root| of_root(root)).collect()
+                }
+            })
+            .collect();
+        let labels = Labels::by_rows(shape.dims, |row, labels| {
+            let slab = row / ny / thick;
+            match roots[slab] {
+                Roots::Palette(_) => {
+                    for (label, &word) in labels.iter_mut().zip(&words[row * nx..]) {
+                        *label = lists[slab][usize::from(word)];
+                    }
+                }
+                Roots::Each(_) => {
+                    let from = row * nx - slab * thick * shape.layer();
+                    labels.copy_from_slice(&lists[slab][from..from + nx]);
+                }
+            }
+        });
         count(&labels, &mut self.basins);
         let mut saddles: Vec<Saddle> = self
             .contacts
@@ -108,30 +132,6 @@ impl Merged {
             saddles,
         }
     }
-}
-
-/// Replaces positions among the roots of a slab by what `of_root` returns for them.
-fn relabeled<T: Copy + Send + Sync + Into<u32>>(
-    mut words: Vec<T>,
-    roots: &[Roots],
-    n_slab: usize,
-    of_root: impl Fn(u32) -> T + Sync,
-) -> Vec<T> {
-    let slabs = words.par_chunks_mut(n_slab).zip(roots);
-    slabs.for_each(|(words, roots)| match roots {
-        Roots::Palette(palette) => {
-            let labels: Vec<T> = palette.iter().map(|&root| of_root(root)).collect();
-            for word in words {
-                *word = labels[Into::<u32>::into(*word) as usize];
-            }
-        }
-        Roots::Each(roots) => {
-            for (word, &root) in words.iter_mut().zip(roots) {
-                *word = of_root(root);
-            }
-        }
-    });
-    words
 }
 
 /// Fills in the sizes of the basins.

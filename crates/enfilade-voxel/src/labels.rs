@@ -1,0 +1,600 @@
+//! Labels of voxels in bricks of 4³: one number where a brick has one label, else a list of its labels and the position in
+//! it of each voxel, in 1, 2 or 4 bits.
+//!
+//! So memory goes by the surfaces between labels rather than by volume: 1/16 byte a voxel plus a quarter of a byte for
+//! those near a surface. A look-up reads one or three nearby words, in whatever direction the next one lies; scans skip
+//! 64 voxels at a time.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+/// Edge of a brick. [Units: vx]
+const EDGE: usize = 4;
+/// Voxels of a brick.
+const VOLUME: usize = EDGE * EDGE * EDGE;
+/// Marks the head of a brick of several labels; two more bits tell how many bits a voxel takes, the rest is the
+/// position of its block.
+const MIXED: u32 = 1 << 31;
+const WIDTH_SHIFT: u32 = 29;
+const POSITION: u32 = (1 << WIDTH_SHIFT) - 1;
+/// Words that a position counts.
+const UNIT: usize = 4;
+/// A width that stands for one word a voxel, without a list.
+const PLAIN: u32 = 3;
+/// From a voxel of a brick to the next one along each axis.
+const STEPS: [usize; 3] = [1, EDGE, EDGE * EDGE];
+
+/// The labels of one brick.
+type Brick = [u32; VOLUME];
+
+/// The label of each voxel of a box, below 2³¹.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Labels {
+    dims: [usize; 3],
+    /// Bricks along each axis, the last ones filled up.
+    bricks: [usize; 3],
+    /// The label of each brick, or where its block is.
+    heads: Vec<u32>,
+    /// Blocks: the labels of a brick, then the position of each voxel among them.
+    blocks: Vec<u32>,
+}
+
+impl Labels {
+    /// Labels all voxels of a box of `dims` by 0.
+    #[must_use]
+    pub fn zero(dims: [usize; 3]) -> Self {
+        let bricks = dims.map(|n| n.div_ceil(EDGE));
+        Self {
+            dims,
+            bricks,
+            heads: vec![0; bricks.iter().product()],
+            blocks: Vec::new(),
+        }
+    }
+
+    /// Compresses labels given in index order.
+    ///
+    /// # Panics
+    /// If there is not one for each voxel of a box of `dims`.
+    #[must_use]
+    pub fn of(dims: [usize; 3], labels: &[u32]) -> Self {
+        let n: usize = dims.iter().product();
+        assert_eq!(labels.len(), n, "a label for each voxel");
+        Self::by_rows(dims, |row, to| {
+            to.copy_from_slice(&labels[row * dims[0]..][..dims[0]]);
+        })
+    }
+
+    /// Compresses the labels that `write(row, labels)` writes for each row along x, numbered along y, then z.
+    ///
+    /// Linear in voxels; threads share the work, each with 16 bytes for each voxel of a layer.
+    #[must_use]
+    pub(crate) fn by_rows(dims: [usize; 3], write: impl Fn(usize, &mut [u32]) + Sync) -> Self {
+        let zero = Self::zero(dims);
+        let [nx, ny, nz] = dims;
+        if zero.heads.is_empty() {
+            return zero;
+        }
+        let [bx, by, bz] = zero.bricks;
+        let part = |buffer: &mut Vec<u32>, k: usize| {
+            buffer.resize(EDGE * nx * ny, 0);
+            for (row, to) in (k * EDGE * ny..).zip(buffer.chunks_exact_mut(nx)) {
+                if row < nz * ny {
+                    write(row, to);
+                }
+            }
+            let mut part = Part::default();
+            for j in 0..by {
+                for i in 0..bx {
+                    let row = |y: usize, z: usize| {
+                        let y = (j * EDGE + y).min(ny - 1);
+                        let z = (k * EDGE + z).min(nz - 1) - k * EDGE;
+                        &buffer[(z * ny + y) * nx..][..nx]
+                    };
+                    part.push(&gather(i, row));
+                }
+            }
+            part
+        };
+        let parts: Vec<Part> = (0..bz).into_par_iter().map_init(Vec::new, part).collect();
+        zero.with(parts)
+    }
+
+    /// Returns the same box with the bricks of `parts`, one part for each layer of bricks.
+    fn with(mut self, parts: Vec<Part>) -> Self {
+        let n_words = parts.iter().map(|part| part.blocks.len()).sum();
+        self.blocks = Vec::with_capacity(n_words);
+        self.heads.clear();
+        for mut part in parts {
+            let base = position(self.blocks.len());
+            let heads = part.heads.iter().map(|&h| moved(h, base));
+            self.heads.extend(heads);
+            self.blocks.append(&mut part.blocks);
+        }
+        self
+    }
+
+    /// Returns the number of voxels along each axis.
+    #[must_use]
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Returns the number of voxels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.dims.iter().product()
+    }
+
+    /// Returns `true` if there are no voxels.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.heads.is_empty()
+    }
+
+    /// Returns the number of bytes that the labels take.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        4 * (self.heads.capacity() + self.blocks.capacity())
+    }
+
+    /// Returns the label of the voxel `[x, y, z]`; 0 if it is occupied.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, [x, y, z]: [usize; 3]) -> u32 {
+        let [bx, by, _] = self.bricks;
+        let head = self.heads[x / EDGE + bx * (y / EDGE + by * (z / EDGE))];
+        if head & MIXED == 0 {
+            return head;
+        }
+        self.in_block(head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
+    }
+
+    /// Returns the label of the voxel at `index`; 0 if it is occupied.
+    #[must_use]
+    #[inline]
+    pub fn get(&self, index: usize) -> u32 {
+        self.at(self.coords(index))
+    }
+
+    #[inline]
+    fn coords(&self, index: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.dims;
+        let row = index / nx;
+        [index - row * nx, row % ny, row / ny]
+    }
+
+    #[inline]
+    fn in_block(&self, head: u32, voxel: usize) -> u32 {
+        let (from, width) = place(head);
+        if width == PLAIN {
+            return self.blocks[from + voxel];
+        }
+        let listed = 1 << (1 << width);
+        let bit = voxel << width;
+        let word = self.blocks[from + listed + bit / 32];
+        self.blocks[from + (word as usize >> (bit % 32) & (listed - 1))]
+    }
+
+    /// Labels the voxel `[x, y, z]`.
+    ///
+    /// Space that a brick outgrows is not used again, so labels of many voxels are better replaced by [`Self::relabel`].
+    pub fn set(&mut self, [x, y, z]: [usize; 3], label: u32) {
+        let [bx, by, _] = self.bricks;
+        let at = x / EDGE + bx * (y / EDGE + by * (z / EDGE));
+        let voxel = x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE));
+        let head = self.heads[at];
+        if self.in_brick(head, voxel) == label {
+            return;
+        }
+        if head & MIXED != 0 {
+            let (from, width) = place(head);
+            let listed = 1 << (1 << width);
+            if width == PLAIN {
+                self.blocks[from + voxel] = label;
+                return;
+            }
+            let list = &self.blocks[from..from + listed];
+            if let Some(which) = list.iter().position(|&l| l == label) {
+                let bit = voxel << width;
+                let word = &mut self.blocks[from + listed + bit / 32];
+                *word &= !((listed as u32 - 1) << (bit % 32));
+                *word |= (which as u32) << (bit % 32);
+                return;
+            }
+        }
+        let mut brick = self.brick(head);
+        brick[voxel] = label;
+        self.heads[at] = encode(&brick, &mut self.blocks);
+    }
+
+    fn in_brick(&self, head: u32, voxel: usize) -> u32 {
+        if head & MIXED == 0 {
+            head
+        } else {
+            self.in_block(head, voxel)
+        }
+    }
+
+    /// Returns all labels of a brick.
+    fn brick(&self, head: u32) -> Brick {
+        if head & MIXED == 0 {
+            return [head; VOLUME];
+        }
+        let (from, width) = place(head);
+        let mut brick = [0; VOLUME];
+        if width == PLAIN {
+            brick.copy_from_slice(&self.blocks[from..from + VOLUME]);
+            return brick;
+        }
+        let (each, listed) = (1 << width, 1 << (1 << width));
+        let (list, words) = self.blocks[from..].split_at(listed);
+        for (voxels, &word) in brick.chunks_exact_mut(32 / each).zip(words) {
+            for (k, label) in voxels.iter_mut().enumerate() {
+                *label = list[word as usize >> (k * each) & (listed - 1)];
+            }
+        }
+        brick
+    }
+
+    /// Calls `run(voxels, label)` for each maximal run of voxels of a row with one label within `range`, ascending.
+    pub fn for_runs(&self, range: Range<usize>, mut run: impl FnMut(Range<usize>, u32)) {
+        let nx = self.dims[0];
+        let mut from = range.start;
+        while from < range.end {
+            let [x, y, z] = self.coords(from);
+            let to = range.end.min(from - x + nx);
+            self.runs_of_row([y, z], x..x + to - from, |voxels, label| {
+                run(from - x + voxels.start..from - x + voxels.end, label);
+            });
+            from = to;
+        }
+    }
+
+    /// Calls `run(voxels, label)` for each maximal run within `along` in the row at y and z.
+    fn runs_of_row(
+        &self,
+        [y, z]: [usize; 2],
+        along: Range<usize>,
+        mut run: impl FnMut(Range<usize>, u32),
+    ) {
+        let [bx, by, _] = self.bricks;
+        let heads = &self.heads[bx * (y / EDGE + by * (z / EDGE))..][..bx];
+        let row = EDGE * (y % EDGE + EDGE * (z % EDGE));
+        let (mut start, mut label) = (along.start, None);
+        let mut next = |x: usize, here: u32| {
+            if let Some(before) = label.replace(here)
+                && before != here
+            {
+                run(start..x, before);
+                start = x;
+            }
+        };
+        let mut x = along.start;
+        while x < along.end {
+            let head = heads[x / EDGE];
+            let end = along.end.min((x / EDGE + 1) * EDGE);
+            if head & MIXED == 0 {
+                next(x, head);
+            } else {
+                (x..end).for_each(|x| next(x, self.in_block(head, row + x % EDGE)));
+            }
+            x = end;
+        }
+        if let Some(label) = label {
+            run(start..along.end, label);
+        }
+    }
+
+    /// Returns the number of layers of bricks, which [`Self::for_faces`] takes one by one.
+    #[must_use]
+    pub fn n_layers(&self) -> usize {
+        self.bricks[2]
+    }
+
+    /// Calls `face(voxel, axis, labels)` for each face between voxels of different labels, given the lesser voxel, for
+    /// those in a layer of bricks and above it, in no particular order.
+    ///
+    /// # Panics
+    /// If the layer is outside the box.
+    pub fn for_faces(&self, layer: usize, mut face: impl FnMut(usize, usize, [u32; 2])) {
+        let [bx, by, bz] = self.bricks;
+        assert!(layer < bz, "layer {layer} of {bz}");
+        for j in 0..by {
+            for i in 0..bx {
+                let at = i + bx * (j + by * layer);
+                let here = self.heads[at];
+                let nexts = [
+                    (i + 1 < bx, at + 1),
+                    (j + 1 < by, at + bx),
+                    (layer + 1 < bz, at + bx * by),
+                ];
+                let nexts = nexts.map(|(is_in, next)| is_in.then(|| self.heads[next]));
+                let is_alike = |next: &Option<u32>| next.is_none_or(|next| next == here);
+                if here & MIXED == 0 && nexts.iter().all(is_alike) {
+                    continue;
+                }
+                let brick = self.brick(here);
+                let corner = [i, j, layer].map(|b| b * EDGE);
+                for axis in 0..3 {
+                    let beyond = nexts[axis].map(|next| self.brick(next));
+                    self.faces_along(axis, corner, &brick, beyond.as_ref(), &mut face);
+                }
+            }
+        }
+    }
+
+    /// Calls `face` for the faces across `axis` of a brick whose first voxel is `corner`, up to those of the brick `beyond`.
+    fn faces_along(
+        &self,
+        axis: usize,
+        corner: [usize; 3],
+        brick: &Brick,
+        beyond: Option<&Brick>,
+        face: &mut impl FnMut(usize, usize, [u32; 2]),
+    ) {
+        let step = STEPS[axis];
+        let last = step * (EDGE - 1);
+        for (voxel, &label) in brick.iter().enumerate() {
+            let is_last = voxel / step % EDGE == EDGE - 1;
+            let other = match (is_last, beyond) {
+                (false, _) => brick[voxel + step],
+                (true, Some(beyond)) => beyond[voxel - last],
+                (true, None) => continue,
+            };
+            if other == label {
+                continue;
+            }
+            let within = [voxel % EDGE, voxel / EDGE % EDGE, voxel / (EDGE * EDGE)];
+            let [x, y, z] = [0, 1, 2].map(|k| corner[k] + within[k]);
+            let mut there = [x, y, z];
+            there[axis] += 1;
+            // Not past the end, where bricks are filled up.
+            if (0..3).all(|k| there[k] < self.dims[k]) {
+                let [nx, ny, _] = self.dims;
+                face(x + nx * (y + ny * z), axis, [label, other]);
+            }
+        }
+    }
+
+    /// Replaces each label by `new(label, y)`. Threads share the work.
+    pub fn relabel(&mut self, new: impl Fn(u32, usize) -> u32 + Sync) {
+        if self.is_empty() {
+            return;
+        }
+        let [bx, by, _] = self.bricks;
+        let most = self.dims[1] - 1;
+        let part = |heads: &[u32]| {
+            let mut part = Part::default();
+            for (at, &head) in heads.iter().enumerate() {
+                let from = at / bx % by * EDGE;
+                if head & MIXED == 0 {
+                    let of = |y: usize| new(head, (from + y).min(most));
+                    let label = of(0);
+                    if (1..EDGE).all(|y| of(y) == label) {
+                        part.heads.push(label);
+                        continue;
+                    }
+                }
+                let mut brick = self.brick(head);
+                for (voxel, label) in brick.iter_mut().enumerate() {
+                    *label = new(*label, (from + voxel / EDGE % EDGE).min(most));
+                }
+                part.push(&brick);
+            }
+            part
+        };
+        let parts = self.heads.par_chunks(bx * by).map(part).collect();
+        *self = Self::zero(self.dims).with(parts);
+    }
+
+    /// Writes the labels of a row along x, numbered along y, then z.
+    pub fn write_row(&self, row: usize, to: &mut [u32]) {
+        let [nx, ny, _] = self.dims;
+        self.runs_of_row([row % ny, row / ny], 0..nx, |run, label| {
+            to[run].fill(label);
+        });
+    }
+
+    /// Returns all labels in index order.
+    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.len()).map(|i| self.get(i))
+    }
+}
+
+/// Bricks that one thread made.
+#[derive(Default)]
+struct Part {
+    heads: Vec<u32>,
+    blocks: Vec<u32>,
+}
+
+impl Part {
+    fn push(&mut self, brick: &Brick) {
+        self.heads.push(encode(brick, &mut self.blocks));
+    }
+}
+
+/// Collects the labels of the brick `i` of rows, those past the end from the last voxel.
+fn gather<'a>(i: usize, row: impl Fn(usize, usize) -> &'a [u32]) -> Brick {
+    let mut brick = [0; VOLUME];
+    for (k, to) in brick.chunks_exact_mut(EDGE).enumerate() {
+        let row = row(k % EDGE, k / EDGE);
+        let from = &row[i * EDGE..row.len().min((i + 1) * EDGE)];
+        if let Ok(from) = <[u32; EDGE]>::try_from(from) {
+            to.copy_from_slice(&from);
+        } else {
+            to.fill(from[from.len() - 1]);
+            to[..from.len()].copy_from_slice(from);
+        }
+    }
+    brick
+}
+
+/// Returns the head of a brick, whose block, if it needs one, is added to `blocks`.
+fn encode(brick: &Brick, blocks: &mut Vec<u32>) -> u32 {
+    let first = brick[0];
+    if brick.iter().fold(0, |d, l| d | (l ^ first)) == 0 {
+        assert!(first < MIXED, "labels below 2^31");
+        return first;
+    }
+    let at = position(blocks.len());
+    // Labels in the order in which they appear, and the positions of voxels among them.
+    let mut list = [first; 16];
+    let mut which = [0_u8; VOLUME];
+    let (mut n, mut last) = (1, 0);
+    for (which, &label) in which.iter_mut().zip(brick) {
+        if list[last] != label {
+            last = match list[..n].iter().position(|&l| l == label) {
+                Some(known) => known,
+                None if n == list.len() => {
+                    blocks.extend_from_slice(brick);
+                    return MIXED | PLAIN << WIDTH_SHIFT | at;
+                }
+                None => {
+                    list[n] = label;
+                    n += 1;
+                    n - 1
+                }
+            };
+        }
+        *which = last as u8;
+    }
+    let width = match n {
+        ..=2 => 0,
+        ..=4 => 1,
+        _ => 2,
+    };
+    let (each, listed) = (1 << width, 1 << (1 << width));
+    blocks.extend_from_slice(&list[..listed]);
+    blocks.extend(which.chunks_exact(32 / each).map(|voxels| {
+        let shifted = voxels.iter().enumerate();
+        shifted.fold(0, |word, (k, &v)| word | u32::from(v) << (k * each))
+    }));
+    MIXED | width << WIDTH_SHIFT | at
+}
+
+/// Returns the first word of a block and its width, given its brick's head.
+#[inline]
+fn place(head: u32) -> (usize, u32) {
+    let width = head >> WIDTH_SHIFT & 3;
+    ((head & POSITION) as usize * UNIT, width)
+}
+
+/// Returns the position of a block that begins at a word.
+fn position(word: usize) -> u32 {
+    let at = u32::try_from(word / UNIT).ok();
+    at.filter(|&at| at <= POSITION)
+        .expect("labels near surfaces below 8 GiB")
+}
+
+/// Returns a head whose block is `base` further on.
+fn moved(head: u32, base: u32) -> u32 {
+    if head & MIXED == 0 {
+        return head;
+    }
+    let at = (head & POSITION) + base;
+    assert!(at <= POSITION, "labels near surfaces below 8 GiB");
+    (head & !POSITION) | at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Labels of a box: runs of a few dozen voxels, or each of its own, out of so many.
+    fn plain([nx, ny, nz]: [usize; 3], seed: u64, run: usize, many: u64) -> Vec<u32> {
+        let hash = |i: usize| (i as u64 ^ seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
+        let label = |i: usize| (hash(i / run) % many) as u32;
+        (0..nx * ny * nz).map(label).collect()
+    }
+
+    fn box_and_labels() -> impl Strategy<Value = ([usize; 3], Vec<u32>)> {
+        let sides = [1_usize..40, 1_usize..11, 1_usize..11];
+        let of = |(dims, seed, run, many)| (dims, plain(dims, seed, run, many));
+        (sides, any::<u64>(), 1_usize..60, 1_u64..40).prop_map(of)
+    }
+
+    proptest! {
+        // Covers V8.
+        #[test]
+        fn each_voxel_keeps_its_label((dims, plain) in box_and_labels(), at in any::<u64>()) {
+            let mut labels = Labels::of(dims, &plain);
+            prop_assert!(labels.iter().eq(plain.iter().copied()));
+            let mut plain = plain;
+            // One label more, then one that is there.
+            for k in 0..40 {
+                let i = (at.rotate_left(k) % plain.len() as u64) as usize;
+                plain[i] = if k % 2 == 0 { 1000 + k } else { plain[0] };
+                labels.set(labels.coords(i), plain[i]);
+                prop_assert_eq!(labels.get(i), plain[i]);
+            }
+            prop_assert!(labels.iter().eq(plain.iter().copied()));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn runs_are_maximal_and_cover_the_range_with_its_labels(
+            (dims, plain) in box_and_labels(), cut in (0.0..0.5f64, 0.5..1.0f64),
+        ) {
+            let labels = Labels::of(dims, &plain);
+            let [from, to] = [cut.0, cut.1].map(|share| (share * plain.len() as f64) as usize);
+            let (mut next, mut last) = (from, None);
+            labels.for_runs(from..to, |run, label| {
+                let is_new_row = run.start % dims[0] == 0;
+                assert!(run.start == next && run.end > next && (is_new_row || last != Some(label)));
+                assert!(plain[run.clone()].iter().all(|&l| l == label));
+                (next, last) = (run.end, Some(label));
+            });
+            prop_assert_eq!(next, to);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn faces_and_new_labels_are_those_of_single_voxels((dims, plain) in box_and_labels()) {
+            let mut labels = Labels::of(dims, &plain);
+            let mut plain = plain;
+            // The last voxel changes beside those that fill up its brick.
+            *plain.last_mut().unwrap() = 77;
+            labels.set(dims.map(|n| n - 1), 77);
+            let [nx, ny, _] = dims;
+            let mut found = Vec::new();
+            for layer in 0..labels.n_layers() {
+                labels.for_faces(layer, |i, axis, pair| found.push((i, axis, pair)));
+            }
+            let mut expected = Vec::new();
+            for (i, &label) in plain.iter().enumerate() {
+                let at = [i % nx, i / nx % ny, i / (nx * ny)];
+                for (axis, step) in [1, nx, nx * ny].into_iter().enumerate() {
+                    if at[axis] + 1 < dims[axis] && plain[i + step] != label {
+                        expected.push((i, axis, [label, plain[i + step]]));
+                    }
+                }
+            }
+            found.sort_unstable();
+            prop_assert_eq!(found, expected);
+            labels.relabel(|label, y| 10 * label + (y % 3) as u32);
+            let new = |(i, l): (usize, &u32)| 10 * l + (i / nx % ny % 3) as u32;
+            let new: Vec<u32> = plain.iter().enumerate().map(new).collect();
+            prop_assert_eq!(&labels, &Labels::of(dims, &new));
+            prop_assert!(labels.iter().eq(new));
+        }
+    }
+
+    #[test]
+    fn memory_goes_by_surface() {
+        // Two halls of 64³ and 128³ voxels, each with a wall in the middle.
+        let bytes = |n: usize| {
+            let wall = |row: usize, to: &mut [u32]| to.fill(u32::from(row / n > n / 2));
+            Labels::by_rows([n; 3], wall).memory()
+        };
+        let heads = |n: usize| n.pow(3) / 16;
+        assert_eq!(bytes(64) - heads(64), 16 * 64 * 64 / 16);
+        assert_eq!(bytes(128) - heads(128), 16 * 128 * 128 / 16);
+        assert_eq!(Labels::zero([0, 4, 4]).memory(), 0);
+    }
+}
