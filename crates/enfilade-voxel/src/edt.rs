@@ -17,13 +17,13 @@ use rayon::prelude::*;
 use super::grid::{BitVolume, for_runs};
 
 /// Number of neighboring lines processed together.
-const LANES: usize = 64;
+pub(super) const LANES: usize = 64;
 
 /// Steps outwards after which a floating-point block falls back to the lower envelope.
 const PATIENCE: usize = 96;
 
 /// A squared distance.
-trait Squared: Copy + Send + Sync + PartialOrd + 'static {
+pub(super) trait Squared: Copy + Send + Sync + PartialOrd + 'static {
     /// No occupied voxel, or too far to represent.
     const FAR: Self;
     const ZERO: Self;
@@ -174,7 +174,7 @@ pub fn distance(occupied: &BitVolume) -> Vec<f32> {
 }
 
 /// Work of transforming so many voxels along one axis or two, in units of [`Allowance`].
-fn work_of(n_voxels: usize) -> u64 {
+pub(super) fn work_of(n_voxels: usize) -> u64 {
     1 + n_voxels as u64 / 16
 }
 
@@ -188,8 +188,7 @@ fn transform<T: Squared>(
     if field.is_empty() {
         return field;
     }
-    let squares: Vec<T> = (0..=nx).map(T::of_steps).collect();
-    let falling: Vec<T> = squares.iter().rev().copied().collect();
+    let tables = Tables::of(nx);
     // Along x and y while a slice is in cache.
     field
         .par_chunks_mut(nx * ny)
@@ -198,13 +197,7 @@ fn transform<T: Squared>(
             if !allowance.spend(work_of(slice.len())) {
                 return;
             }
-            let mut rows: Vec<&mut [T]> = slice.chunks_mut(nx).collect();
-            for (j, row) in rows.iter_mut().enumerate() {
-                distances_in_row(occupied.row(j + ny * k), row, &squares, &falling);
-            }
-            along_rows(&mut rows, scratch, &|j, b| {
-                far.map_or(0, |f| f.row(j + ny * k)[b])
-            });
+            within_slice(occupied, far, k, slice, &tables, scratch);
         });
     if nz > 1 {
         let mut columns: Vec<Vec<&mut [T]>> = (0..ny).map(|_| Vec::with_capacity(nz)).collect();
@@ -218,7 +211,8 @@ fn transform<T: Squared>(
                 if !allowance.spend(work_of(nx * nz)) {
                     return;
                 }
-                along_rows(rows, scratch, &|k, b| {
+                load(rows.iter().map(|row| &**row), scratch);
+                along_rows(rows, Span::whole(nz), scratch, &|k, b| {
                     far.map_or(0, |f| f.row(j + ny * k)[b])
                 });
             });
@@ -226,8 +220,48 @@ fn transform<T: Squared>(
     field
 }
 
+/// Squares of steps along x, up and down.
+pub(super) struct Tables<T> {
+    squares: Vec<T>,
+    falling: Vec<T>,
+}
+
+impl<T: Squared> Tables<T> {
+    pub(super) fn of(nx: usize) -> Self {
+        let squares: Vec<T> = (0..=nx).map(T::of_steps).collect();
+        Self {
+            falling: squares.iter().rev().copied().collect(),
+            squares,
+        }
+    }
+}
+
+/// Writes the squared distances of the voxels of slice `k` to those occupied in it.
+pub(super) fn within_slice<T: Squared>(
+    occupied: &BitVolume,
+    far: Option<&BitVolume>,
+    k: usize,
+    slice: &mut [T],
+    tables: &Tables<T>,
+    scratch: &mut Vec<[T; LANES]>,
+) {
+    let [nx, ny, _] = occupied.dims();
+    let mut rows: Vec<&mut [T]> = slice.chunks_mut(nx).collect();
+    for (j, row) in rows.iter_mut().enumerate() {
+        distances_in_row(occupied.row(j + ny * k), row, tables);
+    }
+    load(rows.iter().map(|row| &**row), scratch);
+    along_rows(&mut rows, Span::whole(ny), scratch, &|j, b| {
+        far.map_or(0, |f| f.row(j + ny * k)[b])
+    });
+}
+
 /// Writes the squared distances along one row: rising and falling squares, copied from tables.
-fn distances_in_row<T: Squared>(bits: &[u64], row: &mut [T], squares: &[T], falling: &[T]) {
+fn distances_in_row<T: Squared>(
+    bits: &[u64],
+    row: &mut [T],
+    Tables { squares, falling }: &Tables<T>,
+) {
     let n = row.len();
     let mut free_from = 0;
     let mut seen = false;
@@ -255,47 +289,98 @@ fn distances_in_row<T: Squared>(bits: &[u64], row: &mut [T], squares: &[T], fall
     }
 }
 
-/// Replaces each column `rows[..][x]` by `min over k of (rows[k][x] + (i - k)²)`, or by a larger value where `far` of a row
-/// and a block has a bit.
-fn along_rows<T: Squared>(
-    rows: &mut [&mut [T]],
+/// The rows of a box that a pass reads, and those of them that it writes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// Rows of the box.
+    pub(super) n: usize,
+    /// Rows that are read: from … to.
+    pub(super) read: [usize; 2],
+    /// Rows that are written.
+    pub(super) own: [usize; 2],
+}
+
+impl Span {
+    fn whole(n: usize) -> Self {
+        Self {
+            n,
+            read: [0, n],
+            own: [0, n],
+        }
+    }
+
+    /// Returns `true` if all rows of the box within `k` of row `i` are read.
+    fn contains(&self, i: usize, k: usize) -> bool {
+        (self.read[0] == 0 || i >= self.read[0] + k) && (self.read[1] == self.n || i + k < self.read[1])
+    }
+}
+
+/// Copies rows into blocks of [`LANES`] columns.
+//
+// Lanes past the end hold zero, so that they never need another step.
+pub(super) fn load<'a, T: Squared>(
+    rows: impl ExactSizeIterator<Item = &'a [T]> + Clone,
     scratch: &mut Vec<[T; LANES]>,
-    far: &impl Fn(usize, usize) -> u64,
 ) {
-    let (n, width) = (rows.len(), rows[0].len());
-    let blocks = width.div_ceil(LANES);
-    // Lanes past the end hold zero, so that they never need another step.
+    let n = rows.len();
+    let width = rows.clone().next().map_or(0, <[T]>::len);
     scratch.clear();
-    scratch.resize(n * blocks, [T::ZERO; LANES]);
-    for (i, row) in rows.iter().enumerate() {
+    scratch.resize(n * width.div_ceil(LANES), [T::ZERO; LANES]);
+    for (i, row) in rows.enumerate() {
         for (b, part) in row.chunks(LANES).enumerate() {
             scratch[b * n + i][..part.len()].copy_from_slice(part);
         }
     }
+}
+
+/// Writes `min over k of (f(k) + (i - k)²)` to each column `rows[i][x]` of the span's own rows, or a larger value where `far`
+/// of a row and a block has a bit. `scratch` holds f for the rows that are read, as [`load`] leaves it.
+///
+/// Returns `false` if rows that are not read could matter; what it wrote is then of no use.
+pub(super) fn along_rows<T: Squared>(
+    rows: &mut [&mut [T]],
+    span: Span,
+    scratch: &[[T; LANES]],
+    far: &impl Fn(usize, usize) -> u64,
+) -> bool {
+    let (n, width) = (span.read[1] - span.read[0], rows[0].len());
     for (b, block) in scratch.chunks(n).enumerate() {
         let from = b * LANES;
         let lanes = LANES.min(width - from);
         let mut write = |i: usize, values: &[T; LANES]| {
             rows[i][from..from + lanes].copy_from_slice(&values[..lanes]);
         };
-        if !least_parabolas(block, &|i| far(i, b), &mut write) {
-            T::envelope(block, &mut write);
+        match least_parabolas(block, span, &|i| far(i, b), &mut write) {
+            Sweep::Done => {}
+            Sweep::GaveUp => T::envelope(block, &mut write),
+            Sweep::Cut => return false,
         }
     }
+    true
 }
 
-/// Writes the least parabola at each row of a block; returns `false` if it gave up.
+/// How a sweep over a block ended.
+enum Sweep {
+    Done,
+    /// Too many steps.
+    GaveUp,
+    /// Rows that are not read could matter.
+    Cut,
+}
+
+/// Writes the least parabola at each own row of a block, the first one as row 0.
 fn least_parabolas<T: Squared>(
     block: &[[T; LANES]],
+    span: Span,
     far: &impl Fn(usize) -> u64,
     write: &mut impl FnMut(usize, &[T; LANES]),
-) -> bool {
-    let n = block.len();
-    for i in 0..n {
+) -> Sweep {
+    for row in span.own[0]..span.own[1] {
+        let (i, to) = (row - span.read[0], row - span.own[0]);
         let mut least = block[i];
-        let far = far(i);
+        let far = far(row);
         if far == u64::MAX {
-            write(i, &least);
+            write(to, &least);
             continue;
         }
         // Far lanes never need another step.
@@ -306,22 +391,25 @@ fn least_parabolas<T: Squared>(
                 T::ZERO
             }
         });
-        let reach = i.max(n - 1 - i);
+        let reach = row.max(span.n - 1 - row);
         let mut most = greatest(&least, &asks);
         let mut k = 1;
         while k <= reach && most > T::of_steps(k) {
             if k > T::MAX_STEPS {
                 if T::FAR > T::of_steps(k) {
-                    return false;
+                    return Sweep::GaveUp;
                 }
                 break;
+            }
+            if !span.contains(row, k + STRIDE - 1) {
+                return Sweep::Cut;
             }
             most = widened(&mut least, &asks, block, i, k);
             k += STRIDE;
         }
-        write(i, &least);
+        write(to, &least);
     }
-    true
+    Sweep::Done
 }
 
 /// Rows on each side between two tests of the maximum: a test costs as much as a row.

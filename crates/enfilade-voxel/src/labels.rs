@@ -10,7 +10,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 /// Edge of a brick. [Units: vx]
-const EDGE: usize = 4;
+pub(crate) const EDGE: usize = 4;
 /// Voxels of a brick.
 const VOLUME: usize = EDGE * EDGE * EDGE;
 /// Marks the head of a brick of several labels; two more bits tell how many bits a voxel takes, the rest is the
@@ -76,7 +76,7 @@ impl Labels {
         if zero.heads.is_empty() {
             return zero;
         }
-        let [bx, by, bz] = zero.bricks;
+        let bz = zero.bricks[2];
         let part = |buffer: &mut Vec<u32>, k: usize| {
             buffer.resize(EDGE * nx * ny, 0);
             for (row, to) in (k * EDGE * ny..).zip(buffer.chunks_exact_mut(nx)) {
@@ -84,25 +84,15 @@ impl Labels {
                     write(row, to);
                 }
             }
-            let mut part = Part::default();
-            for j in 0..by {
-                for i in 0..bx {
-                    let row = |y: usize, z: usize| {
-                        let y = (j * EDGE + y).min(ny - 1);
-                        let z = (k * EDGE + z).min(nz - 1) - k * EDGE;
-                        &buffer[(z * ny + y) * nx..][..nx]
-                    };
-                    part.push(&gather(i, row));
-                }
-            }
-            part
+            let n_layers = EDGE.min(nz - k * EDGE);
+            Part::of([nx, ny], &buffer[..n_layers * nx * ny])
         };
         let parts: Vec<Part> = (0..bz).into_par_iter().map_init(Vec::new, part).collect();
         zero.with(parts)
     }
 
-    /// Returns the same box with the bricks of `parts`, one part for each layer of bricks.
-    fn with(mut self, parts: Vec<Part>) -> Self {
+    /// Returns the same box with the bricks of `parts`, in order.
+    pub(crate) fn with(mut self, parts: Vec<Part>) -> Self {
         let n_words = parts.iter().map(|part| part.blocks.len()).sum();
         self.blocks = Vec::with_capacity(n_words);
         self.heads.clear();
@@ -217,6 +207,13 @@ impl Labels {
         }
     }
 
+    /// Returns the list of a brick of several labels and the words with the positions in it, unless it has none.
+    fn listed(&self, head: u32) -> Option<(&[u32], &[u32])> {
+        let (from, width) = place(head);
+        let lists = (width != PLAIN).then(|| self.blocks[from..].split_at(1 << (1 << width)));
+        lists.map(|(list, words)| (list, &words[..VOLUME << width >> 5]))
+    }
+
     /// Returns all labels of a brick.
     fn brick(&self, head: u32) -> Brick {
         if head & MIXED == 0 {
@@ -224,15 +221,14 @@ impl Labels {
         }
         let (from, width) = place(head);
         let mut brick = [0; VOLUME];
-        if width == PLAIN {
+        let Some((list, words)) = self.listed(head) else {
             brick.copy_from_slice(&self.blocks[from..from + VOLUME]);
             return brick;
-        }
-        let (each, listed) = (1 << width, 1 << (1 << width));
-        let (list, words) = self.blocks[from..].split_at(listed);
+        };
+        let each = 1 << width;
         for (voxels, &word) in brick.chunks_exact_mut(32 / each).zip(words) {
             for (k, label) in voxels.iter_mut().enumerate() {
-                *label = list[word as usize >> (k * each) & (listed - 1)];
+                *label = list[word as usize >> (k * each) & (list.len() - 1)];
             }
         }
         brick
@@ -369,11 +365,22 @@ impl Labels {
             let mut part = Part::default();
             for (at, &head) in heads.iter().enumerate() {
                 let from = at / bx % by * EDGE;
+                // The new label, if it is the same at all heights of the brick.
+                let level = |label: u32| {
+                    let of = |y: usize| new(label, (from + y).min(most));
+                    let first = of(0);
+                    (1..EDGE).all(|y| of(y) == first).then_some(first)
+                };
                 if head & MIXED == 0 {
-                    let of = |y: usize| new(head, (from + y).min(most));
-                    let label = of(0);
-                    if (1..EDGE).all(|y| of(y) == label) {
+                    if let Some(label) = level(head) {
                         part.heads.push(label);
+                        continue;
+                    }
+                } else if let Some((list, _)) = self.listed(head) {
+                    // Most often, all labels of a brick become one.
+                    let label = level(list[0]);
+                    if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
+                        part.heads.extend(label);
                         continue;
                     }
                 }
@@ -403,14 +410,31 @@ impl Labels {
     }
 }
 
-/// Bricks that one thread made.
+/// Some layers of bricks.
 #[derive(Default)]
-struct Part {
+pub(crate) struct Part {
     heads: Vec<u32>,
     blocks: Vec<u32>,
 }
 
 impl Part {
+    /// Compresses layers of `nx` by `ny` labels.
+    pub(crate) fn of([nx, ny]: [usize; 2], labels: &[u32]) -> Self {
+        let mut part = Self::default();
+        for labels in labels.chunks(EDGE * nx * ny) {
+            let last = labels.len() / (nx * ny) - 1;
+            for j in 0..ny.div_ceil(EDGE) {
+                for i in 0..nx.div_ceil(EDGE) {
+                    part.push(&gather(i, |y, z| {
+                        let row = (j * EDGE + y).min(ny - 1) + ny * z.min(last);
+                        &labels[row * nx..][..nx]
+                    }));
+                }
+            }
+        }
+        part
+    }
+
     fn push(&mut self, brick: &Brick) {
         self.heads.push(encode(brick, &mut self.blocks));
     }
@@ -577,11 +601,19 @@ mod tests {
             }
             found.sort_unstable();
             prop_assert_eq!(found, expected);
-            labels.relabel(|label, y| 10 * label + (y % 3) as u32);
-            let new = |(i, l): (usize, &u32)| 10 * l + (i / nx % ny % 3) as u32;
+            // Some labels become the same, some differ by height.
+            let new_label = |label: u32, y: usize| match label {
+                0..3 => 5,
+                3..6 => label + 100 * (y % 3) as u32,
+                _ => label + 1000,
+            };
+            labels.relabel(new_label);
+            let new = |(i, l): (usize, &u32)| new_label(*l, i / nx % ny);
             let new: Vec<u32> = plain.iter().enumerate().map(new).collect();
-            prop_assert_eq!(&labels, &Labels::of(dims, &new));
-            prop_assert!(labels.iter().eq(new));
+            prop_assert!(labels.iter().eq(new.iter().copied()));
+            let mut fresh = Labels::of(dims, &plain);
+            fresh.relabel(new_label);
+            prop_assert_eq!(fresh, Labels::of(dims, &new));
         }
     }
 

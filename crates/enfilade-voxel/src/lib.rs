@@ -26,5 +26,5 @@ pub use far::far_outdoors;
 pub use grid::{BitVolume, Grid, for_runs, set_bits};
 pub use labels::Labels;
 pub use voxelize::voxelize;
-pub use watershed::{Basin, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
+pub use watershed::{Basin, DistanceField, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
 pub use widest::{WidestPath, border, widest_path};

@@ -15,18 +15,20 @@
 //! **Levels** are distances in steps of 1/64 voxel, rounded down. Consecutive squares of distances below 32
 //! voxels are further apart than that, so only wider spaces lose any order.
 //!
-//! **Memory:** works in place, in the array of squared distances: a word holds a voxel's level, then its basin's position
-//! among those of the slab.
+//! **Memory:** a [`DistanceField`] is packed layer by layer as it is measured, and read slab by slab; what comes of a slab is
+//! its contacts and its bricks of [`Labels`].
 //!
 //! | stage | file |
 //! | --- | --- |
-//! | levels, crests and peaks | `crests` |
+//! | distances as levels, packed | `levels` |
+//! | crests and peaks | `crests` |
 //! | ascents and contacts, by slabs | `slabs` |
 //! | shallow basins joined, labels | `join` |
 
 mod basins;
 mod crests;
 mod join;
+mod levels;
 mod slabs;
 
 use enfilade_geom::Allowance;
@@ -34,7 +36,8 @@ use rayon::prelude::*;
 
 use super::grid::BitVolume;
 use super::labels::Labels;
-use crests::{Crests, Shape, to_levels};
+use crests::{Crests, Shape};
+use levels::{Levels, Outdoors};
 
 pub use basins::{Basin, Saddle, Watershed};
 
@@ -75,7 +78,7 @@ pub fn watershed(
     watershed_by(thick, dims, squared, options, allowance)
 }
 
-/// Does [`watershed`] in slabs of `thick` layers.
+/// Does [`watershed`] in slabs of `thick` layers, of whole bricks of labels.
 fn watershed_by(
     thick: usize,
     dims: [usize; 3],
@@ -100,17 +103,90 @@ fn watershed_by(
         return Watershed::unflooded(dims);
     }
     let shape = Shape { dims };
-    let mut words = squared;
-    to_levels(dims, &mut words, outdoors);
-    let first_outdoors = outdoors.map(|o| o.iter_set().find(|&v| words[v] != 0).unwrap_or(0));
-    let crests = Crests::of(shape, &words, allowance);
-    let (roots, contacts) = slabs::label(shape, &mut words, &crests, thick, allowance);
-    if allowance.is_over() {
-        return Watershed::unflooded(dims);
-    }
-    let tree = join::Merged::of(&crests.peaks, contacts, options.h, first_outdoors);
+    let first_outdoors =
+        outdoors.map(|o| o.iter_set().find(|&v| squared[v] != 0).unwrap_or(0));
+    let outdoors = outdoors.map_or(Outdoors::Nothing, Outdoors::Only);
+    let levels = Levels::of(shape, squared, &outdoors);
+    flood(shape, &levels, thick, first_outdoors, options.h, allowance)
+}
+
+/// Divides a field of levels among the basins around its peaks, in slabs of `thick` layers.
+fn flood(
+    shape: Shape,
+    levels: &Levels,
+    thick: usize,
+    first_outdoors: Option<usize>,
+    h: f64,
+    allowance: &Allowance,
+) -> Watershed {
+    let crests = Crests::of(shape, levels, thick, allowance);
+    let Some((roots, contacts)) = slabs::label(shape, levels, &crests, thick, allowance) else {
+        return Watershed::unflooded(shape.dims);
+    };
+    let tree = join::Merged::of(&crests.peaks, contacts, h, first_outdoors);
     drop(crests);
-    tree.finish(shape, &words, &roots, thick)
+    tree.finish(roots)
+}
+
+/// The distance of each voxel of a box to the nearest occupied one, packed: about a third of a byte a voxel.
+#[derive(Clone, Debug)]
+pub struct DistanceField {
+    shape: Shape,
+    levels: Levels,
+    /// The first free voxel of the border or far from everything.
+    first_outdoors: usize,
+}
+
+impl DistanceField {
+    /// Measures the distances to `blocked` voxels; those in `far` are outdoors, and their distances do not matter.
+    ///
+    /// Works slab by slab: besides the answer, the layers in memory are those of a slab and those within reach of it.
+    ///
+    /// # Panics
+    /// If the two boxes differ in size, or have 2³² voxels or more.
+    #[must_use]
+    pub fn of(blocked: &BitVolume, far: &BitVolume, allowance: &Allowance) -> Self {
+        let dims = blocked.dims();
+        assert_eq!(dims, far.dims(), "boxes of one size");
+        let n: usize = dims.iter().product();
+        assert!(u32::try_from(n).is_ok(), "fewer than 2^32 voxels");
+        let shape = Shape { dims };
+        let thick = if n == 0 { 1 } else { slabs::thickness(shape) };
+        Self {
+            shape,
+            levels: Levels::measured(blocked, far, thick, allowance),
+            first_outdoors: first_free(blocked, &Outdoors::AtBorder(far)),
+        }
+    }
+
+    /// Divides the field among the basins around its peaks, as [`watershed`] does, with what is known to be outdoors as one
+    /// basin. Basins with dynamics below `h` join a deeper one. [Units: vx]
+    #[must_use]
+    pub fn watershed(&self, h: f64, allowance: &Allowance) -> Watershed {
+        if self.shape.layer() * self.shape.dims[2] == 0 || allowance.is_over() {
+            return Watershed::unflooded(self.shape.dims);
+        }
+        let thick = slabs::thickness(self.shape);
+        let first = Some(self.first_outdoors);
+        flood(self.shape, &self.levels, thick, first, h, allowance)
+    }
+}
+
+/// Returns the first voxel outdoors that is not blocked, 0 if there is none.
+fn first_free(blocked: &BitVolume, outdoors: &Outdoors<'_>) -> usize {
+    let shape = Shape {
+        dims: blocked.dims(),
+    };
+    let [nx, ny, nz] = shape.dims;
+    let first_of = |row: usize| {
+        let mut first: Option<usize> = None;
+        outdoors.for_runs(shape, row, |from, to| {
+            let free = (from..to).find(|&x| !blocked.get_index(row * nx + x));
+            first = [first, free].into_iter().flatten().min();
+        });
+        first.map(|x| row * nx + x)
+    };
+    (0..ny * nz).find_map(first_of).unwrap_or(0)
 }
 
 /// Marks the dams between basins, one voxel thick: each voxel that shares a face with one of a lesser

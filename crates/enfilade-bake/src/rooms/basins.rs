@@ -33,17 +33,18 @@ impl Basins {
     /// Makes a basin of each connected set of air voxels in one part. `part_at` returns the part of a point, below 2³¹, or
     /// `None` for matter. Everything that connects to the border is outdoors.
     ///
-    /// Linear in voxels, besides the calls of `part_at` for those that are not far from everything; 4 bytes a voxel.
+    /// Linear in voxels, besides the calls of `part_at` for those that are not far from everything; 6 bytes a voxel.
     pub(crate) fn of_parts(
         air: &VoxelAir,
         part_at: impl Fn(DVec3) -> Option<u32> + Sync,
         allowance: &Allowance,
     ) -> Self {
         let dims = air.grid.dims;
+        let (distances, far) = air.solid.distances(allowance);
         let mut outdoors = border(dims);
-        outdoors.union_with(&air.far);
+        outdoors.union_with(&far);
         let part_of = |i: usize| {
-            if air.distances[i] == 0 || !allowance.spend(1) {
+            if distances[i] == 0 || !allowance.spend(1) {
                 return 0;
             }
             if outdoors.get_index(i) {
@@ -52,14 +53,14 @@ impl Basins {
             let [x, y, z] = air.grid.coords(i);
             part_at(air.grid.center(x, y, z)).map_or(0, |part| WAITING | part)
         };
-        let mut labels: Vec<u32> = (0..air.distances.len())
+        let mut labels: Vec<u32> = (0..distances.len())
             .into_par_iter()
             .map(part_of)
             .collect();
         let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
         let n = number_parts(dims, &mut labels, outer);
         let mut peaks = vec![0_u16; n];
-        for (&label, &distance) in labels.iter().zip(&air.distances) {
+        for (&label, &distance) in labels.iter().zip(&distances) {
             let peak = &mut peaks[label as usize];
             *peak = distance.max(*peak);
         }
@@ -71,7 +72,7 @@ impl Basins {
         let saddle = |faces: &Vec<u64>| {
             let distance = |&face: &u64| {
                 let (i, axis) = ((face / 4) as usize, (face % 4) as usize);
-                air.distances[i].min(air.distances[i + [1, nx, nx * ny][axis]])
+                distances[i].min(distances[i + [1, nx, nx * ny][axis]])
             };
             radius(faces.iter().map(distance).max().unwrap_or(0))
         };

@@ -47,8 +47,9 @@ pub(crate) fn propose(
         shut,
         closures,
         lids,
-        ..
+        occupied,
     } = solid;
+    drop(occupied);
 
     context.begin(Stage::Rooms)?;
     let mut regions = basins.merge(&grid, &shut, &slabs, config, allowance);

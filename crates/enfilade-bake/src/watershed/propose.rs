@@ -3,9 +3,9 @@
 use enfilade_geom::Allowance;
 
 use crate::proposal::Proposal;
-use crate::rooms::{self, Basins, VoxelAir};
+use crate::rooms::{self, Basins};
 use crate::structure::Structure;
-use crate::voxel::{WatershedOptions, border, watershed};
+use crate::voxel::{DistanceField, Grid};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// Finds rooms by a flood of the distance field.
@@ -23,9 +23,11 @@ pub(crate) fn propose(
     let mut proposal: Option<Proposal> = None;
     // One after the other: each has a grid of its own, and threads share the work on it.
     for plot in rooms::plots(structure, sites, config, context)? {
-        let mut air = rooms::measure(structure, plot, config, context)?;
+        let air = rooms::measure(structure, plot, config, context)?;
+        let field = air.solid.field(context.allowance());
         context.begin(Stage::Flood)?;
-        let basins = flood(&mut air, config, context.allowance());
+        let basins = flood(&air.grid, &field, config, context.allowance());
+        drop(field);
         context.check()?;
         let here = rooms::propose(structure, air, basins, config, context)?;
         proposal = Some(match proposal {
@@ -41,17 +43,9 @@ pub(crate) fn propose(
     Ok(proposal)
 }
 
-/// Floods the air, which its distances become. Air that is far from everything is known to be outdoors.
-fn flood(air: &mut VoxelAir, config: &BakeConfig, allowance: &Allowance) -> Basins {
-    let grid = &air.grid;
-    let mut outdoors = border(grid.dims); // the padding keeps it empty
-    outdoors.union_with(&air.far);
-    let distances = std::mem::take(&mut air.distances);
-    let options = WatershedOptions {
-        h: config.noise / grid.voxel,
-        outdoors: Some(outdoors),
-    };
-    let flood = watershed(grid.dims, distances, &options, allowance);
+/// Floods the air.
+fn flood(grid: &Grid, field: &DistanceField, config: &BakeConfig, allowance: &Allowance) -> Basins {
+    let flood = field.watershed(config.noise / grid.voxel, allowance);
     let peaks = flood.basins.iter().map(|b| b.peak as f32);
     let saddles = flood.saddles.iter();
     Basins {

@@ -3,13 +3,7 @@
 use enfilade_geom::{Allowance, Sets};
 use rayon::prelude::*;
 
-use super::super::grid::{BitVolume, for_runs};
-use super::basins::STEPS;
-
-/// The part of a word that is a level; 0 is occupied.
-pub(super) const LEVEL: u16 = 0x3FFF;
-/// Marks a free voxel that is known to be outdoors.
-const OUTDOORS: u16 = 0x8000;
+use super::levels::{Levels, OUTDOORS, level};
 
 /// Crest voxels at this many steps from the rim of their plateau, or more, count as peaks.
 ///
@@ -17,7 +11,7 @@ const OUTDOORS: u16 = 0x8000;
 const FAR: u32 = 255;
 
 /// A box whose voxels are numbered along x, then y, then z.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) dims: [usize; 3],
 }
@@ -49,34 +43,6 @@ impl Shape {
     }
 }
 
-/// Converts squared distances to levels, in place, and marks the free voxels of `outdoors`.
-pub(super) fn to_levels(dims: [usize; 3], words: &mut [u16], outdoors: Option<&BitVolume>) {
-    let table: Vec<u16> = (0..=u16::MAX)
-        .map(|d| (f64::from(d).sqrt() * f64::from(STEPS)) as u16)
-        .collect();
-    let rows = words.par_chunks_mut(dims[0].max(1)).enumerate();
-    rows.with_min_len(64).for_each(|(row, words)| {
-        for word in &mut *words {
-            *word = table[usize::from(*word)];
-        }
-        if let Some(outdoors) = outdoors {
-            for_runs(outdoors.row(row), |from, to| {
-                for word in &mut words[from as usize..to as usize] {
-                    *word |= if *word == 0 { 0 } else { OUTDOORS };
-                }
-            });
-        }
-    });
-}
-
-pub(super) fn level(word: u16) -> u16 {
-    word & LEVEL
-}
-
-pub(super) fn is_outdoors(word: u16) -> bool {
-    word & OUTDOORS != 0
-}
-
 /// A summit of the field: where a basin starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Peak {
@@ -84,6 +50,33 @@ pub(super) struct Peak {
     /// First voxel of its plateau.
     pub(super) voxel: u32,
 }
+
+/// A crest voxel as it is found.
+#[derive(Clone, Copy)]
+struct Crest {
+    voxel: u32,
+    level: u16,
+    /// The neighbors at the same level, a bit for each in the order of [`Shape::neighbors`].
+    alike: u8,
+}
+
+impl Crest {
+    /// Returns the neighbors at the same level, those of `mask`.
+    fn beside(&self, shape: Shape, mask: u8) -> impl Iterator<Item = usize> + use<> {
+        let [row, layer] = [shape.dims[0] as isize, shape.layer() as isize];
+        let steps = [-layer, -row, -1, 1, row, layer];
+        let (voxel, alike) = (self.voxel as usize, self.alike & mask);
+        let is_alike = move |k: &usize| alike >> k & 1 != 0;
+        (0..6)
+            .filter(is_alike)
+            .map(move |k| voxel.wrapping_add_signed(steps[k]))
+    }
+}
+
+/// All neighbors.
+const AROUND: u8 = 0b11_1111;
+/// Those that come after a voxel.
+const AFTER: u8 = 0b11_1000;
 
 /// The crests of a field: free voxels, not outdoors, that no neighbor exceeds.
 pub(super) struct Crests {
@@ -99,12 +92,15 @@ pub(super) struct Crests {
 }
 
 impl Crests {
-    /// Finds the crests. Linear in voxels; a fifth of a byte a voxel, and 12 bytes for each crest voxel, 4 of them to stay.
-    pub(super) fn of(shape: Shape, words: &[u16], allowance: &Allowance) -> Self {
-        let found = find(shape, words, allowance);
-        let mut bits = vec![0_u64; words.len().div_ceil(64)];
-        for &voxel in &found {
-            bits[voxel as usize / 64] |= 1 << (voxel % 64);
+    /// Finds the crests, in slabs of `thick` layers.
+    ///
+    /// Linear in voxels; a fifth of a byte a voxel, and 16 bytes for each crest voxel, 4 of them to stay.
+    pub(super) fn of(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Self {
+        let found = find(shape, levels, thick, allowance);
+        let n_voxels = shape.layer() * shape.dims[2];
+        let mut bits = vec![0_u64; n_voxels.div_ceil(64)];
+        for crest in &found {
+            bits[crest.voxel as usize / 64] |= 1 << (crest.voxel % 64);
         }
         let mut n = 0;
         let before = bits
@@ -120,8 +116,8 @@ impl Crests {
             steps: vec![FAR; found.len()],
             peaks: Vec::new(),
         };
-        crests.measure(shape, words, &found, allowance);
-        crests.number(shape, words, &found);
+        crests.measure(shape, &found, allowance);
+        crests.number(shape, &found);
         crests
     }
 
@@ -139,28 +135,26 @@ impl Crests {
     }
 
     /// Measures the steps breadth first, from the rims of plateaus inward.
-    fn measure(&mut self, shape: Shape, words: &[u16], found: &[u32], allowance: &Allowance) {
-        let level_of = |voxel: usize| level(words[voxel]);
-        let beside = |voxel: usize| {
-            let here = level_of(voxel);
-            let around = shape.neighbors(shape.coords(voxel));
-            around.filter(move |&q| level_of(q) == here)
+    fn measure(&mut self, shape: Shape, found: &[Crest], allowance: &Allowance) {
+        let beside = |at: u32| {
+            let around = found[at as usize].beside(shape, AROUND);
+            around.map(|q| self.find(q))
         };
-        let is_rim = |&&voxel: &&u32| beside(voxel as usize).any(|q| self.find(q).is_none());
-        let mut front: Vec<u32> = found.par_iter().filter(is_rim).copied().collect();
+        let is_rim = |&at: &u32| beside(at).any(|q| q.is_none());
+        let all = 0..found.len() as u32;
+        let mut front: Vec<u32> = all.into_par_iter().filter(is_rim).collect();
         for steps in 1..FAR {
-            for &voxel in &front {
-                if let Some(at) = self.find(voxel as usize) {
-                    self.steps[at] = steps;
-                }
+            for &at in &front {
+                self.steps[at as usize] = steps;
             }
             if !allowance.spend(1 + front.len() as u64 / 2) {
                 return;
             }
             let mut next: Vec<u32> = Vec::new();
-            for &voxel in &front {
-                let is_new = |&q: &usize| self.steps_of(q) == FAR;
-                next.extend(beside(voxel as usize).filter(is_new).map(|q| q as u32));
+            for &at in &front {
+                let around = found[at as usize].beside(shape, AROUND);
+                let crests = around.filter_map(|q| self.find(q));
+                next.extend(crests.filter(|&q| self.steps[q] == FAR).map(|q| q as u32));
             }
             next.sort_unstable();
             next.dedup();
@@ -172,24 +166,14 @@ impl Crests {
     }
 
     /// Numbers the peaks: sets of crest voxels at one level that the rims do not reach.
-    fn number(&mut self, shape: Shape, words: &[u16], found: &[u32]) {
+    fn number(&mut self, shape: Shape, found: &[Crest]) {
         let mut plateaus = Sets::new(found.len());
-        for (at, &voxel) in found.iter().enumerate() {
+        for (at, crest) in found.iter().enumerate() {
             if self.steps[at] < FAR {
                 continue;
             }
-            let voxel = voxel as usize;
-            let [x, y, z] = shape.coords(voxel);
-            let [nx, ny, nz] = shape.dims;
-            let nexts = [
-                (x + 1 < nx, voxel + 1),
-                (y + 1 < ny, voxel + nx),
-                (z + 1 < nz, voxel + shape.layer()),
-            ];
-            for (_, q) in nexts.into_iter().filter(|n| n.0) {
-                if level(words[q]) == level(words[voxel])
-                    && let Some(other) = self.find(q).filter(|&o| self.steps[o] == FAR)
-                {
+            for q in crest.beside(shape, AFTER) {
+                if let Some(other) = self.find(q).filter(|&o| self.steps[o] == FAR) {
                     plateaus.join(at as u32, other as u32);
                 }
             }
@@ -197,14 +181,14 @@ impl Crests {
         // The least member of a set is its first voxel.
         let first = plateaus.into_least();
         let is_peak = |&at: &usize| self.steps[at] == FAR && first[at] as usize == at;
-        let level_at = |at: usize| level(words[found[at] as usize]);
+        let level_at = |at: usize| found[at].level;
         let mut order: Vec<usize> = (0..found.len()).filter(is_peak).collect();
         order.par_sort_unstable_by_key(|&at| (std::cmp::Reverse(level_at(at)), at));
         self.peaks = order
             .iter()
             .map(|&at| Peak {
                 level: level_at(at),
-                voxel: found[at],
+                voxel: found[at].voxel,
             })
             .collect();
         for (n, &at) in order.iter().enumerate() {
@@ -240,25 +224,21 @@ impl Crests {
 }
 
 /// Returns all crest voxels, in ascending order.
-fn find(shape: Shape, words: &[u16], allowance: &Allowance) -> Vec<u32> {
+fn find(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Vec<Crest> {
     let [nx, ny, nz] = shape.dims;
-    let row_of = |row: usize| &words[row * nx..(row + 1) * nx];
-    let layers = (0..nz).into_par_iter();
-    let of_layer = |z: usize| {
+    let of_slab = |buffer: &mut Vec<u16>, s: usize| {
+        let own = s * thick..nz.min((s + 1) * thick);
+        let read = [own.start.saturating_sub(1), nz.min(own.end + 1)];
+        let words = levels.read(shape, read, buffer);
+        let row_of = |row: usize| &words[(row - read[0] * ny) * nx..][..nx];
         let mut found = Vec::new();
         let mut most = vec![0_u16; nx];
-        for y in 0..ny {
-            let row = y + ny * z;
+        for row in own.start * ny..own.end * ny {
             let here = row_of(row);
+            let rows = rows_around(shape, row).map(|other| other.map(row_of));
             most.fill(0);
-            let around = [
-                (z > 0, row.wrapping_sub(ny)),
-                (y > 0, row.wrapping_sub(1)),
-                (y + 1 < ny, row + 1),
-                (z + 1 < nz, row + ny),
-            ];
-            for (_, other) in around.into_iter().filter(|a| a.0) {
-                for (most, word) in most.iter_mut().zip(row_of(other)) {
+            for other in rows.into_iter().flatten() {
+                for (most, word) in most.iter_mut().zip(other) {
                     *most = (*most).max(level(*word));
                 }
             }
@@ -271,13 +251,36 @@ fn find(shape: Shape, words: &[u16], allowance: &Allowance) -> Vec<u32> {
             for (x, (&word, &most)) in here.iter().zip(&most).enumerate() {
                 // Neither occupied nor outdoors.
                 if word != 0 && word < OUTDOORS && word >= most {
-                    found.push((row * nx + x) as u32);
+                    let [z_before, y_before, y_after, z_after] = rows.map(|row| row.map(|r| r[x]));
+                    let x_before = (x > 0).then(|| here[x - 1]);
+                    let x_after = here.get(x + 1).copied();
+                    let around = [z_before, y_before, x_before, x_after, y_after, z_after];
+                    let is_alike = |w: Option<u16>| w.is_some_and(|w| level(w) == word);
+                    let bits = (0..).zip(around.map(is_alike));
+                    found.push(Crest {
+                        voxel: (row * nx + x) as u32,
+                        level: word,
+                        alike: bits.fold(0, |mask, (k, is)| mask | u8::from(is) << k),
+                    });
                 }
             }
         }
         found
     };
-    let is_allowed = allowance.each(1 + shape.layer() as u64 / 32);
-    let per_layer: Vec<Vec<u32>> = layers.filter(is_allowed).map(of_layer).collect();
-    per_layer.concat()
+    let is_allowed = allowance.each(1 + (thick * shape.layer()) as u64 / 32);
+    let slabs = (0..nz.div_ceil(thick)).into_par_iter().filter(is_allowed);
+    let per_slab: Vec<Vec<Crest>> = slabs.map_init(Vec::new, of_slab).collect();
+    per_slab.concat()
+}
+
+/// Returns the rows that share faces with a row: before it along z and y, and after it along y and z.
+pub(super) fn rows_around(shape: Shape, row: usize) -> [Option<usize>; 4] {
+    let [_, ny, nz] = shape.dims;
+    let (y, z) = (row % ny, row / ny);
+    [
+        (z > 0).then(|| row - ny),
+        (y > 0).then(|| row - 1),
+        (y + 1 < ny).then(|| row + 1),
+        (z + 1 < nz).then(|| row + ny),
+    ]
 }

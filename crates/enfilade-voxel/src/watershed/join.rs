@@ -1,12 +1,11 @@
 //! Joins shallow basins to deeper ones, and writes the labels.
 
 use enfilade_geom::Sets;
-use rayon::prelude::*;
 
 use super::super::labels::Labels;
 use super::basins::{Basin, STEPS, Saddle, Watershed};
-use super::crests::{Peak, Shape};
-use super::slabs::{Contact, OUTER, Roots, merged};
+use super::crests::Peak;
+use super::slabs::{Contact, OUTER, merged};
 
 /// Basins after shallow ones have joined deeper ones.
 pub(super) struct Merged {
@@ -77,38 +76,10 @@ impl Merged {
         }
     }
 
-    /// Labels the voxels, given `words` whose slabs of `thick` layers hold what `roots` tells.
-    pub(super) fn finish(
-        mut self,
-        shape: Shape,
-        words: &[u16],
-        roots: &[Roots],
-        thick: usize,
-    ) -> Watershed {
-        let [nx, ny, _] = shape.dims;
+    /// Labels the voxels, given one more than the root of each.
+    pub(super) fn finish(mut self, mut labels: Labels) -> Watershed {
         let of_root = |root: u32| self.labels.get(root as usize).copied().unwrap_or(0);
-        let lists: Vec<Vec<u32>> = roots
-            .par_iter()
-            .map(|roots| match roots {
-                Roots::Palette(list) | Roots::Each(list) => {
-                    list.iter().map(|&root| of_root(root)).collect()
-                }
-            })
-            .collect();
-        let labels = Labels::by_rows(shape.dims, |row, labels| {
-            let slab = row / ny / thick;
-            match roots[slab] {
-                Roots::Palette(_) => {
-                    for (label, &word) in labels.iter_mut().zip(&words[row * nx..]) {
-                        *label = lists[slab][usize::from(word)];
-                    }
-                }
-                Roots::Each(_) => {
-                    let from = row * nx - slab * thick * shape.layer();
-                    labels.copy_from_slice(&lists[slab][from..from + nx]);
-                }
-            }
-        });
+        labels.relabel(|root, _| root.checked_sub(1).map_or(0, of_root));
         count(&labels, &mut self.basins);
         let mut saddles: Vec<Saddle> = self
             .contacts

@@ -5,7 +5,9 @@ use std::sync::Mutex;
 use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
-use super::crests::{Crests, Shape, is_outdoors, level};
+use super::super::labels::{EDGE, Labels, Part};
+use super::crests::{Crests, Shape};
+use super::levels::{Levels, is_outdoors, level};
 
 /// Least number of voxels of a slab, if there are as many: fewer are mostly border.
 const SLAB: usize = 1 << 20;
@@ -21,7 +23,8 @@ const ABOVE: u32 = 1 << 30;
 /// Returns the number of layers of a slab: with fewer there are more borders to keep, with more a slab takes more memory.
 pub(super) fn thickness(shape: Shape) -> usize {
     let least = SLAB.div_ceil(shape.layer());
-    least.max((shape.dims[2] as f64).sqrt() as usize)
+    let thick = least.max((shape.dims[2] as f64).sqrt() as usize);
+    thick.next_multiple_of(EDGE)
 }
 
 /// Contact of two roots.
@@ -59,14 +62,6 @@ pub(super) fn merged(mut contacts: Vec<Contact>) -> Vec<Contact> {
     contacts
 }
 
-/// The root of each voxel of a slab.
-pub(super) enum Roots {
-    /// The words of the slab hold positions in this list.
-    Palette(Vec<u32>),
-    /// More roots than words can tell.
-    Each(Vec<u32>),
-}
-
 /// Roots of a layer as runs: a root, and the voxel at which the next one begins.
 struct RootRuns(Vec<(u32, u32)>);
 
@@ -93,25 +88,20 @@ impl RootRuns {
     }
 }
 
-/// Replaces the levels in `words` by roots; returns these by slabs of `thick` layers, and the contacts between roots.
+/// Returns one more than the root of each voxel, 0 for solid ones, and the contacts between roots; `None` if the allowance is
+/// over.
 ///
-/// Follows the ascents from the borders of slabs first, so that slabs can be labeled independently. An ascent ends at a voxel
-/// whose root is known, so each voxel is passed about once.
+/// Follows the ascents from the borders of slabs of `thick` layers first, so that slabs can be labeled independently. An
+/// ascent ends at a voxel whose root is known, so each voxel is passed about once.
 pub(super) fn label(
     shape: Shape,
-    words: &mut [u16],
+    levels: &Levels,
     crests: &Crests,
     thick: usize,
     allowance: &Allowance,
-) -> (Vec<Roots>, Vec<Contact>) {
-    let layer = shape.layer();
+) -> Option<(Labels, Vec<Contact>)> {
     let n_slabs = shape.dims[2].div_ceil(thick);
-    // The layers on either side of the borders between slabs.
-    let beside: Vec<[Vec<u16>; 2]> = (1..n_slabs)
-        .map(|s| [s * thick - 1, s * thick].map(|z| words[z * layer..(z + 1) * layer].to_vec()))
-        .collect();
-    let is_allowed =
-        |(_, words): &(usize, &mut [u16])| allowance.spend(1 + words.len() as u64 / 16);
+    let work = 1 + (thick * shape.layer()) as u64 / 16;
     // Buffers for one slab a thread, so that their memory is mapped once.
     let pool: Mutex<Vec<Buffers>> = Mutex::default();
     let take = || {
@@ -125,38 +115,41 @@ pub(super) fn label(
             pool.push(buffers);
         }
     };
-    let borders: Vec<[RootRuns; 2]> = words
-        .par_chunks_mut(thick * layer)
-        .enumerate()
-        .filter(is_allowed)
-        .map(|(s, words)| {
-            let first = s * thick * layer;
-            let mut slab = Slab::new(shape, crests, first, words, halo(&beside, s), take());
+    let slabs = || (0..n_slabs).into_par_iter().filter(allowance.each(work));
+    let borders: Vec<[RootRuns; 2]> = slabs()
+        .map(|s| {
+            let mut buffers = take();
+            let mut words = std::mem::take(&mut buffers.words);
+            let mut slab = Slab::new(shape, crests, levels, [s, thick], &mut words, buffers);
             let borders = slab.borders();
-            give(slab.buffers);
+            let buffers = slab.buffers;
+            give(Buffers { words, ..buffers });
             borders
         })
         .collect();
     if borders.len() < n_slabs {
-        return (Vec::new(), Vec::new());
+        return None;
     }
-    let labeled: Vec<(Roots, Vec<Contact>)> = words
-        .par_chunks_mut(thick * layer)
-        .enumerate()
-        .filter(is_allowed)
-        .map(|(s, words)| {
-            let first = s * thick * layer;
-            let mut slab = Slab::new(shape, crests, first, words, halo(&beside, s), take());
+    let labeled: Vec<(Part, Vec<Contact>)> = slabs()
+        .map(|s| {
+            let mut buffers = take();
+            let mut words = std::mem::take(&mut buffers.words);
+            let mut slab = Slab::new(shape, crests, levels, [s, thick], &mut words, buffers);
             slab.enter(s, &borders);
             slab.ascend(slab.own());
             let contacts = slab.contacts();
-            let roots = slab.write();
-            give(slab.buffers);
-            (roots, contacts)
+            let part = slab.write();
+            let buffers = slab.buffers;
+            give(Buffers { words, ..buffers });
+            (part, contacts)
         })
         .collect();
-    let (roots, contacts): (Vec<_>, Vec<_>) = labeled.into_iter().unzip();
-    (roots, merged(contacts.concat()))
+    if labeled.len() < n_slabs {
+        return None;
+    }
+    let (parts, contacts): (Vec<_>, Vec<_>) = labeled.into_iter().unzip();
+    let labels = Labels::zero(shape.dims).with(parts);
+    Some((labels, merged(contacts.concat())))
 }
 
 /// Writes the way up from each voxel of a row, given the rows before it along z and y, and after it along y and z.
@@ -185,12 +178,6 @@ fn ways_along(wide: &[u16], [before_z, before_y, after_y, after_z]: [&[u16]; 4],
     }
 }
 
-/// Returns the layers on either side of slab `s`.
-fn halo(beside: &[[Vec<u16>; 2]], s: usize) -> [Option<&[u16]>; 2] {
-    let below = s.checked_sub(1).map(|at| &beside[at][0][..]);
-    [below, beside.get(s).map(|beside| &beside[1][..])]
-}
-
 /// Returns the root behind `exit` from slab `s`: the one in the slab that it leads to, and so on.
 fn behind(borders: &[[RootRuns; 2]], mut s: usize, mut exit: u32) -> u32 {
     while (EXIT..UNKNOWN).contains(&exit) {
@@ -213,7 +200,7 @@ struct Slab<'a> {
     /// Index of the first voxel of the layer below it.
     base: usize,
     /// Own words.
-    words: &'a mut [u16],
+    words: &'a [u16],
     /// Words of the layers below and above.
     beside: [Option<&'a [u16]>; 2],
     buffers: Buffers,
@@ -226,21 +213,31 @@ struct Buffers {
     ways: Vec<u8>,
     /// Roots of the layer below, of own voxels, and of the layer above.
     roots: Vec<u32>,
+    /// Words, if they are packed.
+    words: Vec<u16>,
 }
 
 /// A way that ends, or runs along a plateau.
 const CREST: i16 = 6;
 
 impl<'a> Slab<'a> {
+    /// Reads slab `s` of those of `thick` layers.
     fn new(
         shape: Shape,
         crests: &'a Crests,
-        first: usize,
-        words: &'a mut [u16],
-        beside: [Option<&'a [u16]>; 2],
+        levels: &'a Levels,
+        [s, thick]: [usize; 2],
+        words: &'a mut Vec<u16>,
         mut buffers: Buffers,
     ) -> Self {
-        let layer = shape.layer();
+        let (layer, nz) = (shape.layer(), shape.dims[2]);
+        let (from, to) = (s * thick, nz.min((s + 1) * thick));
+        let read = [from.saturating_sub(1), nz.min(to + 1)];
+        let words = levels.read(shape, read, words);
+        let (below, words) = words.split_at((from - read[0]) * layer);
+        let (words, above) = words.split_at((to - from) * layer);
+        let beside = [below, above].map(|words| (!words.is_empty()).then_some(words));
+        let first = from * layer;
         let roots = &mut buffers.roots;
         roots.clear();
         let add_layer = |roots: &mut Vec<u32>, beside: Option<&[u16]>, side: u32| match beside {
@@ -295,7 +292,7 @@ impl<'a> Slab<'a> {
         ways.resize(self.words.len(), 0);
         for (ways, row) in ways.chunks_exact_mut(nx).zip(ny..) {
             let y = row % ny;
-            let is_in = [true, y > 0, y + 1 < ny, true];
+            let is_in = [true, y > 0, y + 1 < ny, true]; // beside the slab there may be nothing
             let rows = [row - ny, row - 1, row + 1, row + ny];
             let row_at = |k: usize| is_in[k].then(|| self.row(rows[k])).flatten();
             let rows: [&[u16]; 4] = std::array::from_fn(|k| row_at(k).unwrap_or(&nothing));
@@ -420,26 +417,14 @@ impl<'a> Slab<'a> {
         merged(all)
     }
 
-    /// Writes positions in a list of the roots, 0 for solid, if words can hold them.
-    fn write(&mut self) -> Roots {
-        let own = &self.buffers.roots[self.own()];
-        let mut palette = vec![SOLID];
-        let mut position = vec![0_u16; self.crests.peaks.len() + 1];
-        for (word, &root) in self.words.iter_mut().zip(own) {
-            if root == SOLID {
-                *word = 0;
-                continue;
-            }
-            let position = &mut position[root as usize];
-            if *position == 0 {
-                let Ok(fresh) = u16::try_from(palette.len()) else {
-                    return Roots::Each(own.to_vec());
-                };
-                palette.push(root);
-                *position = fresh;
-            }
-            *word = *position;
+    /// Compresses one more than each root, 0 for solid.
+    fn write(&mut self) -> Part {
+        let [nx, ny, _] = self.shape.dims;
+        let own = self.own();
+        let roots = &mut self.buffers.roots[own];
+        for root in &mut *roots {
+            *root = root.wrapping_add(1);
         }
-        Roots::Palette(palette)
+        Part::of([nx, ny], roots)
     }
 }

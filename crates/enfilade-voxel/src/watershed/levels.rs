@@ -1,0 +1,270 @@
+//! Levels of distance, layer by layer: plain, or packed as they are measured.
+//!
+//! The distances of a slab need the slices within the largest distance in it only, so they are measured slab by slab, and a
+//! whole field is never held. They are the same as those of [`distance_squared_near`](super::super::distance_squared_near):
+//! where a voxel's nearest surface could lie beyond the slices read, more are read.
+
+use std::collections::VecDeque;
+
+use enfilade_geom::Allowance;
+use rayon::prelude::*;
+
+use super::super::edt::{LANES, Span, Tables, along_rows, load, within_slice, work_of};
+use super::super::grid::{BitVolume, for_runs};
+use super::basins::STEPS;
+use super::crests::Shape;
+
+/// The part of a word that is a level; 0 is occupied.
+const LEVEL: u16 = 0x3FFF;
+/// Marks a free voxel that is known to be outdoors.
+pub(super) const OUTDOORS: u16 = 0x8000;
+
+/// Slices read on either side of a slab at first, for rooms of up to so many voxels. It doubles where that is too few.
+const HALO: usize = 16;
+
+pub(super) fn level(word: u16) -> u16 {
+    word & LEVEL
+}
+
+pub(super) fn is_outdoors(word: u16) -> bool {
+    word & OUTDOORS != 0
+}
+
+/// Levels of all voxels of a box.
+#[derive(Clone, Debug)]
+pub(super) enum Levels {
+    Plain(Vec<u16>),
+    /// One block for each layer.
+    Packed(Vec<Vec<u8>>),
+}
+
+impl Levels {
+    /// Converts squared distances to levels, in place, and marks the free voxels of `outdoors`.
+    pub(super) fn of(shape: Shape, mut squared: Vec<u16>, outdoors: &Outdoors<'_>) -> Self {
+        let table = table();
+        let rows = squared.par_chunks_mut(shape.dims[0].max(1)).enumerate();
+        rows.with_min_len(64)
+            .for_each(|(row, words)| to_levels(shape, row, words, &table, outdoors));
+        Self::Plain(squared)
+    }
+
+    /// Measures the distances to what `blocked` holds, in slabs of `thick` layers, with less work in `far`.
+    pub(super) fn measured(
+        blocked: &BitVolume,
+        far: &BitVolume,
+        thick: usize,
+        allowance: &Allowance,
+    ) -> Self {
+        let shape = Shape {
+            dims: blocked.dims(),
+        };
+        let [nx, ny, nz] = shape.dims;
+        let (table, tables) = (table(), Tables::of(nx));
+        let outdoors = Outdoors::AtBorder(far);
+        let mut near = Slices {
+            first: 0,
+            slices: VecDeque::new(),
+        };
+        let mut halo = HALO;
+        let mut layers: Vec<Vec<u8>> = Vec::with_capacity(nz);
+        let mut words: Vec<u16> = Vec::new();
+        for from in (0..nz).step_by(thick) {
+            let to = nz.min(from + thick);
+            words.resize((to - from) * shape.layer(), 0);
+            loop {
+                let span = Span {
+                    n: nz,
+                    read: [from.saturating_sub(halo), nz.min(to + halo)],
+                    own: [from, to],
+                };
+                near.read(blocked, far, span.read, &tables, allowance);
+                if near.sweep(far, span, &mut words, allowance) {
+                    break;
+                }
+                halo *= 2;
+            }
+            if allowance.is_over() {
+                break;
+            }
+            let layer = |(z, words): (usize, &mut [u16])| {
+                for (row, words) in (z * ny..).zip(words.chunks_mut(nx)) {
+                    to_levels(shape, row, words, &table, &outdoors);
+                }
+                lz4_flex::block::compress(bytemuck::cast_slice(words))
+            };
+            let own = words.par_chunks_mut(shape.layer()).enumerate();
+            layers.par_extend(own.map(|(k, words)| layer((from + k, words))));
+        }
+        Self::Packed(layers)
+    }
+
+    /// Returns the levels of layers `from..to`, in `buffer` if they were packed.
+    pub(super) fn read<'a>(
+        &'a self,
+        shape: Shape,
+        [from, to]: [usize; 2],
+        buffer: &'a mut Vec<u16>,
+    ) -> &'a [u16] {
+        let layer = shape.layer();
+        match self {
+            Self::Plain(words) => &words[from * layer..to * layer],
+            Self::Packed(layers) => {
+                buffer.resize((to - from) * layer, 0);
+                for (packed, words) in layers[from..to].iter().zip(buffer.chunks_mut(layer)) {
+                    let n = lz4_flex::block::decompress_into(packed, bytemuck::cast_slice_mut(words));
+                    assert_eq!(n.ok(), Some(2 * layer), "a layer as it was packed");
+                }
+                buffer
+            }
+        }
+    }
+}
+
+/// Returns the level of each squared distance.
+fn table() -> Vec<u16> {
+    (0..=u16::MAX)
+        .map(|d| (f64::from(d).sqrt() * f64::from(STEPS)) as u16)
+        .collect()
+}
+
+/// Voxels known to be outdoors, if they are free.
+pub(super) enum Outdoors<'a> {
+    Nothing,
+    Only(&'a BitVolume),
+    /// These, and all at the border of the box.
+    AtBorder(&'a BitVolume),
+}
+
+impl Outdoors<'_> {
+    /// Calls `run(from, to)` for runs of voxels of a row; some may overlap.
+    pub(super) fn for_runs(
+        &self,
+        shape: Shape,
+        row: usize,
+        mut run: impl FnMut(usize, usize),
+    ) {
+        let [nx, ny, nz] = shape.dims;
+        let (y, z) = (row % ny, row / ny);
+        match self {
+            Self::Nothing => {}
+            Self::Only(set) => for_runs(set.row(row), |from, to| run(from as usize, to as usize)),
+            Self::AtBorder(_) if y == 0 || z == 0 || y + 1 == ny || z + 1 == nz => run(0, nx),
+            Self::AtBorder(set) => {
+                for_runs(set.row(row), |from, to| run(from as usize, to as usize));
+                run(0, 1);
+                run(nx - 1, nx);
+            }
+        }
+    }
+}
+
+fn to_levels(shape: Shape, row: usize, words: &mut [u16], table: &[u16], outdoors: &Outdoors<'_>) {
+    for word in &mut *words {
+        *word = table[usize::from(*word)];
+    }
+    outdoors.for_runs(shape, row, |from, to| {
+        for word in &mut words[from..to] {
+            *word |= if *word == 0 { 0 } else { OUTDOORS };
+        }
+    });
+}
+
+/// Squared distances within slices, those from `first` on.
+struct Slices {
+    first: usize,
+    slices: VecDeque<Vec<u16>>,
+}
+
+impl Slices {
+    /// Ensures that the slices `from..to` are there, and no others before them.
+    fn read(
+        &mut self,
+        blocked: &BitVolume,
+        far: &BitVolume,
+        [from, to]: [usize; 2],
+        tables: &Tables<u16>,
+        allowance: &Allowance,
+    ) {
+        let [nx, ny, _] = blocked.dims();
+        while self.first < from && self.slices.pop_front().is_some() {
+            self.first += 1;
+        }
+        if self.slices.is_empty() {
+            self.first = from;
+        }
+        let measure = |scratch: &mut Vec<[u16; LANES]>, k: usize| {
+            let mut slice = vec![0; nx * ny];
+            if allowance.spend(work_of(nx * ny)) {
+                within_slice(blocked, Some(far), k, &mut slice, tables, scratch);
+            }
+            slice
+        };
+        let of = |range: std::ops::Range<usize>| -> Vec<Vec<u16>> {
+            range.into_par_iter().map_init(Vec::new, measure).collect()
+        };
+        for slice in of(from..self.first).into_iter().rev() {
+            self.slices.push_front(slice);
+            self.first -= 1;
+        }
+        let end = self.first + self.slices.len();
+        self.slices.extend(of(end..to.max(end)));
+    }
+
+    /// Writes the squared distances of a slab; returns `false` if more slices could matter.
+    fn sweep(&self, far: &BitVolume, span: Span, words: &mut [u16], allowance: &Allowance) -> bool {
+        let [nx, ny, _] = far.dims();
+        let n_own = span.own[1] - span.own[0];
+        let mut columns: Vec<Vec<&mut [u16]>> = (0..ny).map(|_| Vec::with_capacity(n_own)).collect();
+        for (row, words) in words.chunks_mut(nx).enumerate() {
+            columns[row % ny].push(words);
+        }
+        let from = span.read[0] - self.first;
+        let read = from..from + span.read[1] - span.read[0];
+        columns
+            .par_iter_mut()
+            .enumerate()
+            .map_init(Vec::new, |scratch, (j, rows)| {
+                if !allowance.spend(work_of(nx * n_own)) {
+                    return true;
+                }
+                let slices = self.slices.range(read.clone());
+                load(slices.map(|slice| &slice[j * nx..][..nx]), scratch);
+                along_rows(rows, span, scratch, &|k, b| far.row(j + ny * k)[b])
+            })
+            .reduce(|| true, |a, b| a && b)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{border, distance_squared_near, far_outdoors};
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        // Covers V13.
+        #[test]
+        fn levels_measured_slab_by_slab_are_those_of_the_whole_field(
+            dims in [1_usize..150, 1_usize..30, 1_usize..90],
+            places in prop::collection::vec(any::<usize>(), 0..12),
+            thick in 1_usize..40,
+        ) {
+            let shape = Shape { dims };
+            let mut blocked = BitVolume::new(dims);
+            for place in places {
+                let at = shape.coords(place % dims.iter().product::<usize>());
+                blocked.set(at[0], at[1], at[2], true);
+            }
+            let allowance = Allowance::default();
+            let far = far_outdoors(&blocked, &allowance);
+            let mut outdoors = border(dims);
+            outdoors.union_with(&far);
+            let whole = distance_squared_near(&blocked, &far, &allowance);
+            let whole = Levels::of(shape, whole, &Outdoors::Only(&outdoors));
+            let slabs = Levels::measured(&blocked, &far, thick, &allowance);
+            let (mut a, mut b) = (Vec::new(), Vec::new());
+            let all = [0, dims[2]];
+            prop_assert_eq!(slabs.read(shape, all, &mut a), whole.read(shape, all, &mut b));
+        }
+    }
+}
