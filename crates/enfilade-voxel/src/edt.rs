@@ -311,7 +311,8 @@ impl Span {
 
     /// Returns `true` if all rows of the box within `k` of row `i` are read.
     fn contains(&self, i: usize, k: usize) -> bool {
-        (self.read[0] == 0 || i >= self.read[0] + k) && (self.read[1] == self.n || i + k < self.read[1])
+        (self.read[0] == 0 || i >= self.read[0] + k)
+            && (self.read[1] == self.n || i + k < self.read[1])
     }
 }
 

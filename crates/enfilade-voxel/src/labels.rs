@@ -273,6 +273,14 @@ impl Labels {
             let end = along.end.min((x / EDGE + 1) * EDGE);
             if head & MIXED == 0 {
                 next(x, head);
+            } else if let Some((list, words)) = self.listed(head) {
+                let width = place(head).1;
+                let (bit, each) = (row << width, 1 << width);
+                // All four lie in one word.
+                let which = words[bit / 32] as usize >> (bit % 32);
+                for x in x..end {
+                    next(x, list[which >> (x % EDGE * each) & (list.len() - 1)]);
+                }
             } else {
                 (x..end).for_each(|x| next(x, self.in_block(head, row + x % EDGE)));
             }
@@ -281,6 +289,35 @@ impl Labels {
         if let Some(label) = label {
             run(start..along.end, label);
         }
+    }
+
+    /// Returns all voxels of a layer of bricks that have a label, in no particular order.
+    ///
+    /// # Panics
+    /// If the layer is outside the box.
+    #[must_use]
+    pub fn voxels_of(&self, label: u32, layer: usize) -> Vec<[usize; 3]> {
+        let [bx, by, _] = self.bricks;
+        let mut found = Vec::new();
+        let heads = &self.heads[bx * by * layer..][..bx * by];
+        for (at, &head) in heads.iter().enumerate() {
+            let may_be = match head & MIXED {
+                0 => head == label,
+                _ => self.listed(head).is_none_or(|l| l.0.contains(&label)),
+            };
+            if !may_be {
+                continue;
+            }
+            let corner = [at % bx, at / bx, layer].map(|b| b * EDGE);
+            for (voxel, &here) in self.brick(head).iter().enumerate() {
+                let within = [voxel % EDGE, voxel / EDGE % EDGE, voxel / (EDGE * EDGE)];
+                let at = [0, 1, 2].map(|k| corner[k] + within[k]);
+                if here == label && (0..3).all(|k| at[k] < self.dims[k]) {
+                    found.push(at);
+                }
+            }
+        }
+        found
     }
 
     /// Returns the number of layers of bricks, which [`Self::for_faces`] takes one by one.
@@ -601,6 +638,11 @@ mod tests {
             }
             found.sort_unstable();
             prop_assert_eq!(found, expected);
+            let twos = (0..labels.n_layers()).flat_map(|layer| labels.voxels_of(2, layer));
+            let mut twos: Vec<usize> = twos.map(|[x, y, z]| x + nx * (y + ny * z)).collect();
+            twos.sort_unstable();
+            let expected = (0..plain.len()).filter(|&i| plain[i] == 2);
+            prop_assert!(twos.into_iter().eq(expected));
             // Some labels become the same, some differ by height.
             let new_label = |label: u32, y: usize| match label {
                 0..3 => 5,

@@ -15,6 +15,7 @@ mod enclosure;
 mod far;
 mod grid;
 mod labels;
+mod sparse;
 mod voxelize;
 mod watershed;
 mod widest;
@@ -25,6 +26,9 @@ pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use far::far_outdoors;
 pub use grid::{BitVolume, Grid, for_runs, set_bits};
 pub use labels::Labels;
+pub use sparse::SparseVolume;
 pub use voxelize::voxelize;
-pub use watershed::{Basin, DistanceField, Saddle, Watershed, WatershedOptions, mark_dams, watershed};
+pub use watershed::{
+    Basin, DistanceField, Saddle, Watershed, WatershedOptions, mark_dams, watershed,
+};
 pub use widest::{WidestPath, border, widest_path};

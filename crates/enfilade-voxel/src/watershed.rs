@@ -103,8 +103,7 @@ fn watershed_by(
         return Watershed::unflooded(dims);
     }
     let shape = Shape { dims };
-    let first_outdoors =
-        outdoors.map(|o| o.iter_set().find(|&v| squared[v] != 0).unwrap_or(0));
+    let first_outdoors = outdoors.map(|o| o.iter_set().find(|&v| squared[v] != 0).unwrap_or(0));
     let outdoors = outdoors.map_or(Outdoors::Nothing, Outdoors::Only);
     let levels = Levels::of(shape, squared, &outdoors);
     flood(shape, &levels, thick, first_outdoors, options.h, allowance)

@@ -1,5 +1,7 @@
 //! The air of a scene in voxels, before it is divided.
 
+use std::borrow::Cow;
+
 use enfilade_geom::Allowance;
 
 use super::lids::{Lids, find_lids};
@@ -7,7 +9,7 @@ use super::rims::rim_caps;
 use crate::config::BYTES_A_VOXEL;
 use crate::structure::{Site, Structure};
 use crate::voxel::{
-    BitVolume, DistanceField, Grid, distance_squared_near, far_outdoors, voxelize,
+    BitVolume, DistanceField, Grid, SparseVolume, distance_squared_near, far_outdoors, voxelize,
 };
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
@@ -122,10 +124,10 @@ pub(crate) fn measure(
 pub(crate) struct Solid {
     pub(super) occupied: BitVolume,
     /// Voxels that door leaves and panes fill.
-    pub(super) closures: BitVolume,
+    pub(super) closures: SparseVolume,
     pub(super) lids: Lids,
     /// Closures, lids, caps of open tubes, and missing wall triangles.
-    pub(super) shut: BitVolume,
+    pub(super) shut: SparseVolume,
 }
 
 impl Solid {
@@ -144,9 +146,9 @@ impl Solid {
         }
         Self {
             occupied,
-            closures,
+            closures: SparseVolume::of(&closures),
             lids,
-            shut,
+            shut: SparseVolume::of(&shut),
         }
     }
 
@@ -164,9 +166,11 @@ impl Solid {
     }
 
     /// Returns all voxels that stop a flood, and the outdoor voxels far from them.
-    fn blocked(&self, allowance: &Allowance) -> (BitVolume, BitVolume) {
-        let mut blocked = self.occupied.clone();
-        blocked.union_with(&self.shut);
+    fn blocked(&self, allowance: &Allowance) -> (Cow<'_, BitVolume>, BitVolume) {
+        let mut blocked = Cow::Borrowed(&self.occupied);
+        if !self.shut.is_empty() {
+            self.shut.add_to(blocked.to_mut());
+        }
         let far = far_outdoors(&blocked, allowance);
         (blocked, far)
     }

@@ -13,7 +13,7 @@ use super::regions::{Regions, merge_basins};
 use super::slabs::cut_at_slabs;
 use crate::BakeConfig;
 use crate::structure::OUTDOORS;
-use crate::voxel::{BitVolume, Grid, Labels, border};
+use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, border};
 
 /// Marks a voxel that has a part, but no basin yet; the other bits are the part.
 const WAITING: u32 = 1 << 31;
@@ -53,10 +53,7 @@ impl Basins {
             let [x, y, z] = air.grid.coords(i);
             part_at(air.grid.center(x, y, z)).map_or(0, |part| WAITING | part)
         };
-        let mut labels: Vec<u32> = (0..distances.len())
-            .into_par_iter()
-            .map(part_of)
-            .collect();
+        let mut labels: Vec<u32> = (0..distances.len()).into_par_iter().map(part_of).collect();
         let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
         let n = number_parts(dims, &mut labels, outer);
         let mut peaks = vec![0_u16; n];
@@ -103,7 +100,7 @@ impl Basins {
     pub(super) fn merge(
         &self,
         grid: &Grid,
-        shut: &BitVolume,
+        shut: &SparseVolume,
         slabs: &[f64],
         config: &BakeConfig,
         allowance: &Allowance,

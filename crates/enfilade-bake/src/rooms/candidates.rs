@@ -10,7 +10,7 @@ use super::fronts::{
 use super::lids::Lids;
 use super::regions::Regions;
 use crate::structure::{Candidate, fit_candidate};
-use crate::voxel::{BitVolume, Grid, Labels};
+use crate::voxel::{Grid, Labels, SparseVolume};
 
 /// Smaller openings, in voxel faces, are left to the complex, which finds them as cracks.
 const MIN_FACES: usize = 4;
@@ -26,7 +26,7 @@ pub(super) fn fit_candidates(
     grid: &Grid,
     labels: &Labels,
     regions: &Regions,
-    (closures, lids): (&BitVolume, &Lids),
+    (closures, lids): (&SparseVolume, &Lids),
     walls: &[Triangle],
     [closed_share, hole]: [f64; 2],
     allowance: &Allowance,
@@ -63,7 +63,7 @@ pub(super) fn fit_candidates(
         if let Some(lid) = lids.candidate_of(grid, &faces) {
             return Some(lid);
         }
-        let is_lesser = |i: usize| regions.region_of_basin[labels.get(i) as usize] == pair[0];
+        let is_lesser = |at| regions.region_of_basin[labels.at(at) as usize] == pair[0];
         let front = front_of(grid, faces, &is_lesser, Some(closures));
         let centers: Vec<DVec3> = front.faces.iter().map(|&f| face_center(grid, f)).collect();
         let opening = &front.opening;

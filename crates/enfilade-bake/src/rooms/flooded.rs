@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
-use crate::voxel::{BitVolume, Grid, Labels};
+use crate::voxel::{Grid, Labels, SparseVolume};
 
 /// Faces through which two cells touch: voxel index × 4 + axis, for the face between the voxel and the next one
 /// along the axis.
@@ -21,7 +21,7 @@ pub(crate) struct Flooded<'a> {
     /// Largest distance in each basin. [Units: vx]
     pub(crate) peaks: &'a [f32],
     /// Voxels that a door leaf or a pane fills.
-    pub(crate) closures: Option<&'a BitVolume>,
+    pub(crate) closures: Option<&'a SparseVolume>,
     /// Heights at which basins were cut at slabs, ascending. [Units: wu]
     pub(crate) slabs: &'a [f64],
     /// Shared budget of all that works on the volume.

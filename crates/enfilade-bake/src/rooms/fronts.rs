@@ -7,7 +7,7 @@ use enfilade_geom::{DVec3, Plane, Sets};
 pub(super) use super::flooded::Faces;
 use super::flooded::Flooded;
 use crate::structure::Opening;
-use crate::voxel::{BitVolume, Grid};
+use crate::voxel::{Grid, SparseVolume};
 
 /// A connected or coplanar group of faces between two cells.
 #[derive(Clone, Debug)]
@@ -21,8 +21,10 @@ pub(crate) struct Front {
 /// Returns the center of a face. [Units: wu]
 #[must_use]
 pub(crate) fn face_center(grid: &Grid, face: u64) -> DVec3 {
-    let axis = (face % 4) as usize;
-    let [i, j, k] = grid.coords((face / 4) as usize);
+    center_of(grid, grid.coords((face / 4) as usize), (face % 4) as usize)
+}
+
+fn center_of(grid: &Grid, [i, j, k]: [usize; 3], axis: usize) -> DVec3 {
     let mut p = grid.center(i, j, k);
     p[axis] += grid.voxel * 0.5;
     p
@@ -30,10 +32,19 @@ pub(crate) fn face_center(grid: &Grid, face: u64) -> DVec3 {
 
 /// Returns `true` if one of a face's two voxels is in a set.
 #[must_use]
-pub(crate) fn is_in(grid: &Grid, voxels: &BitVolume, face: u64) -> bool {
-    let [nx, ny, _] = grid.dims;
-    let (index, axis) = ((face / 4) as usize, (face % 4) as usize);
-    voxels.get_index(index) || voxels.get_index(index + [1, nx, nx * ny][axis])
+pub(crate) fn is_in(grid: &Grid, voxels: &SparseVolume, face: u64) -> bool {
+    is_beside(
+        voxels,
+        grid.coords((face / 4) as usize),
+        (face % 4) as usize,
+    )
+}
+
+/// Returns `true` if a voxel or the next one along an axis is in a set.
+fn is_beside(voxels: &SparseVolume, at: [usize; 3], axis: usize) -> bool {
+    let mut next = at;
+    next[axis] += 1;
+    [at, next].iter().any(|&[i, j, k]| voxels.get(i, j, k))
 }
 
 /// Cost per face of finding patches, in units of [`Allowance`](enfilade_geom::Allowance).
@@ -43,12 +54,12 @@ pub(super) const WORK_A_FACE: u64 = 8;
 ///
 /// Faces that touch (or nearly: within two voxels) belong together. Groups that share a plane are also
 /// one opening, because a column in the middle of a wide opening does not make two doors of it.
-/// `is_lesser` returns `true` if a voxel index lies in the cell with the lower label.
+/// `is_lesser` returns `true` if a voxel lies in the cell with the lower label.
 #[must_use]
 pub(crate) fn group_faces(
     flooded: Flooded<'_>,
     faces: &[u64],
-    is_lesser: &dyn Fn(usize) -> bool,
+    is_lesser: &dyn Fn([usize; 3]) -> bool,
 ) -> Vec<Front> {
     let Flooded {
         grid,
@@ -149,19 +160,19 @@ pub(crate) fn connected_patches(grid: &Grid, faces: &[u64]) -> Vec<Faces> {
 pub(crate) fn front_of(
     grid: &Grid,
     faces: Faces,
-    is_lesser: &dyn Fn(usize) -> bool,
-    closures: Option<&BitVolume>,
+    is_lesser: &dyn Fn([usize; 3]) -> bool,
+    closures: Option<&SparseVolume>,
 ) -> Front {
-    let [nx, ny, _] = grid.dims;
     let unit = grid.voxel * grid.voxel;
     let (mut vector, mut center, mut closed) = (DVec3::ZERO, DVec3::ZERO, 0_usize);
     let mut per_axis = [0_usize; 3];
     for &face in &faces {
-        let (index, axis) = ((face / 4) as usize, (face % 4) as usize);
-        vector[axis] += if is_lesser(index) { 1.0 } else { -1.0 };
+        let axis = (face % 4) as usize;
+        let at = grid.coords((face / 4) as usize);
+        vector[axis] += if is_lesser(at) { 1.0 } else { -1.0 };
         per_axis[axis] += 1;
-        center += face_center(grid, face);
-        closed += usize::from(closures.is_some_and(|bits| is_in(grid, bits, face)));
+        center += center_of(grid, at, axis);
+        closed += usize::from(closures.is_some_and(|bits| is_beside(bits, at, axis)));
     }
     center /= faces.len() as f64;
     // A flat front seen along the worst diagonal has √3 times its area in voxel faces. If the vector area
@@ -176,7 +187,8 @@ pub(crate) fn front_of(
             .filter(|&&f| (f % 4) as usize == axis)
             .map(|&f| {
                 let i = (f / 4) as usize;
-                let at = [i % nx, i / nx % ny, i / (nx * ny)];
+                let [nx, ny, _] = grid.dims;
+                let at = grid.coords(i);
                 match axis {
                     0 => at[1] + at[2] * ny,
                     1 => at[0] + at[2] * nx,

@@ -22,7 +22,7 @@ use std::ops::Range;
 use enfilade_geom::{Allowance, Sets};
 use rayon::prelude::*;
 
-use crate::voxel::{BitVolume, Grid, Labels, distance};
+use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, distance};
 
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
@@ -48,7 +48,7 @@ pub(crate) fn split_limbs(
     labels: &mut Labels,
     regions: &mut Regions,
     peaks: &mut Vec<f32>,
-    shut: &BitVolume,
+    shut: &SparseVolume,
     settings: &MergeSettings,
     allowance: &Allowance,
 ) {
@@ -145,7 +145,7 @@ fn join_limbs(
         if b < first || s.max(t) >= THICKER * s.min(t) {
             continue;
         }
-        let is_lesser = |i: usize| region_of(flooded.labels.get(i)) == a;
+        let is_lesser = |at| region_of(flooded.labels.at(at)) == a;
         let fronts = group_faces(flooded, faces, &is_lesser);
         let Some(front) = fronts.first() else {
             continue;

@@ -21,26 +21,21 @@ pub(crate) fn flood_closures(labels: &mut Labels, occupied: &BitVolume) {
         .filter(|n| n.0)
         .map(|n| n.1)
     };
-    // First round: air voxels without a label that touch a labelled one, in index order.
+    // First round: air voxels without a label that touch a labelled one.
     let before = &*labels;
-    let of_row = |row: usize| {
-        let (y, z) = (row % ny, row / ny);
-        let bits = occupied.row(row);
-        let mut waiting: Vec<usize> = Vec::new();
-        before.for_runs(row * nx..(row + 1) * nx, |run, label| {
-            if label == 0 {
-                let run = run.start - row * nx..run.end - row * nx;
-                waiting.extend(run.filter(|x| bits[x / 64] >> (x % 64) & 1 == 0));
-            }
-        });
-        waiting.into_iter().filter_map(move |x| {
-            let around = neighbors([x, y, z]).map(|at| before.at(at));
-            let first = around.into_iter().find(|&label| label != 0);
-            first.map(|label| ([z, y, x], label))
-        })
+    let of_layer = |layer: usize| {
+        let waiting = before.voxels_of(0, layer).into_iter();
+        waiting
+            .filter(|&[x, y, z]| !occupied.get(x, y, z))
+            .filter_map(|at| {
+                let around = neighbors(at).map(|at| before.at(at));
+                let first = around.into_iter().find(|&label| label != 0);
+                first.map(|label| ([at[2], at[1], at[0]], label))
+            })
     };
-    let rows = (0..ny * nz).into_par_iter().with_min_len(64);
-    let mut front: Vec<([usize; 3], u32)> = rows.flat_map_iter(of_row).collect();
+    let layers = (0..labels.n_layers()).into_par_iter();
+    let mut front: Vec<([usize; 3], u32)> = layers.flat_map_iter(of_layer).collect();
+    front.par_sort_unstable();
     while !front.is_empty() {
         for &([z, y, x], label) in &front {
             labels.set([x, y, z], label);

@@ -228,7 +228,9 @@ impl BasinMerger<'_> {
             });
             sides
         };
-        let layers = (0..labels.n_layers()).into_par_iter().with_min_len(LAYERS / 4);
+        let layers = (0..labels.n_layers())
+            .into_par_iter()
+            .with_min_len(LAYERS / 4);
         layers.fold(zero, count).reduce(zero, sum)
     }
 
@@ -281,7 +283,7 @@ impl Mergeable for BasinMerger<'_> {
             return low;
         }
         self.flooded.allowance.spend(WORK);
-        let side = |i: usize| self.cell[self.flooded.labels.get(i) as usize] == a;
+        let side = |at| self.cell[self.flooded.labels.at(at) as usize] == a;
         let fronts = group_faces(self.flooded, faces, &side);
         // The two largest are enough: a third opening between the same two is smaller still.
         fronts

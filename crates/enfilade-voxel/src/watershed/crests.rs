@@ -8,7 +8,7 @@ use super::levels::{Levels, OUTDOORS, level};
 /// Crest voxels at this many steps from the rim of their plateau, or more, count as peaks.
 ///
 /// So an ascent depends on voxels within that distance only, however large a plateau is.
-const FAR: u32 = 255;
+const FAR: u8 = u8::MAX;
 
 /// A box whose voxels are numbered along x, then y, then z.
 #[derive(Clone, Copy, Debug)]
@@ -51,29 +51,7 @@ pub(super) struct Peak {
     pub(super) voxel: u32,
 }
 
-/// A crest voxel as it is found.
-#[derive(Clone, Copy)]
-struct Crest {
-    voxel: u32,
-    level: u16,
-    /// The neighbors at the same level, a bit for each in the order of [`Shape::neighbors`].
-    alike: u8,
-}
-
-impl Crest {
-    /// Returns the neighbors at the same level, those of `mask`.
-    fn beside(&self, shape: Shape, mask: u8) -> impl Iterator<Item = usize> + use<> {
-        let [row, layer] = [shape.dims[0] as isize, shape.layer() as isize];
-        let steps = [-layer, -row, -1, 1, row, layer];
-        let (voxel, alike) = (self.voxel as usize, self.alike & mask);
-        let is_alike = move |k: &usize| alike >> k & 1 != 0;
-        (0..6)
-            .filter(is_alike)
-            .map(move |k| voxel.wrapping_add_signed(steps[k]))
-    }
-}
-
-/// All neighbors.
+/// All neighbors in a mask of those alike, a bit for each in the order of [`Shape::neighbors`].
 const AROUND: u8 = 0b11_1111;
 /// Those that come after a voxel.
 const AFTER: u8 = 0b11_1000;
@@ -84,24 +62,24 @@ pub(super) struct Crests {
     bits: Vec<u64>,
     /// Number of crest voxels before each word of `bits`.
     before: Vec<u32>,
-    /// For each crest voxel the steps along its plateau to a voxel with a higher neighbor; on a peak [`FAR`] plus its
-    /// number.
-    steps: Vec<u32>,
+    /// For each crest voxel the steps along its plateau to a voxel with a higher neighbor; [`FAR`] on a peak.
+    steps: Vec<u8>,
+    /// The crest voxels on peaks, by their position among all, and the number of the peak.
+    summits: Vec<(u32, u32)>,
     /// Deepest first, then by voxel.
     pub(super) peaks: Vec<Peak>,
 }
 
+/// For each crest voxel the mask of neighbors at the same level.
+type Alike = Vec<u8>;
+
 impl Crests {
     /// Finds the crests, in slabs of `thick` layers.
     ///
-    /// Linear in voxels; a fifth of a byte a voxel, and 16 bytes for each crest voxel, 4 of them to stay.
+    /// Linear in voxels; a fifth of a byte a voxel, and 2 bytes for each crest voxel, one of them to stay, and 8 for those
+    /// inside plateaus.
     pub(super) fn of(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Self {
-        let found = find(shape, levels, thick, allowance);
-        let n_voxels = shape.layer() * shape.dims[2];
-        let mut bits = vec![0_u64; n_voxels.div_ceil(64)];
-        for crest in &found {
-            bits[crest.voxel as usize / 64] |= 1 << (crest.voxel % 64);
-        }
+        let (bits, alike) = find(shape, levels, thick, allowance);
         let mut n = 0;
         let before = bits
             .iter()
@@ -113,11 +91,14 @@ impl Crests {
         let mut crests = Self {
             bits,
             before,
-            steps: vec![FAR; found.len()],
+            steps: Vec::new(),
+            summits: Vec::new(),
             peaks: Vec::new(),
         };
-        crests.measure(shape, &found, allowance);
-        crests.number(shape, &found);
+        crests.measure(shape, &alike, allowance);
+        let peaks = crests.number(shape, &alike);
+        drop(alike);
+        crests.rank(shape, levels, peaks);
         crests
     }
 
@@ -129,76 +110,123 @@ impl Crests {
             .then(|| self.before[voxel / 64] as usize + below.count_ones() as usize)
     }
 
+    /// Returns all crest voxels, each with its position, in order.
+    fn all(&self) -> impl ParallelIterator<Item = (usize, usize)> + '_ {
+        let words = self.bits.par_iter().zip(&self.before).enumerate();
+        words.flat_map_iter(|(w, (&word, &before))| {
+            let mut rest = word;
+            let next = move || {
+                let bit = rest.trailing_zeros() as usize;
+                rest &= rest.wrapping_sub(1);
+                (bit < 64).then_some(w * 64 + bit)
+            };
+            (before as usize..).zip(std::iter::from_fn(next))
+        })
+    }
+
     /// Returns the steps from a voxel to one with a higher neighbor; 0 if it has one itself.
-    fn steps_of(&self, voxel: usize) -> u32 {
+    fn steps_of(&self, voxel: usize) -> u8 {
         self.find(voxel).map_or(0, |at| self.steps[at])
     }
 
     /// Measures the steps breadth first, from the rims of plateaus inward.
-    fn measure(&mut self, shape: Shape, found: &[Crest], allowance: &Allowance) {
-        let beside = |at: u32| {
-            let around = found[at as usize].beside(shape, AROUND);
-            around.map(|q| self.find(q))
+    fn measure(&mut self, shape: Shape, alike: &Alike, allowance: &Allowance) {
+        let around = |at: usize, voxel: usize| beside(shape, voxel, alike[at] & AROUND);
+        // Most crest voxels are rims, so these are never listed.
+        let of_rim = |(at, voxel)| match around(at, voxel).any(|q| self.find(q).is_none()) {
+            true => 1,
+            false => FAR,
         };
-        let is_rim = |&at: &u32| beside(at).any(|q| q.is_none());
-        let all = 0..found.len() as u32;
-        let mut front: Vec<u32> = all.into_par_iter().filter(is_rim).collect();
-        for steps in 1..FAR {
-            for &at in &front {
-                self.steps[at as usize] = steps;
+        self.steps = self.all().map(of_rim).collect();
+        if !allowance.spend(1 + self.steps.len() as u64 / 2) {
+            return;
+        }
+        let is_next = |&(at, voxel): &(usize, usize)| {
+            self.steps[at] == FAR && around(at, voxel).any(|q| self.steps_of(q) == 1)
+        };
+        let next = self.all().filter(is_next);
+        let mut front: Vec<u32> = next.map(|(_, voxel)| voxel as u32).collect();
+        for steps in 2..FAR {
+            for &voxel in &front {
+                if let Some(at) = self.find(voxel as usize) {
+                    self.steps[at] = steps;
+                }
             }
-            if !allowance.spend(1 + front.len() as u64 / 2) {
+            if front.is_empty() || !allowance.spend(1 + front.len() as u64 / 2) {
                 return;
             }
             let mut next: Vec<u32> = Vec::new();
-            for &at in &front {
-                let around = found[at as usize].beside(shape, AROUND);
-                let crests = around.filter_map(|q| self.find(q));
-                next.extend(crests.filter(|&q| self.steps[q] == FAR).map(|q| q as u32));
+            for &voxel in &front {
+                let voxel = voxel as usize;
+                let inner = self.find(voxel).into_iter();
+                let around = inner.flat_map(|at| around(at, voxel));
+                next.extend(
+                    around
+                        .filter(|&q| self.steps_of(q) == FAR)
+                        .map(|q| q as u32),
+                );
             }
             next.sort_unstable();
             next.dedup();
-            if next.is_empty() {
-                return;
-            }
             front = next;
         }
     }
 
-    /// Numbers the peaks: sets of crest voxels at one level that the rims do not reach.
-    fn number(&mut self, shape: Shape, found: &[Crest]) {
-        let mut plateaus = Sets::new(found.len());
-        for (at, crest) in found.iter().enumerate() {
-            if self.steps[at] < FAR {
-                continue;
-            }
-            for q in crest.beside(shape, AFTER) {
-                if let Some(other) = self.find(q).filter(|&o| self.steps[o] == FAR) {
-                    plateaus.join(at as u32, other as u32);
+    /// Finds the peaks: sets of crest voxels at one level that the rims do not reach. Returns the first voxel of each, and
+    /// leaves the number in this order in `summits`.
+    fn number(&mut self, shape: Shape, alike: &Alike) -> Vec<usize> {
+        let on_peaks = self.all().filter(|&(at, _)| self.steps[at] == FAR);
+        let on_peaks: Vec<(usize, usize)> = on_peaks.collect();
+        let mut plateaus = Sets::new(on_peaks.len());
+        for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
+            for q in beside(shape, voxel, alike[at] & AFTER) {
+                if let Ok(other) = on_peaks.binary_search_by_key(&q, |&(_, voxel)| voxel) {
+                    plateaus.join(k as u32, other as u32);
                 }
             }
         }
         // The least member of a set is its first voxel.
         let first = plateaus.into_least();
-        let is_peak = |&at: &usize| self.steps[at] == FAR && first[at] as usize == at;
-        let level_at = |at: usize| found[at].level;
-        let mut order: Vec<usize> = (0..found.len()).filter(is_peak).collect();
-        order.par_sort_unstable_by_key(|&at| (std::cmp::Reverse(level_at(at)), at));
-        self.peaks = order
-            .iter()
-            .map(|&at| Peak {
-                level: level_at(at),
-                voxel: found[at].voxel,
-            })
-            .collect();
-        for (n, &at) in order.iter().enumerate() {
-            self.steps[at] += n as u32;
-        }
-        for (at, &first) in first.iter().enumerate() {
-            if self.steps[at] == FAR {
-                self.steps[at] = self.steps[first as usize];
+        let mut peaks = Vec::new();
+        let mut number = vec![0_u32; on_peaks.len()];
+        for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
+            if first[k] as usize == k {
+                number[k] = peaks.len() as u32;
+                peaks.push(voxel);
+            } else {
+                number[k] = number[first[k] as usize];
             }
+            self.summits.push((at as u32, number[k]));
         }
+        peaks
+    }
+
+    /// Sorts the peaks, given the first voxel of each in ascending order.
+    fn rank(&mut self, shape: Shape, levels: &Levels, peaks: Vec<usize>) {
+        let layers: Vec<&[usize]> = peaks
+            .chunk_by(|a, b| a / shape.layer() == b / shape.layer())
+            .collect();
+        let of_layer = |buffer: &mut Vec<u16>, voxels: &&[usize]| -> Vec<Peak> {
+            let z = voxels[0] / shape.layer();
+            let words = levels.read(shape, [z, z + 1], buffer);
+            let peak = |&voxel: &usize| Peak {
+                level: level(words[voxel - z * shape.layer()]),
+                voxel: voxel as u32,
+            };
+            voxels.iter().map(peak).collect()
+        };
+        let found: Vec<Vec<Peak>> = layers.par_iter().map_init(Vec::new, of_layer).collect();
+        let found = found.concat();
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        order.par_sort_unstable_by_key(|&k| (std::cmp::Reverse(found[k].level), k));
+        let mut rank = vec![0_u32; order.len()];
+        for (n, &k) in order.iter().enumerate() {
+            rank[k] = n as u32;
+        }
+        for (_, number) in &mut self.summits {
+            *number = rank[*number as usize];
+        }
+        self.peaks = order.into_iter().map(|k| found[k]).collect();
     }
 
     /// Returns the next voxel of the ascent from a crest voxel, on the shortest way to its plateau's rim and last of
@@ -210,8 +238,10 @@ impl Crests {
         voxel: usize,
     ) -> Result<usize, u32> {
         let steps = self.steps_of(voxel);
-        if steps >= FAR {
-            return Err(steps - FAR);
+        if steps == FAR {
+            let at = self.find(voxel).unwrap_or_default() as u32;
+            let of = self.summits.binary_search_by_key(&at, |&(at, _)| at);
+            return Err(of.map_or(0, |k| self.summits[k].1));
         }
         let here = level(voxel);
         let is_nearer = |&q: &usize| level(q) == here && self.steps_of(q) < steps;
@@ -223,58 +253,88 @@ impl Crests {
     }
 }
 
-/// Returns all crest voxels, in ascending order.
-fn find(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Vec<Crest> {
+/// Returns the neighbors of a voxel in a mask.
+fn beside(shape: Shape, voxel: usize, mask: u8) -> impl Iterator<Item = usize> {
+    let [row, layer] = [shape.dims[0] as isize, shape.layer() as isize];
+    let steps = [-layer, -row, -1, 1, row, layer];
+    let is_in = move |k: &usize| mask >> k & 1 != 0;
+    (0..6)
+        .filter(is_in)
+        .map(move |k| voxel.wrapping_add_signed(steps[k]))
+}
+
+/// Returns a bit for each voxel, set for crests, and for each of these the neighbors at the same level.
+fn find(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> (Vec<u64>, Alike) {
+    let n_slabs = shape.dims[2].div_ceil(thick);
+    let n_voxels = shape.layer() * shape.dims[2];
+    let (mut bits, mut alike) = (vec![0_u64; n_voxels.div_ceil(64)], Alike::new());
+    let work = 1 + (thick * shape.layer()) as u64 / 32;
+    // Some slabs at a time, so that lists of voxels are short.
+    let many = 2 * rayon::current_num_threads();
+    for from in (0..n_slabs).step_by(many) {
+        let slabs = (from..n_slabs.min(from + many)).into_par_iter();
+        let found: Vec<Vec<(u32, u8)>> = slabs
+            .filter(allowance.each(work))
+            .map_init(Vec::new, |buffer, s| {
+                find_in_slab(shape, levels, [s, thick], buffer)
+            })
+            .collect();
+        for (voxel, mask) in found.into_iter().flatten() {
+            bits[voxel as usize / 64] |= 1 << (voxel % 64);
+            alike.push(mask);
+        }
+    }
+    (bits, alike)
+}
+
+/// Returns the crest voxels of slab `s` of those of `thick` layers, each with its mask, in ascending order.
+fn find_in_slab(
+    shape: Shape,
+    levels: &Levels,
+    [s, thick]: [usize; 2],
+    buffer: &mut Vec<u16>,
+) -> Vec<(u32, u8)> {
     let [nx, ny, nz] = shape.dims;
-    let of_slab = |buffer: &mut Vec<u16>, s: usize| {
-        let own = s * thick..nz.min((s + 1) * thick);
-        let read = [own.start.saturating_sub(1), nz.min(own.end + 1)];
-        let words = levels.read(shape, read, buffer);
-        let row_of = |row: usize| &words[(row - read[0] * ny) * nx..][..nx];
-        let mut found = Vec::new();
-        let mut most = vec![0_u16; nx];
-        for row in own.start * ny..own.end * ny {
-            let here = row_of(row);
-            let rows = rows_around(shape, row).map(|other| other.map(row_of));
-            most.fill(0);
-            for other in rows.into_iter().flatten() {
-                for (most, word) in most.iter_mut().zip(other) {
-                    *most = (*most).max(level(*word));
-                }
-            }
-            for (most, word) in most[1..].iter_mut().zip(here) {
+    let own = s * thick..nz.min((s + 1) * thick);
+    let read = [own.start.saturating_sub(1), nz.min(own.end + 1)];
+    let words = levels.read(shape, read, buffer);
+    let row_of = |row: usize| &words[(row - read[0] * ny) * nx..][..nx];
+    let mut found = Vec::new();
+    let mut most = vec![0_u16; nx];
+    for row in own.start * ny..own.end * ny {
+        let here = row_of(row);
+        let rows = rows_around(shape, row).map(|other| other.map(row_of));
+        most.fill(0);
+        for other in rows.into_iter().flatten() {
+            for (most, word) in most.iter_mut().zip(other) {
                 *most = (*most).max(level(*word));
-            }
-            for (most, word) in most.iter_mut().zip(&here[1..]) {
-                *most = (*most).max(level(*word));
-            }
-            for (x, (&word, &most)) in here.iter().zip(&most).enumerate() {
-                // Neither occupied nor outdoors.
-                if word != 0 && word < OUTDOORS && word >= most {
-                    let [z_before, y_before, y_after, z_after] = rows.map(|row| row.map(|r| r[x]));
-                    let x_before = (x > 0).then(|| here[x - 1]);
-                    let x_after = here.get(x + 1).copied();
-                    let around = [z_before, y_before, x_before, x_after, y_after, z_after];
-                    let is_alike = |w: Option<u16>| w.is_some_and(|w| level(w) == word);
-                    let bits = (0..).zip(around.map(is_alike));
-                    found.push(Crest {
-                        voxel: (row * nx + x) as u32,
-                        level: word,
-                        alike: bits.fold(0, |mask, (k, is)| mask | u8::from(is) << k),
-                    });
-                }
             }
         }
-        found
-    };
-    let is_allowed = allowance.each(1 + (thick * shape.layer()) as u64 / 32);
-    let slabs = (0..nz.div_ceil(thick)).into_par_iter().filter(is_allowed);
-    let per_slab: Vec<Vec<Crest>> = slabs.map_init(Vec::new, of_slab).collect();
-    per_slab.concat()
+        for (most, word) in most[1..].iter_mut().zip(here) {
+            *most = (*most).max(level(*word));
+        }
+        for (most, word) in most.iter_mut().zip(&here[1..]) {
+            *most = (*most).max(level(*word));
+        }
+        for (x, (&word, &most)) in here.iter().zip(&most).enumerate() {
+            // Neither occupied nor outdoors.
+            if word != 0 && word < OUTDOORS && word >= most {
+                let [z_before, y_before, y_after, z_after] = rows.map(|row| row.map(|r| r[x]));
+                let x_before = (x > 0).then(|| here[x - 1]);
+                let x_after = here.get(x + 1).copied();
+                let around = [z_before, y_before, x_before, x_after, y_after, z_after];
+                let is_alike = |w: Option<u16>| w.is_some_and(|w| level(w) == word);
+                let bits = (0..).zip(around.map(is_alike));
+                let mask = bits.fold(0, |mask, (k, is)| mask | u8::from(is) << k);
+                found.push(((row * nx + x) as u32, mask));
+            }
+        }
+    }
+    found
 }
 
 /// Returns the rows that share faces with a row: before it along z and y, and after it along y and z.
-pub(super) fn rows_around(shape: Shape, row: usize) -> [Option<usize>; 4] {
+fn rows_around(shape: Shape, row: usize) -> [Option<usize>; 4] {
     let [_, ny, nz] = shape.dims;
     let (y, z) = (row % ny, row / ny);
     [

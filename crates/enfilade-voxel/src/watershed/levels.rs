@@ -111,7 +111,8 @@ impl Levels {
             Self::Packed(layers) => {
                 buffer.resize((to - from) * layer, 0);
                 for (packed, words) in layers[from..to].iter().zip(buffer.chunks_mut(layer)) {
-                    let n = lz4_flex::block::decompress_into(packed, bytemuck::cast_slice_mut(words));
+                    let n =
+                        lz4_flex::block::decompress_into(packed, bytemuck::cast_slice_mut(words));
                     assert_eq!(n.ok(), Some(2 * layer), "a layer as it was packed");
                 }
                 buffer
@@ -137,12 +138,7 @@ pub(super) enum Outdoors<'a> {
 
 impl Outdoors<'_> {
     /// Calls `run(from, to)` for runs of voxels of a row; some may overlap.
-    pub(super) fn for_runs(
-        &self,
-        shape: Shape,
-        row: usize,
-        mut run: impl FnMut(usize, usize),
-    ) {
+    pub(super) fn for_runs(&self, shape: Shape, row: usize, mut run: impl FnMut(usize, usize)) {
         let [nx, ny, nz] = shape.dims;
         let (y, z) = (row % ny, row / ny);
         match self {
@@ -214,7 +210,8 @@ impl Slices {
     fn sweep(&self, far: &BitVolume, span: Span, words: &mut [u16], allowance: &Allowance) -> bool {
         let [nx, ny, _] = far.dims();
         let n_own = span.own[1] - span.own[0];
-        let mut columns: Vec<Vec<&mut [u16]>> = (0..ny).map(|_| Vec::with_capacity(n_own)).collect();
+        let mut columns: Vec<Vec<&mut [u16]>> =
+            (0..ny).map(|_| Vec::with_capacity(n_own)).collect();
         for (row, words) in words.chunks_mut(nx).enumerate() {
             columns[row % ny].push(words);
         }

@@ -9,8 +9,8 @@ use super::super::labels::{EDGE, Labels, Part};
 use super::crests::{Crests, Shape};
 use super::levels::{Levels, is_outdoors, level};
 
-/// Least number of voxels of a slab, if there are as many: fewer are mostly border.
-const SLAB: usize = 1 << 20;
+/// Number of voxels of a slab, if layers are not larger: fewer are mostly border, more take more memory.
+const SLAB: usize = 1 << 22;
 
 /// Root of the outdoors; the root of a peak is one more than its number.
 pub(super) const OUTER: u32 = 0;
@@ -20,11 +20,9 @@ const UNKNOWN: u32 = u32::MAX - 1;
 const EXIT: u32 = 1 << 31;
 const ABOVE: u32 = 1 << 30;
 
-/// Returns the number of layers of a slab: with fewer there are more borders to keep, with more a slab takes more memory.
+/// Returns the number of layers of a slab: whole bricks of labels.
 pub(super) fn thickness(shape: Shape) -> usize {
-    let least = SLAB.div_ceil(shape.layer());
-    let thick = least.max((shape.dims[2] as f64).sqrt() as usize);
-    thick.next_multiple_of(EDGE)
+    (SLAB / shape.layer()).max(1).next_multiple_of(EDGE)
 }
 
 /// Contact of two roots.
@@ -62,30 +60,59 @@ pub(super) fn merged(mut contacts: Vec<Contact>) -> Vec<Contact> {
     contacts
 }
 
-/// Roots of a layer as runs: a root, and the voxel at which the next one begins.
-struct RootRuns(Vec<(u32, u32)>);
+/// Roots of a layer as runs.
+struct RootRuns(Vec<RootRun>);
+
+/// Voxels one after the other with one root, or with exits one after the other.
+struct RootRun {
+    root: u32,
+    /// Difference from each root to the next: 0 or 1.
+    step: u32,
+    /// First voxel, and the one at which the next run begins.
+    span: [u32; 2],
+}
 
 impl RootRuns {
     fn of(roots: &[u32]) -> Self {
-        let mut end = 0;
-        let run = |run: &[u32]| {
-            end += run.len() as u32;
-            (run[0], end)
-        };
-        Self(roots.chunk_by(|a, b| a == b).map(run).collect())
+        let mut runs: Vec<RootRun> = Vec::new();
+        for (at, &root) in (0..).zip(roots) {
+            if let Some(run) = runs.last_mut() {
+                let is_second = run.span[1] - run.span[0] == 1;
+                if is_second && is_exit(root) && root == run.root.wrapping_add(1) {
+                    run.step = 1;
+                }
+                if root == run.root + run.step * (at - run.span[0]) {
+                    run.span[1] = at + 1;
+                    continue;
+                }
+            }
+            runs.push(RootRun {
+                root,
+                step: 0,
+                span: [at, at + 1],
+            });
+        }
+        runs.shrink_to_fit();
+        Self(runs)
     }
 
     fn get(&self, at: u32) -> u32 {
-        self.0[self.0.partition_point(|run| run.1 <= at)].0
+        let run = &self.0[self.0.partition_point(|run| run.span[1] <= at)];
+        run.root + run.step * (at - run.span[0])
     }
 
     fn write(&self, roots: &mut [u32]) {
-        let mut from = 0;
-        for &(root, to) in &self.0 {
-            roots[from..to as usize].fill(root);
-            from = to as usize;
+        for run in &self.0 {
+            let [from, to] = run.span;
+            for (k, root) in (0..).zip(&mut roots[from as usize..to as usize]) {
+                *root = run.root + run.step * k;
+            }
         }
     }
+}
+
+fn is_exit(root: u32) -> bool {
+    (EXIT..UNKNOWN).contains(&root)
 }
 
 /// Returns one more than the root of each voxel, 0 for solid ones, and the contacts between roots; `None` if the allowance is
@@ -180,7 +207,7 @@ fn ways_along(wide: &[u16], [before_z, before_y, after_y, after_z]: [&[u16]; 4],
 
 /// Returns the root behind `exit` from slab `s`: the one in the slab that it leads to, and so on.
 fn behind(borders: &[[RootRuns; 2]], mut s: usize, mut exit: u32) -> u32 {
-    while (EXIT..UNKNOWN).contains(&exit) {
+    while is_exit(exit) {
         let at = exit & (ABOVE - 1);
         exit = if exit & ABOVE == 0 {
             s -= 1;
