@@ -32,8 +32,13 @@ type Brick = [u32; VOLUME];
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Labels {
     dims: [usize; 3],
-    /// Bricks along each axis, the last ones filled up.
-    bricks: [usize; 3],
+    /// Layers of bricks along z, the last bricks along each axis filled up.
+    layers: Vec<Layer>,
+}
+
+/// A layer of bricks.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Layer {
     /// The label of each brick, or where its block is.
     heads: Vec<u32>,
     /// Blocks: the labels of a brick, then the position of each voxel among them.
@@ -44,16 +49,18 @@ impl Labels {
     /// Labels all voxels of a box of `dims` by 0.
     #[must_use]
     pub fn zero(dims: [usize; 3]) -> Self {
-        let bricks = dims.map(|n| n.div_ceil(EDGE));
+        let [bx, by, bz] = dims.map(|n| n.div_ceil(EDGE));
+        let layer = Layer {
+            heads: vec![0; bx * by],
+            blocks: Vec::new(),
+        };
         Self {
             dims,
-            bricks,
-            heads: vec![0; bricks.iter().product()],
-            blocks: Vec::new(),
+            layers: vec![layer; bz],
         }
     }
 
-    /// Compresses labels given in index order.
+    /// Compresses labels given in index order. Linear in voxels; threads share the work.
     ///
     /// # Panics
     /// If there is not one for each voxel of a box of `dims`.
@@ -61,48 +68,23 @@ impl Labels {
     pub fn of(dims: [usize; 3], labels: &[u32]) -> Self {
         let n: usize = dims.iter().product();
         assert_eq!(labels.len(), n, "a label for each voxel");
-        Self::by_rows(dims, |row, to| {
-            to.copy_from_slice(&labels[row * dims[0]..][..dims[0]]);
-        })
+        if n == 0 {
+            return Self::zero(dims);
+        }
+        let layers = labels.par_chunks(EDGE * dims[0] * dims[1]);
+        let layer = |labels| Layer::of([dims[0], dims[1]], labels);
+        Self::from_layers(dims, layers.map(layer).collect())
     }
 
-    /// Compresses the labels that `write(row, labels)` writes for each row along x, numbered along y, then z.
-    ///
-    /// Linear in voxels; threads share the work, each with 16 bytes for each voxel of a layer.
-    #[must_use]
-    pub(crate) fn by_rows(dims: [usize; 3], write: impl Fn(usize, &mut [u32]) + Sync) -> Self {
-        let zero = Self::zero(dims);
-        let [nx, ny, nz] = dims;
-        if zero.heads.is_empty() {
-            return zero;
-        }
-        let bz = zero.bricks[2];
-        let part = |buffer: &mut Vec<u32>, k: usize| {
-            buffer.resize(EDGE * nx * ny, 0);
-            for (row, to) in (k * EDGE * ny..).zip(buffer.chunks_exact_mut(nx)) {
-                if row < nz * ny {
-                    write(row, to);
-                }
-            }
-            let n_layers = EDGE.min(nz - k * EDGE);
-            Part::of([nx, ny], &buffer[..n_layers * nx * ny])
-        };
-        let parts: Vec<Part> = (0..bz).into_par_iter().map_init(Vec::new, part).collect();
-        zero.with(parts)
+    /// Returns a box of `dims` of these layers.
+    pub(crate) fn from_layers(dims: [usize; 3], layers: Vec<Layer>) -> Self {
+        debug_assert_eq!(layers.len(), dims[2].div_ceil(EDGE), "layers of {dims:?}");
+        Self { dims, layers }
     }
 
-    /// Returns the same box with the bricks of `parts`, in order.
-    pub(crate) fn with(mut self, parts: Vec<Part>) -> Self {
-        let n_words = parts.iter().map(|part| part.blocks.len()).sum();
-        self.blocks = Vec::with_capacity(n_words);
-        self.heads.clear();
-        for mut part in parts {
-            let base = position(self.blocks.len());
-            let heads = part.heads.iter().map(|&h| moved(h, base));
-            self.heads.extend(heads);
-            self.blocks.append(&mut part.blocks);
-        }
-        self
+    /// Returns the number of bricks along x.
+    fn width(&self) -> usize {
+        self.dims[0].div_ceil(EDGE)
     }
 
     /// Returns the number of voxels along each axis.
@@ -120,25 +102,26 @@ impl Labels {
     /// Returns `true` if there are no voxels.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.heads.is_empty()
+        self.len() == 0
     }
 
     /// Returns the number of bytes that the labels take.
     #[must_use]
     pub fn memory(&self) -> usize {
-        4 * (self.heads.capacity() + self.blocks.capacity())
+        let words = |layer: &Layer| layer.heads.capacity() + layer.blocks.capacity();
+        4 * self.layers.iter().map(words).sum::<usize>()
     }
 
     /// Returns the label of the voxel `[x, y, z]`; 0 if it is occupied.
     #[must_use]
     #[inline]
     pub fn at(&self, [x, y, z]: [usize; 3]) -> u32 {
-        let [bx, by, _] = self.bricks;
-        let head = self.heads[x / EDGE + bx * (y / EDGE + by * (z / EDGE))];
+        let layer = &self.layers[z / EDGE];
+        let head = layer.heads[x / EDGE + self.width() * (y / EDGE)];
         if head & MIXED == 0 {
             return head;
         }
-        self.in_block(head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
+        layer.in_block(head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
     }
 
     /// Returns the label of the voxel at `index`; 0 if it is occupied.
@@ -155,6 +138,247 @@ impl Labels {
         [index - row * nx, row % ny, row / ny]
     }
 
+    /// Labels the voxel `[x, y, z]`.
+    ///
+    /// Space that a brick outgrows is not used again, so labels of many voxels are better replaced by [`Self::relabel`].
+    pub fn set(&mut self, [x, y, z]: [usize; 3], label: u32) {
+        let brick = x / EDGE + self.width() * (y / EDGE);
+        let voxel = x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE));
+        self.layers[z / EDGE].set(brick, voxel, label);
+    }
+
+    /// Calls `run(voxels, label)` for each maximal run of voxels of a row with one label within `range`, ascending.
+    pub fn for_runs(&self, range: Range<usize>, mut run: impl FnMut(Range<usize>, u32)) {
+        let nx = self.dims[0];
+        let mut from = range.start;
+        while from < range.end {
+            let [x, y, z] = self.coords(from);
+            let to = range.end.min(from - x + nx);
+            self.runs_of_row([y, z], x..x + to - from, |voxels, label| {
+                run(from - x + voxels.start..from - x + voxels.end, label);
+            });
+            from = to;
+        }
+    }
+
+    /// Calls `run(voxels, label)` for each maximal run within `along` in the row at y and z.
+    fn runs_of_row(
+        &self,
+        [y, z]: [usize; 2],
+        along: Range<usize>,
+        mut run: impl FnMut(Range<usize>, u32),
+    ) {
+        let layer = &self.layers[z / EDGE];
+        let heads = &layer.heads[self.width() * (y / EDGE)..][..self.width()];
+        let row = EDGE * (y % EDGE + EDGE * (z % EDGE));
+        let (mut start, mut label) = (along.start, None);
+        let mut next = |x: usize, here: u32| {
+            if let Some(before) = label.replace(here)
+                && before != here
+            {
+                run(start..x, before);
+                start = x;
+            }
+        };
+        let mut x = along.start;
+        while x < along.end {
+            let head = heads[x / EDGE];
+            let end = along.end.min((x / EDGE + 1) * EDGE);
+            if head & MIXED == 0 {
+                next(x, head);
+            } else if let Some((list, words)) = layer.listed(head) {
+                let width = place(head).1;
+                let (bit, each) = (row << width, 1 << width);
+                // All four lie in one word.
+                let which = words[bit / 32] as usize >> (bit % 32);
+                for x in x..end {
+                    next(x, list[which >> (x % EDGE * each) & (list.len() - 1)]);
+                }
+            } else {
+                (x..end).for_each(|x| next(x, layer.in_block(head, row + x % EDGE)));
+            }
+            x = end;
+        }
+        if let Some(label) = label {
+            run(start..along.end, label);
+        }
+    }
+
+    /// Returns all voxels of a layer of bricks that have a label, in no particular order.
+    ///
+    /// # Panics
+    /// If the layer is outside the box.
+    #[must_use]
+    pub fn voxels_of(&self, label: u32, layer: usize) -> Vec<[usize; 3]> {
+        let bx = self.width();
+        let mut found = Vec::new();
+        let of = &self.layers[layer];
+        for (at, &head) in of.heads.iter().enumerate() {
+            let may_be = match head & MIXED {
+                0 => head == label,
+                _ => of.listed(head).is_none_or(|l| l.0.contains(&label)),
+            };
+            if !may_be {
+                continue;
+            }
+            let corner = [at % bx, at / bx, layer].map(|b| b * EDGE);
+            for (voxel, &here) in of.brick(head).iter().enumerate() {
+                let within = [voxel % EDGE, voxel / EDGE % EDGE, voxel / (EDGE * EDGE)];
+                let at = [0, 1, 2].map(|k| corner[k] + within[k]);
+                if here == label && (0..3).all(|k| at[k] < self.dims[k]) {
+                    found.push(at);
+                }
+            }
+        }
+        found
+    }
+
+    /// Returns the number of layers of bricks, which [`Self::for_faces`] takes one by one.
+    #[must_use]
+    pub fn n_layers(&self) -> usize {
+        self.layers.len()
+    }
+
+    /// Calls `face(voxel, axis, labels)` for each face between voxels of different labels, given the lesser voxel, for
+    /// those in a layer of bricks and above it, in no particular order.
+    ///
+    /// # Panics
+    /// If the layer is outside the box.
+    pub fn for_faces(&self, layer: usize, mut face: impl FnMut(usize, usize, [u32; 2])) {
+        let (bx, by) = (self.width(), self.dims[1].div_ceil(EDGE));
+        let (of, after) = (&self.layers[layer], self.layers.get(layer + 1));
+        for j in 0..by {
+            for i in 0..bx {
+                let at = i + bx * j;
+                let here = of.heads[at];
+                let nexts = [
+                    (i + 1 < bx).then(|| (of, of.heads[at + 1])),
+                    (j + 1 < by).then(|| (of, of.heads[at + bx])),
+                    after.map(|after| (after, after.heads[at])),
+                ];
+                let is_alike =
+                    |next: &Option<(&Layer, u32)>| next.is_none_or(|(_, next)| next == here);
+                if here & MIXED == 0 && nexts.iter().all(is_alike) {
+                    continue;
+                }
+                let brick = of.brick(here);
+                let corner = [i, j, layer].map(|b| b * EDGE);
+                for axis in 0..3 {
+                    let beyond = nexts[axis].map(|(of, next)| of.brick(next));
+                    self.faces_along(axis, corner, &brick, beyond.as_ref(), &mut face);
+                }
+            }
+        }
+    }
+
+    /// Calls `face` for the faces across `axis` of a brick whose first voxel is `corner`, up to those of the brick `beyond`.
+    fn faces_along(
+        &self,
+        axis: usize,
+        corner: [usize; 3],
+        brick: &Brick,
+        beyond: Option<&Brick>,
+        face: &mut impl FnMut(usize, usize, [u32; 2]),
+    ) {
+        let step = STEPS[axis];
+        let last = step * (EDGE - 1);
+        for (voxel, &label) in brick.iter().enumerate() {
+            let is_last = voxel / step % EDGE == EDGE - 1;
+            let other = match (is_last, beyond) {
+                (false, _) => brick[voxel + step],
+                (true, Some(beyond)) => beyond[voxel - last],
+                (true, None) => continue,
+            };
+            if other == label {
+                continue;
+            }
+            let within = [voxel % EDGE, voxel / EDGE % EDGE, voxel / (EDGE * EDGE)];
+            let [x, y, z] = [0, 1, 2].map(|k| corner[k] + within[k]);
+            let mut there = [x, y, z];
+            there[axis] += 1;
+            // Not past the end, where bricks are filled up.
+            if (0..3).all(|k| there[k] < self.dims[k]) {
+                let [nx, ny, _] = self.dims;
+                face(x + nx * (y + ny * z), axis, [label, other]);
+            }
+        }
+    }
+
+    /// Replaces each label by `new(label, y)`. Threads share the work.
+    pub fn relabel(&mut self, new: impl Fn(u32, usize) -> u32 + Sync) {
+        if self.is_empty() {
+            return;
+        }
+        let (bx, most) = (self.width(), self.dims[1] - 1);
+        self.layers.par_iter_mut().for_each(|of| {
+            let mut part = Layer::default();
+            for (at, &head) in of.heads.iter().enumerate() {
+                let from = at / bx * EDGE;
+                // The new label, if it is the same at all heights of the brick.
+                let level = |label: u32| {
+                    let of = |y: usize| new(label, (from + y).min(most));
+                    let first = of(0);
+                    (1..EDGE).all(|y| of(y) == first).then_some(first)
+                };
+                if head & MIXED == 0 {
+                    if let Some(label) = level(head) {
+                        part.heads.push(label);
+                        continue;
+                    }
+                } else if let Some((list, _)) = of.listed(head) {
+                    // Most often, all labels of a brick become one.
+                    let label = level(list[0]);
+                    if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
+                        part.heads.extend(label);
+                        continue;
+                    }
+                }
+                let mut brick = of.brick(head);
+                for (voxel, label) in brick.iter_mut().enumerate() {
+                    *label = new(*label, (from + voxel / EDGE % EDGE).min(most));
+                }
+                part.push(&brick);
+            }
+            part.blocks.shrink_to_fit();
+            *of = part;
+        });
+    }
+
+    /// Writes the labels of a row along x, numbered along y, then z.
+    pub fn write_row(&self, row: usize, to: &mut [u32]) {
+        let [nx, ny, _] = self.dims;
+        self.runs_of_row([row % ny, row / ny], 0..nx, |run, label| {
+            to[run].fill(label);
+        });
+    }
+
+    /// Returns all labels in index order.
+    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.len()).map(|i| self.get(i))
+    }
+}
+
+impl Layer {
+    /// Compresses up to four layers of `nx` by `ny` labels.
+    pub(crate) fn of([nx, ny]: [usize; 2], labels: &[u32]) -> Self {
+        let mut layer = Self::default();
+        let last = labels.len() / (nx * ny) - 1;
+        for j in 0..ny.div_ceil(EDGE) {
+            for i in 0..nx.div_ceil(EDGE) {
+                layer.push(&gather(i, |y, z| {
+                    let row = (j * EDGE + y).min(ny - 1) + ny * z.min(last);
+                    &labels[row * nx..][..nx]
+                }));
+            }
+        }
+        layer.blocks.shrink_to_fit();
+        layer
+    }
+
+    fn push(&mut self, brick: &Brick) {
+        self.heads.push(encode(brick, &mut self.blocks));
+    }
+
     #[inline]
     fn in_block(&self, head: u32, voxel: usize) -> u32 {
         let (from, width) = place(head);
@@ -167,13 +391,8 @@ impl Labels {
         self.blocks[from + (word as usize >> (bit % 32) & (listed - 1))]
     }
 
-    /// Labels the voxel `[x, y, z]`.
-    ///
-    /// Space that a brick outgrows is not used again, so labels of many voxels are better replaced by [`Self::relabel`].
-    pub fn set(&mut self, [x, y, z]: [usize; 3], label: u32) {
-        let [bx, by, _] = self.bricks;
-        let at = x / EDGE + bx * (y / EDGE + by * (z / EDGE));
-        let voxel = x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE));
+    /// Labels a voxel of brick `at`.
+    fn set(&mut self, at: usize, voxel: usize, label: u32) {
         let head = self.heads[at];
         if self.in_brick(head, voxel) == label {
             return;
@@ -232,248 +451,6 @@ impl Labels {
             }
         }
         brick
-    }
-
-    /// Calls `run(voxels, label)` for each maximal run of voxels of a row with one label within `range`, ascending.
-    pub fn for_runs(&self, range: Range<usize>, mut run: impl FnMut(Range<usize>, u32)) {
-        let nx = self.dims[0];
-        let mut from = range.start;
-        while from < range.end {
-            let [x, y, z] = self.coords(from);
-            let to = range.end.min(from - x + nx);
-            self.runs_of_row([y, z], x..x + to - from, |voxels, label| {
-                run(from - x + voxels.start..from - x + voxels.end, label);
-            });
-            from = to;
-        }
-    }
-
-    /// Calls `run(voxels, label)` for each maximal run within `along` in the row at y and z.
-    fn runs_of_row(
-        &self,
-        [y, z]: [usize; 2],
-        along: Range<usize>,
-        mut run: impl FnMut(Range<usize>, u32),
-    ) {
-        let [bx, by, _] = self.bricks;
-        let heads = &self.heads[bx * (y / EDGE + by * (z / EDGE))..][..bx];
-        let row = EDGE * (y % EDGE + EDGE * (z % EDGE));
-        let (mut start, mut label) = (along.start, None);
-        let mut next = |x: usize, here: u32| {
-            if let Some(before) = label.replace(here)
-                && before != here
-            {
-                run(start..x, before);
-                start = x;
-            }
-        };
-        let mut x = along.start;
-        while x < along.end {
-            let head = heads[x / EDGE];
-            let end = along.end.min((x / EDGE + 1) * EDGE);
-            if head & MIXED == 0 {
-                next(x, head);
-            } else if let Some((list, words)) = self.listed(head) {
-                let width = place(head).1;
-                let (bit, each) = (row << width, 1 << width);
-                // All four lie in one word.
-                let which = words[bit / 32] as usize >> (bit % 32);
-                for x in x..end {
-                    next(x, list[which >> (x % EDGE * each) & (list.len() - 1)]);
-                }
-            } else {
-                (x..end).for_each(|x| next(x, self.in_block(head, row + x % EDGE)));
-            }
-            x = end;
-        }
-        if let Some(label) = label {
-            run(start..along.end, label);
-        }
-    }
-
-    /// Returns all voxels of a layer of bricks that have a label, in no particular order.
-    ///
-    /// # Panics
-    /// If the layer is outside the box.
-    #[must_use]
-    pub fn voxels_of(&self, label: u32, layer: usize) -> Vec<[usize; 3]> {
-        let [bx, by, _] = self.bricks;
-        let mut found = Vec::new();
-        let heads = &self.heads[bx * by * layer..][..bx * by];
-        for (at, &head) in heads.iter().enumerate() {
-            let may_be = match head & MIXED {
-                0 => head == label,
-                _ => self.listed(head).is_none_or(|l| l.0.contains(&label)),
-            };
-            if !may_be {
-                continue;
-            }
-            let corner = [at % bx, at / bx, layer].map(|b| b * EDGE);
-            for (voxel, &here) in self.brick(head).iter().enumerate() {
-                let within = [voxel % EDGE, voxel / EDGE % EDGE, voxel / (EDGE * EDGE)];
-                let at = [0, 1, 2].map(|k| corner[k] + within[k]);
-                if here == label && (0..3).all(|k| at[k] < self.dims[k]) {
-                    found.push(at);
-                }
-            }
-        }
-        found
-    }
-
-    /// Returns the number of layers of bricks, which [`Self::for_faces`] takes one by one.
-    #[must_use]
-    pub fn n_layers(&self) -> usize {
-        self.bricks[2]
-    }
-
-    /// Calls `face(voxel, axis, labels)` for each face between voxels of different labels, given the lesser voxel, for
-    /// those in a layer of bricks and above it, in no particular order.
-    ///
-    /// # Panics
-    /// If the layer is outside the box.
-    pub fn for_faces(&self, layer: usize, mut face: impl FnMut(usize, usize, [u32; 2])) {
-        let [bx, by, bz] = self.bricks;
-        assert!(layer < bz, "layer {layer} of {bz}");
-        for j in 0..by {
-            for i in 0..bx {
-                let at = i + bx * (j + by * layer);
-                let here = self.heads[at];
-                let nexts = [
-                    (i + 1 < bx, at + 1),
-                    (j + 1 < by, at + bx),
-                    (layer + 1 < bz, at + bx * by),
-                ];
-                let nexts = nexts.map(|(is_in, next)| is_in.then(|| self.heads[next]));
-                let is_alike = |next: &Option<u32>| next.is_none_or(|next| next == here);
-                if here & MIXED == 0 && nexts.iter().all(is_alike) {
-                    continue;
-                }
-                let brick = self.brick(here);
-                let corner = [i, j, layer].map(|b| b * EDGE);
-                for axis in 0..3 {
-                    let beyond = nexts[axis].map(|next| self.brick(next));
-                    self.faces_along(axis, corner, &brick, beyond.as_ref(), &mut face);
-                }
-            }
-        }
-    }
-
-    /// Calls `face` for the faces across `axis` of a brick whose first voxel is `corner`, up to those of the brick `beyond`.
-    fn faces_along(
-        &self,
-        axis: usize,
-        corner: [usize; 3],
-        brick: &Brick,
-        beyond: Option<&Brick>,
-        face: &mut impl FnMut(usize, usize, [u32; 2]),
-    ) {
-        let step = STEPS[axis];
-        let last = step * (EDGE - 1);
-        for (voxel, &label) in brick.iter().enumerate() {
-            let is_last = voxel / step % EDGE == EDGE - 1;
-            let other = match (is_last, beyond) {
-                (false, _) => brick[voxel + step],
-                (true, Some(beyond)) => beyond[voxel - last],
-                (true, None) => continue,
-            };
-            if other == label {
-                continue;
-            }
-            let within = [voxel % EDGE, voxel / EDGE % EDGE, voxel / (EDGE * EDGE)];
-            let [x, y, z] = [0, 1, 2].map(|k| corner[k] + within[k]);
-            let mut there = [x, y, z];
-            there[axis] += 1;
-            // Not past the end, where bricks are filled up.
-            if (0..3).all(|k| there[k] < self.dims[k]) {
-                let [nx, ny, _] = self.dims;
-                face(x + nx * (y + ny * z), axis, [label, other]);
-            }
-        }
-    }
-
-    /// Replaces each label by `new(label, y)`. Threads share the work.
-    pub fn relabel(&mut self, new: impl Fn(u32, usize) -> u32 + Sync) {
-        if self.is_empty() {
-            return;
-        }
-        let [bx, by, _] = self.bricks;
-        let most = self.dims[1] - 1;
-        let part = |heads: &[u32]| {
-            let mut part = Part::default();
-            for (at, &head) in heads.iter().enumerate() {
-                let from = at / bx % by * EDGE;
-                // The new label, if it is the same at all heights of the brick.
-                let level = |label: u32| {
-                    let of = |y: usize| new(label, (from + y).min(most));
-                    let first = of(0);
-                    (1..EDGE).all(|y| of(y) == first).then_some(first)
-                };
-                if head & MIXED == 0 {
-                    if let Some(label) = level(head) {
-                        part.heads.push(label);
-                        continue;
-                    }
-                } else if let Some((list, _)) = self.listed(head) {
-                    // Most often, all labels of a brick become one.
-                    let label = level(list[0]);
-                    if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
-                        part.heads.extend(label);
-                        continue;
-                    }
-                }
-                let mut brick = self.brick(head);
-                for (voxel, label) in brick.iter_mut().enumerate() {
-                    *label = new(*label, (from + voxel / EDGE % EDGE).min(most));
-                }
-                part.push(&brick);
-            }
-            part
-        };
-        let parts = self.heads.par_chunks(bx * by).map(part).collect();
-        *self = Self::zero(self.dims).with(parts);
-    }
-
-    /// Writes the labels of a row along x, numbered along y, then z.
-    pub fn write_row(&self, row: usize, to: &mut [u32]) {
-        let [nx, ny, _] = self.dims;
-        self.runs_of_row([row % ny, row / ny], 0..nx, |run, label| {
-            to[run].fill(label);
-        });
-    }
-
-    /// Returns all labels in index order.
-    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
-        (0..self.len()).map(|i| self.get(i))
-    }
-}
-
-/// Some layers of bricks.
-#[derive(Default)]
-pub(crate) struct Part {
-    heads: Vec<u32>,
-    blocks: Vec<u32>,
-}
-
-impl Part {
-    /// Compresses layers of `nx` by `ny` labels.
-    pub(crate) fn of([nx, ny]: [usize; 2], labels: &[u32]) -> Self {
-        let mut part = Self::default();
-        for labels in labels.chunks(EDGE * nx * ny) {
-            let last = labels.len() / (nx * ny) - 1;
-            for j in 0..ny.div_ceil(EDGE) {
-                for i in 0..nx.div_ceil(EDGE) {
-                    part.push(&gather(i, |y, z| {
-                        let row = (j * EDGE + y).min(ny - 1) + ny * z.min(last);
-                        &labels[row * nx..][..nx]
-                    }));
-                }
-            }
-        }
-        part
-    }
-
-    fn push(&mut self, brick: &Brick) {
-        self.heads.push(encode(brick, &mut self.blocks));
     }
 }
 
@@ -547,17 +524,7 @@ fn place(head: u32) -> (usize, u32) {
 fn position(word: usize) -> u32 {
     let at = u32::try_from(word / UNIT).ok();
     at.filter(|&at| at <= POSITION)
-        .expect("labels near surfaces below 8 GiB")
-}
-
-/// Returns a head whose block is `base` further on.
-fn moved(head: u32, base: u32) -> u32 {
-    if head & MIXED == 0 {
-        return head;
-    }
-    let at = (head & POSITION) + base;
-    assert!(at <= POSITION, "labels near surfaces below 8 GiB");
-    (head & !POSITION) | at
+        .expect("a layer below 8 GiB")
 }
 
 #[cfg(test)]
@@ -663,8 +630,10 @@ mod tests {
     fn memory_goes_by_surface() {
         // Two halls of 64³ and 128³ voxels, each with a wall in the middle.
         let bytes = |n: usize| {
-            let wall = |row: usize, to: &mut [u32]| to.fill(u32::from(row / n > n / 2));
-            Labels::by_rows([n; 3], wall).memory()
+            let wall: Vec<u32> = (0..n.pow(3))
+                .map(|i| u32::from(i / (n * n) > n / 2))
+                .collect();
+            Labels::of([n; 3], &wall).memory()
         };
         let heads = |n: usize| n.pow(3) / 16;
         assert_eq!(bytes(64) - heads(64), 16 * 64 * 64 / 16);

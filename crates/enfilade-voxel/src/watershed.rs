@@ -150,10 +150,9 @@ impl DistanceField {
         let n: usize = dims.iter().product();
         assert!(u32::try_from(n).is_ok(), "fewer than 2^32 voxels");
         let shape = Shape { dims };
-        let thick = if n == 0 { 1 } else { slabs::thickness(shape) };
         Self {
             shape,
-            levels: Levels::measured(blocked, far, thick, allowance),
+            levels: Levels::measured(blocked, far, allowance),
             first_outdoors: first_free(blocked, &Outdoors::AtBorder(far)),
         }
     }
@@ -177,10 +176,13 @@ fn first_free(blocked: &BitVolume, outdoors: &Outdoors<'_>) -> usize {
         dims: blocked.dims(),
     };
     let [nx, ny, nz] = shape.dims;
+    if nx == 0 {
+        return 0;
+    }
     let first_of = |row: usize| {
         let mut first: Option<usize> = None;
         outdoors.for_runs(shape, row, |from, to| {
-            let free = (from..to).find(|&x| !blocked.get_index(row * nx + x));
+            let free = (from..to).find(|&x| !blocked.get(x, row % ny, row / ny));
             first = [first, free].into_iter().flatten().min();
         });
         first.map(|x| row * nx + x)

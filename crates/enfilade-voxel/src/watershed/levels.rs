@@ -5,6 +5,7 @@
 //! where a voxel's nearest surface could lie beyond the slices read, more are read.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use enfilade_geom::Allowance;
 use rayon::prelude::*;
@@ -19,7 +20,9 @@ const LEVEL: u16 = 0x3FFF;
 /// Marks a free voxel that is known to be outdoors.
 pub(super) const OUTDOORS: u16 = 0x8000;
 
-/// Slices read on either side of a slab at first, for rooms of up to so many voxels. It doubles where that is too few.
+/// Layers measured at a time.
+const THICK: usize = 32;
+/// Slices read on either side of them at first, for rooms of up to so many voxels. It doubles where that is too few.
 const HALO: usize = 16;
 
 pub(super) fn level(word: u16) -> u16 {
@@ -48,22 +51,31 @@ impl Levels {
         Self::Plain(squared)
     }
 
-    /// Measures the distances to what `blocked` holds, in slabs of `thick` layers, with less work in `far`.
-    pub(super) fn measured(
+    /// Measures the distances to what `blocked` holds, with less work in `far`.
+    pub(super) fn measured(blocked: &BitVolume, far: &BitVolume, allowance: &Allowance) -> Self {
+        Self::measured_in(THICK, blocked, far, allowance)
+    }
+
+    /// Does [`Self::measured`] in slabs of `thick` layers.
+    fn measured_in(
+        thick: usize,
         blocked: &BitVolume,
         far: &BitVolume,
-        thick: usize,
         allowance: &Allowance,
     ) -> Self {
         let shape = Shape {
             dims: blocked.dims(),
         };
         let [nx, ny, nz] = shape.dims;
+        if shape.layer() == 0 {
+            return Self::Packed(Vec::new());
+        }
         let (table, tables) = (table(), Tables::of(nx));
         let outdoors = Outdoors::AtBorder(far);
         let mut near = Slices {
             first: 0,
             slices: VecDeque::new(),
+            spare: Vec::new(),
         };
         let mut halo = HALO;
         let mut layers: Vec<Vec<u8>> = Vec::with_capacity(nz);
@@ -169,6 +181,8 @@ fn to_levels(shape: Shape, row: usize, words: &mut [u16], table: &[u16], outdoor
 struct Slices {
     first: usize,
     slices: VecDeque<Vec<u16>>,
+    /// Slices no longer needed, whose memory is.
+    spare: Vec<Vec<u16>>,
 }
 
 impl Slices {
@@ -182,21 +196,30 @@ impl Slices {
         allowance: &Allowance,
     ) {
         let [nx, ny, _] = blocked.dims();
-        while self.first < from && self.slices.pop_front().is_some() {
+        while self.first < from
+            && let Some(slice) = self.slices.pop_front()
+        {
+            self.spare.push(slice);
             self.first += 1;
         }
         if self.slices.is_empty() {
             self.first = from;
         }
-        let measure = |scratch: &mut Vec<[u16; LANES]>, k: usize| {
-            let mut slice = vec![0; nx * ny];
+        let measure = |scratch: &mut Vec<[u16; LANES]>, (k, mut slice): (usize, Vec<u16>)| {
+            slice.clear();
+            slice.resize(nx * ny, 0); // only free voxels are written
             if allowance.spend(work_of(nx * ny)) {
                 within_slice(blocked, Some(far), k, &mut slice, tables, scratch);
             }
             slice
         };
-        let of = |range: std::ops::Range<usize>| -> Vec<Vec<u16>> {
-            range.into_par_iter().map_init(Vec::new, measure).collect()
+        let spare = &mut self.spare;
+        let mut of = |range: Range<usize>| -> Vec<Vec<u16>> {
+            let asked: Vec<(usize, Vec<u16>)> = range
+                .map(|k| (k, spare.pop().unwrap_or_default()))
+                .collect();
+            let slices = asked.into_par_iter().map_init(Vec::new, measure);
+            slices.collect()
         };
         for slice in of(from..self.first).into_iter().rev() {
             self.slices.push_front(slice);
@@ -258,7 +281,7 @@ mod tests {
             outdoors.union_with(&far);
             let whole = distance_squared_near(&blocked, &far, &allowance);
             let whole = Levels::of(shape, whole, &Outdoors::Only(&outdoors));
-            let slabs = Levels::measured(&blocked, &far, thick, &allowance);
+            let slabs = Levels::measured_in(thick, &blocked, &far, &allowance);
             let (mut a, mut b) = (Vec::new(), Vec::new());
             let all = [0, dims[2]];
             prop_assert_eq!(slabs.read(shape, all, &mut a), whole.read(shape, all, &mut b));

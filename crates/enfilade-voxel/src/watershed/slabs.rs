@@ -5,12 +5,14 @@ use std::sync::Mutex;
 use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
-use super::super::labels::{EDGE, Labels, Part};
+use super::super::labels::{EDGE, Labels, Layer};
 use super::crests::{Crests, Shape};
 use super::levels::{Levels, is_outdoors, level};
 
-/// Number of voxels of a slab, if layers are not larger: fewer are mostly border, more take more memory.
-const SLAB: usize = 1 << 22;
+/// Number of voxels of a slab, unless layers are large: with fewer, more is border; with more, it takes more memory.
+const SLAB: usize = 1 << 23;
+/// Least number of layers, of as many as there are.
+const THICK: usize = 12;
 
 /// Root of the outdoors; the root of a peak is one more than its number.
 pub(super) const OUTER: u32 = 0;
@@ -22,7 +24,7 @@ const ABOVE: u32 = 1 << 30;
 
 /// Returns the number of layers of a slab: whole bricks of labels.
 pub(super) fn thickness(shape: Shape) -> usize {
-    (SLAB / shape.layer()).max(1).next_multiple_of(EDGE)
+    (SLAB / shape.layer()).max(THICK).next_multiple_of(EDGE)
 }
 
 /// Contact of two roots.
@@ -157,7 +159,7 @@ pub(super) fn label(
     if borders.len() < n_slabs {
         return None;
     }
-    let labeled: Vec<(Part, Vec<Contact>)> = slabs()
+    let labeled: Vec<(Vec<Layer>, Vec<Contact>)> = slabs()
         .map(|s| {
             let mut buffers = take();
             let mut words = std::mem::take(&mut buffers.words);
@@ -165,17 +167,18 @@ pub(super) fn label(
             slab.enter(s, &borders);
             slab.ascend(slab.own());
             let contacts = slab.contacts();
-            let part = slab.write();
+            let layers = slab.write();
             let buffers = slab.buffers;
             give(Buffers { words, ..buffers });
-            (part, contacts)
+            (layers, contacts)
         })
         .collect();
     if labeled.len() < n_slabs {
         return None;
     }
-    let (parts, contacts): (Vec<_>, Vec<_>) = labeled.into_iter().unzip();
-    let labels = Labels::zero(shape.dims).with(parts);
+    let (layers, contacts): (Vec<_>, Vec<_>) = labeled.into_iter().unzip();
+    let layers = layers.into_iter().flatten().collect();
+    let labels = Labels::from_layers(shape.dims, layers);
     Some((labels, merged(contacts.concat())))
 }
 
@@ -445,13 +448,14 @@ impl<'a> Slab<'a> {
     }
 
     /// Compresses one more than each root, 0 for solid.
-    fn write(&mut self) -> Part {
+    fn write(&mut self) -> Vec<Layer> {
         let [nx, ny, _] = self.shape.dims;
         let own = self.own();
         let roots = &mut self.buffers.roots[own];
         for root in &mut *roots {
             *root = root.wrapping_add(1);
         }
-        Part::of([nx, ny], roots)
+        let layers = roots.chunks(EDGE * nx * ny);
+        layers.map(|roots| Layer::of([nx, ny], roots)).collect()
     }
 }

@@ -389,6 +389,12 @@ fn outdoors_takes_the_space_around_it() {
 
 #[test]
 fn empty_and_full_boxes_have_no_basins() {
+    for dims in [[0, 4, 4], [4, 0, 4], [4, 4, 0]] {
+        let empty = BitVolume::new(dims);
+        let field = DistanceField::of(&empty, &empty, &Allowance::default());
+        let flood = field.watershed(1.0, &Allowance::default());
+        assert_eq!(flood, Watershed::unflooded(dims));
+    }
     for (dims, value, n) in [([0, 3, 3], 0, 0), ([3, 4, 5], 0, 0), ([3, 4, 5], 65535, 1)] {
         let w = check(dims, &vec![value; dims.iter().product()], 1.0, None);
         assert_eq!((w.basins.len(), w.saddles.len()), (n, 0));
