@@ -124,6 +124,18 @@ impl Labels {
         layer.in_block(head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
     }
 
+    /// Returns a reader of labels at places near each other.
+    #[must_use]
+    pub fn reader(&self) -> Reader<'_> {
+        Reader {
+            labels: self,
+            width: self.width(),
+            brick: [usize::MAX; 2],
+            layer: None,
+            head: 0,
+        }
+    }
+
     /// Returns the label of the voxel at `index`; 0 if it is occupied.
     #[must_use]
     #[inline]
@@ -358,6 +370,38 @@ impl Labels {
     }
 }
 
+/// Reads labels at places near each other: the brick of the last one is at hand.
+#[derive(Debug)]
+pub struct Reader<'a> {
+    labels: &'a Labels,
+    /// Bricks along x.
+    width: usize,
+    /// The brick of the last voxel, in its layer, and the layer.
+    brick: [usize; 2],
+    layer: Option<&'a Layer>,
+    head: u32,
+}
+
+impl Reader<'_> {
+    /// Returns the label of the voxel `[x, y, z]`; 0 if it is occupied.
+    #[inline]
+    pub fn at(&mut self, [x, y, z]: [usize; 3]) -> u32 {
+        let brick = [x / EDGE + self.width * (y / EDGE), z / EDGE];
+        if brick != self.brick {
+            let layer = &self.labels.layers[brick[1]];
+            self.head = layer.heads[brick[0]];
+            self.layer = Some(layer);
+            self.brick = brick;
+        }
+        match self.layer {
+            Some(layer) if self.head & MIXED != 0 => {
+                layer.in_block(self.head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
+            }
+            _ => self.head,
+        }
+    }
+}
+
 impl Layer {
     /// Compresses up to four layers of `nx` by `ny` labels.
     pub(crate) fn of([nx, ny]: [usize; 2], labels: &[u32]) -> Self {
@@ -551,6 +595,8 @@ mod tests {
         fn each_voxel_keeps_its_label((dims, plain) in box_and_labels(), at in any::<u64>()) {
             let mut labels = Labels::of(dims, &plain);
             prop_assert!(labels.iter().eq(plain.iter().copied()));
+            let mut reader = labels.reader();
+            prop_assert!((0..plain.len()).all(|i| reader.at(labels.coords(i)) == plain[i]));
             let mut plain = plain;
             // One label more, then one that is there.
             for k in 0..40 {

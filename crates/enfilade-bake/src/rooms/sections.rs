@@ -256,7 +256,8 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
         let end = DVec3::from(grid.dims.map(|n| n as f64));
         let is_in = |p: DVec3| p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
         // Positive, so the cast rounds down; and 32 bits are half the work of 64.
-        let label_at = |p: DVec3| labels.at([p.x, p.y, p.z].map(|c| c as i32 as usize));
+        let mut reader = labels.reader();
+        let mut label_at = |p: DVec3| reader.at([p.x, p.y, p.z].map(|c| c as i32 as usize));
         let [du, dv, dn] = self.along;
         // In voxel coordinates, so that a lattice point costs an addition and a look-up.
         let base = self.base + dn * s as f64;

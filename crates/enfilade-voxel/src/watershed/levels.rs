@@ -37,8 +37,7 @@ pub(super) fn is_outdoors(word: u16) -> bool {
 #[derive(Clone, Debug)]
 pub(super) enum Levels {
     Plain(Vec<u16>),
-    /// One block for each layer.
-    Packed(Vec<Vec<u8>>),
+    Packed(Vec<PackedLayer>),
 }
 
 impl Levels {
@@ -78,7 +77,7 @@ impl Levels {
             spare: Vec::new(),
         };
         let mut halo = HALO;
-        let mut layers: Vec<Vec<u8>> = Vec::with_capacity(nz);
+        let mut layers: Vec<PackedLayer> = Vec::with_capacity(nz);
         let mut words: Vec<u16> = Vec::new();
         for from in (0..nz).step_by(thick) {
             let to = nz.min(from + thick);
@@ -102,7 +101,7 @@ impl Levels {
                 for (row, words) in (z * ny..).zip(words.chunks_mut(nx)) {
                     to_levels(shape, row, words, &table, &outdoors);
                 }
-                lz4_flex::block::compress(bytemuck::cast_slice(words))
+                PackedLayer::of(nx, words)
             };
             let own = words.par_chunks_mut(shape.layer()).enumerate();
             layers.par_extend(own.map(|(k, words)| layer((from + k, words))));
@@ -123,12 +122,48 @@ impl Levels {
             Self::Packed(layers) => {
                 buffer.resize((to - from) * layer, 0);
                 for (packed, words) in layers[from..to].iter().zip(buffer.chunks_mut(layer)) {
-                    let n =
-                        lz4_flex::block::decompress_into(packed, bytemuck::cast_slice_mut(words));
-                    assert_eq!(n.ok(), Some(2 * layer), "a layer as it was packed");
+                    packed.write(shape.dims[0], words);
                 }
                 buffer
             }
+        }
+    }
+}
+
+/// A packed layer.
+#[derive(Clone, Debug)]
+pub(super) struct PackedLayer {
+    /// Rows that differ from the one before: in the sky, few.
+    rows: Vec<u32>,
+    /// These rows.
+    block: Vec<u8>,
+}
+
+impl PackedLayer {
+    /// Packs rows of `nx` words.
+    fn of(nx: usize, words: &[u16]) -> Self {
+        let row = |at: usize| &words[at * nx..][..nx];
+        let differs = |at: &u32| *at == 0 || row(*at as usize) != row(*at as usize - 1);
+        let rows: Vec<u32> = (0..(words.len() / nx) as u32).filter(differs).collect();
+        let some: Vec<&[u16]> = rows.iter().map(|&at| row(at as usize)).collect();
+        let mut block = lz4_flex::block::compress(bytemuck::cast_slice(&some.concat()));
+        block.shrink_to_fit();
+        Self { rows, block }
+    }
+
+    /// Writes the layer's words.
+    fn write(&self, nx: usize, words: &mut [u16]) {
+        let n = self.rows.len() * nx;
+        let packed = bytemuck::cast_slice_mut(&mut words[..n]);
+        let found = lz4_flex::block::decompress_into(&self.block, packed);
+        assert_eq!(found.ok(), Some(2 * n), "a layer as it was packed");
+        // From the last row on, so that none is overwritten before it is moved.
+        let mut end = words.len() / nx;
+        for (k, &at) in self.rows.iter().enumerate().rev() {
+            for row in (at as usize..end).rev().filter(|row| *row > k) {
+                words.copy_within(k * nx..(k + 1) * nx, row * nx);
+            }
+            end = at as usize;
         }
     }
 }
