@@ -244,7 +244,7 @@ fn positive(name: &'static str, value: f64) -> Result<f64, BakeError> {
 }
 
 /// Peak memory of a bake, rounded from `docs/benchmarks/growth.md`.
-pub(crate) const BYTES_A_VOXEL: f64 = 3.6;
+pub(crate) const BYTES_A_VOXEL: f64 = 2.2;
 
 fn n_voxels(bounds: &Aabb, voxel: f64) -> f64 {
     let n = (bounds.size() / voxel).ceil() + 2.0 * PADDING as f64;

@@ -9,24 +9,10 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-/// Edge of a brick. [Units: vx]
-pub(crate) const EDGE: usize = 4;
-/// Voxels of a brick.
-const VOLUME: usize = EDGE * EDGE * EDGE;
-/// Marks the head of a brick of several labels; two more bits tell how many bits a voxel takes, the rest is the
-/// position of its block.
-const MIXED: u32 = 1 << 31;
-const WIDTH_SHIFT: u32 = 29;
-const POSITION: u32 = (1 << WIDTH_SHIFT) - 1;
-/// Words that a position counts.
-const UNIT: usize = 4;
-/// A width that stands for one word a voxel, without a list.
-const PLAIN: u32 = 3;
-/// From a voxel of a brick to the next one along each axis.
-const STEPS: [usize; 3] = [1, EDGE, EDGE * EDGE];
+mod bricks;
 
-/// The labels of one brick.
-type Brick = [u32; VOLUME];
+use bricks::{Brick, MIXED, in_block, place};
+pub(crate) use bricks::{EDGE, Layer};
 
 /// The label of each voxel of a box, below 2³¹.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,15 +20,6 @@ pub struct Labels {
     dims: [usize; 3],
     /// Layers of bricks along z, the last bricks along each axis filled up.
     layers: Vec<Layer>,
-}
-
-/// A layer of bricks.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Layer {
-    /// The label of each brick, or where its block is.
-    heads: Vec<u32>,
-    /// Blocks: the labels of a brick, then the position of each voxel among them.
-    blocks: Vec<u32>,
 }
 
 impl Labels {
@@ -131,8 +108,9 @@ impl Labels {
             labels: self,
             width: self.width(),
             brick: [usize::MAX; 2],
-            layer: None,
             head: 0,
+            block: &[],
+            bits: 0,
         }
     }
 
@@ -275,8 +253,8 @@ impl Labels {
                 }
                 let brick = of.brick(here);
                 let corner = [i, j, layer].map(|b| b * EDGE);
-                for axis in 0..3 {
-                    let beyond = nexts[axis].map(|(of, next)| of.brick(next));
+                for (axis, next) in nexts.into_iter().enumerate() {
+                    let beyond = next.map(|(of, next)| of.brick(next));
                     self.faces_along(axis, corner, &brick, beyond.as_ref(), &mut face);
                 }
             }
@@ -292,10 +270,11 @@ impl Labels {
         beyond: Option<&Brick>,
         face: &mut impl FnMut(usize, usize, [u32; 2]),
     ) {
-        let step = STEPS[axis];
+        let shift = axis * EDGE.ilog2() as usize;
+        let step = 1 << shift;
         let last = step * (EDGE - 1);
         for (voxel, &label) in brick.iter().enumerate() {
-            let is_last = voxel / step % EDGE == EDGE - 1;
+            let is_last = (voxel >> shift) % EDGE == EDGE - 1;
             let other = match (is_last, beyond) {
                 (false, _) => brick[voxel + step],
                 (true, Some(beyond)) => beyond[voxel - last],
@@ -376,10 +355,12 @@ pub struct Reader<'a> {
     labels: &'a Labels,
     /// Bricks along x.
     width: usize,
-    /// The brick of the last voxel, in its layer, and the layer.
+    /// The brick of the last voxel in its layer, and the layer.
     brick: [usize; 2],
-    layer: Option<&'a Layer>,
     head: u32,
+    /// The block of the brick, and the bits of a voxel in it as a power of two.
+    block: &'a [u32],
+    bits: u32,
 }
 
 impl Reader<'_> {
@@ -389,186 +370,22 @@ impl Reader<'_> {
         let brick = [x / EDGE + self.width * (y / EDGE), z / EDGE];
         if brick != self.brick {
             let layer = &self.labels.layers[brick[1]];
-            self.head = layer.heads[brick[0]];
-            self.layer = Some(layer);
             self.brick = brick;
-        }
-        match self.layer {
-            Some(layer) if self.head & MIXED != 0 => {
-                layer.in_block(self.head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
-            }
-            _ => self.head,
-        }
-    }
-}
-
-impl Layer {
-    /// Compresses up to four layers of `nx` by `ny` labels.
-    pub(crate) fn of([nx, ny]: [usize; 2], labels: &[u32]) -> Self {
-        let mut layer = Self::default();
-        let last = labels.len() / (nx * ny) - 1;
-        for j in 0..ny.div_ceil(EDGE) {
-            for i in 0..nx.div_ceil(EDGE) {
-                layer.push(&gather(i, |y, z| {
-                    let row = (j * EDGE + y).min(ny - 1) + ny * z.min(last);
-                    &labels[row * nx..][..nx]
-                }));
+            self.head = layer.heads[brick[0]];
+            if self.head & MIXED != 0 {
+                let (from, bits) = place(self.head);
+                (self.block, self.bits) = (&layer.blocks[from..], bits);
             }
         }
-        layer.blocks.shrink_to_fit();
-        layer
-    }
-
-    fn push(&mut self, brick: &Brick) {
-        self.heads.push(encode(brick, &mut self.blocks));
-    }
-
-    #[inline]
-    fn in_block(&self, head: u32, voxel: usize) -> u32 {
-        let (from, width) = place(head);
-        if width == PLAIN {
-            return self.blocks[from + voxel];
+        if self.head & MIXED == 0 {
+            return self.head;
         }
-        let listed = 1 << (1 << width);
-        let bit = voxel << width;
-        let word = self.blocks[from + listed + bit / 32];
-        self.blocks[from + (word as usize >> (bit % 32) & (listed - 1))]
+        in_block(
+            self.block,
+            self.bits,
+            x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)),
+        )
     }
-
-    /// Labels a voxel of brick `at`.
-    fn set(&mut self, at: usize, voxel: usize, label: u32) {
-        let head = self.heads[at];
-        if self.in_brick(head, voxel) == label {
-            return;
-        }
-        if head & MIXED != 0 {
-            let (from, width) = place(head);
-            let listed = 1 << (1 << width);
-            if width == PLAIN {
-                self.blocks[from + voxel] = label;
-                return;
-            }
-            let list = &self.blocks[from..from + listed];
-            if let Some(which) = list.iter().position(|&l| l == label) {
-                let bit = voxel << width;
-                let word = &mut self.blocks[from + listed + bit / 32];
-                *word &= !((listed as u32 - 1) << (bit % 32));
-                *word |= (which as u32) << (bit % 32);
-                return;
-            }
-        }
-        let mut brick = self.brick(head);
-        brick[voxel] = label;
-        self.heads[at] = encode(&brick, &mut self.blocks);
-    }
-
-    fn in_brick(&self, head: u32, voxel: usize) -> u32 {
-        if head & MIXED == 0 {
-            head
-        } else {
-            self.in_block(head, voxel)
-        }
-    }
-
-    /// Returns the list of a brick of several labels and the words with the positions in it, unless it has none.
-    fn listed(&self, head: u32) -> Option<(&[u32], &[u32])> {
-        let (from, width) = place(head);
-        let lists = (width != PLAIN).then(|| self.blocks[from..].split_at(1 << (1 << width)));
-        lists.map(|(list, words)| (list, &words[..VOLUME << width >> 5]))
-    }
-
-    /// Returns all labels of a brick.
-    fn brick(&self, head: u32) -> Brick {
-        if head & MIXED == 0 {
-            return [head; VOLUME];
-        }
-        let (from, width) = place(head);
-        let mut brick = [0; VOLUME];
-        let Some((list, words)) = self.listed(head) else {
-            brick.copy_from_slice(&self.blocks[from..from + VOLUME]);
-            return brick;
-        };
-        let each = 1 << width;
-        for (voxels, &word) in brick.chunks_exact_mut(32 / each).zip(words) {
-            for (k, label) in voxels.iter_mut().enumerate() {
-                *label = list[word as usize >> (k * each) & (list.len() - 1)];
-            }
-        }
-        brick
-    }
-}
-
-/// Collects the labels of the brick `i` of rows, those past the end from the last voxel.
-fn gather<'a>(i: usize, row: impl Fn(usize, usize) -> &'a [u32]) -> Brick {
-    let mut brick = [0; VOLUME];
-    for (k, to) in brick.chunks_exact_mut(EDGE).enumerate() {
-        let row = row(k % EDGE, k / EDGE);
-        let from = &row[i * EDGE..row.len().min((i + 1) * EDGE)];
-        if let Ok(from) = <[u32; EDGE]>::try_from(from) {
-            to.copy_from_slice(&from);
-        } else {
-            to.fill(from[from.len() - 1]);
-            to[..from.len()].copy_from_slice(from);
-        }
-    }
-    brick
-}
-
-/// Returns the head of a brick, whose block, if it needs one, is added to `blocks`.
-fn encode(brick: &Brick, blocks: &mut Vec<u32>) -> u32 {
-    let first = brick[0];
-    if brick.iter().fold(0, |d, l| d | (l ^ first)) == 0 {
-        assert!(first < MIXED, "labels below 2^31");
-        return first;
-    }
-    let at = position(blocks.len());
-    // Labels in the order in which they appear, and the positions of voxels among them.
-    let mut list = [first; 16];
-    let mut which = [0_u8; VOLUME];
-    let (mut n, mut last) = (1, 0);
-    for (which, &label) in which.iter_mut().zip(brick) {
-        if list[last] != label {
-            last = match list[..n].iter().position(|&l| l == label) {
-                Some(known) => known,
-                None if n == list.len() => {
-                    blocks.extend_from_slice(brick);
-                    return MIXED | PLAIN << WIDTH_SHIFT | at;
-                }
-                None => {
-                    list[n] = label;
-                    n += 1;
-                    n - 1
-                }
-            };
-        }
-        *which = last as u8;
-    }
-    let width = match n {
-        ..=2 => 0,
-        ..=4 => 1,
-        _ => 2,
-    };
-    let (each, listed) = (1 << width, 1 << (1 << width));
-    blocks.extend_from_slice(&list[..listed]);
-    blocks.extend(which.chunks_exact(32 / each).map(|voxels| {
-        let shifted = voxels.iter().enumerate();
-        shifted.fold(0, |word, (k, &v)| word | u32::from(v) << (k * each))
-    }));
-    MIXED | width << WIDTH_SHIFT | at
-}
-
-/// Returns the first word of a block and its width, given its brick's head.
-#[inline]
-fn place(head: u32) -> (usize, u32) {
-    let width = head >> WIDTH_SHIFT & 3;
-    ((head & POSITION) as usize * UNIT, width)
-}
-
-/// Returns the position of a block that begins at a word.
-fn position(word: usize) -> u32 {
-    let at = u32::try_from(word / UNIT).ok();
-    at.filter(|&at| at <= POSITION)
-        .expect("a layer below 8 GiB")
 }
 
 #[cfg(test)]

@@ -98,7 +98,7 @@ impl Crests {
         crests.measure(shape, &alike, allowance);
         let peaks = crests.number(shape, &alike);
         drop(alike);
-        crests.rank(shape, levels, peaks);
+        crests.rank(shape, levels, &peaks);
         crests
     }
 
@@ -155,18 +155,16 @@ impl Crests {
             if front.is_empty() || !allowance.spend(1 + front.len() as u64 / 2) {
                 return;
             }
-            let mut next: Vec<u32> = Vec::new();
-            for &voxel in &front {
+            let onward = |&voxel: &u32| {
                 let voxel = voxel as usize;
                 let inner = self.find(voxel).into_iter();
-                let around = inner.flat_map(|at| around(at, voxel));
-                next.extend(
-                    around
-                        .filter(|&q| self.steps_of(q) == FAR)
-                        .map(|q| q as u32),
-                );
-            }
-            next.sort_unstable();
+                let around = inner.flat_map(move |at| around(at, voxel));
+                let is_next = |&q: &usize| self.steps_of(q) == FAR;
+                around.filter(is_next).map(|q| q as u32)
+            };
+            let many = front.par_iter().with_min_len(1 << 12);
+            let mut next: Vec<u32> = many.flat_map_iter(onward).collect();
+            next.par_sort_unstable();
             next.dedup();
             front = next;
         }
@@ -202,7 +200,7 @@ impl Crests {
     }
 
     /// Sorts the peaks, given the first voxel of each in ascending order.
-    fn rank(&mut self, shape: Shape, levels: &Levels, peaks: Vec<usize>) {
+    fn rank(&mut self, shape: Shape, levels: &Levels, peaks: &[usize]) {
         let layers: Vec<&[usize]> = peaks
             .chunk_by(|a, b| a / shape.layer() == b / shape.layer())
             .collect();

@@ -4,6 +4,7 @@
 //! whole field is never held. They are the same as those of [`distance_squared_near`](super::super::distance_squared_near):
 //! where a voxel's nearest surface could lie beyond the slices read, more are read.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -145,8 +146,14 @@ impl PackedLayer {
         let row = |at: usize| &words[at * nx..][..nx];
         let differs = |at: &u32| *at == 0 || row(*at as usize) != row(*at as usize - 1);
         let rows: Vec<u32> = (0..(words.len() / nx) as u32).filter(differs).collect();
+        let all = rows.len() * nx == words.len();
         let some: Vec<&[u16]> = rows.iter().map(|&at| row(at as usize)).collect();
-        let mut block = lz4_flex::block::compress(bytemuck::cast_slice(&some.concat()));
+        let some = if all {
+            Cow::Borrowed(words)
+        } else {
+            Cow::Owned(some.concat())
+        };
+        let mut block = lz4_flex::block::compress(bytemuck::cast_slice(&some));
         block.shrink_to_fit();
         Self { rows, block }
     }
