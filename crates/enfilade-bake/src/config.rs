@@ -182,11 +182,16 @@ impl BakeConfig {
         positive("min_opening", self.min_opening).map(|_| ())
     }
 
-    /// Returns the grid for a scene of so many triangles within these bounds. All checks of settings are here.
+    /// Returns the grid for a scene of so many triangles within these bounds, if a voxel takes so many bytes. All checks of settings are here.
     ///
     /// # Errors
     /// If a setting is out of its limits, or the budget allows only voxels wider than openings or than requested.
-    pub(crate) fn grid(&self, bounds: &Aabb, n_triangles: usize) -> Result<Grid, BakeError> {
+    pub(crate) fn grid(
+        &self,
+        bounds: &Aabb,
+        n_triangles: usize,
+        bytes_a_voxel: f64,
+    ) -> Result<Grid, BakeError> {
         positive("min_opening", self.min_opening)?;
         self.smallest_hole.check()?;
         let wanted = positive("voxel", self.voxel.unwrap_or(self.min_opening / 6.0))?;
@@ -198,7 +203,7 @@ impl BakeConfig {
             });
         }
         let mut voxel = wanted;
-        let most = self.budget.voxels(n_triangles, BYTES_A_VOXEL);
+        let most = self.budget.voxels(n_triangles, bytes_a_voxel);
         let most = most.min(self.max_voxels as f64);
         // Growing by a tenth at a time ends close below the budget. Past the scene's size only padding is left, which
         // may still be too much.
@@ -214,7 +219,7 @@ impl BakeConfig {
                 return Err(BakeError::TooFine {
                     wanted,
                     finest,
-                    bytes: BYTES_A_VOXEL * n_voxels(bounds, wanted),
+                    bytes: bytes_a_voxel * n_voxels(bounds, wanted),
                 });
             }
         }
@@ -223,7 +228,7 @@ impl BakeConfig {
                 size: bounds.size().to_array(),
                 voxel,
                 wanted,
-                bytes: BYTES_A_VOXEL * n_voxels(bounds, wanted),
+                bytes: bytes_a_voxel * n_voxels(bounds, wanted),
                 max_voxels: most as usize,
                 min_opening: self.min_opening,
             });
@@ -243,9 +248,6 @@ fn positive(name: &'static str, value: f64) -> Result<f64, BakeError> {
     })
 }
 
-/// Peak memory of a bake, rounded from `docs/benchmarks/growth.md`.
-pub(crate) const BYTES_A_VOXEL: f64 = 2.2;
-
 fn n_voxels(bounds: &Aabb, voxel: f64) -> f64 {
     let n = (bounds.size() / voxel).ceil() + 2.0 * PADDING as f64;
     n.x * n.y * n.z
@@ -263,11 +265,11 @@ mod tests {
             ..BakeConfig::default()
         };
         let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
-        let grid = config.grid(&bounds, 100_000).unwrap();
+        let grid = config.grid(&bounds, 100_000, 2.2).unwrap();
         assert!(grid.n_voxels() <= 20_000_000);
         assert!(grid.voxel > 0.1);
         let small = Aabb::new(DVec3::ZERO, DVec3::splat(5.0));
-        assert!((config.grid(&small, 12).unwrap().voxel - 0.1).abs() < 1e-12);
+        assert!((config.grid(&small, 12, 2.2).unwrap().voxel - 0.1).abs() < 1e-12);
     }
 
     #[test]
@@ -277,14 +279,14 @@ mod tests {
             ..BakeConfig::default()
         };
         let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
-        let error = config.grid(&bounds, 100_000).unwrap_err();
+        let error = config.grid(&bounds, 100_000, 2.2).unwrap_err();
         assert!(matches!(error, BakeError::TooLarge { .. }), "{error}");
         let said = error.to_string();
         for word in ["200 x 30 x 200 m", "--unit", "max_voxels", "5 GB"] {
             assert!(said.contains(word), "{word}: {said}");
         }
         config.min_opening = 10.0;
-        config.grid(&bounds, 100_000).unwrap();
+        config.grid(&bounds, 100_000, 2.2).unwrap();
     }
 
     #[test]
@@ -296,7 +298,7 @@ mod tests {
                 ..BakeConfig::default()
             };
             let bounds = Aabb::new(DVec3::ZERO, DVec3::new(10.0, 3.0, 10.0));
-            config.grid(&bounds, 1000)
+            config.grid(&bounds, 1000, 2.2)
         };
         assert!((grid(0.05, Budget::default()).unwrap().voxel - 0.05).abs() < 1e-12);
         let rich = Budget {
@@ -326,7 +328,7 @@ mod tests {
             ..BakeConfig::default()
         };
         let error = config
-            .grid(&Aabb::new(DVec3::ZERO, DVec3::ONE), 12)
+            .grid(&Aabb::new(DVec3::ZERO, DVec3::ONE), 12, 2.2)
             .unwrap_err();
         assert!(error.to_string().contains("voxel"));
     }

@@ -11,6 +11,7 @@
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Bvh, DVec3};
 
+use crate::rooms::FLOODED;
 use crate::structure::{Frame, bounds_of, plates, structural_triangles};
 use crate::voxel::{
     ENCLOSED, Grid, WidestPath, ascend, deepest_enclosed, distance_squared, enclosure, voxelize,
@@ -127,7 +128,11 @@ pub fn find_leak_trail(
         }));
     }
     let frame = Frame::of(&matter);
-    let grid = config.grid(&bounds_of(&frame.triangles_to_grid(&matter)), matter.len())?;
+    let grid = config.grid(
+        &bounds_of(&frame.triangles_to_grid(&matter)),
+        matter.len(),
+        FLOODED,
+    )?;
     // Includes leaves that stand open: a room ends at its doorways.
     matter.extend(plates(scene).concat());
     let matter = frame.triangles_to_grid(&matter);

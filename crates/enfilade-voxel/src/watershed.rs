@@ -29,6 +29,7 @@ mod basins;
 mod crests;
 mod join;
 mod levels;
+mod shape;
 mod slabs;
 
 use enfilade_geom::Allowance;
@@ -36,8 +37,9 @@ use rayon::prelude::*;
 
 use super::grid::BitVolume;
 use super::labels::Labels;
-use crests::{Crests, Shape};
+use crests::Crests;
 use levels::{Levels, Outdoors};
+use shape::Shape;
 
 pub use basins::{Basin, Saddle, Watershed};
 

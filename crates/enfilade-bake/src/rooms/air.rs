@@ -6,7 +6,6 @@ use enfilade_geom::Allowance;
 
 use super::lids::{Lids, find_lids};
 use super::rims::rim_caps;
-use crate::config::BYTES_A_VOXEL;
 use crate::structure::{Site, Structure};
 use crate::voxel::{
     BitVolume, DistanceField, Grid, SparseVolume, distance_squared_near, far_outdoors, voxelize,
@@ -36,19 +35,25 @@ pub(crate) struct Plot {
     resolution: Resolution,
 }
 
-/// Lays grids over parts of a structure, and reports the work ahead.
+/// Peak memory of a bake by the watershed, rounded from `docs/benchmarks/growth.md`. [Units: bytes/vx]
+pub(crate) const FLOODED: f64 = 2.2;
+/// Peak memory of a bake whose parts of the air are given: labels and distances of all voxels. [Units: bytes/vx]
+const IN_PARTS: f64 = 6.5;
+
+/// Lays grids over parts of a structure whose voxels take so many bytes each, and reports the work ahead.
 ///
 /// # Errors
 /// If a setting is invalid, or the scene is too large for the voxel budget.
 pub(crate) fn plots(
     structure: &Structure<'_>,
     sites: Vec<Site>,
+    bytes_a_voxel: f64,
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Vec<Plot>, BakeError> {
     config.check_opening()?;
     let grid = |site: Site| {
-        let grid = config.grid(&site.bounds, structure.triangles.len())?;
+        let grid = config.grid(&site.bounds, structure.triangles.len(), bytes_a_voxel)?;
         Ok::<_, BakeError>((site, grid))
     };
     let grids: Vec<(Site, Grid)> = sites
@@ -64,7 +69,7 @@ pub(crate) fn plots(
         n_voxels: n_voxels as u64,
     };
     // Grids are held one after the other.
-    let memory = BYTES_A_VOXEL * largest.map_or(0, Grid::n_voxels) as f64;
+    let memory = bytes_a_voxel * largest.map_or(0, Grid::n_voxels) as f64;
     context.tell(resolution, memory);
     let plot = |(site, grid): (Site, Grid)| Plot {
         site,
@@ -86,7 +91,13 @@ pub(crate) fn prepare(
 ) -> Result<VoxelAir, BakeError> {
     let sites = structure.sites(config.min_opening);
     let all = sites.into_iter().reduce(Site::union);
-    let mut plots = plots(structure, all.into_iter().collect(), config, context)?;
+    let mut plots = plots(
+        structure,
+        all.into_iter().collect(),
+        IN_PARTS,
+        config,
+        context,
+    )?;
     measure(structure, plots.swap_remove(0), config, context)
 }
 

@@ -25,7 +25,7 @@ mod slabs;
 mod voids;
 mod votes;
 
-pub(crate) use air::{measure, plots, prepare};
+pub(crate) use air::{FLOODED, measure, plots, prepare};
 pub(crate) use basins::Basins;
 pub(crate) use find::propose;
 pub(crate) use limbs::{Limb, Plan, THICKER};

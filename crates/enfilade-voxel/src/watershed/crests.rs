@@ -4,44 +4,12 @@ use enfilade_geom::{Allowance, Sets};
 use rayon::prelude::*;
 
 use super::levels::{Levels, OUTDOORS, level};
+use super::shape::Shape;
 
 /// Crest voxels at this many steps from the rim of their plateau, or more, count as peaks.
 ///
 /// So an ascent depends on voxels within that distance only, however large a plateau is.
 const FAR: u8 = u8::MAX;
-
-/// A box whose voxels are numbered along x, then y, then z.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
-    pub(super) dims: [usize; 3],
-}
-
-impl Shape {
-    pub(super) fn layer(&self) -> usize {
-        self.dims[0] * self.dims[1]
-    }
-
-    pub(super) fn coords(&self, voxel: usize) -> [usize; 3] {
-        let [nx, ny, _] = self.dims;
-        [voxel % nx, voxel / nx % ny, voxel / (nx * ny)]
-    }
-
-    /// Returns the voxels that share a face with the one at `at`, in ascending order.
-    pub(super) fn neighbors(&self, [x, y, z]: [usize; 3]) -> impl Iterator<Item = usize> + use<> {
-        let [nx, ny, nz] = self.dims;
-        let layer = nx * ny;
-        let voxel = x + nx * y + layer * z;
-        let all = [
-            (z > 0, voxel.wrapping_sub(layer)),
-            (y > 0, voxel.wrapping_sub(nx)),
-            (x > 0, voxel.wrapping_sub(1)),
-            (x + 1 < nx, voxel + 1),
-            (y + 1 < ny, voxel + nx),
-            (z + 1 < nz, voxel + layer),
-        ];
-        all.into_iter().filter(|n| n.0).map(|n| n.1)
-    }
-}
 
 /// A summit of the field: where a basin starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::super::edt::{LANES, Span, Tables, along_rows, load, within_slice, work_of};
 use super::super::grid::{BitVolume, for_runs};
 use super::basins::STEPS;
-use super::crests::Shape;
+use super::shape::Shape;
 
 /// The part of a word that is a level; 0 is occupied.
 const LEVEL: u16 = 0x3FFF;

@@ -6,8 +6,9 @@ use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::super::labels::{EDGE, Labels, Layer};
-use super::crests::{Crests, Shape};
+use super::crests::Crests;
 use super::levels::{Levels, is_outdoors, level};
+use super::shape::Shape;
 
 /// Number of voxels of a slab, unless layers are large: with fewer, more is border; with more, it takes more memory.
 const SLAB: usize = 1 << 23;
