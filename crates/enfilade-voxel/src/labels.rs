@@ -335,14 +335,6 @@ impl Labels {
         });
     }
 
-    /// Writes the labels of a row along x, numbered along y, then z.
-    pub fn write_row(&self, row: usize, to: &mut [u32]) {
-        let [nx, ny, _] = self.dims;
-        self.runs_of_row([row % ny, row / ny], 0..nx, |run, label| {
-            to[run].fill(label);
-        });
-    }
-
     /// Returns all labels in index order.
     pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.len()).map(|i| self.get(i))

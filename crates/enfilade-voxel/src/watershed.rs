@@ -200,42 +200,24 @@ fn first_free(blocked: &BitVolume, outdoors: &Outdoors<'_>) -> usize {
 #[must_use]
 pub fn mark_dams(dims: [usize; 3], labels: &Labels) -> BitVolume {
     assert_eq!(labels.dims(), dims, "a label for each voxel");
-    let [nx, ny, nz] = dims;
-    let mut out = BitVolume::new(dims);
-    if labels.is_empty() {
-        return out;
-    }
-    let per_row = out.row_words();
-    let rows = out.words_mut().par_chunks_mut(per_row).enumerate();
-    rows.with_min_len(16)
-        .for_each_init(Vec::new, |buffer: &mut Vec<u32>, (row, words)| {
-            let (y, z) = (row % ny, row / ny);
-            let near = [
-                (true, row),
-                (y > 0, row.wrapping_sub(1)),
-                (z > 0, row.wrapping_sub(ny)),
-                (y + 1 < ny, row + 1),
-                (z + 1 < nz, row + ny),
-            ];
-            buffer.clear();
-            buffer.resize(near.len() * nx, 0);
-            let rows: Vec<&mut [u32]> = buffer.chunks_exact_mut(nx).collect();
-            for ((is_in, row), to) in near.into_iter().zip(rows) {
-                if is_in {
-                    labels.write_row(row, to);
-                }
-            }
-            let (here, around) = buffer.split_at(nx);
-            for x in 0..nx {
-                let dam = |other: u32| other != 0 && other < here[x];
-                if (x > 0 && dam(here[x - 1]))
-                    || (x + 1 < nx && dam(here[x + 1]))
-                    || around.chunks_exact(nx).any(|row| dam(row[x]))
-                {
-                    words[x / 64] |= 1 << (x % 64);
-                }
+    let dams_of = |layer: usize| {
+        let mut dams: Vec<usize> = Vec::new();
+        labels.for_faces(layer, |voxel, axis, [a, b]| {
+            if a != 0 && b != 0 {
+                let next = [1, dims[0], dims[0] * dims[1]][axis];
+                dams.push(if a > b { voxel } else { voxel + next });
             }
         });
+        dams
+    };
+    let layers = (0..labels.n_layers()).into_par_iter();
+    let dams: Vec<Vec<usize>> = layers.map(dams_of).collect();
+    let mut out = BitVolume::new(dims);
+    let shape = Shape { dims };
+    for voxel in dams.into_iter().flatten() {
+        let [x, y, z] = shape.coords(voxel);
+        out.set(x, y, z, true);
+    }
     out
 }
 

@@ -42,12 +42,28 @@ impl Layer {
     pub(crate) fn of([nx, ny]: [usize; 2], labels: &[u32]) -> Self {
         let mut layer = Self::default();
         let last = labels.len() / (nx * ny) - 1;
+        let row = |row: usize| &labels[row * nx..][..nx];
+        // For each brick of a row, the bits in which some label of it differs from its first.
+        let mut differs: Vec<u32> = Vec::new();
         for j in 0..ny.div_ceil(EDGE) {
-            for i in 0..nx.div_ceil(EDGE) {
-                layer.push(&gather(i, |y, z| {
-                    let row = (j * EDGE + y).min(ny - 1) + ny * z.min(last);
-                    &labels[row * nx..][..nx]
-                }));
+            let row = |y: usize, z: usize| row((j * EDGE + y).min(ny - 1) + ny * z.min(last));
+            let first = row(0, 0).iter().step_by(EDGE);
+            differs.clear();
+            differs.resize(nx.div_ceil(EDGE), 0);
+            for k in 0..EDGE * EDGE {
+                let bricks = row(k % EDGE, k / EDGE).chunks(EDGE);
+                for ((differs, labels), first) in differs.iter_mut().zip(bricks).zip(first.clone())
+                {
+                    *differs |= labels.iter().fold(0, |d, l| d | (l ^ first));
+                }
+            }
+            for ((i, &differs), &first) in differs.iter().enumerate().zip(first) {
+                if differs == 0 {
+                    assert!(first < MIXED, "labels below 2^31");
+                    layer.heads.push(first);
+                } else {
+                    layer.push(&gather(i, row));
+                }
             }
         }
         layer.blocks.shrink_to_fit();
