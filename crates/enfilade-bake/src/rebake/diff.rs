@@ -68,9 +68,9 @@ impl Diff {
         let detail_of = same_details(old, structure.scene);
         add_details(old, structure.scene, &detail_of, &mut boxes);
         Self {
-            detail_of,
             batch_of,
             removed,
+            detail_of,
             boxes,
         }
     }
@@ -85,7 +85,7 @@ impl Diff {
 /// door is cut has other triangles, but most of its surface is as it was. Quadratic in those in one plane, within [`MOST_PAIRS`].
 fn uncovered(of: &[Triangle], by: &[Triangle], eps: f64) -> Vec<Aabb> {
     if of.len().saturating_mul(by.len()) > MOST_PAIRS {
-        return of.iter().map(|t| Aabb::of_points(t)).collect();
+        return of.iter().map(Aabb::of_points).collect();
     }
     let mut boxes = Vec::new();
     for t in of {
@@ -109,7 +109,7 @@ fn uncovered(of: &[Triangle], by: &[Triangle], eps: f64) -> Vec<Aabb> {
             rest = outside;
         }
         rest.retain(|part| is_larger(part, SLIVER * SLIVER, SLIVER));
-        boxes.extend(rest.iter().map(|part| Aabb::of_points(part)));
+        boxes.extend(rest.iter().map(Aabb::of_points));
     }
     boxes
 }

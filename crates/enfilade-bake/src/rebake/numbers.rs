@@ -99,16 +99,19 @@ impl Numbers {
         self.fresh.iter().map(|&id| CellId(self.last(id)))
     }
 
-    /// Gives the cells of a locator their last numbers.
-    pub(super) fn renumber_locator(&self, locator: &mut Locator) {
-        let leaf = |at: i32| match cell_of(at) {
+    fn last_leaf(&self, at: i32) -> i32 {
+        match cell_of(at) {
             Some(cell) => Locator::leaf(Some(CellId(self.last(cell.0)))),
             None => at,
-        };
-        locator.root = leaf(locator.root);
+        }
+    }
+
+    /// Gives the cells of a locator their last numbers.
+    pub(super) fn renumber_locator(&self, locator: &mut Locator) {
+        locator.root = self.last_leaf(locator.root);
         locator.outside = locator.outside.map(|c| CellId(self.last(c.0)));
         for node in &mut locator.nodes {
-            node.children = node.children.map(leaf);
+            node.children = node.children.map(|c| self.last_leaf(c));
         }
     }
 }

@@ -7,6 +7,7 @@ use enfilade_geom::scene::Scene;
 use enfilade_geom::{Aabb, DVec3};
 
 use super::outcome::{RebakeError, Rebaked, WholeBecause};
+use super::tree::cell_of;
 use crate::bake;
 use crate::{BakeConfig, BakeContext};
 
@@ -127,14 +128,15 @@ fn renumber(world: &mut World, number: &[u32]) {
         portal.cells = portal.cells.map(of);
     }
     graph.specials = crate::specials::renumbered(&graph.specials, of, Some::<PortalId>);
-    let leaf = |at: i32| match at {
-        at if at <= -2 => Locator::leaf(Some(of(CellId((-2 - at) as u32)))),
-        at => at,
+    let leaf = |at: &mut i32| {
+        if let Some(cell) = cell_of(*at) {
+            *at = Locator::leaf(Some(of(cell)));
+        }
     };
-    graph.locator.root = leaf(graph.locator.root);
+    leaf(&mut graph.locator.root);
     graph.locator.outside = graph.locator.outside.map(of);
     for node in &mut graph.locator.nodes {
-        node.children = node.children.map(leaf);
+        node.children.iter_mut().for_each(leaf);
     }
     world.batches.iter_mut().for_each(|b| list(&mut b.cells));
     world.details.iter_mut().for_each(|d| list(&mut d.cells));
