@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn a_part_has_the_bits_of_the_whole() {
         let dims = [150, 7, 5];
-        let is_set = |i: usize| i % 7 == 0 || i % 11 == 3;
+        let is_set = |i: usize| i.is_multiple_of(7) || i % 11 == 3;
         let whole = BitVolume::from_fn(dims, is_set);
         for (from, to) in [
             ([0, 0, 0], dims),
