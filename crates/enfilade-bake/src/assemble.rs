@@ -9,6 +9,8 @@ mod fittings;
 mod kinds;
 mod seals;
 
+pub(crate) use seals::{SealPart, batches_of};
+
 use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{
@@ -25,7 +27,7 @@ use crate::structure::{Candidate, SceneStructure, plates};
 
 /// A scene divided into cells: input of the last stage, which all builders share.
 pub(crate) struct Cut<'a> {
-    pub(crate) structure: SceneStructure<'a>,
+    pub(crate) structure: &'a SceneStructure<'a>,
     pub(crate) partition: Partition,
     pub(crate) candidates: &'a [Candidate],
     /// Distance by which outlines grow, so that rounding never cuts into an opening. [Units: wu]
@@ -49,8 +51,8 @@ struct Judged {
 }
 
 pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statistics) -> World {
-    let (scene, partition) = (cut.structure.scene, &cut.partition);
-    let mut cells: Vec<Cell> = (0..partition.label_of_cell.len())
+    let partition = &cut.partition;
+    let cells: Vec<Cell> = (0..partition.label_of_cell.len())
         .map(|i| {
             let outdoor = partition.outside == Some(i as u32);
             let is_void = !outdoor && matches!(partition.label_of_cell[i], Label::Void(_));
@@ -63,17 +65,38 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
                 },
                 aabb: [b.min.as_vec3().to_array(), b.max.as_vec3().to_array()],
                 volume: partition.volumes[i] as f32,
-                n_triangles: 0,
-                n_detail_triangles: 0,
-                portals: Vec::new(),
                 outdoor,
                 is_void,
+                ..Cell::default()
             }
         })
         .collect();
-    let plates = plates(scene).into_iter();
+    let portals = portals_of(cut, &|c| cells[c as usize].is_void);
+    let graph = CellPortalGraph {
+        specials: Vec::new(),
+        cells,
+        portals,
+        locator: partition.locator.clone(),
+        provenance,
+        statistics,
+    };
+    let seals = seals::batches(cut);
+    let seen_from = |t: usize| partition.triangle_cells.both(t);
+    dressed(
+        cut.structure,
+        graph,
+        &seen_from,
+        &|_| None,
+        seals,
+        cut.allowance,
+    )
+}
+
+/// Returns the portals of a cut, divided between the objects that fill them.
+pub(crate) fn portals_of(cut: &Cut<'_>, is_void: &dyn Fn(u32) -> bool) -> Vec<Portal> {
+    let plates = plates(cut.structure.scene).into_iter();
     let plates: Vec<_> = plates.map(fillers::FlatObject::new).collect();
-    let in_turn = partition.portals.par_iter();
+    let in_turn = cut.partition.portals.par_iter();
     let in_turn = in_turn.filter(cut.allowance.each(WORK_A_PORTAL));
     let judge = kinds::Judge::new(cut);
     let judge = &judge;
@@ -90,28 +113,38 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         })
     });
     let bays = bays::join_bays(judged.collect());
-    let is_void = |c: u32| cells[c as usize].is_void;
-    let portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| judge.kind(p, false))
+    bays::join_slits(bays, is_void, |p| judge.kind(p, false))
         .iter()
         .filter_map(|j| portal(cut, j))
-        .collect();
-    for (i, p) in portals.iter().enumerate() {
+        .collect()
+}
+
+/// Returns a world of a graph whose cells have neither geometry nor portals yet, and whose portals have no fittings.
+/// `seen_from` returns the cells that see a structural triangle, `touched_by` those that an object touches, if known.
+pub(crate) fn dressed(
+    structure: &SceneStructure<'_>,
+    mut graph: CellPortalGraph,
+    seen_from: &dyn Fn(usize) -> Vec<u32>,
+    touched_by: &(dyn Fn(usize) -> Option<Vec<CellId>> + Sync),
+    seals: Vec<Batch>,
+    allowance: &Allowance,
+) -> World {
+    let scene = structure.scene;
+    for (i, p) in graph.portals.iter().enumerate() {
         for c in p.cells {
-            cells[c.0 as usize].portals.push(PortalId(i as u32));
+            graph.cells[c.0 as usize].portals.push(PortalId(i as u32));
         }
     }
-    let mut batches = batches(cut, &mut cells);
-    batches.extend(seals::batches(cut));
-    let (details, detail_meshes) = details(scene, &partition.locator, &mut cells, cut.allowance);
+    let mut batches = batches(structure, seen_from, &mut graph.cells);
+    batches.extend(seals);
+    let locator = &graph.locator;
+    let cells_of = |i: usize| {
+        let known = touched_by(i);
+        known.unwrap_or_else(|| cells_of_object(scene, i, locator, allowance))
+    };
+    let (details, detail_meshes) = details(scene, &cells_of, &mut graph.cells);
     let mut world = World {
-        graph: CellPortalGraph {
-            specials: Vec::new(),
-            cells,
-            portals,
-            locator: partition.locator.clone(),
-            provenance,
-            statistics,
-        },
+        graph,
         batches,
         details,
         detail_meshes,
@@ -124,7 +157,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         about: scene.about.clone(),
         pvs: None,
     };
-    fittings::fit(&mut world, &cut.structure.bvh, cut.allowance);
+    fittings::fit(&mut world, &structure.bvh, allowance);
     world
 }
 
@@ -291,12 +324,16 @@ struct BatchBuilder {
     sources: SourceRuns,
 }
 
-fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
-    let scene = cut.structure.scene;
+fn batches(
+    structure: &SceneStructure<'_>,
+    seen_from: &dyn Fn(usize) -> Vec<u32>,
+    cells: &mut [Cell],
+) -> Vec<Batch> {
+    let scene = structure.scene;
     let mut builders: BTreeMap<(Vec<u32>, Option<u32>, Layout), BatchBuilder> = BTreeMap::new();
     let mut normal_matrix: Option<(u32, DMat3)> = None;
-    for (t, source) in cut.structure.sources.iter().enumerate() {
-        let seen_from = cut.partition.triangle_cells.both(t);
+    for (t, source) in structure.sources.iter().enumerate() {
+        let seen_from = seen_from(t);
         for &c in &seen_from {
             cells[c as usize].n_triangles += 1;
         }
@@ -317,7 +354,7 @@ fn batches(cut: &Cut<'_>, cells: &mut [Cell]) -> Vec<Batch> {
         let to = &mut builder.primitive;
         to.material = from.material;
         to.uvs.resize(from.uvs.len(), Vec::new());
-        for (corner, position) in cut.structure.triangles[t].iter().enumerate() {
+        for (corner, position) in structure.triangles[t].iter().enumerate() {
             let v = from.indices[source.triangle as usize * 3 + corner];
             let key = (source.object, source.primitive, v);
             let index = *builder.vertices.entry(key).or_insert_with(|| {
@@ -361,17 +398,13 @@ fn turned(n: [f32; 3], by: impl Fn(DVec3) -> DVec3) -> [f32; 3] {
 
 fn details(
     scene: &Scene,
-    locator: &Locator,
+    cells_of: &(dyn Fn(usize) -> Vec<CellId> + Sync),
     cells: &mut [Cell],
-    allowance: &Allowance,
 ) -> (Vec<DetailObject>, Vec<Mesh>) {
     let ids: Vec<usize> = (0..scene.objects.len())
         .filter(|&i| scene.objects[i].role == Role::Detail)
         .collect();
-    let touched: Vec<Vec<CellId>> = ids
-        .par_iter()
-        .map(|&i| cells_of_object(scene, i, locator, allowance))
-        .collect();
+    let touched: Vec<Vec<CellId>> = ids.par_iter().map(|&i| cells_of(i)).collect();
     let mut meshes = Vec::new();
     let mut new_index: HashMap<u32, u32> = HashMap::new();
     let mut out = Vec::new();

@@ -7,6 +7,7 @@ use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::{DVec3, Sets};
 
 use crate::complex::{Complex, Label, LeafCells, OpenContact, Partition, Vote};
+use crate::proposal::BEYOND;
 use crate::structure::OUTDOORS;
 
 /// Merges each cell that opens to no other region with the largest cell of its region: shallow voids, the insides of
@@ -25,7 +26,7 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
     let mut opens_elsewhere = vec![false; n];
     for p in &partition.portals {
         let regions = p.cells.map(region);
-        if regions[0] != regions[1] {
+        if regions[0] != regions[1] && !regions.contains(&Some(BEYOND)) {
             p.cells
                 .iter()
                 .for_each(|&c| opens_elsewhere[c as usize] = true);

@@ -33,6 +33,7 @@ pub mod names;
 mod output;
 mod proposal;
 mod realize;
+pub mod rebake;
 mod rooms;
 pub mod simplify;
 mod specials;

@@ -8,6 +8,9 @@ use crate::Resolution;
 use crate::complex::{Label, LabelSettings, Vote};
 use crate::structure::{Candidate, OUTDOORS};
 
+/// Region of everything beyond the part of a scene that is baked, and of matter that its border cuts.
+pub(crate) const BEYOND: u32 = u32::MAX >> 1;
+
 /// Rooms and openings that a builder found, in scene coordinates.
 pub(crate) struct Proposal {
     /// The box to divide into cells.

@@ -12,7 +12,7 @@ use crate::complex::{
     Complex, ComplexInput, Label, LeafCells, Partition, Vote, build_complex_within,
 };
 use crate::join::{join_enclosed, join_unparted, join_voids};
-use crate::proposal::Proposal;
+use crate::proposal::{BEYOND, Proposal};
 use crate::structure::Structure;
 use crate::void::mark_voids;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
@@ -65,7 +65,7 @@ pub(crate) fn realize(
     context.begin(Stage::Geometry)?;
     let leaks = partition.leaks.clone();
     let cut = Cut {
-        structure,
+        structure: &structure,
         partition,
         candidates: &proposal.candidates,
         outward,
@@ -91,7 +91,11 @@ pub(crate) fn realize(
 const VOID_WEIGHT: f32 = 1.0;
 
 /// Divides the leaves of the complex among cells.
-fn part(complex: &Complex<'_>, proposal: &mut Proposal, allowance: &Allowance) -> Partition {
+pub(crate) fn part(
+    complex: &Complex<'_>,
+    proposal: &mut Proposal,
+    allowance: &Allowance,
+) -> Partition {
     let Proposal {
         votes,
         voids,
@@ -104,9 +108,11 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal, allowance: &Allowance) -
         cells = complex.label(votes, label);
     }
     // Voids that no room's votes reached.
+    let region = |c: u32| cells.label_of_cell[c as usize].region();
+    let is_reached = |c: u32| region(c) != Some(BEYOND);
     let mut unreached: Vec<Vote> = std::mem::take(voids)
         .into_iter()
-        .filter(|(p, _)| complex.cell_at(&cells, *p).is_none())
+        .filter(|(p, _)| !complex.cell_at(&cells, *p).is_some_and(is_reached))
         .map(|(point, region)| Vote {
             point,
             label: Label::Void(region),
@@ -145,7 +151,10 @@ fn part(complex: &Complex<'_>, proposal: &mut Proposal, allowance: &Allowance) -
 fn opening_elsewhere(complex: &Complex<'_>, cells: &LeafCells) -> BTreeSet<u32> {
     let region = |c: u32| cells.label_of_cell[c as usize].region();
     let pairs = complex.contacts(cells).into_keys();
-    let elsewhere = pairs.filter(|[a, b]| region(*a) != region(*b));
+    let elsewhere = pairs.filter(|pair| {
+        let regions = pair.map(region);
+        regions[0] != regions[1] && !regions.contains(&Some(BEYOND))
+    });
     elsewhere.flatten().collect()
 }
 
@@ -177,7 +186,7 @@ fn world_of(cut: &Cut<'_>, method: Method, proposal: &Proposal) -> World {
 }
 
 /// Returns the FNV-1a hash of the triangles and settings, as 16 hexadecimal digits.
-fn input_hash(
+pub(crate) fn input_hash(
     triangles: &[Triangle],
     settings: &std::collections::BTreeMap<String, String>,
 ) -> String {

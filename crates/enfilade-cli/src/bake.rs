@@ -3,7 +3,7 @@
 mod cracks;
 pub(crate) mod delaunay;
 mod doorless;
-mod found;
+pub(crate) mod found;
 mod gaps;
 mod leak_path;
 pub(crate) mod settings;

@@ -30,6 +30,7 @@ mod portals;
 mod progress;
 mod progress_lines;
 mod pvs;
+mod rebake;
 mod render;
 mod report;
 mod screen;
@@ -85,6 +86,7 @@ enum Command {
     Plan(plan::Plan),
     Portals(portals::Portals),
     Pvs(pvs::Pvs),
+    Rebake(rebake::Rebake),
     Render(render::Render),
     Report(report::Report),
     See(see::See),
@@ -121,6 +123,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Plan(args) => plan::run(&args),
         Command::Portals(args) => portals::run(&args),
         Command::Pvs(args) => pvs::run(&args),
+        Command::Rebake(args) => rebake::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),

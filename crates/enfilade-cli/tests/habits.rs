@@ -11,7 +11,7 @@ use enfilade_testkit::{Variant, gjorup_rooms};
 use serde_json::Value;
 
 /// Keys in the `--json` output of each command; the files come from the rows before.
-const COMMANDS: [(&str, &[&str]); 31] = [
+const COMMANDS: [(&str, &[&str]); 32] = [
     ("demo", &["files", "triangles", "cells_indoors"]),
     (
         "bake house.glb --voxel 0.2 -o w.glb",
@@ -55,6 +55,10 @@ const COMMANDS: [(&str, &[&str]); 31] = [
         &["file", "bytes", "textures", "left_out"],
     ),
     ("pvs world.glb -o p.pvs", &["cells", "pairs", "complete"]),
+    (
+        "rebake w.glb --source house.glb --voxel 0.2 -o re.glb",
+        &["file", "bytes", "changed", "gone", "moved", "whole"],
+    ),
     (
         "render world.glb --size 64x36 --plain --adapter software -o x.png",
         &["file", "eye", "triangles"],

@@ -10,6 +10,8 @@ mod errands;
 mod game_loop;
 #[path = "../examples/lift.rs"]
 mod lift;
+#[path = "../examples/live_edit.rs"]
+mod live_edit;
 #[path = "../examples/own_builder.rs"]
 mod own_builder;
 #[path = "../examples/radio.rs"]
@@ -28,6 +30,11 @@ fn doors_close_slide_and_are_hit() {
 #[test]
 fn a_walk_draws_less_than_everything() {
     game_loop::main().unwrap();
+}
+
+#[test]
+fn a_door_is_cut_while_the_world_is_in_use() {
+    live_edit::main().unwrap();
 }
 
 #[test]

@@ -28,11 +28,11 @@ pub(crate) struct VoxelAir {
 #[derive(Clone, Copy)]
 pub(crate) struct Plot {
     site: Site,
-    grid: Grid,
+    pub(super) grid: Grid,
     /// Share of all voxels of the scene.
     share: f64,
     /// Resolution of the whole scene.
-    resolution: Resolution,
+    pub(super) resolution: Resolution,
 }
 
 /// Peak memory of a bake by the watershed, rounded from `docs/benchmarks/growth.md`. [Units: bytes/vx]

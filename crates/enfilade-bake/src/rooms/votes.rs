@@ -11,7 +11,7 @@ use crate::structure::Frame;
 use crate::voxel::{BitVolume, Grid, Labels, voxelize};
 
 /// Approximate upper limit on the number of votes.
-const MAX_VOTES: usize = 1_000_000;
+pub(super) const MAX_VOTES: usize = 1_000_000;
 /// Voxels this close to where two regions meet do not vote: a candidate may lie on either
 /// side of them. [Units: wu]
 const UNSURE: f64 = 0.35;

@@ -83,6 +83,13 @@ impl Frame {
         self == Self::SCENE
     }
 
+    /// Returns `true` if both turn by the same angle up to `by`, and both or neither turn at all. [Units: rad]
+    #[must_use]
+    pub(crate) fn is_near(self, other: Self, by: f64) -> bool {
+        let off = (self.cos - other.cos).hypot(self.sin - other.sin);
+        self.is_scene() == other.is_scene() && off <= by
+    }
+
     /// Returns the turn of the grid, from x toward z. [Units: degrees]
     #[must_use]
     pub(crate) fn degrees(self) -> f64 {

@@ -36,10 +36,10 @@ pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
 pub(crate) use lattice::{Jambs, connected_count, rim_share};
 pub(crate) use of::{
-    OUTDOORS, SceneStructure, Structure, bounds_of, in_own_order, structural_triangles,
+    OUTDOORS, SceneStructure, Structure, bounds_of, in_own_order, slabs_of, structural_triangles,
 };
 pub(crate) use outline::grown;
 pub(crate) use pinch::{Mergeable, Pair, join_rooms};
 pub(crate) use rims::{RimVertex, Rims};
-pub(crate) use site::Site;
+pub(crate) use site::{Site, sites};
 pub(crate) use slabs::lies_in_slab;

@@ -149,10 +149,7 @@ impl<'a> Structure<'a> {
 
     /// Returns the heights at which storeys end in a box, ascending: beside wide land, no slab would be large. [Units: wu]
     pub(crate) fn slabs(&self, within: &Aabb) -> Vec<f64> {
-        let within = within.expanded(ON_BORDER);
-        let is_in = |t: &&Triangle| t.iter().all(|&p| within.contains(p));
-        let walls: Vec<Triangle> = self.walls.iter().filter(is_in).copied().collect();
-        slab_heights(&walls)
+        slabs_of(&self.walls, within)
     }
 
     /// Returns the triangles of detail objects that may close an opening, in frame coordinates: shut door leaves,
@@ -184,6 +181,14 @@ impl<'a> Structure<'a> {
             hole: self.hole,
         }
     }
+}
+
+/// Returns the heights at which storeys of these walls end in a box; see [`Structure::slabs`].
+pub(crate) fn slabs_of(walls: &[Triangle], within: &Aabb) -> Vec<f64> {
+    let within = within.expanded(ON_BORDER);
+    let is_in = |t: &&Triangle| t.iter().all(|&p| within.contains(p));
+    let walls: Vec<Triangle> = walls.iter().filter(is_in).copied().collect();
+    slab_heights(&walls)
 }
 
 /// Returns the structural triangles that have an area, with their sources.

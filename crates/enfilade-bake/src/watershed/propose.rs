@@ -5,7 +5,7 @@ use enfilade_geom::Allowance;
 use crate::proposal::Proposal;
 use crate::rooms::{self, Basins};
 use crate::structure::Structure;
-use crate::voxel::{DistanceField, Grid};
+use crate::voxel::{BitVolume, DistanceField, Grid, Watershed, WatershedOptions, watershed};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// Finds rooms by a flood of the distance field.
@@ -45,7 +45,25 @@ pub(crate) fn propose(
 
 /// Floods the air.
 fn flood(grid: &Grid, field: &DistanceField, config: &BakeConfig, allowance: &Allowance) -> Basins {
-    let flood = field.watershed(config.noise / grid.voxel, allowance);
+    basins_of(field.watershed(config.noise / grid.voxel, allowance))
+}
+
+/// Floods a part of the air, with the squared distances of its voxels. Those of `outdoors` are known to be there. [Units: vx²]
+pub(crate) fn flood_part(
+    grid: &Grid,
+    distances: Vec<u16>,
+    outdoors: BitVolume,
+    config: &BakeConfig,
+    allowance: &Allowance,
+) -> Basins {
+    let options = WatershedOptions {
+        h: config.noise / grid.voxel,
+        outdoors: Some(outdoors),
+    };
+    basins_of(watershed(grid.dims, distances, &options, allowance))
+}
+
+fn basins_of(flood: Watershed) -> Basins {
     let peaks = flood.basins.iter().map(|b| b.peak as f32);
     let saddles = flood.saddles.iter();
     Basins {

@@ -3,6 +3,7 @@
 mod bad;
 mod city;
 mod memory;
+mod rebaked;
 mod scenes;
 mod speed;
 mod stitched;
@@ -26,6 +27,9 @@ const STITCHED: &[&str] = &[
 /// A level of 1,500 instances, and one of a tenth, as those of Gjørup 1999.
 const CITY: &[&str] = &["maze-1500"];
 
+/// Scenes that are edited: a real one, and a generated one of so many rooms.
+const REBAKED: &[&str] = &["institute", "tower-256"];
+
 pub(crate) const ROWS: &[Row] = &[
     made("stitched: cells", STITCHED, stitched::cells),
     made("stitched: portals", STITCHED, stitched::portals),
@@ -41,6 +45,8 @@ pub(crate) const ROWS: &[Row] = &[
     made("city: visible", CITY, city::visible),
     made("city: frame", CITY, city::frame),
     made("city: frame of instances", CITY, city::frame_of_instances),
+    made("local rebuild: same", REBAKED, rebaked::same),
+    made("local rebuild: time", REBAKED, rebaked::time),
     made("bad input", &["pieces"], bad::taken),
 ];
 

@@ -12,7 +12,7 @@ use enfilade::import::{CleaningOptions, ImportReport, RepairOptions, cleaning_re
 use crate::screen::{At, Told, Warned, write_lines};
 
 /// Reports what was read; with `verbose`, also the roles of the objects and all notes of the import.
-pub(super) fn report_import(
+pub(crate) fn report_import(
     scene: &Scene,
     report: &ImportReport,
     verbose: bool,
@@ -63,7 +63,7 @@ pub(super) fn report_import(
 }
 
 /// Returns what the world tells about its input: surfaces extracted from sources, and repairs.
-pub(super) fn settings_of(
+pub(crate) fn settings_of(
     report: &ImportReport,
     repair: Option<RepairOptions>,
 ) -> BTreeMap<String, String> {
@@ -77,7 +77,7 @@ pub(super) fn settings_of(
 
 /// Returns the doubts about unit and axis, for the verdict. They are reported; the bake ends if the files state neither,
 /// as their numbers alone then speak.
-pub(super) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<String>> {
+pub(crate) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<String>> {
     if let Some(why) = report.refusal() {
         bail!("{why}");
     }

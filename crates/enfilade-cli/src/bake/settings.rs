@@ -121,10 +121,10 @@ pub(crate) struct BakeOptions {
     max_time: Option<Duration>,
     /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(super) threads: Option<u16>,
+    pub(crate) threads: Option<u16>,
     /// Print the roles of objects with their reasons, notes of the import and stage times.
     #[arg(short, long)]
-    pub(super) verbose: bool,
+    pub(crate) verbose: bool,
 }
 
 /// Axes by their letters, which clap lists.
@@ -171,6 +171,16 @@ pub(crate) struct Resolved {
     pub(crate) bake: enfilade_settings::Resolved,
 }
 impl BakeOptions {
+    /// Returns an option that was given and only makes sense for a bake.
+    pub(crate) fn of_bakes_alone(&self) -> Option<&'static str> {
+        let given = [
+            (self.leak.is_some(), "--leak"),
+            (self.allow_leak, "--allow-leak"),
+            (self.leak_path.is_some(), "--leak-path"),
+        ];
+        given.into_iter().find(|(is, _)| *is).map(|(_, name)| name)
+    }
+
     /// All files to read, including `scene`.
     pub(crate) fn inputs<'a>(&'a self, scene: &'a [PathBuf]) -> impl Iterator<Item = &'a PathBuf> {
         scene
