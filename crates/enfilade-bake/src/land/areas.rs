@@ -214,3 +214,42 @@ fn flooded(relief: &Relief, mut of_square: Vec<u32>, n: usize, keys: &[i64]) -> 
     }
     Areas { of_square, n }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Covers V11.
+    #[test]
+    fn streets_end_where_they_cross_and_go_on_where_a_lane_opens() {
+        // Blocks of 50 squares, and streets of 10 between them; across the middle of each row of blocks a lane of 6.
+        const PITCH: usize = 60;
+        let is_street = |v: usize| v % PITCH < 10;
+        let is_lane = |v: usize| (32..38).contains(&(v % PITCH));
+        let side = 4 * PITCH + 10;
+        let is_low = |x: usize, z: usize| is_street(x) || is_street(z) || is_lane(z);
+        let all: Vec<bool> = (0..side * side)
+            .map(|i| is_low(i % side, i / side))
+            .collect();
+        let top: Vec<f32> = all.iter().map(|low| if *low { 0.0 } else { 9.0 }).collect();
+        let relief = Relief {
+            origin: [0.0; 2],
+            square: 0.5,
+            dims: [side; 2],
+            ground: top.clone(),
+            top,
+        };
+        let settings = MergeSettings::default();
+        let found = areas(&relief, &all, 0.015, &settings, &Allowance::default());
+        let at = |x: usize, z: usize| found.of_square[x + side * z];
+        // Along a street across its lanes; along x from crossing to crossing.
+        assert_eq!(at(65, 80), at(65, 110));
+        assert_ne!(at(65, 80), at(65, 140));
+        assert_ne!(at(90, 65), at(150, 65));
+        assert_ne!(at(90, 65), at(65, 80));
+        // The lane, and the crossing.
+        assert!(![at(65, 80), at(125, 80)].contains(&at(95, 95)));
+        assert!(![at(65, 80), at(90, 65)].contains(&at(65, 65)));
+        assert!(found.of_square.iter().all(|a| *a != 0));
+    }
+}
