@@ -222,10 +222,10 @@ mod tests {
     // Covers V11.
     #[test]
     fn streets_end_where_they_cross_and_go_on_where_a_lane_opens() {
-        // Blocks of 50 squares, and streets of 10 between them; across the middle of each row of blocks a lane of 6.
+        // Blocks of 50 squares, and streets of 10 between them; across the middle of each row of blocks a lane of 8.
         const PITCH: usize = 60;
         let is_street = |v: usize| v % PITCH < 10;
-        let is_lane = |v: usize| (32..38).contains(&(v % PITCH));
+        let is_lane = |v: usize| (31..39).contains(&(v % PITCH));
         let side = 4 * PITCH + 10;
         let is_low = |x: usize, z: usize| is_street(x) || is_street(z) || is_lane(z);
         let all: Vec<bool> = (0..side * side)
