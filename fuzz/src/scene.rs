@@ -3,8 +3,8 @@
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::Role;
 use enfilade_import::{
-    CleaningOptions, ImportError, ImportOptions, Imported, Limits, VolumeOptions, cleaning_report, decode_gltf,
-    decode_e57, decode_implicit, decode_map, decode_obj, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
+    CleaningOptions, HeightOptions, ImportError, ImportOptions, Imported, Limits, VolumeOptions, cleaning_report, decode_gltf,
+    decode_e57, decode_heights, decode_implicit, decode_map, decode_obj, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
     write_pvs_text,
 };
 
@@ -52,6 +52,18 @@ pub fn scan(data: &[u8]) {
         ..options()
     };
     check(decode_ply(data, &options));
+}
+
+/// Height maps: PNG and TIFF.
+pub fn heights(data: &[u8]) {
+    let options = ImportOptions {
+        heights: HeightOptions {
+            cell: Some(1.0),
+            heights: Some([0.0, 10.0]),
+        },
+        ..options()
+    };
+    check(decode_heights(data, &options));
 }
 
 /// Scans in E57.

@@ -12,6 +12,7 @@ mod seals;
 pub(crate) use seals::{SealPart, batches_of};
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, Portal, PortalId, PortalKind,
@@ -30,12 +31,27 @@ pub(crate) struct Cut<'a> {
     pub(crate) structure: &'a SceneStructure<'a>,
     pub(crate) partition: Partition,
     pub(crate) candidates: &'a [Candidate],
+    /// Regions that are open land.
+    pub(crate) land: Range<u32>,
     /// Distance by which outlines grow, so that rounding never cuts into an opening. [Units: wu]
     pub(crate) outward: f64,
     /// Share of an opening that a leaf or pane must fill to make a door of it.
     pub(crate) closed_share: f64,
     /// Allowance of work for this stage.
     pub(crate) allowance: &'a Allowance,
+}
+
+impl Cut<'_> {
+    /// Returns `true` for an area of open land.
+    fn is_land(&self, cell: u32) -> bool {
+        let region = self.partition.label_of_cell[cell as usize].region();
+        region.is_some_and(|r| self.land.contains(&r))
+    }
+
+    /// Returns `true` for the outdoors and for open land.
+    fn is_outdoors(&self, cell: u32) -> bool {
+        self.partition.outside == Some(cell) || self.is_land(cell)
+    }
 }
 
 /// A portal and its classification.
@@ -67,6 +83,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
                 volume: partition.volumes[i] as f32,
                 outdoor,
                 is_void,
+                is_land: !outdoor && !is_void && cut.is_land(i as u32),
                 ..Cell::default()
             }
         })

@@ -13,7 +13,9 @@ use crate::names::name_cells;
 use crate::realize::realize;
 use crate::structure::Structure;
 use crate::vessel::is_vessel;
-use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, bsp, delaunay, watershed};
+use crate::{
+    BakeConfig, BakeContext, BakeError, BakeOutput, Method, bsp, delaunay, land, watershed,
+};
 
 /// Finds the rooms and doorways of a scene.
 ///
@@ -71,7 +73,8 @@ pub fn bake_session(
     let context = &context.within(&config.budget, n_structural(scene));
     let method = Method::Delaunay;
     let structure = Structure::of(scene, method, config, context.allowance())?;
-    let proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
+    let mut proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
+    land::split(&structure, config, context, &mut proposal)?;
     let mut baked = realize(structure, method, proposal, config, context)?;
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
     name_cells(&mut baked.world, &mut baked.notes, &scene.rooms);
@@ -89,10 +92,11 @@ fn bake_by(
 ) -> Result<BakeOutput, BakeError> {
     context.begin_method(method, reason)?;
     let structure = Structure::of(scene, method, config, context.allowance())?;
-    let proposal = match method {
+    let mut proposal = match method {
         Method::Bsp => bsp::propose(&structure, config, context)?,
         Method::Delaunay => delaunay::propose(&structure, config, context)?,
         Method::Watershed => watershed::propose(&structure, config, context)?,
     };
+    land::split(&structure, config, context, &mut proposal)?;
     realize(structure, method, proposal, config, context)
 }

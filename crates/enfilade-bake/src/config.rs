@@ -29,6 +29,8 @@ pub struct BakeConfig {
     pub smallest_hole: SmallestHole,
     /// Settings that decide where rooms end.
     pub merge: MergeSettings,
+    /// Cells outdoors: one, or several.
+    pub outdoors: Outdoors,
     /// Bounds on the cost of cells, and the model of costs; no bounds by default.
     pub costs: SimplifySettings,
     /// Watershed, and BSP in buildings: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. An edge
@@ -54,6 +56,7 @@ impl Default for BakeConfig {
             min_opening: 0.6,
             smallest_hole: SmallestHole::default(),
             merge: MergeSettings::default(),
+            outdoors: Outdoors::default(),
             costs: SimplifySettings::default(),
             voxel: None,
             max_voxels: 1_600_000_000,
@@ -63,6 +66,20 @@ impl Default for BakeConfig {
             delaunay: DelaunayConfig::default(),
         }
     }
+}
+
+/// Choice of cells outdoors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Outdoors {
+    /// All that is outdoors is one cell.
+    #[default]
+    Whole,
+    /// Open land is divided in plan into valleys, streets, squares and courtyards, each a cell between the ground and a sky limit.
+    /// All that is above and around them stays one cell.
+    Split {
+        /// Places, x and z, from which the land is flooded instead of the minima of the plan: one cell each. [Units: wu]
+        minima: Vec<[f64; 2]>,
+    },
 }
 
 /// Diameter of balls that decides on gaps: an opening that no such ball passes is a gap and joins no rooms. [Units: wu]

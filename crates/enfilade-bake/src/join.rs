@@ -2,6 +2,7 @@
 //! them, voids that open to each other, and regions that no plane separates.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::{DVec3, Sets};
@@ -139,12 +140,13 @@ const MAX_LEAK: f64 = 1.0;
 ///
 /// A portal is planar. Where two regions meet in the open, outside their candidates (over a flight of
 /// stairs, say), the border between them would follow arbitrary planes of the cell complex: dozens of
-/// meaningless portals. Such regions are one room.
+/// meaningless portals. Such regions are one room. The outdoors and the `land` in it are never joined so.
 pub(crate) fn join_unparted(
     complex: &Complex<'_>,
     cells: &LeafCells,
     votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],
+    land: &Range<u32>,
 ) -> bool {
     let mut between: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
     for (pair, contact) in complex.contacts(cells) {
@@ -165,7 +167,8 @@ pub(crate) fn join_unparted(
     for (pair, contact) in between {
         // A model full of holes must not lose its rooms to the outdoors.
         let is_unparted = contact.beside > MAX_LEAK && contact.beside > contact.on_candidates;
-        if pair[0] != OUTDOORS && is_unparted {
+        let is_open = |region: &u32| *region == OUTDOORS || land.contains(region);
+        if !pair.iter().any(is_open) && is_unparted {
             let [a, b] = pair.map(|l| labels.partition_point(|&m| m < l) as u32);
             sets.join(a, b);
         }

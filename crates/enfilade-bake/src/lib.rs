@@ -9,6 +9,7 @@
 //! | [`watershed`], [`bsp`], [`delaunay`] | a division of the air: three methods, independent of each other |
 //! | `rooms` | where rooms end: which parts are one room, and the openings between rooms, by one rule for all methods |
 //! | [`complex`] | which space is open: convex leaves and the facets between them, exactly |
+//! | `land` | open land as cells, if that is wanted |
 //! | `realize`, `assemble` | the world: which leaves form a cell, which geometry each cell sees |
 //! | [`simplify`], [`bound`], [`edit`], [`names`] | changes to a finished world |
 //! | [`leak`] | where a model is open that should be closed |
@@ -25,6 +26,7 @@ pub mod delaunay;
 pub mod edit;
 mod error;
 mod join;
+mod land;
 mod layout;
 pub mod leak;
 mod marked;
@@ -47,7 +49,7 @@ pub mod watershed;
 
 pub use bake::{bake, bake_session};
 pub use budget::Budget;
-pub use config::{BakeConfig, MergeSettings, SmallestHole};
+pub use config::{BakeConfig, MergeSettings, Outdoors, SmallestHole};
 pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;
 pub use method::Method;

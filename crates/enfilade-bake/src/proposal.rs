@@ -1,6 +1,7 @@
 //! A builder's proposal: rooms and possible portals. [`realize`](crate::realize) makes it exact.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use enfilade_geom::{Aabb, DVec3};
 
@@ -21,6 +22,8 @@ pub(crate) struct Proposal {
     pub(crate) votes: Vec<Vote>,
     /// Points in shallow voids, each with its region, although no opening connects the two.
     pub(crate) voids: Vec<(DVec3, u32)>,
+    /// Regions that are open land: parts of the outdoors.
+    pub(crate) land: Range<u32>,
     /// How votes become cells.
     pub(crate) label: LabelSettings,
     /// Joins regions that no plane separates, and voids that open to each other: see [`crate::join`].
@@ -42,6 +45,7 @@ impl Proposal {
             candidates: Vec::new(),
             votes,
             voids: Vec::new(),
+            land: 0..0,
             label: LabelSettings::default(),
             joins_unparted: true,
             counts: Vec::new(),
@@ -51,12 +55,17 @@ impl Proposal {
         }
     }
 
-    /// Adds the proposal for another part of the scene that nothing but the outdoors connects with this one.
-    pub(crate) fn beside(mut self, mut other: Self) -> Self {
+    /// Returns the greatest region with a vote or a void, at least the outdoors.
+    pub(crate) fn n_regions(&self) -> u32 {
         let region = |label: &Label| label.region().unwrap_or(OUTDOORS);
         let votes = self.votes.iter().map(|v| region(&v.label));
         let last = votes.chain(self.voids.iter().map(|v| v.1)).max();
-        let after = last.unwrap_or(OUTDOORS);
+        last.unwrap_or(OUTDOORS)
+    }
+
+    /// Adds the proposal for another part of the scene that nothing but the outdoors connects with this one.
+    pub(crate) fn beside(mut self, mut other: Self) -> Self {
+        let after = self.n_regions();
         let moved = |region: u32| match region {
             0 | OUTDOORS => region,
             _ => after + region - OUTDOORS,

@@ -69,6 +69,7 @@ pub(crate) fn realize(
         partition,
         candidates: &proposal.candidates,
         outward,
+        land: proposal.land.clone(),
         closed_share: config.merge.closed_share,
         allowance: context.allowance(),
     };
@@ -99,12 +100,13 @@ pub(crate) fn part(
     let Proposal {
         votes,
         voids,
+        land,
         label,
         joins_unparted,
         ..
     } = proposal;
     let mut cells = complex.label(votes, label);
-    while *joins_unparted && join_unparted(complex, &cells, votes, voids) {
+    while *joins_unparted && join_unparted(complex, &cells, votes, voids, land) {
         cells = complex.label(votes, label);
     }
     // Voids that no room's votes reached.

@@ -22,6 +22,8 @@ pub enum Stage {
     Tetrahedra,
     /// Delaunay: tetrahedral cells joined into rooms.
     Decimation,
+    /// Open land divided in plan.
+    Land,
     /// A plane for each opening.
     Candidates,
     /// Space cut into convex leaves.
@@ -48,6 +50,7 @@ impl Stage {
             Self::Separators => "separators",
             Self::Tetrahedra => "tetrahedra",
             Self::Decimation => "decimation",
+            Self::Land => "divide land",
             Self::Candidates => "fit candidates",
             Self::Complex => "cell complex",
             Self::Partition => "cells and portals",

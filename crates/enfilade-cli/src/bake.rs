@@ -263,6 +263,9 @@ pub(crate) struct Summary {
     cells_indoors: usize,
     /// Those of them in which nobody can stand.
     voids: usize,
+    /// Areas of open land.
+    #[serde(skip_serializing_if = "is_zero")]
+    areas_of_land: usize,
     portals: usize,
     doors: usize,
     windows: usize,
@@ -272,6 +275,10 @@ pub(crate) struct Summary {
     special_portals: usize,
 }
 
+fn is_zero(n: &usize) -> bool {
+    *n == 0
+}
+
 impl Summary {
     pub(crate) fn of(world: &World) -> Self {
         let graph = &world.graph;
@@ -279,7 +286,8 @@ impl Summary {
         let triangles = graph.statistics.counts.get("input_triangles");
         Self {
             triangles: triangles.copied().unwrap_or(0.0) as usize,
-            cells_indoors: graph.indoor_cells().count(),
+            cells_indoors: graph.cells.iter().filter(|c| c.is_indoors()).count(),
+            areas_of_land: graph.cells.iter().filter(|c| c.is_land).count(),
             voids: graph.cells.iter().filter(|c| c.is_void).count(),
             portals: graph.portals.len(),
             doors: count(PortalKind::Door),
@@ -310,6 +318,7 @@ pub(crate) fn print_summary(out: &mut impl Write, world: &World) -> io::Result<(
     // Few worlds have any.
     for (name, n) in [
         ("voids", summary.voids),
+        ("areas of land", summary.areas_of_land),
         ("special portals", summary.special_portals),
     ] {
         if n > 0 {

@@ -205,9 +205,10 @@ fn input_triangles(world: &World) -> u64 {
 }
 
 fn cell_kind(cell: &Cell) -> &'static str {
-    match (cell.outdoor, cell.is_void) {
-        (true, _) => "outdoors",
-        (_, true) => "void",
+    match cell {
+        _ if cell.outdoor => "outdoors",
+        _ if cell.is_void => "void",
+        _ if cell.is_land => "land",
         _ => "room",
     }
 }

@@ -55,15 +55,20 @@ impl CellPortalGraph {
         })
     }
 
-    /// Returns all cells but the outdoors, rooms and voids, ascending. O(cells).
+    /// Returns all cells but the outdoors, rooms, voids and open land, ascending. O(cells).
     pub fn indoor_cells(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
         let numbered = (0..).map(CellId).zip(&self.cells);
         numbered.filter(|(_, cell)| !cell.outdoor)
     }
 
-    /// Returns the rooms: all cells but the outdoors and voids, ascending. O(cells).
+    /// Returns the rooms: all cells but the outdoors, voids and open land, ascending. O(cells).
     pub fn rooms(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
-        self.indoor_cells().filter(|(_, cell)| !cell.is_void)
+        self.indoor_cells().filter(|(_, cell)| cell.is_room())
+    }
+
+    /// Returns rooms and open land, all cells that maps show, ascending. O(cells).
+    pub fn places(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
+        self.indoor_cells().filter(|(_, cell)| cell.is_place())
     }
 
     /// Returns the outdoors, if there is one. O(cells).

@@ -101,7 +101,11 @@ impl World {
     pub fn doubts(&self) -> Vec<Doubt> {
         let graph = &self.graph;
         let rooms: Vec<(CellId, &Cell)> = graph.rooms().collect();
-        let n_indoors = graph.indoor_cells().count();
+        let n_land = graph.cells.iter().filter(|c| c.is_land).count();
+        let n_indoors = graph.indoor_cells().count() - n_land;
+        if n_indoors == 0 && n_land > 0 {
+            return Vec::new(); // land without houses was not meant to have rooms
+        }
         if n_indoors == 0 {
             return vec![Doubt::NoRooms];
         }
@@ -114,7 +118,7 @@ impl World {
             door_height(graph),
             more_voids(n_indoors - rooms.len(), rooms.len()),
             doorways(graph, &rooms),
-            many_openings(graph, n_indoors),
+            many_openings(graph, n_indoors + n_land),
             open_to_sky(graph, &rooms),
             more_cracks(graph),
         ];
@@ -146,7 +150,7 @@ impl World {
 
 fn flat_doorways(graph: &CellPortalGraph) -> Option<Doubt> {
     // Over open rooms, an opening to the sky lies flat, too.
-    let is_inside = |p: &&Portal| p.cells.iter().all(|c| !graph[*c].outdoor);
+    let is_inside = |p: &&Portal| p.cells.iter().all(|c| graph[*c].is_indoors());
     let doorways = || {
         let inside = graph.portals.iter().filter(is_inside);
         inside.filter(|p| p.is_doorway())
@@ -165,7 +169,7 @@ fn door_height(graph: &CellPortalGraph) -> Option<Doubt> {
     let mut heights: Vec<f32> = doors.map(|p| p.size()[1]).collect();
     let mut usual = DOOR;
     if heights.is_empty() {
-        let is_inside = |p: &&Portal| p.cells.iter().all(|c| !graph[*c].outdoor);
+        let is_inside = |p: &&Portal| p.cells.iter().all(|c| graph[*c].is_indoors());
         let open = upright().filter(|p| p.kind == PortalKind::Open);
         let sizes = open.filter(is_inside).map(Portal::size);
         heights.extend(sizes.filter(|[w, h]| *h > SLIM * w).map(|s| s[1]));

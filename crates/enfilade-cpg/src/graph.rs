@@ -26,13 +26,28 @@ pub struct Cell {
     /// `true` for a space in which nobody can stand and into which no doorway leads: above a hung ceiling, in a shaft or a
     /// hollow wall. Sight and sound pass it as any other cell, but it counts as no room. Never outdoors.
     pub is_void: bool,
+    /// `true` for an area of open land, from the ground to a sky limit: a street, a valley. It counts as no room. Never outdoors
+    /// and never a void.
+    pub is_land: bool,
 }
 
 impl Cell {
-    /// Returns `true` if it is neither outdoors nor a void.
+    /// Returns `true` if it is neither outdoors, nor a void, nor open land.
     #[must_use]
     pub fn is_room(&self) -> bool {
+        self.is_indoors() && !self.is_void
+    }
+
+    /// Returns `true` if it is a room or open land: people stand in it, and maps show it.
+    #[must_use]
+    pub fn is_place(&self) -> bool {
         !self.outdoor && !self.is_void
+    }
+
+    /// Returns `true` if it is neither outdoors nor open land.
+    #[must_use]
+    pub fn is_indoors(&self) -> bool {
+        !self.outdoor && !self.is_land
     }
 }
 

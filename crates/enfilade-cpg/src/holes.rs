@@ -61,9 +61,11 @@ impl CellPortalGraph {
                 .filter_map(|c| self.cells.get(c.0 as usize))
                 .any(|c| c.outdoor && c.n_triangles > 0)
         };
+        // Land is meant to be open.
+        let is_land = |p: &Portal| p.cells.iter().any(|c| self[*c].is_land);
         let mut holes: Vec<Hole> = (0..)
             .zip(&self.portals)
-            .filter(|(_, p)| is_outdoor(p))
+            .filter(|(_, p)| is_outdoor(p) && !is_land(p))
             .filter_map(|(id, p)| {
                 Some(Hole {
                     portal: PortalId(id),

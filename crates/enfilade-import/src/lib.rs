@@ -63,7 +63,8 @@ pub use report::{FileReport, ImportReport, Note, SurfaceReport, UpDoubt, cleanin
 use builder::Builder;
 use enfilade_geom::scene::Scene;
 pub use enfilade_source::AirSide;
-use enfilade_source::{ImplicitScene, Volume};
+pub use enfilade_source::HeightOptions;
+use enfilade_source::{HeightMap, ImplicitScene, Volume};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -161,6 +162,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Implicit => sources::read_implicit(bytes, builder),
         Format::Volume => sources::read_volume(bytes, builder),
         Format::E57 => sources::read_e57(bytes, builder),
+        Format::Heights => sources::read_heights(bytes, builder),
     }
 }
 
@@ -176,6 +178,7 @@ enum Format {
     Implicit,
     Volume,
     E57,
+    Heights,
 }
 
 impl Format {
@@ -191,7 +194,8 @@ impl Format {
             | Self::Ifc
             | Self::Implicit
             | Self::Volume
-            | Self::E57 => u64::MAX,
+            | Self::E57
+            | Self::Heights => u64::MAX,
         }
     }
 }
@@ -220,6 +224,8 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         return Err(error);
     } else if bytes.starts_with(b"ASTM-E57") {
         Format::E57
+    } else if HeightMap::is_one(bytes) {
+        Format::Heights
     } else if Volume::is_one(bytes) {
         Format::Volume
     } else if ImplicitScene::is_one(bytes) {
@@ -273,6 +279,15 @@ pub fn decode_volume(bytes: &[u8], options: &ImportOptions) -> Result<Imported, 
 /// As [`import`].
 pub fn decode_e57(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.e57", options, sources::read_e57)
+}
+
+/// Reads a height map from memory: gray PNG or TIFF.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_heights(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.png", options, sources::read_heights)
 }
 
 /// Reads an OBJ file from memory, without its material libraries.

@@ -2,7 +2,7 @@
 
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_prepare::{BadOption, RepairOptions, RoleRules};
-use enfilade_source::AirSide;
+use enfilade_source::{AirSide, HeightOptions};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -66,6 +66,8 @@ pub struct ImportOptions {
     pub ignores_marks: bool,
     /// Where the surface of a volume lies.
     pub volume: VolumeOptions,
+    /// Size and heights of height maps.
+    pub heights: HeightOptions,
     /// Places of the scanner, for clouds of points that do not tell them; in meters, +Y up. [Units: wu]
     pub stations: Vec<DVec3>,
     /// Repairs of structural triangles; `None` repairs nothing.

@@ -9,8 +9,8 @@ use e57::{CartesianCoordinate, E57Reader};
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_source::{
-    AirSide, ImplicitScene, Level, Scan, ScanOptions, SourceError, SourceLimits, Surface, Volume,
-    VolumeSummary,
+    AirSide, HeightMap, ImplicitScene, Level, Scan, ScanOptions, SourceError, SourceLimits,
+    Surface, Volume, VolumeSummary,
 };
 
 use crate::builder::Builder;
@@ -141,6 +141,50 @@ fn level(found: &VolumeSummary, builder: &Builder<'_>) -> Result<Level, ImportEr
         value,
         air: given.air.unwrap_or(usual),
     })
+}
+
+/// Reads a height map. Its middle is the origin, unless the options give one: then the place that the file tells counts.
+pub(crate) fn read_heights(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    builder.set_format(HeightMap::format(bytes));
+    let limits = limits(builder);
+    let bad = |builder: &Builder<'_>, e: SourceError| builder.malformed(e.place, e.problem);
+    let map = HeightMap::parse(bytes, &limits).map_err(|e| bad(builder, e))?;
+    let options = builder.options.heights.clone();
+    let surface = map.surface(&options, &limits);
+    let surface = surface.map_err(|e| bad(builder, e))?;
+    let cell = map.cell(&options).map_err(|e| bad(builder, e))?;
+    let n = map.samples.iter().filter(|s| s.is_nan()).count();
+    let mut text = format!("{} × {} heights", map.dims[0], map.dims[1]);
+    if n > 0 {
+        let _ = write!(text, ", {n} of them missing: there is no ground");
+    }
+    let mut to_input = DMat4::IDENTITY;
+    if let Some([east, north]) = map.middle() {
+        if builder.options.origin == DVec3::ZERO {
+            let _ = write!(
+                text,
+                "; its middle, {east:.1} east and {north:.1} north, is the origin (--origin {east:.0},0,{:.0} keeps its place \
+                 beside models with coordinates)",
+                -north
+            );
+        } else {
+            to_input = DMat4::from_translation(DVec3::new(east, 0.0, -north));
+        }
+    }
+    if builder.options.up == Some(Up::Z) {
+        to_input = Up::Z.axes().inverse() * to_input;
+    }
+    let step = cell[0].max(cell[1]);
+    add(
+        builder,
+        surface,
+        to_input,
+        step,
+        Told {
+            text,
+            enlarged: None,
+        },
+    )
 }
 
 /// Edge of the voxels of a scan: walls are at least two of them thick. [Units: wu]

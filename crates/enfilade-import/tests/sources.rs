@@ -6,7 +6,8 @@ use std::io::Cursor;
 use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_import::{
-    ImportOptions, SceneSource, decode_e57, decode_implicit, decode_ply, import_sources,
+    HeightOptions, ImportOptions, SceneSource, decode_e57, decode_heights, decode_implicit,
+    decode_ply, import_sources,
 };
 
 const BALL: &str = r#"{ "enfilade": "implicit", "unit": "cm", "air": { "ball": { "at": [100, 0, 0], "radius": 200 } } }"#;
@@ -180,4 +181,53 @@ fn scans_in_e57_stand_where_their_poses_say_with_z_up() {
     broken[at] ^= 0xff;
     let error = decode_e57(&broken, &plain).unwrap_err().to_string();
     assert!(error.contains("scan 0"), "{error}");
+}
+
+/// Gray of 16 bits, 9 × 7 samples.
+const GRAY: &[u8] = include_bytes!("../../../fuzz/seeds/heights/gray16.png");
+/// Real numbers, 6 × 5 samples 2 m apart, with a place.
+const GEOTIFF: &[u8] = include_bytes!("../../../fuzz/seeds/heights/geotiff.tif");
+
+// Covers V11.
+#[test]
+fn a_height_map_is_land_in_meters_alone_or_beside_models() {
+    let mut options = ImportOptions {
+        heights: HeightOptions {
+            cell: Some(2.0),
+            heights: Some([100.0, 110.0]),
+        },
+        ..ImportOptions::default()
+    };
+    let imported = decode_heights(GRAY, &options).unwrap();
+    let bounds: Aabb = imported.scene.object_aabb(0);
+    assert!((bounds.size().x - 16.0).abs() < 1e-3 && (bounds.size().z - 12.0).abs() < 1e-3);
+    assert!((100.0..110.0).contains(&bounds.min.y) && bounds.min.y < bounds.max.y);
+    options.heights = HeightOptions::default();
+    let problem = decode_heights(GRAY, &options).unwrap_err().to_string();
+    assert!(problem.contains("--cell"), "{problem}");
+    // The file tells how far its samples are apart, and where they are.
+    let bounds = decode_heights(GEOTIFF, &options)
+        .unwrap()
+        .scene
+        .object_aabb(0);
+    assert!((bounds.size().x - 10.0).abs() < 1e-3 && bounds.center().x.abs() < 1e-3);
+    options.origin = DVec3::new(500_000.0, 0.0, -4_000_000.0);
+    let placed = decode_heights(GEOTIFF, &options)
+        .unwrap()
+        .scene
+        .object_aabb(0);
+    assert!(
+        (placed.min.x).abs() < 1e-3 && (placed.min.z).abs() < 1e-3,
+        "{placed:?}"
+    );
+    let house = b"o house\nv 5 0 0\nv 9 0 0\nv 9 3 0\nv 5 3 0\nf 1 2 3 4\n";
+    let source = |name: &str, bytes: &'static [u8]| SceneSource {
+        path: name.into(),
+        stream: Some(Box::new(bytes)),
+        is_detail: false,
+    };
+    let both = [source("land.tif", GEOTIFF), source("house.obj", house)];
+    let imported = import_sources(both, &ImportOptions::default()).unwrap();
+    let formats: Vec<_> = imported.report.files.iter().map(|f| f.format).collect();
+    assert_eq!(formats, ["TIFF", "OBJ"]);
 }

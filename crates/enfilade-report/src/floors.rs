@@ -71,7 +71,7 @@ pub(crate) fn find_floors(world: &World) -> Floors {
         unfloored: Vec::new(),
         tile,
     };
-    for (cell, _) in world.graph.rooms() {
+    for (cell, _) in world.graph.places() {
         match samples.get(&cell) {
             Some(samples) => levels_of(cell, samples, tile, &mut out.levels),
             None => out.unfloored.push(cell),
@@ -90,7 +90,7 @@ pub(crate) fn tile_at(x: f64, z: f64, tile: f64) -> (i32, i32) {
 fn tile_of(world: &World) -> f64 {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let mut reach = 0.0_f64;
-    for (_, cell) in world.graph.rooms() {
+    for (_, cell) in world.graph.places() {
         let [a, b] = cell.aabb.map(|p| DVec2::new(p[0].into(), p[2].into()));
         reach = reach.max((b - a).length());
         (low, high) = (low.min(a), high.max(b));
@@ -103,7 +103,7 @@ fn tile_of(world: &World) -> f64 {
 fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
     let mut out = BTreeMap::new();
     for batch in &world.batches {
-        let is_room = |c: &CellId| world.graph[*c].is_room();
+        let is_room = |c: &CellId| world.graph[*c].is_place();
         if !batch.cells.iter().any(is_room) {
             continue;
         }
@@ -149,7 +149,7 @@ fn ask(
             );
             let p = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
             let above = |up: f64| locator.locate(p + DVec3::Y * up);
-            let Some(cell) = above(JUST_ABOVE).filter(|&c| world.graph[c].is_room()) else {
+            let Some(cell) = above(JUST_ABOVE).filter(|&c| world.graph[c].is_place()) else {
                 continue;
             };
             // The top of a suspended ceiling, or of a wall under the roof, is not a floor of either cell.

@@ -29,9 +29,10 @@ fn portal_kind(kind: PortalKind) -> &'static str {
 
 /// Returns the name of a cell's kind.
 fn cell_kind(cell: &Cell) -> &'static str {
-    match (cell.outdoor, cell.is_void) {
-        (true, _) => "outdoors",
-        (_, true) => "void",
+    match cell {
+        _ if cell.outdoor => "outdoors",
+        _ if cell.is_void => "void",
+        _ if cell.is_land => "land",
         _ => "room",
     }
 }

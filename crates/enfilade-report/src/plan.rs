@@ -118,7 +118,7 @@ fn hidden_cells(world: &World, pages: &[Drawn]) -> BTreeSet<CellId> {
     let regions = pages.iter().flat_map(|p| &p.regions);
     let shown = regions.filter_map(|r| cell_of(r.0)).filter(|c| c.1);
     let shown: BTreeSet<CellId> = shown.map(|c| c.0).collect();
-    let rooms = world.graph.rooms().map(|c| c.0);
+    let rooms = world.graph.places().map(|c| c.0);
     rooms.filter(|c| !shown.contains(c)).collect()
 }
 
@@ -469,7 +469,7 @@ fn lettering(plan: DVec2, n_storeys: usize) -> f64 {
 
 /// The rectangle (x and z) around all rooms; around the triangles if there are none.
 fn extent(world: &World) -> (DVec2, DVec2) {
-    let rooms = world.graph.rooms().flat_map(|(_, c)| c.aabb);
+    let rooms = world.graph.places().flat_map(|(_, c)| c.aabb);
     let mut corners: Vec<[f32; 3]> = rooms.collect();
     if corners.is_empty() {
         corners.extend(

@@ -91,7 +91,7 @@ pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
     let mut pages: Vec<Page> = groups.iter().map(|g| page(world, &floors, g)).collect();
     drop_landings(&mut pages);
     pages.sort_by(|a, b| a.storey.floor.total_cmp(&b.storey.floor));
-    let highest = world.graph.rooms().map(|(_, c)| c.aabb[1][1]);
+    let highest = world.graph.places().map(|(_, c)| c.aabb[1][1]);
     let highest = f64::from(highest.fold(f32::NEG_INFINITY, f32::max));
     for k in 0..pages.len() {
         pages[k].storey.name = (k + 1).to_string();

@@ -126,12 +126,18 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// Returns the cells of a graph by kind in words, always in this order: rooms, voids, outdoors.
+/// Returns the cells of a graph by kind in words, always in this order: rooms, voids, land, outdoors.
 #[must_use]
 pub fn cells_in_words(graph: &CellPortalGraph) -> String {
     let rooms = graph.rooms().count();
     let indoors = graph.indoor_cells().count();
-    let voids = match indoors - rooms {
+    let n_land = graph.cells.iter().filter(|c| c.is_land).count();
+    let land = match n_land {
+        0 => String::new(),
+        1 => ", 1 area of land".to_owned(),
+        n => format!(", {n} areas of land"),
+    };
+    let voids = match indoors - rooms - n_land {
         0 => String::new(),
         n => format!(", {}", count(n, "void")),
     };
@@ -139,7 +145,7 @@ pub fn cells_in_words(graph: &CellPortalGraph) -> String {
         0 => "",
         _ => " and outdoors",
     };
-    format!("{}{voids}{outdoors}", count(rooms, "room"))
+    format!("{}{voids}{land}{outdoors}", count(rooms, "room"))
 }
 
 /// Number of things, with the noun.
@@ -151,8 +157,12 @@ fn count(n: usize, noun: &str) -> String {
 fn found(world: &World) -> String {
     let graph = &world.graph;
     let rooms = graph.rooms().count();
-    if rooms == 0 {
+    let n_land = graph.cells.iter().filter(|c| c.is_land).count();
+    if rooms == 0 && n_land == 0 {
         return "no rooms".into();
+    }
+    if n_land > 0 {
+        return cells_in_words(graph);
     }
     let rooms = count(rooms, "room");
     if world.doubts().is_empty() {

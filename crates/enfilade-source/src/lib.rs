@@ -19,6 +19,7 @@
 mod blocks;
 mod error;
 mod field;
+mod heights;
 mod implicit;
 mod json;
 mod patches;
@@ -31,6 +32,7 @@ mod volume;
 pub use blocks::Lattice;
 pub use error::{SourceError, SourceLimits};
 pub use field::{Field, Interval};
+pub use heights::{HeightMap, HeightOptions};
 pub use implicit::ImplicitScene;
 pub use scan::{Scan, ScanOptions};
 pub use surface::{ExtractOptions, Surface, extract};

@@ -206,7 +206,7 @@ fn stance_problem(world: &World, p: &Portal, ground: &Bvh) -> Option<String> {
 fn leads_outdoors(world: &World, p: &Portal) -> bool {
     let cells = p.cells.iter();
     let mut cells = cells.filter_map(|c| world.graph.cells.get(c.0 as usize));
-    cells.any(|c| c.outdoor)
+    cells.any(|c| !c.is_indoors())
 }
 
 fn is_upright(p: &Portal) -> bool {

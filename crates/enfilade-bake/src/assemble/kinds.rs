@@ -111,8 +111,7 @@ impl<'a> Judge<'a> {
     ///
     /// The ground outdoors says nothing: it is often missing, and so are balconies.
     fn is_stepped_through(&self, p: &PartitionPortal) -> bool {
-        let outdoors = self.cut.partition.outside;
-        let leads_outdoors = p.cells.iter().any(|&c| outdoors == Some(c));
+        let leads_outdoors = p.cells.iter().any(|&c| self.cut.is_outdoors(c));
         self.sill(p) <= if leads_outdoors { THRESHOLD } else { PARAPET }
     }
 

@@ -13,7 +13,7 @@ use super::branches::Walls;
 use super::cells::OUTDOOR_CELL;
 use super::labels::{BranchMouth, Branches};
 use super::space::Space;
-use crate::rooms::{Limb, Plan, THICKER};
+use crate::rooms::{Limb, LimbRule, Plan, THICKER};
 
 /// Cells of a plan across the narrowest opening.
 const ACROSS: f64 = 6.0;
@@ -61,7 +61,10 @@ impl Branches {
         }
         let limbs_of = |(&room, parts): (&u32, &Vec<u32>)| {
             let level = of.largest_level(room, parts, narrowest / ACROSS)?;
-            let (_, mut limbs) = level.plan.limbs(min_radius / level.step, of.allowance);
+            let (_, mut limbs) =
+                level
+                    .plan
+                    .limbs(min_radius / level.step, LimbRule::ROOMS, of.allowance);
             limbs.retain(|limb| level.is_corridor(limb, of.walls));
             Some((room, level, limbs))
         };

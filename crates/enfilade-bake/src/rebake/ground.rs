@@ -11,7 +11,7 @@ use super::outcome::{RebakeError, WholeBecause};
 use crate::rooms::WholeAir;
 use crate::simplify::SimplifySettings;
 use crate::structure::{Frame, SceneStructure, Site, Structure, bounds_of, sites, slabs_of};
-use crate::{BakeConfig, BakeContext, Method, SmallestHole};
+use crate::{BakeConfig, BakeContext, Method, Outdoors, SmallestHole};
 
 /// Greatest turn of the grid that is rounding: few walls of a building that stands askew are exactly parallel. [Units: rad]
 const TURN: f64 = 1e-5;
@@ -93,6 +93,8 @@ pub(super) fn why_whole(old: &World, scene: &Scene, config: &BakeConfig) -> Opti
         Some(WholeBecause::Costs)
     } else if !scene.marks.is_empty() || !old.graph.specials.is_empty() {
         Some(WholeBecause::Specials)
+    } else if config.outdoors != Outdoors::Whole || old.graph.cells.iter().any(|c| c.is_land) {
+        Some(WholeBecause::Land)
     } else if !scene.solids.is_empty() || old.graph.indoor_cells().count() <= 1 {
         Some(WholeBecause::Kind)
     } else {

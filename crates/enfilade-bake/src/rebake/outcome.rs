@@ -37,6 +37,8 @@ pub enum WholeBecause {
     Costs,
     /// The scene or the world has special portals.
     Specials,
+    /// The outdoors is or was several cells.
+    Land,
     /// There is one room, or the scene is made of brushes.
     Kind,
     /// The triangles of the scene fit together better or worse than before.
@@ -53,7 +55,7 @@ pub enum WholeBecause {
     Storeys,
     /// The part to bake is most of the scene.
     Extent,
-    /// BakedPart and world do not agree at the seam.
+    /// The part and the world do not agree at the seam.
     Seam,
 }
 
@@ -63,6 +65,7 @@ impl fmt::Display for WholeBecause {
             Self::Method => "only worlds of the watershed are baked in parts",
             Self::Costs => "bounds on costs apply to the whole world",
             Self::Specials => "it has special portals",
+            Self::Land => "its outdoors is divided by the lie of all the land",
             Self::Kind => "it has a single room, or is made of brushes",
             Self::Misfit => "its triangles fit together otherwise than before",
             Self::Site => "it has several buildings, or ceilings or floors are missing",

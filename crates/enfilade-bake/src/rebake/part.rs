@@ -79,6 +79,7 @@ pub(super) fn bake_part(
         candidates: &proposal.candidates,
         outward,
         closed_share: config.merge.closed_share,
+        land: proposal.land.clone(),
         allowance,
     };
     let portals = portals_of(&cut, &|c| is_void[c as usize]);

@@ -9,6 +9,7 @@ use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
 use super::candidates::fit_candidates;
 use super::hollow::{Matter, find_matter};
+use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
 use super::low::join_low;
 use super::regions::Regions;
@@ -60,7 +61,7 @@ pub(crate) fn propose(
         &mut regions,
         &mut basins.peaks,
         &shut,
-        &config.merge,
+        (&config.merge, LimbRule::ROOMS),
         allowance,
     );
     join_low(&grid, &basins.labels, &mut regions, allowance);

@@ -26,15 +26,14 @@ use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, distance};
 
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
+use super::limb_rule::{LimbRule, THICKER, sagitta};
 use super::regions::Regions;
 use super::sections::section_of;
 use super::slabs::LAYERS;
 use crate::MergeSettings;
 use crate::structure::OUTDOORS;
 
-/// A limb opens to areas at least this many times as thick: its section is at most half of theirs.
-pub(crate) const THICKER: f64 = 2.0;
-/// … and is at least this many of its widths long, of which up to half a width lies in the room before its mouth.
+/// A limb is at least this many of its widths long, of which up to half a width lies in the room before its mouth.
 const LONG: f64 = 2.5;
 /// Cells on the axis of a limb are farther from its walls than this share of its half-width.
 const ON_AXIS: f64 = 0.9;
@@ -49,7 +48,7 @@ pub(crate) fn split_limbs(
     regions: &mut Regions,
     peaks: &mut Vec<f32>,
     shut: &SparseVolume,
-    settings: &MergeSettings,
+    (settings, rule): (&MergeSettings, LimbRule),
     allowance: &Allowance,
 ) {
     let least = settings.min_radius / grid.voxel;
@@ -60,7 +59,7 @@ pub(crate) fn split_limbs(
     let found: Vec<(u32, Plan, (f64, Vec<Limb>))> = plans(grid, labels, regions)
         .into_par_iter()
         .map(|(region, plan)| {
-            let limbs = plan.limbs(least, allowance);
+            let limbs = plan.limbs(least, rule, allowance);
             (region, plan, limbs)
         })
         .collect();
@@ -104,7 +103,14 @@ pub(crate) fn split_limbs(
         slabs: &[],
         allowance,
     };
-    if join_limbs(flooded, regions, &thickness, n as u32, settings) {
+    let first = n as u32;
+    if join_limbs(
+        flooded,
+        regions,
+        &thickness,
+        (first, rule.thicker),
+        settings,
+    ) {
         regions.contacts = contacts_of(regions, &by_basin);
     }
 }
@@ -132,7 +138,7 @@ fn join_limbs(
     flooded: Flooded<'_>,
     regions: &mut Regions,
     thickness: &BTreeMap<u32, f64>,
-    first: u32,
+    (first, thicker): (u32, f64),
     settings: &MergeSettings,
 ) -> bool {
     let region_of = |basin: u32| regions.region_of_basin[basin as usize];
@@ -142,7 +148,7 @@ fn join_limbs(
         let (Some(&s), Some(&t)) = (thickness.get(&a), thickness.get(&b)) else {
             continue;
         };
-        if b < first || s.max(t) >= THICKER * s.min(t) {
+        if b < first || s.max(t) >= thicker * s.min(t) {
             continue;
         }
         let is_lesser = |at| region_of(flooded.labels.at(at)) == a;
@@ -283,8 +289,14 @@ impl Plan {
 
     /// Returns the largest half-width, and the limbs whose half-width is at least `least`, narrow ones first.
     /// [Units: vx]
-    pub(crate) fn limbs(&self, least: f64, allowance: &Allowance) -> (f64, Vec<Limb>) {
-        let to_wall = self.distance_to(|c| !self.is_free[c]);
+    pub(crate) fn limbs(
+        &self,
+        least: f64,
+        rule: LimbRule,
+        allowance: &Allowance,
+    ) -> (f64, Vec<Limb>) {
+        let LimbRule { thicker, is_net } = rule;
+        let mut to_wall = self.distance_to(|c| !self.is_free[c]);
         // A cell center next to a wall is already half a cell away from it.
         let thickness = |c: usize| f64::from(to_wall[c]) - 0.5;
         let thickest = (0..to_wall.len()).map(thickness).fold(0.0, f64::max);
@@ -296,8 +308,9 @@ impl Plan {
         let mut half_width = least;
         // Each width computes distances and components over all cells.
         let work = 1 + self.is_free.len() as u64;
-        while THICKER * half_width <= thickest && allowance.spend(work) {
-            let reach = THICKER * half_width;
+        while thicker * half_width <= thickest && allowance.spend(work) {
+            let reach = thicker * half_width;
+            let thickness = |c: usize| f64::from(to_wall[c]) - 0.5;
             let to_core = self.distance_to(|c| thickness(c) >= reach);
             // Rounded outward by half a cell, or a lining of single cells would be left along walls.
             let is_core = |c: usize| f64::from(to_core[c]) <= reach + 0.5 && rest[c];
@@ -310,7 +323,7 @@ impl Plan {
                 if widest >= least
                     && widest <= half_width
                     && allowance.spend(self.is_free.len() as u64 / 16 + 5 * cells.len() as u64)
-                    && self.length(&roomy, &core.0) >= LONG * 2.0 * widest
+                    && self.length(&roomy, &core.0, is_net) >= LONG * 2.0 * widest
                 {
                     found.push(Limb {
                         cells,
@@ -318,10 +331,16 @@ impl Plan {
                     });
                 }
             }
-            for limb in found {
+            for limb in &found {
                 limb.cells.iter().for_each(|&c| rest[c] = false);
-                out.push(limb);
             }
+            if is_net && !found.is_empty() {
+                // A disc of the wider part reaches into each mouth.
+                let to_limb = self.distance_to(|c| self.is_free[c] && !rest[c]);
+                let is_mouth = |c: usize| f64::from(to_limb[c]) <= sagitta(thicker, half_width);
+                to_wall = self.distance_to(|c| !rest[c] || is_mouth(c));
+            }
+            out.append(&mut found);
             half_width *= STEP;
         }
         (thickest, out)
@@ -341,7 +360,7 @@ impl Plan {
 
     /// Returns the cells of a limb, up to the line across each mouth: there a disc of the room reaches into the limb.
     pub(crate) fn up_to_mouths(&self, limb: &Limb) -> Vec<usize> {
-        let sagitta = (THICKER - (THICKER * THICKER - 1.0).sqrt()) * limb.half_width;
+        let sagitta = sagitta(THICKER, limb.half_width);
         let mut is_in = vec![false; self.is_free.len()];
         limb.cells.iter().for_each(|&c| is_in[c] = true);
         let to_limb = self.distance_to(|c| is_in[c]);
@@ -350,8 +369,8 @@ impl Plan {
     }
 
     /// Returns the length of an area between the thicker parts `core`: from mouth to mouth, or to its end. 0 if
-    /// it has no mouth, or more than one to the same part.
-    fn length(&self, cells: &[usize], core: &[u32]) -> f64 {
+    /// it has no mouth, or more than one to the same part unless it `is_net`.
+    fn length(&self, cells: &[usize], core: &[u32], is_net: bool) -> f64 {
         let mut steps: BTreeMap<usize, u32> = cells.iter().map(|&c| (c, u32::MAX)).collect();
         let mut front: Vec<usize> = Vec::new();
         let mut opens_to: Vec<u32> = Vec::new();
@@ -368,7 +387,7 @@ impl Plan {
         let n_mouths = self.count_patches(&front, &is_mouth);
         opens_to.sort_unstable();
         opens_to.dedup();
-        if n_mouths == 0 || n_mouths > opens_to.len() {
+        if n_mouths == 0 || n_mouths > opens_to.len() && !is_net {
             return 0.0;
         }
         // Alternates steps by edges only and steps with diagonals: exact along the axes, short by a tenth at most
@@ -487,7 +506,7 @@ mod tests {
 
     /// Lowest and highest x of each limb.
     fn spans(plan: &Plan) -> Vec<[usize; 2]> {
-        let (_, limbs) = plan.limbs(3.0, &Allowance::default());
+        let (_, limbs) = plan.limbs(3.0, LimbRule::ROOMS, &Allowance::default());
         let span = |l: &Limb| {
             let x = || l.cells.iter().map(|c| c % plan.side[0]);
             [x().min().unwrap(), x().max().unwrap()]

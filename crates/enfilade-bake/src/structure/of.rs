@@ -8,7 +8,7 @@ use super::frame::Frame;
 use super::misfit::misfit;
 use super::rims::Rims;
 use super::settle::settle;
-use super::site::{Site, sites};
+use super::site::{Site, is_bare, sites};
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
 use crate::{BakeConfig, BakeError, Method, SmallestHole};
@@ -145,6 +145,11 @@ impl<'a> Structure<'a> {
     /// Returns the parts in which anything can bound rooms, in frame coordinates: without open land.
     pub(crate) fn sites(&self, opening: f64) -> Vec<Site> {
         sites(&self.walls, &self.bounds(), opening, self.allowance)
+    }
+
+    /// Returns `true` if there is nothing but open land.
+    pub(crate) fn is_bare(&self, opening: f64) -> bool {
+        is_bare(&self.walls, &self.bounds(), opening, self.allowance)
     }
 
     /// Returns the heights at which storeys end in a box, ascending: beside wide land, no slab would be large. [Units: wu]

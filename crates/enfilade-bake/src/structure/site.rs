@@ -73,19 +73,12 @@ pub(crate) fn sites(
     opening: f64,
     allowance: &Allowance,
 ) -> Vec<Site> {
-    let size = bounds.size();
-    let square = SQUARE.max(size.x.max(size.z) / MOST_ALONG);
-    let n = [size.x, size.z].map(|s| (s / square).ceil().max(1.0) as usize);
+    let (square, n) = plan_of(bounds);
     let whole = vec![Site::whole(bounds)];
     let Some(mut patches) = patches_of(triangles, bounds, square, n, allowance) else {
         return whole;
     };
-    patches.sort_unstable_by(|a, b| a.square.cmp(&b.square).then(a.low.total_cmp(&b.low)));
-    let built: Vec<u32> = patches
-        .chunk_by(|a, b| a.square == b.square)
-        .filter(|here| is_built(here, opening))
-        .map(|here| here[0].square)
-        .collect();
+    let built = built_squares(&mut patches, opening);
     let corner = |at: u32| {
         let [x, z] = [at as usize % n[0], at as usize / n[0]].map(|k| k as f64 * square);
         bounds.min + DVec3::new(x, 0.0, z)
@@ -143,6 +136,36 @@ pub(crate) fn sites(
     } else {
         whole
     }
+}
+
+/// Returns the edge of a square, and the number of squares along x and z.
+fn plan_of(bounds: &Aabb) -> (f64, [usize; 2]) {
+    let size = bounds.size();
+    let square = SQUARE.max(size.x.max(size.z) / MOST_ALONG);
+    let n = [size.x, size.z].map(|s| (s / square).ceil().max(1.0) as usize);
+    (square, n)
+}
+
+/// Returns `true` if triangles are open land and nothing else.
+pub(crate) fn is_bare(
+    triangles: &[Triangle],
+    bounds: &Aabb,
+    opening: f64,
+    allowance: &Allowance,
+) -> bool {
+    let (square, n) = plan_of(bounds);
+    let patches = patches_of(triangles, bounds, square, n, allowance);
+    patches.is_some_and(|mut patches| built_squares(&mut patches, opening).is_empty())
+}
+
+/// Returns the squares that are built up, ascending, and sorts the patches by square.
+fn built_squares(patches: &mut [Patch], opening: f64) -> Vec<u32> {
+    patches.sort_unstable_by(|a, b| a.square.cmp(&b.square).then(a.low.total_cmp(&b.low)));
+    let built = patches
+        .chunk_by(|a, b| a.square == b.square)
+        .filter(|here| is_built(here, opening))
+        .map(|here| here[0].square);
+    built.collect()
 }
 
 /// Returns `true` if there is a wall in a square, or space between two surfaces, given what is there from below.

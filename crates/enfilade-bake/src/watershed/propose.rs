@@ -6,7 +6,7 @@ use crate::proposal::Proposal;
 use crate::rooms::{self, Basins};
 use crate::structure::Structure;
 use crate::voxel::{BitVolume, DistanceField, Grid, Watershed, WatershedOptions, watershed};
-use crate::{BakeConfig, BakeContext, BakeError, Stage};
+use crate::{BakeConfig, BakeContext, BakeError, Outdoors, Stage};
 
 /// Finds rooms by a flood of the distance field.
 ///
@@ -19,6 +19,14 @@ pub(crate) fn propose(
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Proposal, BakeError> {
+    if config.outdoors != Outdoors::Whole && structure.is_bare(config.min_opening) {
+        // Land alone is divided in plan.
+        let bounds = structure.frame.aabb_to_scene(&structure.bounds());
+        return Ok(Proposal {
+            settings: config.voxel_settings(),
+            ..Proposal::new(bounds, Vec::new())
+        });
+    }
     let sites = structure.sites(config.min_opening);
     let mut proposal: Option<Proposal> = None;
     // One after the other: each has a grid of its own, and threads share the work on it.

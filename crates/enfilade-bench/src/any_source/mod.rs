@@ -3,6 +3,7 @@
 //! To add rows, add a file for their family beside this one and lines in [`ROWS`].
 
 mod implicit;
+mod land;
 mod volume;
 
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
@@ -17,6 +18,11 @@ const SHAPES: &[&str] = &["balls", "cavern", "house", "gyroid"];
 const AORTA: &[&str] = &["aorta"];
 /// Airway trees of 15 branches, with the noise of computed tomography in its units.
 const AIRWAYS: &[&str] = &["airway-noise-0", "airway-noise-40", "airway-noise-80"];
+
+/// Open land of a square kilometer each.
+const LANDS: &[&str] = &["valleys", "hamlets", "city-1", "city-2"];
+const BUILT: &[&str] = &["hamlets", "city-1", "city-2"];
+const CITIES: &[&str] = &["city-1", "city-2"];
 
 const fn of_aorta(
     name: &'static str,
@@ -38,6 +44,11 @@ pub(crate) const ROWS: &[Row] = &[
     made("implicit: cells", SHAPES, implicit::cells),
     made("implicit: portals", SHAPES, implicit::portals),
     made("implicit: samples by volume", &["balls"], implicit::samples),
+    made("land: places missed", LANDS, land::missed),
+    made("land: rooms lost or made up", BUILT, land::rooms),
+    made("land: seconds", LANDS, land::seconds),
+    made("land: broken promises", LANDS, land::broken),
+    made("land: visible share", CITIES, land::seen),
 ];
 
 /// Bakes with default settings.

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
-use enfilade::bake::Method;
+use enfilade::bake::{Method, Outdoors};
 use enfilade::geom::DVec3;
-use enfilade::import::{AirSide, IfcConverter, ImportOptions, VolumeOptions};
+use enfilade::import::{AirSide, HeightOptions, IfcConverter, ImportOptions, VolumeOptions};
 use enfilade_settings::{
     Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit, parse_weld,
 };
@@ -45,6 +45,12 @@ pub(crate) struct SceneOptions {
     /// Volumes: the side of the level on which air is [default: below a given level, above that of a mask].
     #[arg(long, value_enum)]
     air: Option<AirName>,
+    /// Height maps (PNG, TIFF): distance in meters between samples [default: that of a GeoTIFF].
+    #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
+    cell: Option<f64>,
+    /// Height maps of grays: heights in meters of black and of white.
+    #[arg(long, value_name = "MIN,MAX", value_parser = parse_place, allow_hyphen_values = true)]
+    heights: Option<[f64; 2]>,
     /// Scans (clouds of points in PLY): a place of the scanner, in meters with y up, if the file does not tell it; repeatable.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     station: Vec<DVec3>,
@@ -102,6 +108,12 @@ pub(crate) struct BakeOptions {
     /// With `--max-cost`: cut the outdoors, too.
     #[arg(long)]
     split_outdoors: bool,
+    /// Cells outdoors: one, or those of open land (valleys, streets, squares, courtyards), from the ground to a sky limit.
+    #[arg(long, value_enum, default_value_t = OutdoorsName::Whole)]
+    outdoors: OutdoorsName,
+    /// A place from which open land is flooded, in meters, instead of its own minima: one cell each; repeatable.
+    #[arg(long, value_name = "X,Z", value_parser = parse_place, allow_hyphen_values = true)]
+    minimum: Vec<[f64; 2]>,
     /// Edge of a voxel in meters; chosen from the narrowest opening and the scene's size if not given.
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     voxel: Option<f64>,
@@ -150,6 +162,23 @@ fn parse_level(text: &str) -> Result<f64, String> {
 enum Switch {
     On,
     Off,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum OutdoorsName {
+    /// One cell.
+    Whole,
+    /// A cell for each area of open land, and one for the sky and all beyond.
+    Split,
+}
+
+fn parse_place(text: &str) -> Result<[f64; 2], String> {
+    let number = |n: &str| n.trim().parse().ok().filter(|n: &f64| n.is_finite());
+    let place = text.split_once(',').map(|(x, z)| [number(x), number(z)]);
+    match place {
+        Some([Some(x), Some(z)]) => Ok([x, z]),
+        _ => Err("give two numbers with a comma between, such as 120,-45".to_owned()),
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
@@ -231,7 +260,20 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
         ..enfilade::bake::Budget::default()
     };
     config.delaunay = options.delaunay.resolve()?;
+    config.outdoors = outdoors(options)?;
     Ok(Resolved { import, bake })
+}
+
+/// Returns the choice of cells outdoors. Places to flood land from are a choice, too.
+fn outdoors(options: &BakeOptions) -> anyhow::Result<Outdoors> {
+    let minima = options.minimum.clone();
+    match options.outdoors {
+        OutdoorsName::Split => Ok(Outdoors::Split { minima }),
+        OutdoorsName::Whole if minima.is_empty() => Ok(Outdoors::Whole),
+        OutdoorsName::Whole => {
+            anyhow::bail!("--minimum divides open land: give --outdoors split, too")
+        }
+    }
 }
 
 impl SceneOptions {
@@ -276,6 +318,10 @@ impl SceneOptions {
             allow_outside: self.allow_outside,
             ifc: Some(ifc),
             stations: self.station.clone(),
+            heights: HeightOptions {
+                cell: self.cell,
+                heights: self.heights,
+            },
             volume: VolumeOptions {
                 level: self.level,
                 air: self.air.map(|air| match air {

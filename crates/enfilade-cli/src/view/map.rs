@@ -86,7 +86,7 @@ impl Map {
             names: (world.graph.cells.iter())
                 .map(|c| shown(&c.name).to_string())
                 .collect(),
-            is_room: world.graph.cells.iter().map(Cell::is_room).collect(),
+            is_room: world.graph.cells.iter().map(Cell::is_place).collect(),
             portals: portals.collect(),
             n: size.map(|s| (s * density).max(1.0) as usize),
             low,

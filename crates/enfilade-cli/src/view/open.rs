@@ -78,7 +78,11 @@ pub(super) struct Open {
 
 /// The name of a cell, and what it is unless a room or the outdoors.
 fn titled(cell: &Cell) -> String {
-    let kind = if cell.is_void { " (void)" } else { "" };
+    let kind = match cell {
+        _ if cell.is_void => " (void)",
+        _ if cell.is_land => " (land)",
+        _ => "",
+    };
     format!("{}{kind}", shown(&cell.name))
 }
 

@@ -20,11 +20,11 @@ const DEEP: f64 = 100.0;
 /// Finds a first camera: in the middle of the largest room that leads to another, or else of the largest, toward its first doorway.
 pub(super) fn start_in(world: &World, sight: &Sight) -> Camera {
     let middle = |aabb: [[f32; 3]; 2]| [0, 1, 2].map(|k| (aabb[0][k] + aabb[1][k]) * 0.5);
-    let rooms = world.graph.rooms();
+    let rooms = world.graph.places();
     let rooms = rooms.filter(|(id, cell)| sight.locate(middle(cell.aabb)) == Some(*id));
     let door = |room: CellId| {
         let mut exits = world.graph.exits(room);
-        exits.find(|e| is_walked(e.portal.kind) && world.graph[e.to].is_room())
+        exits.find(|e| is_walked(e.portal.kind) && world.graph[e.to].is_place())
     };
     let largest = rooms.max_by(|(a, x), (b, y)| {
         let leads = door(*a).is_some().cmp(&door(*b).is_some());

@@ -254,6 +254,7 @@ impl<'a> Reader<'a> {
                 portals: c.portals.iter().copied().map(PortalId).collect(),
                 outdoor: c.outdoor,
                 is_void: c.void,
+                is_land: c.land,
             })
         });
         let cells = cells.collect::<Result<_, _>>()?;

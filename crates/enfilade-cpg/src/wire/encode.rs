@@ -529,6 +529,7 @@ fn cells(world: &World) -> Vec<json::CellJson> {
         portals: cell.portals.iter().map(|p| p.0).collect(),
         outdoor: cell.outdoor,
         void: cell.is_void,
+        land: cell.is_land,
     };
     world.graph.cells.iter().enumerate().map(cell).collect()
 }

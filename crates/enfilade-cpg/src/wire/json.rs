@@ -256,6 +256,8 @@ pub(super) struct CellJson {
     pub(super) outdoor: bool,
     #[serde(default, skip_serializing_if = "is_false")]
     pub(super) void: bool,
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub(super) land: bool,
 }
 
 #[derive(Serialize, Deserialize)]

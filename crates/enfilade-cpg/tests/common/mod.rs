@@ -49,6 +49,7 @@ pub(crate) fn cell(name: &str, aabb: [[f32; 3]; 2], portals: &[u32]) -> Cell {
         portals: portals.iter().copied().map(PortalId).collect(),
         outdoor: name == "outdoors",
         is_void: false,
+        is_land: false,
     }
 }
 
