@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 mod bricks;
 
-use bricks::{Brick, MIXED, in_block, place};
+use bricks::{Brick, MIXED};
 pub(crate) use bricks::{EDGE, Layer};
 
 /// The label of each voxel of a box, below 2³¹.
@@ -94,11 +94,8 @@ impl Labels {
     #[inline]
     pub fn at(&self, [x, y, z]: [usize; 3]) -> u32 {
         let layer = &self.layers[z / EDGE];
-        let head = layer.heads[x / EDGE + self.width() * (y / EDGE)];
-        if head & MIXED == 0 {
-            return head;
-        }
-        layer.in_block(head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
+        let brick = x / EDGE + self.width() * (y / EDGE);
+        layer.label(brick, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
     }
 
     /// Returns a reader of labels at places near each other.
@@ -108,8 +105,8 @@ impl Labels {
             labels: self,
             width: self.width(),
             brick: [usize::MAX; 2],
-            head: 0,
-            block: &[],
+            list: &[],
+            words: &[],
             bits: 0,
         }
     }
@@ -176,16 +173,14 @@ impl Labels {
             let end = along.end.min((x / EDGE + 1) * EDGE);
             if head & MIXED == 0 {
                 next(x, head);
-            } else if let Some((list, words)) = layer.listed(head) {
-                let width = place(head).1;
-                let (bit, each) = (row << width, 1 << width);
+            } else {
+                let (list, words, bits) = layer.lists(&heads[x / EDGE]);
+                let (bit, each) = (row << bits, 1 << bits);
                 // All four lie in one word.
                 let which = words[bit / 32] as usize >> (bit % 32);
                 for x in x..end {
                     next(x, list[which >> (x % EDGE * each) & (list.len() - 1)]);
                 }
-            } else {
-                (x..end).for_each(|x| next(x, layer.in_block(head, row + x % EDGE)));
             }
             x = end;
         }
@@ -203,12 +198,8 @@ impl Labels {
         let bx = self.width();
         let mut found = Vec::new();
         let of = &self.layers[layer];
-        for (at, &head) in of.heads.iter().enumerate() {
-            let may_be = match head & MIXED {
-                0 => head == label,
-                _ => of.listed(head).is_none_or(|l| l.0.contains(&label)),
-            };
-            if !may_be {
+        for (at, head) in of.heads.iter().enumerate() {
+            if !of.lists(head).0.contains(&label) {
                 continue;
             }
             let corner = [at % bx, at / bx, layer].map(|b| b * EDGE);
@@ -251,10 +242,10 @@ impl Labels {
                 if here & MIXED == 0 && nexts.iter().all(is_alike) {
                     continue;
                 }
-                let brick = of.brick(here);
+                let brick = of.brick(&here);
                 let corner = [i, j, layer].map(|b| b * EDGE);
                 for (axis, next) in nexts.into_iter().enumerate() {
-                    let beyond = next.map(|(of, next)| of.brick(next));
+                    let beyond = next.map(|(of, next)| of.brick(&next));
                     self.faces_along(axis, corner, &brick, beyond.as_ref(), &mut face);
                 }
             }
@@ -303,7 +294,7 @@ impl Labels {
         let (bx, most) = (self.width(), self.dims[1] - 1);
         self.layers.par_iter_mut().for_each(|of| {
             let mut part = Layer::default();
-            for (at, &head) in of.heads.iter().enumerate() {
+            for (at, head) in of.heads.iter().enumerate() {
                 let from = at / bx * EDGE;
                 // The new label, if it is the same at all heights of the brick.
                 let level = |label: u32| {
@@ -311,18 +302,12 @@ impl Labels {
                     let first = of(0);
                     (1..EDGE).all(|y| of(y) == first).then_some(first)
                 };
-                if head & MIXED == 0 {
-                    if let Some(label) = level(head) {
-                        part.heads.push(label);
-                        continue;
-                    }
-                } else if let Some((list, _)) = of.listed(head) {
-                    // Most often, all labels of a brick become one.
-                    let label = level(list[0]);
-                    if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
-                        part.heads.extend(label);
-                        continue;
-                    }
+                // Most often, all labels of a brick become one.
+                let list = of.lists(head).0;
+                let label = level(list[0]);
+                if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
+                    part.heads.extend(label);
+                    continue;
                 }
                 let mut brick = of.brick(head);
                 for (voxel, label) in brick.iter_mut().enumerate() {
@@ -349,34 +334,32 @@ pub struct Reader<'a> {
     width: usize,
     /// The brick of the last voxel in its layer, and the layer.
     brick: [usize; 2],
-    head: u32,
-    /// The block of the brick, and the bits of a voxel in it as a power of two.
-    block: &'a [u32],
+    /// The labels of the brick, and the position of each voxel among them in so many bits, as a power of two.
+    list: &'a [u32],
+    words: &'a [u32],
     bits: u32,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
     /// Returns the label of the voxel `[x, y, z]`; 0 if it is occupied.
-    #[inline]
+    #[inline(always)]
     pub fn at(&mut self, [x, y, z]: [usize; 3]) -> u32 {
         let brick = [x / EDGE + self.width * (y / EDGE), z / EDGE];
         if brick != self.brick {
-            let layer = &self.labels.layers[brick[1]];
-            self.brick = brick;
-            self.head = layer.heads[brick[0]];
-            if self.head & MIXED != 0 {
-                let (from, bits) = place(self.head);
-                (self.block, self.bits) = (&layer.blocks[from..], bits);
-            }
+            self.enter(brick);
         }
-        if self.head & MIXED == 0 {
-            return self.head;
+        if let [label] = *self.list {
+            return label;
         }
-        in_block(
-            self.block,
-            self.bits,
-            x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)),
-        )
+        let bit = (x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE))) << self.bits;
+        let word = self.words[(bit / 32) & (self.words.len() - 1)];
+        self.list[(word as usize >> (bit % 32)) & (self.list.len() - 1)]
+    }
+
+    fn enter(&mut self, brick: [usize; 2]) {
+        let layer = &self.labels.layers[brick[1]];
+        self.brick = brick;
+        (self.list, self.words, self.bits) = layer.lists(&layer.heads[brick[0]]);
     }
 }
 
