@@ -356,6 +356,21 @@ impl<'a> Reader<'a> {
         self.list[(word as usize >> (bit % 32)) & (self.list.len() - 1)]
     }
 
+    /// Returns the label of two voxels and of all between them, if they lie in one brick or in two that share a face, and these
+    /// have one label.
+    #[inline]
+    pub fn between(&mut self, a: [usize; 3], b: [usize; 3]) -> Option<u32> {
+        let apart = |k: usize| (a[k] / EDGE).abs_diff(b[k] / EDGE);
+        if apart(0) + apart(1) + apart(2) > 1 {
+            return None;
+        }
+        let head = |[x, y, z]: [usize; 3]| {
+            self.labels.layers[z / EDGE].heads[x / EDGE + self.width * (y / EDGE)]
+        };
+        let label = head(a);
+        (label & MIXED == 0 && head(b) == label).then_some(label)
+    }
+
     fn enter(&mut self, brick: [usize; 2]) {
         let layer = &self.labels.layers[brick[1]];
         self.brick = brick;
@@ -389,6 +404,16 @@ mod tests {
             prop_assert!(labels.iter().eq(plain.iter().copied()));
             let mut reader = labels.reader();
             prop_assert!((0..plain.len()).all(|i| reader.at(labels.coords(i)) == plain[i]));
+            // All voxels of the box that two span.
+            for i in 0..plain.len() {
+                let [a, b] = [i, (i + i / 3 + 7) % plain.len()].map(|i| labels.coords(i));
+                if let Some(label) = reader.between(a, b) {
+                    let range = |k: usize| a[k].min(b[k])..=a[k].max(b[k]);
+                    let all = range(2).flat_map(|z| range(1).map(move |y| (y, z)));
+                    let mut all = all.flat_map(|(y, z)| range(0).map(move |x| [x, y, z]));
+                    prop_assert!(all.all(|at| labels.at(at) == label));
+                }
+            }
             let mut plain = plain;
             // One label more, then one that is there.
             for k in 0..40 {

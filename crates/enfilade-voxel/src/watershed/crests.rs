@@ -261,13 +261,13 @@ fn find(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> (
     let n_slabs = shape.dims[2].div_ceil(thick);
     let n_voxels = shape.layer() * shape.dims[2];
     let (mut bits, mut alike) = (vec![0_u64; n_voxels.div_ceil(64)], Alike::new());
-    let work = 1 + (thick * shape.layer()) as u64 / 32;
+    let is_allowed = |s: &usize| allowance.spend(1 + shape.n_of_slab(*s, thick) as u64 / 32);
     // Some slabs at a time, so that lists of voxels are short.
     let many = 2 * rayon::current_num_threads();
     for from in (0..n_slabs).step_by(many) {
         let slabs = (from..n_slabs.min(from + many)).into_par_iter();
         let found: Vec<Vec<(u32, u8)>> = slabs
-            .filter(allowance.each(work))
+            .filter(is_allowed)
             .map_init(Vec::new, |buffer, s| {
                 find_in_slab(shape, levels, [s, thick], buffer)
             })

@@ -131,7 +131,6 @@ pub(super) fn label(
     allowance: &Allowance,
 ) -> Option<(Labels, Vec<Contact>)> {
     let n_slabs = shape.dims[2].div_ceil(thick);
-    let work = 1 + (thick * shape.layer()) as u64 / 16;
     // Buffers for one slab a thread, so that their memory is mapped once.
     let pool: Mutex<Vec<Buffers>> = Mutex::default();
     let take = || {
@@ -145,7 +144,8 @@ pub(super) fn label(
             pool.push(buffers);
         }
     };
-    let slabs = || (0..n_slabs).into_par_iter().filter(allowance.each(work));
+    let is_allowed = |s: &usize| allowance.spend(1 + shape.n_of_slab(*s, thick) as u64 / 16);
+    let slabs = || (0..n_slabs).into_par_iter().filter(is_allowed);
     let borders: Vec<[RootRuns; 2]> = slabs()
         .map(|s| {
             let mut buffers = take();
