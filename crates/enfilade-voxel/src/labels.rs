@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 mod bricks;
 
-use bricks::{Brick, MIXED};
+use bricks::{Brick, MIXED, in_block, place};
 pub(crate) use bricks::{EDGE, Layer};
 
 /// The label of each voxel of a box, below 2³¹.
@@ -94,8 +94,11 @@ impl Labels {
     #[inline]
     pub fn at(&self, [x, y, z]: [usize; 3]) -> u32 {
         let layer = &self.layers[z / EDGE];
-        let brick = x / EDGE + self.width() * (y / EDGE);
-        layer.label(brick, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
+        let head = layer.heads[x / EDGE + self.width() * (y / EDGE)];
+        if head & MIXED == 0 {
+            return head;
+        }
+        layer.in_block(head, x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
     }
 
     /// Returns a reader of labels at places near each other.
@@ -105,8 +108,8 @@ impl Labels {
             labels: self,
             width: self.width(),
             brick: [usize::MAX; 2],
-            list: &[],
-            words: &[],
+            head: 0,
+            block: &[],
             bits: 0,
         }
     }
@@ -173,14 +176,16 @@ impl Labels {
             let end = along.end.min((x / EDGE + 1) * EDGE);
             if head & MIXED == 0 {
                 next(x, head);
-            } else {
-                let (list, words, bits) = layer.lists(&heads[x / EDGE]);
-                let (bit, each) = (row << bits, 1 << bits);
+            } else if let Some((list, words)) = layer.listed(head) {
+                let width = place(head).1;
+                let (bit, each) = (row << width, 1 << width);
                 // All four lie in one word.
                 let which = words[bit / 32] as usize >> (bit % 32);
                 for x in x..end {
                     next(x, list[which >> (x % EDGE * each) & (list.len() - 1)]);
                 }
+            } else {
+                (x..end).for_each(|x| next(x, layer.in_block(head, row + x % EDGE)));
             }
             x = end;
         }
@@ -198,8 +203,12 @@ impl Labels {
         let bx = self.width();
         let mut found = Vec::new();
         let of = &self.layers[layer];
-        for (at, head) in of.heads.iter().enumerate() {
-            if !of.lists(head).0.contains(&label) {
+        for (at, &head) in of.heads.iter().enumerate() {
+            let may_be = match head & MIXED {
+                0 => head == label,
+                _ => of.listed(head).is_none_or(|l| l.0.contains(&label)),
+            };
+            if !may_be {
                 continue;
             }
             let corner = [at % bx, at / bx, layer].map(|b| b * EDGE);
@@ -242,10 +251,10 @@ impl Labels {
                 if here & MIXED == 0 && nexts.iter().all(is_alike) {
                     continue;
                 }
-                let brick = of.brick(&here);
+                let brick = of.brick(here);
                 let corner = [i, j, layer].map(|b| b * EDGE);
                 for (axis, next) in nexts.into_iter().enumerate() {
-                    let beyond = next.map(|(of, next)| of.brick(&next));
+                    let beyond = next.map(|(of, next)| of.brick(next));
                     self.faces_along(axis, corner, &brick, beyond.as_ref(), &mut face);
                 }
             }
@@ -294,7 +303,7 @@ impl Labels {
         let (bx, most) = (self.width(), self.dims[1] - 1);
         self.layers.par_iter_mut().for_each(|of| {
             let mut part = Layer::default();
-            for (at, head) in of.heads.iter().enumerate() {
+            for (at, &head) in of.heads.iter().enumerate() {
                 let from = at / bx * EDGE;
                 // The new label, if it is the same at all heights of the brick.
                 let level = |label: u32| {
@@ -302,12 +311,18 @@ impl Labels {
                     let first = of(0);
                     (1..EDGE).all(|y| of(y) == first).then_some(first)
                 };
-                // Most often, all labels of a brick become one.
-                let list = of.lists(head).0;
-                let label = level(list[0]);
-                if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
-                    part.heads.extend(label);
-                    continue;
+                if head & MIXED == 0 {
+                    if let Some(label) = level(head) {
+                        part.heads.push(label);
+                        continue;
+                    }
+                } else if let Some((list, _)) = of.listed(head) {
+                    // Most often, all labels of a brick become one.
+                    let label = level(list[0]);
+                    if label.is_some() && list[1..].iter().all(|&l| level(l) == label) {
+                        part.heads.extend(label);
+                        continue;
+                    }
                 }
                 let mut brick = of.brick(head);
                 for (voxel, label) in brick.iter_mut().enumerate() {
@@ -334,47 +349,34 @@ pub struct Reader<'a> {
     width: usize,
     /// The brick of the last voxel in its layer, and the layer.
     brick: [usize; 2],
-    /// The labels of the brick, and the position of each voxel among them in so many bits, as a power of two.
-    list: &'a [u32],
-    words: &'a [u32],
+    head: u32,
+    /// The block of the brick, and the bits of a voxel in it as a power of two.
+    block: &'a [u32],
     bits: u32,
 }
 
-impl<'a> Reader<'a> {
+impl Reader<'_> {
     /// Returns the label of the voxel `[x, y, z]`; 0 if it is occupied.
-    #[inline(always)]
+    #[inline]
     pub fn at(&mut self, [x, y, z]: [usize; 3]) -> u32 {
         let brick = [x / EDGE + self.width * (y / EDGE), z / EDGE];
         if brick != self.brick {
-            self.enter(brick);
+            let layer = &self.labels.layers[brick[1]];
+            self.brick = brick;
+            self.head = layer.heads[brick[0]];
+            if self.head & MIXED != 0 {
+                let (from, bits) = place(self.head);
+                (self.block, self.bits) = (&layer.blocks[from..], bits);
+            }
         }
-        if let [label] = *self.list {
-            return label;
+        if self.head & MIXED == 0 {
+            return self.head;
         }
-        let bit = (x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE))) << self.bits;
-        let word = self.words[(bit / 32) & (self.words.len() - 1)];
-        self.list[(word as usize >> (bit % 32)) & (self.list.len() - 1)]
-    }
-
-    /// Returns the label of two voxels and of all between them, if they lie in one brick or in two that share a face, and these
-    /// have one label.
-    #[inline]
-    pub fn between(&mut self, a: [usize; 3], b: [usize; 3]) -> Option<u32> {
-        let apart = |k: usize| (a[k] / EDGE).abs_diff(b[k] / EDGE);
-        if apart(0) + apart(1) + apart(2) > 1 {
-            return None;
-        }
-        let head = |[x, y, z]: [usize; 3]| {
-            self.labels.layers[z / EDGE].heads[x / EDGE + self.width * (y / EDGE)]
-        };
-        let label = head(a);
-        (label & MIXED == 0 && head(b) == label).then_some(label)
-    }
-
-    fn enter(&mut self, brick: [usize; 2]) {
-        let layer = &self.labels.layers[brick[1]];
-        self.brick = brick;
-        (self.list, self.words, self.bits) = layer.lists(&layer.heads[brick[0]]);
+        in_block(
+            self.block,
+            self.bits,
+            x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)),
+        )
     }
 }
 
@@ -404,16 +406,6 @@ mod tests {
             prop_assert!(labels.iter().eq(plain.iter().copied()));
             let mut reader = labels.reader();
             prop_assert!((0..plain.len()).all(|i| reader.at(labels.coords(i)) == plain[i]));
-            // All voxels of the box that two span.
-            for i in 0..plain.len() {
-                let [a, b] = [i, (i + i / 3 + 7) % plain.len()].map(|i| labels.coords(i));
-                if let Some(label) = reader.between(a, b) {
-                    let range = |k: usize| a[k].min(b[k])..=a[k].max(b[k]);
-                    let all = range(2).flat_map(|z| range(1).map(move |y| (y, z)));
-                    let mut all = all.flat_map(|(y, z)| range(0).map(move |x| [x, y, z]));
-                    prop_assert!(all.all(|at| labels.at(at) == label));
-                }
-            }
             let mut plain = plain;
             // One label more, then one that is there.
             for k in 0..40 {

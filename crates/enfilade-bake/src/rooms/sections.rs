@@ -125,9 +125,6 @@ fn measured(
     }
 }
 
-/// Steps to the point with which a point is compared.
-const AHEAD: usize = 7;
-
 /// Slices with fewer points than this are visited on one thread.
 const ALONE: usize = 500;
 
@@ -259,8 +256,8 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
         let end = DVec3::from(grid.dims.map(|n| n as f64));
         let is_in = |p: DVec3| p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
         // Positive, so the cast rounds down; and 32 bits are half the work of 64.
-        let voxel_at = |p: DVec3| [p.x, p.y, p.z].map(|c| c as i32 as usize);
         let mut reader = labels.reader();
+        let mut label_at = |p: DVec3| reader.at([p.x, p.y, p.z].map(|c| c as i32 as usize));
         let [du, dv, dn] = self.along;
         // In voxel coordinates, so that a lattice point costs an addition and a look-up.
         let base = self.base + dn * s as f64;
@@ -270,30 +267,13 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             let at = |i: usize| row + du * i as f64;
             // A segment between two points of a box lies in it.
             let all_in = is_in(at(0)) && is_in(at(self.side[0] - 1));
-            let mut cell_of = |label: u32| {
+            for i in 0..self.side[0] {
+                let p = at(i);
+                let label = if all_in || is_in(p) { label_at(p) } else { 0 };
                 if label != last.0 {
                     last = (label, if label == 0 { 0 } else { (self.cell_of)(label) });
                 }
-                last.1
-            };
-            let mut i = 0;
-            while i < self.side[0] {
-                let p = at(i);
-                // In the open, many points lie in bricks of one label.
-                let ahead = i + AHEAD;
-                if all_in
-                    && ahead < self.side[0]
-                    && let Some(label) = reader.between(voxel_at(p), voxel_at(at(ahead)))
-                {
-                    let cell = cell_of(label);
-                    (i..=ahead).for_each(|i| point(j * self.side[0] + i, cell));
-                    i = ahead + 1;
-                    continue;
-                }
-                let is_there = all_in || is_in(p);
-                let label = if is_there { reader.at(voxel_at(p)) } else { 0 };
-                point(j * self.side[0] + i, cell_of(label));
-                i += 1;
+                point(j * self.side[0] + i, last.1);
             }
         }
     }

@@ -26,17 +26,16 @@ pub(crate) struct Layer {
     pub(super) blocks: Vec<u32>,
 }
 
-/// Positions of voxels in the list of a brick of one label, and in a list of one label for each voxel.
-const ALL_FIRST: [u32; 2] = [0; 2];
-const EACH: [u32; VOLUME / 4] = {
-    let mut words = [0; VOLUME / 4];
-    let mut voxel = 0;
-    while voxel < VOLUME {
-        words[voxel / 4] |= (voxel as u32) << (voxel % 4 * 8);
-        voxel += 1;
+/// Returns the label of a voxel of the brick whose block begins here, given the bits of a voxel in it as a power of two.
+#[inline]
+pub(super) fn in_block(block: &[u32], bits: u32, voxel: usize) -> u32 {
+    if bits == PLAIN {
+        return block[voxel];
     }
-    words
-};
+    let listed = 1 << (1 << bits);
+    let bit = voxel << bits;
+    block[block[listed + bit / 32] as usize >> (bit % 32) & (listed - 1)]
+}
 
 impl Layer {
     /// Compresses up to four layers of `nx` by `ny` labels.
@@ -75,10 +74,16 @@ impl Layer {
         self.heads.push(encode(brick, &mut self.blocks));
     }
 
+    #[inline]
+    pub(super) fn in_block(&self, head: u32, voxel: usize) -> u32 {
+        let (from, bits) = place(head);
+        in_block(&self.blocks[from..], bits, voxel)
+    }
+
     /// Labels a voxel of brick `at`.
     pub(super) fn set(&mut self, at: usize, voxel: usize, label: u32) {
         let head = self.heads[at];
-        if self.label(at, voxel) == label {
+        if self.in_brick(head, voxel) == label {
             return;
         }
         if head & MIXED != 0 {
@@ -97,45 +102,38 @@ impl Layer {
                 return;
             }
         }
-        let mut brick = self.brick(&head);
+        let mut brick = self.brick(head);
         brick[voxel] = label;
         self.heads[at] = encode(&brick, &mut self.blocks);
     }
 
-    /// Returns the labels of a brick, and the position of each of its voxels among them in so many bits, as a power of two.
-    #[inline]
-    pub(super) fn lists<'a>(&'a self, head: &'a u32) -> (&'a [u32], &'a [u32], u32) {
+    fn in_brick(&self, head: u32, voxel: usize) -> u32 {
         if head & MIXED == 0 {
-            return (std::slice::from_ref(head), &ALL_FIRST, 0);
+            head
+        } else {
+            self.in_block(head, voxel)
         }
-        let (from, bits) = place(*head);
-        let block = &self.blocks[from..];
-        if bits == PLAIN {
-            return (&block[..VOLUME], &EACH, bits);
-        }
-        let (list, words) = block.split_at(1 << (1 << bits));
-        (list, &words[..VOLUME << bits >> 5], bits)
     }
 
-    /// Returns the label of a voxel of a brick.
-    #[inline]
-    pub(super) fn label(&self, brick: usize, voxel: usize) -> u32 {
-        let (list, words, bits) = self.lists(&self.heads[brick]);
-        if let [label] = *list {
-            return label;
-        }
-        let bit = voxel << bits;
-        list[words[bit / 32] as usize >> (bit % 32) & (list.len() - 1)]
+    /// Returns the list of a brick of several labels and the words with the positions in it, unless it has none.
+    pub(super) fn listed(&self, head: u32) -> Option<(&[u32], &[u32])> {
+        let (from, width) = place(head);
+        let lists = (width != PLAIN).then(|| self.blocks[from..].split_at(1 << (1 << width)));
+        lists.map(|(list, words)| (list, &words[..VOLUME << width >> 5]))
     }
 
     /// Returns all labels of a brick.
-    pub(super) fn brick(&self, head: &u32) -> Brick {
+    pub(super) fn brick(&self, head: u32) -> Brick {
         if head & MIXED == 0 {
-            return [*head; VOLUME];
+            return [head; VOLUME];
         }
-        let (list, words, bits) = self.lists(head);
-        let each = 1 << bits;
+        let (from, width) = place(head);
         let mut brick = [0; VOLUME];
+        let Some((list, words)) = self.listed(head) else {
+            brick.copy_from_slice(&self.blocks[from..from + VOLUME]);
+            return brick;
+        };
+        let each = 1 << width;
         for (voxels, &word) in brick.chunks_exact_mut(32 / each).zip(words) {
             for (k, label) in voxels.iter_mut().enumerate() {
                 *label = list[word as usize >> (k * each) & (list.len() - 1)];
