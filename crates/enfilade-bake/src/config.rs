@@ -296,14 +296,14 @@ mod tests {
             ..BakeConfig::default()
         };
         let bounds = Aabb::new(DVec3::ZERO, DVec3::new(200.0, 30.0, 200.0));
-        let error = config.grid(&bounds, 100_000, 2.2).unwrap_err();
+        let error = config.grid(&bounds, 100_000, 3.6).unwrap_err();
         assert!(matches!(error, BakeError::TooLarge { .. }), "{error}");
         let said = error.to_string();
         for word in ["200 x 30 x 200 m", "--unit", "max_voxels", "5 GB"] {
             assert!(said.contains(word), "{word}: {said}");
         }
         config.min_opening = 10.0;
-        config.grid(&bounds, 100_000, 2.2).unwrap();
+        config.grid(&bounds, 100_000, 3.6).unwrap();
     }
 
     #[test]

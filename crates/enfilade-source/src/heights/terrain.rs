@@ -97,7 +97,7 @@ impl RightTriangles<'_> {
     fn measure(&mut self) {
         let side = self.size - 1;
         let n = 2 * side * side - 2;
-        let n_parents = n - side * side;
+        let n_parents = n.saturating_sub(side * side); // none in a single square
         for i in (0..n).rev() {
             let corners = numbered(i + 2, side);
             let at = self.index(middle(&corners));

@@ -21,19 +21,17 @@ pub(super) struct Peak {
 
 /// All neighbors in a mask of those alike, a bit for each in the order of [`Shape::neighbors`].
 const AROUND: u8 = 0b11_1111;
-/// Those that come after a voxel.
-const AFTER: u8 = 0b11_1000;
 
 /// The crests of a field: free voxels, not outdoors, that no neighbor exceeds.
 pub(super) struct Crests {
-    /// One bit a voxel, by index.
-    bits: Vec<u64>,
-    /// Number of crest voxels before each word of `bits`.
-    before: Vec<u32>,
+    /// The crest voxels.
+    crests: Ranked,
     /// For each crest voxel the steps along its plateau to a voxel with a higher neighbor; [`FAR`] on a peak.
     steps: Vec<u8>,
-    /// The crest voxels on peaks, by their position among all, and the number of the peak.
-    summits: Vec<(u32, u32)>,
+    /// Those of them that are on peaks, by their position among all.
+    summits: Ranked,
+    /// The number of the peak of each of these.
+    peak_of: Vec<u32>,
     /// Deepest first, then by voxel.
     pub(super) peaks: Vec<Peak>,
 }
@@ -41,13 +39,16 @@ pub(super) struct Crests {
 /// For each crest voxel the mask of neighbors at the same level.
 type Alike = Vec<u8>;
 
-impl Crests {
-    /// Finds the crests, in slabs of `thick` layers.
-    ///
-    /// Linear in voxels; a fifth of a byte a voxel, and 2 bytes for each crest voxel, one of them to stay, and 8 for those
-    /// inside plateaus.
-    pub(super) fn of(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Self {
-        let (bits, alike) = find(shape, levels, thick, allowance);
+/// A set of indices, each of which tells its position among all.
+#[derive(Default)]
+struct Ranked {
+    bits: Vec<u64>,
+    /// Number of members before each word of `bits`.
+    before: Vec<u32>,
+}
+
+impl Ranked {
+    fn of(bits: Vec<u64>) -> Self {
         let mut n = 0;
         let before = bits
             .iter()
@@ -56,29 +57,18 @@ impl Crests {
                 n - word.count_ones()
             })
             .collect();
-        let mut crests = Self {
-            bits,
-            before,
-            steps: Vec::new(),
-            summits: Vec::new(),
-            peaks: Vec::new(),
-        };
-        crests.measure(shape, &alike, allowance);
-        let peaks = crests.number(shape, &alike);
-        drop(alike);
-        crests.rank(shape, levels, &peaks);
-        crests
+        Self { bits, before }
     }
 
-    /// Returns the position of a voxel among all crest voxels.
-    fn find(&self, voxel: usize) -> Option<usize> {
-        let (word, bit) = (self.bits[voxel / 64], voxel % 64);
+    /// Returns the position of an index among all members.
+    fn position(&self, index: usize) -> Option<usize> {
+        let (word, bit) = (self.bits[index / 64], index % 64);
         let below = word & ((1 << bit) - 1);
         (word >> bit & 1 != 0)
-            .then(|| self.before[voxel / 64] as usize + below.count_ones() as usize)
+            .then(|| self.before[index / 64] as usize + below.count_ones() as usize)
     }
 
-    /// Returns all crest voxels, each with its position, in order.
+    /// Returns all members, each with its position, in order.
     fn all(&self) -> impl ParallelIterator<Item = (usize, usize)> + '_ {
         let words = self.bits.par_iter().zip(&self.before).enumerate();
         words.flat_map_iter(|(w, (&word, &before))| {
@@ -91,32 +81,55 @@ impl Crests {
             (before as usize..).zip(std::iter::from_fn(next))
         })
     }
+}
+
+impl Crests {
+    /// Finds the crests, in slabs of `thick` layers.
+    ///
+    /// Linear in voxels; a fifth of a byte a voxel, and 2 bytes for each crest voxel, one of them to stay, and 8 for those
+    /// inside plateaus.
+    pub(super) fn of(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Self {
+        let (bits, alike) = find(shape, levels, thick, allowance);
+        let mut crests = Self {
+            crests: Ranked::of(bits),
+            steps: Vec::new(),
+            summits: Ranked::default(),
+            peak_of: Vec::new(),
+            peaks: Vec::new(),
+        };
+        crests.measure(shape, &alike, allowance);
+        let peaks = crests.number(shape, &alike);
+        drop(alike);
+        crests.rank(shape, levels, &peaks);
+        crests
+    }
 
     /// Returns the steps from a voxel to one with a higher neighbor; 0 if it has one itself.
     fn steps_of(&self, voxel: usize) -> u8 {
-        self.find(voxel).map_or(0, |at| self.steps[at])
+        self.crests.position(voxel).map_or(0, |at| self.steps[at])
     }
 
     /// Measures the steps breadth first, from the rims of plateaus inward.
     fn measure(&mut self, shape: Shape, alike: &Alike, allowance: &Allowance) {
         let around = |at: usize, voxel: usize| beside(shape, voxel, alike[at] & AROUND);
         // Most crest voxels are rims, so these are never listed.
-        let of_rim = |(at, voxel)| match around(at, voxel).any(|q| self.find(q).is_none()) {
-            true => 1,
-            false => FAR,
-        };
-        self.steps = self.all().map(of_rim).collect();
+        let of_rim =
+            |(at, voxel)| match around(at, voxel).any(|q| self.crests.position(q).is_none()) {
+                true => 1,
+                false => FAR,
+            };
+        self.steps = self.crests.all().map(of_rim).collect();
         if !allowance.spend(1 + self.steps.len() as u64 / 2) {
             return;
         }
         let is_next = |&(at, voxel): &(usize, usize)| {
             self.steps[at] == FAR && around(at, voxel).any(|q| self.steps_of(q) == 1)
         };
-        let next = self.all().filter(is_next);
+        let next = self.crests.all().filter(is_next);
         let mut front: Vec<u32> = next.map(|(_, voxel)| voxel as u32).collect();
         for steps in 2..FAR {
             for &voxel in &front {
-                if let Some(at) = self.find(voxel as usize) {
+                if let Some(at) = self.crests.position(voxel as usize) {
                     self.steps[at] = steps;
                 }
             }
@@ -125,7 +138,7 @@ impl Crests {
             }
             let onward = |&voxel: &u32| {
                 let voxel = voxel as usize;
-                let inner = self.find(voxel).into_iter();
+                let inner = self.crests.position(voxel).into_iter();
                 let around = inner.flat_map(move |at| around(at, voxel));
                 let is_next = |&q: &usize| self.steps_of(q) == FAR;
                 around.filter(is_next).map(|q| q as u32)
@@ -139,14 +152,26 @@ impl Crests {
     }
 
     /// Finds the peaks: sets of crest voxels at one level that the rims do not reach. Returns the first voxel of each, and
-    /// leaves the number in this order in `summits`.
+    /// leaves the numbers in this order.
     fn number(&mut self, shape: Shape, alike: &Alike) -> Vec<usize> {
-        let on_peaks = self.all().filter(|&(at, _)| self.steps[at] == FAR);
-        let on_peaks: Vec<(usize, usize)> = on_peaks.collect();
+        let on_peaks = self.crests.all().filter(|&(at, _)| self.steps[at] == FAR);
+        let on_peaks: Vec<(u32, u32)> = on_peaks
+            .map(|(at, voxel)| (at as u32, voxel as u32))
+            .collect();
         let mut plateaus = Sets::new(on_peaks.len());
-        for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
-            for q in beside(shape, voxel, alike[at] & AFTER) {
-                if let Ok(other) = on_peaks.binary_search_by_key(&q, |&(_, voxel)| voxel) {
+        let after = [1, shape.dims[0], shape.layer()];
+        for (step, bit) in after.into_iter().zip([1 << 3, 1 << 4, 1 << 5]) {
+            // Both voxels of a pair ascend.
+            let mut other = 0;
+            for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
+                if alike[at as usize] & bit == 0 {
+                    continue;
+                }
+                let next = voxel as usize + step;
+                while on_peaks.get(other).is_some_and(|o| (o.1 as usize) < next) {
+                    other += 1;
+                }
+                if on_peaks.get(other).is_some_and(|o| o.1 as usize == next) {
                     plateaus.join(k as u32, other as u32);
                 }
             }
@@ -154,16 +179,18 @@ impl Crests {
         // The least member of a set is its first voxel.
         let first = plateaus.into_least();
         let mut peaks = Vec::new();
-        let mut number = vec![0_u32; on_peaks.len()];
+        let mut bits = vec![0_u64; self.steps.len().div_ceil(64)];
+        self.peak_of = vec![0; on_peaks.len()];
         for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
+            bits[at as usize / 64] |= 1 << (at % 64);
             if first[k] as usize == k {
-                number[k] = peaks.len() as u32;
-                peaks.push(voxel);
+                self.peak_of[k] = peaks.len() as u32;
+                peaks.push(voxel as usize);
             } else {
-                number[k] = number[first[k] as usize];
+                self.peak_of[k] = self.peak_of[first[k] as usize];
             }
-            self.summits.push((at as u32, number[k]));
         }
+        self.summits = Ranked::of(bits);
         peaks
     }
 
@@ -189,7 +216,7 @@ impl Crests {
         for (n, &k) in order.iter().enumerate() {
             rank[k] = n as u32;
         }
-        for (_, number) in &mut self.summits {
+        for number in &mut self.peak_of {
             *number = rank[*number as usize];
         }
         self.peaks = order.into_iter().map(|k| found[k]).collect();
@@ -205,9 +232,9 @@ impl Crests {
     ) -> Result<usize, u32> {
         let steps = self.steps_of(voxel);
         if steps == FAR {
-            let at = self.find(voxel).unwrap_or_default() as u32;
-            let of = self.summits.binary_search_by_key(&at, |&(at, _)| at);
-            return Err(of.map_or(0, |k| self.summits[k].1));
+            let at = self.crests.position(voxel);
+            let summit = at.and_then(|at| self.summits.position(at));
+            return Err(summit.map_or(0, |k| self.peak_of[k]));
         }
         let here = level(voxel);
         let is_nearer = |&q: &usize| level(q) == here && self.steps_of(q) < steps;
@@ -234,13 +261,13 @@ fn find(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> (
     let n_slabs = shape.dims[2].div_ceil(thick);
     let n_voxels = shape.layer() * shape.dims[2];
     let (mut bits, mut alike) = (vec![0_u64; n_voxels.div_ceil(64)], Alike::new());
-    let work = 1 + (thick * shape.layer()) as u64 / 32;
+    let is_allowed = |s: &usize| allowance.spend(1 + shape.n_of_slab(*s, thick) as u64 / 32);
     // Some slabs at a time, so that lists of voxels are short.
     let many = 2 * rayon::current_num_threads();
     for from in (0..n_slabs).step_by(many) {
         let slabs = (from..n_slabs.min(from + many)).into_par_iter();
         let found: Vec<Vec<(u32, u8)>> = slabs
-            .filter(allowance.each(work))
+            .filter(is_allowed)
             .map_init(Vec::new, |buffer, s| {
                 find_in_slab(shape, levels, [s, thick], buffer)
             })

@@ -11,6 +11,11 @@ impl Shape {
         self.dims[0] * self.dims[1]
     }
 
+    /// Returns the number of voxels of slab `s` of those of `thick` layers.
+    pub(super) fn n_of_slab(&self, s: usize, thick: usize) -> usize {
+        thick.min(self.dims[2] - s * thick) * self.layer()
+    }
+
     pub(super) fn coords(&self, voxel: usize) -> [usize; 3] {
         let [nx, ny, _] = self.dims;
         [voxel % nx, voxel / nx % ny, voxel / (nx * ny)]

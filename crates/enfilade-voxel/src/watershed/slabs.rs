@@ -10,9 +10,11 @@ use super::crests::Crests;
 use super::levels::{Levels, is_outdoors, level};
 use super::shape::Shape;
 
-/// Number of voxels of a slab, unless layers are large: with fewer, more is border; with more, it takes more memory.
-const SLAB: usize = 1 << 23;
-/// Least number of layers, of as many as there are.
+/// Least number of voxels of a slab, if there are as many: fewer are mostly border.
+const LEAST: usize = 1 << 20;
+/// Greatest number, unless layers are large: more take more memory.
+const MOST: usize = 1 << 23;
+/// Number of layers that a slab may have in any case.
 const THICK: usize = 12;
 
 /// Root of the outdoors; the root of a peak is one more than its number.
@@ -25,7 +27,9 @@ const ABOVE: u32 = 1 << 30;
 
 /// Returns the number of layers of a slab: whole bricks of labels.
 pub(super) fn thickness(shape: Shape) -> usize {
-    (SLAB / shape.layer()).max(THICK).next_multiple_of(EDGE)
+    let enough = (LEAST / shape.layer()).max((shape.dims[2] as f64).sqrt() as usize);
+    let most = (MOST / shape.layer()).max(THICK);
+    enough.min(most).next_multiple_of(EDGE).max(EDGE)
 }
 
 /// Contact of two roots.
@@ -131,7 +135,6 @@ pub(super) fn label(
     allowance: &Allowance,
 ) -> Option<(Labels, Vec<Contact>)> {
     let n_slabs = shape.dims[2].div_ceil(thick);
-    let work = 1 + (thick * shape.layer()) as u64 / 16;
     // Buffers for one slab a thread, so that their memory is mapped once.
     let pool: Mutex<Vec<Buffers>> = Mutex::default();
     let take = || {
@@ -145,7 +148,8 @@ pub(super) fn label(
             pool.push(buffers);
         }
     };
-    let slabs = || (0..n_slabs).into_par_iter().filter(allowance.each(work));
+    let is_allowed = |s: &usize| allowance.spend(1 + shape.n_of_slab(*s, thick) as u64 / 16);
+    let slabs = || (0..n_slabs).into_par_iter().filter(is_allowed);
     let borders: Vec<[RootRuns; 2]> = slabs()
         .map(|s| {
             let mut buffers = take();
