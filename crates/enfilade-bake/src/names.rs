@@ -110,7 +110,7 @@ pub fn rename_cells(graph: &mut CellPortalGraph, names: &[(CellId, String)]) -> 
 }
 
 /// Tests if a name is the number of another cell.
-fn is_number_of_other(name: &str, cell: CellId) -> bool {
+pub(crate) fn is_number_of_other(name: &str, cell: CellId) -> bool {
     let number = name.strip_prefix("cell-");
     number.is_some_and(|n| n.parse::<u32>().is_ok_and(|n| n != cell.0))
 }

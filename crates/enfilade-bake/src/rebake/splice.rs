@@ -15,6 +15,7 @@ use super::seam::{Place, box_of_portal, in_one_plane};
 use super::tree::{LocatorSplice, PlaneTree, cell_of};
 use crate::BakeContext;
 use crate::assemble::{SealPart, batches_of, dressed};
+use crate::names::is_number_of_other;
 use crate::realize::input_hash;
 
 /// Largest difference of the volumes of one cell in the block. [Units: wu³]
@@ -218,7 +219,7 @@ impl Joint<'_> {
             let b = self.part.aabbs[n as usize];
             cell.aabb = [b.min, b.max].map(|p| p.as_vec3().to_array());
         }
-        name_new(&mut cells);
+        name_by_number(&mut cells);
         cells
     }
 
@@ -402,17 +403,12 @@ fn measure(cell: &mut Cell, locator: &Locator, id: CellId) {
     }
 }
 
-/// Names the cells without a name by numbers that are free, first their own.
-fn name_new(cells: &mut [Cell]) {
-    let mut taken: BTreeSet<String> = cells.iter().map(|c| c.name.clone()).collect();
-    for i in (0..cells.len())
-        .filter(|&i| cells[i].name.is_empty())
-        .collect::<Vec<_>>()
-    {
-        let mut names = (i..).map(|k| format!("cell-{k}"));
-        let name = names.find(|name| !taken.contains(name)).unwrap_or_default();
-        taken.insert(name.clone());
-        cells[i].name = name;
+/// Names the cells that have no name, or the number of another cell, by their own numbers.
+fn name_by_number(cells: &mut [Cell]) {
+    for (id, cell) in (0..).map(CellId).zip(cells) {
+        if cell.name.is_empty() || is_number_of_other(&cell.name, id) {
+            cell.name = format!("cell-{}", id.0);
+        }
     }
 }
 
