@@ -5,7 +5,7 @@
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
-use crate::land::hills;
+use crate::land::{hills, quads};
 use crate::rng::Rng;
 
 /// Half the side of the land. [Units: wu]
@@ -64,31 +64,6 @@ impl OpenLand {
     }
 }
 
-/// Makes ground of quads of `square`, at the given heights.
-fn ground(square: f64, height: impl Fn(f64, f64) -> f64) -> Mesh {
-    let n = (2.0 * HALF / square) as u32;
-    let mut primitive = Primitive::default();
-    for k in 0..=n {
-        for i in 0..=n {
-            let [x, z] = [i, k].map(|v| f64::from(v) * square - HALF);
-            primitive
-                .positions
-                .push([x as f32, height(x, z) as f32, z as f32]);
-        }
-    }
-    for k in 0..n {
-        for i in 0..n {
-            let a = i + k * (n + 1);
-            let [b, c, d] = [a + 1, a + n + 1, a + n + 2];
-            primitive.indices.extend([a, c, d, a, d, b]);
-        }
-    }
-    Mesh {
-        name: "land".to_owned(),
-        primitives: vec![primitive],
-    }
-}
-
 /// Makes six winding valleys side by side, 160 m wide, that fall to the south; ridges between them are 11 to 18 m high.
 #[must_use]
 pub fn valleys() -> OpenLand {
@@ -102,7 +77,7 @@ pub fn valleys() -> OpenLand {
         let rough = 0.3 * (1.7 * x).sin() * (1.3 * z).sin();
         DEEP * ridge * pass - 0.03 * z + rough
     };
-    let mut land = OpenLand::new(ground(8.0, height));
+    let mut land = OpenLand::new(quads(8.0, height));
     let point = |k: i32, z: f64| {
         let x = axis(k, z);
         DVec3::new(x, height(x, z) + EYES, z)
@@ -173,7 +148,7 @@ const STREET: f64 = 20.0;
 /// Makes twelve by twelve blocks, 9 to 21 m high, some around courtyards, with streets, lanes and two squares.
 #[must_use]
 pub fn city(seed: u64) -> OpenLand {
-    let mut land = OpenLand::new(ground(20.0, |_, _| 0.0));
+    let mut land = OpenLand::new(quads(20.0, |_, _| 0.0));
     let mut rng = Rng::new(seed);
     let first = -0.5 * PITCH * BLOCKS as f64;
     let line = |k: usize| first + k as f64 * PITCH;

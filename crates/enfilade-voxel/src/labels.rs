@@ -1,9 +1,10 @@
-//! Labels of voxels in bricks of 4³: one number where a brick has one label, else a list of its labels and the position in
-//! it of each voxel, in 1, 2 or 4 bits.
+//! Labels of voxels in bricks of 4³.
 //!
-//! So memory goes by the surfaces between labels rather than by volume: 1/16 byte a voxel plus a quarter of a byte for
-//! those near a surface. A look-up reads one or three nearby words, in whatever direction the next one lies; scans skip
-//! 64 voxels at a time.
+//! A brick of one label is one number. Another has a list of its labels, and for each voxel an index into it of 1, 2 or 4
+//! bits; with more than 16 labels, it has one word for each voxel.
+//!
+//! Memory grows with the surfaces between labels rather than with volume: 1/16 byte a voxel, and a quarter of a byte for
+//! those near a surface. A look-up reads up to three words; scans skip uniform bricks, 64 voxels at a time.
 
 use std::ops::Range;
 

@@ -134,50 +134,30 @@ pub(super) fn label(
     thick: usize,
     allowance: &Allowance,
 ) -> Option<(Labels, Vec<Contact>)> {
+    let field = Field {
+        shape,
+        levels,
+        crests,
+        thick,
+        pool: Mutex::default(),
+    };
     let n_slabs = shape.dims[2].div_ceil(thick);
-    // Buffers for one slab a thread, so that their memory is mapped once.
-    let pool: Mutex<Vec<Buffers>> = Mutex::default();
-    let take = || {
-        pool.lock()
-            .ok()
-            .and_then(|mut pool| pool.pop())
-            .unwrap_or_default()
-    };
-    let give = |buffers| {
-        if let Ok(mut pool) = pool.lock() {
-            pool.push(buffers);
-        }
-    };
     let is_allowed = |s: &usize| allowance.spend(1 + shape.n_of_slab(*s, thick) as u64 / 16);
     let slabs = || (0..n_slabs).into_par_iter().filter(is_allowed);
     let borders: Vec<[RootRuns; 2]> = slabs()
-        .map(|s| {
-            let mut buffers = take();
-            let mut words = std::mem::take(&mut buffers.words);
-            let mut slab = Slab::new(shape, crests, levels, [s, thick], &mut words, buffers);
-            let borders = slab.borders();
-            let buffers = slab.buffers;
-            give(Buffers { words, ..buffers });
-            borders
-        })
+        .map(|s| field.with_slab(s, |slab, _| slab.borders()))
         .collect();
     if borders.len() < n_slabs {
         return None;
     }
-    let labeled: Vec<(Vec<Layer>, Vec<Contact>)> = slabs()
-        .map(|s| {
-            let mut buffers = take();
-            let mut words = std::mem::take(&mut buffers.words);
-            let mut slab = Slab::new(shape, crests, levels, [s, thick], &mut words, buffers);
-            slab.enter(s, &borders);
-            slab.ascend(slab.own());
-            let contacts = slab.contacts();
-            let layers = slab.write();
-            let buffers = slab.buffers;
-            give(Buffers { words, ..buffers });
-            (layers, contacts)
-        })
-        .collect();
+    let all_of = |slab: &mut Slab<'_>, s: usize| {
+        slab.enter(s, &borders);
+        slab.ascend(slab.own());
+        let contacts = slab.contacts();
+        (slab.write(), contacts)
+    };
+    let labeled: Vec<(Vec<Layer>, Vec<Contact>)> =
+        slabs().map(|s| field.with_slab(s, all_of)).collect();
     if labeled.len() < n_slabs {
         return None;
     }
@@ -185,6 +165,33 @@ pub(super) fn label(
     let layers = layers.into_iter().flatten().collect();
     let labels = Labels::from_layers(shape.dims, layers);
     Some((labels, merged(contacts.concat())))
+}
+
+/// A field that is worked on slab by slab.
+struct Field<'a> {
+    shape: Shape,
+    levels: &'a Levels,
+    crests: &'a Crests,
+    /// Layers of a slab.
+    thick: usize,
+    /// Buffers for one slab a thread, so that their memory is mapped once.
+    pool: Mutex<Vec<Buffers>>,
+}
+
+impl Field<'_> {
+    /// Reads slab `s`, and returns the result of `work` on it.
+    fn with_slab<T>(&self, s: usize, work: impl FnOnce(&mut Slab<'_>, usize) -> T) -> T {
+        let spare = self.pool.lock().ok().and_then(|mut pool| pool.pop());
+        let mut buffers = spare.unwrap_or_default();
+        let mut words = std::mem::take(&mut buffers.words);
+        let mut slab = Slab::new(self, s, &mut words, buffers);
+        let result = work(&mut slab, s);
+        let buffers = slab.buffers;
+        if let Ok(mut pool) = self.pool.lock() {
+            pool.push(Buffers { words, ..buffers });
+        }
+        result
+    }
 }
 
 /// Writes the way up from each voxel of a row, given the rows before it along z and y, and after it along y and z.
@@ -256,15 +263,14 @@ struct Buffers {
 const CREST: i16 = 6;
 
 impl<'a> Slab<'a> {
-    /// Reads slab `s` of those of `thick` layers.
-    fn new(
-        shape: Shape,
-        crests: &'a Crests,
-        levels: &'a Levels,
-        [s, thick]: [usize; 2],
-        words: &'a mut Vec<u16>,
-        mut buffers: Buffers,
-    ) -> Self {
+    fn new(field: &Field<'a>, s: usize, words: &'a mut Vec<u16>, mut buffers: Buffers) -> Self {
+        let Field {
+            shape,
+            levels,
+            crests,
+            thick,
+            ..
+        } = *field;
         let (layer, nz) = (shape.layer(), shape.dims[2]);
         let (from, to) = (s * thick, nz.min((s + 1) * thick));
         let read = [from.saturating_sub(1), nz.min(to + 1)];
@@ -327,7 +333,7 @@ impl<'a> Slab<'a> {
         ways.resize(self.words.len(), 0);
         for (ways, row) in ways.chunks_exact_mut(nx).zip(ny..) {
             let y = row % ny;
-            let is_in = [true, y > 0, y + 1 < ny, true]; // beside the slab there may be nothing
+            let is_in = [true, y > 0, y + 1 < ny, true];
             let rows = [row - ny, row - 1, row + 1, row + ny];
             let row_at = |k: usize| is_in[k].then(|| self.row(rows[k])).flatten();
             let rows: [&[u16]; 4] = std::array::from_fn(|k| row_at(k).unwrap_or(&nothing));
