@@ -78,12 +78,18 @@ pub(crate) fn find_matter(
     }
     let (open, enclosed): (Vec<_>, Vec<_>) =
         groups(regions).into_iter().partition(|g| g[0] == OUTDOORS);
-    let open: Vec<u32> = open.into_iter().flatten().collect();
+    let mut open: Vec<u32> = open.into_iter().flatten().collect();
+    open.sort_unstable();
     let wanted: Vec<u32> = enclosed.iter().flatten().chain(&open).copied().collect();
     let points = sample_points(grid, labels, regions, &wanted);
+    // Of air that is open to the outdoors, the first hits are enough.
+    let rays = |region: u32| match open.binary_search(&region) {
+        Ok(_) => Rays::First,
+        Err(_) => Rays::All,
+    };
     let seen: BTreeMap<u32, Seen> = points
         .par_iter()
-        .map(|(&region, at)| (region, Seen::from(bvh, at, allowance)))
+        .map(|(&region, at)| (region, Seen::from(bvh, at, rays(region), allowance)))
         .collect::<Vec<_>>()
         .into_iter()
         .collect();
@@ -222,6 +228,15 @@ impl Facing {
 /// Cost of a ray, in units of [`Allowance`]; each hit costs one more.
 const WORK_A_RAY: u64 = 10;
 
+/// Hits of a ray that are looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Rays {
+    /// All that it passes, as if surfaces were glass.
+    All,
+    /// Those at the first place where it hits anything: much cheaper in a large building.
+    First,
+}
+
 /// The hits of rays from inside a region.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
@@ -241,11 +256,17 @@ struct Seen {
 }
 
 impl Seen {
-    fn from(bvh: &Bvh, points: &[DVec3], allowance: &Allowance) -> Self {
+    fn from(bvh: &Bvh, points: &[DVec3], rays: Rays, allowance: &Allowance) -> Self {
         let mut seen = Self::default();
         let mut hits: Vec<(f64, bool)> = Vec::new();
-        for ray in rays_from(points) {
+        for mut ray in rays_from(points) {
             hits.clear();
+            if rays == Rays::First {
+                let Some(hit) = bvh.closest_hit(&ray, |_| false) else {
+                    continue;
+                };
+                ray.t_max = hit.t;
+            }
             bvh.for_each_hit(&ray, |hit| hits.push((hit.t, hit.front)));
             if !allowance.spend(WORK_A_RAY + hits.len() as u64) {
                 break;

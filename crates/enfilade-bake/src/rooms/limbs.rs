@@ -313,17 +313,23 @@ impl Plan {
             let thickness = |c: usize| f64::from(to_wall[c]) - 0.5;
             let to_core = self.distance_to(|c| thickness(c) >= reach);
             // Rounded outward by half a cell, or a lining of single cells would be left along walls.
-            let is_core = |c: usize| f64::from(to_core[c]) <= reach + 0.5 && rest[c];
-            let core = self.components(is_core);
-            let narrow = self.components(|c| rest[c] && !is_core(c));
+            let core =
+                |(&to_core, &is_left): (&f32, &bool)| f64::from(to_core) <= reach + 0.5 && is_left;
+            let is_core: Vec<bool> = to_core.iter().zip(&rest).map(core).collect();
+            let narrow = self.components(|c| rest[c] && !is_core[c]).1;
+            // Most widths have nothing narrow but the ends of rooms.
+            let core = std::cell::OnceCell::new();
+            let core = || &core.get_or_init(|| self.components(|c| is_core[c])).0[..];
             let mut found = Vec::new();
-            for cells in narrow.1 {
+            for cells in narrow {
                 let widest = cells.iter().map(|&c| thickness(c)).fold(0.0, f64::max);
+                if widest < least || widest > half_width {
+                    continue;
+                }
                 let roomy: Vec<usize> = cells.iter().copied().filter(|&c| !is_crevice(c)).collect();
-                if widest >= least
-                    && widest <= half_width
-                    && allowance.spend(self.is_free.len() as u64 / 16 + 5 * cells.len() as u64)
-                    && self.length(&roomy, &core.0, is_net) >= LONG * 2.0 * widest
+                let work = self.is_free.len() as u64 / 16 + 5 * cells.len() as u64;
+                if allowance.spend(work)
+                    && self.length(&roomy, core(), is_net) >= LONG * 2.0 * widest
                 {
                     found.push(Limb {
                         cells,
