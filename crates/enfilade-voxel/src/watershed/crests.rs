@@ -68,19 +68,33 @@ impl Ranked {
             .then(|| self.before[index / 64] as usize + below.count_ones() as usize)
     }
 
-    /// Returns all members, each with its position, in order.
+    /// Returns the number of members.
+    fn len(&self) -> usize {
+        let last = self.bits.last().zip(self.before.last());
+        last.map_or(0, |(word, before)| (word.count_ones() + before) as usize)
+    }
+
+    /// Returns all members, each with its position, in order. Threads share the work.
     fn all(&self) -> impl ParallelIterator<Item = (usize, usize)> + '_ {
         let words = self.bits.par_iter().zip(&self.before).enumerate();
-        words.flat_map_iter(|(w, (&word, &before))| {
-            let mut rest = word;
-            let next = move || {
-                let bit = rest.trailing_zeros() as usize;
-                rest &= rest.wrapping_sub(1);
-                (bit < 64).then_some(w * 64 + bit)
-            };
-            (before as usize..).zip(std::iter::from_fn(next))
-        })
+        words.flat_map_iter(|(w, (&word, &before))| members_of(w, word, before))
     }
+
+    /// Returns all members, each with its position, one after the other.
+    fn iter(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let words = self.bits.iter().zip(&self.before).enumerate();
+        words.flat_map(|(w, (&word, &before))| members_of(w, word, before))
+    }
+}
+
+/// Returns the members in word `w` of a set, each with its position, given the number of members before it.
+fn members_of(w: usize, mut word: u64, before: u32) -> impl Iterator<Item = (usize, usize)> {
+    let next = move || {
+        let bit = word.trailing_zeros() as usize;
+        word &= word.wrapping_sub(1);
+        (bit < 64).then_some(w * 64 + bit)
+    };
+    (before as usize..).zip(std::iter::from_fn(next))
 }
 
 impl Crests {
@@ -154,43 +168,42 @@ impl Crests {
     /// Finds the peaks: sets of crest voxels at one level that the rims do not reach. Returns the first voxel of each, and
     /// leaves the numbers in this order.
     fn number(&mut self, shape: Shape, alike: &Alike) -> Vec<usize> {
-        let on_peaks = self.crests.all().filter(|&(at, _)| self.steps[at] == FAR);
-        let on_peaks: Vec<(u32, u32)> = on_peaks
-            .map(|(at, voxel)| (at as u32, voxel as u32))
-            .collect();
-        let mut plateaus = Sets::new(on_peaks.len());
-        let after = [1, shape.dims[0], shape.layer()];
-        for (step, bit) in after.into_iter().zip([1 << 3, 1 << 4, 1 << 5]) {
+        let of_peaks = |steps: &[u8]| {
+            let bits = (0..).zip(steps.iter().map(|&s| u64::from(s == FAR)));
+            bits.fold(0, |word, (k, bit)| word | bit << k)
+        };
+        self.summits = Ranked::of(self.steps.par_chunks(64).map(of_peaks).collect());
+        // Never listed: on large plateaus, a list would be the largest thing in memory.
+        let on_peaks = || self.crests.iter().filter(|&(at, _)| self.steps[at] == FAR);
+        let mut plateaus = Sets::new(self.summits.len());
+        let after = [
+            (1, 1 << 3),
+            (shape.dims[0], 1 << 4),
+            (shape.layer(), 1 << 5),
+        ];
+        for (k, (at, voxel)) in (0..).zip(on_peaks()) {
             // Both voxels of a pair ascend.
-            let mut other = 0;
-            for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
-                if alike[at as usize] & bit == 0 {
-                    continue;
-                }
-                let next = voxel as usize + step;
-                while on_peaks.get(other).is_some_and(|o| (o.1 as usize) < next) {
-                    other += 1;
-                }
-                if on_peaks.get(other).is_some_and(|o| o.1 as usize == next) {
-                    plateaus.join(k as u32, other as u32);
+            let alike = after.into_iter().filter(|a| alike[at] & a.1 != 0);
+            for (step, _) in alike {
+                let other = self.crests.position(voxel + step);
+                if let Some(other) = other.and_then(|at| self.summits.position(at)) {
+                    plateaus.join(k, other as u32);
                 }
             }
         }
-        // The least member of a set is its first voxel.
-        let first = plateaus.into_least();
+        // The least member of a set is its first voxel. The number of each voxel's peak takes its place.
+        let mut number_of = plateaus.into_least();
         let mut peaks = Vec::new();
-        let mut bits = vec![0_u64; self.steps.len().div_ceil(64)];
-        self.peak_of = vec![0; on_peaks.len()];
-        for (k, &(at, voxel)) in on_peaks.iter().enumerate() {
-            bits[at as usize / 64] |= 1 << (at % 64);
-            if first[k] as usize == k {
-                self.peak_of[k] = peaks.len() as u32;
-                peaks.push(voxel as usize);
+        for (k, (_, voxel)) in on_peaks().enumerate() {
+            let first = number_of[k] as usize;
+            if first == k {
+                number_of[k] = peaks.len() as u32;
+                peaks.push(voxel);
             } else {
-                self.peak_of[k] = self.peak_of[first[k] as usize];
+                number_of[k] = number_of[first];
             }
         }
-        self.summits = Ranked::of(bits);
+        self.peak_of = number_of;
         peaks
     }
 
