@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use enfilade_geom::{Allowance, End, MemoryProbe};
 
-use crate::{BakeError, Budget, Method, Resolution, Stage};
+use crate::{BakeError, Budget, Method, Pieces, Resolution, Stage};
 
 /// Approximate memory of the complex for each structural triangle. [Units: bytes]
 const BYTES_A_TRIANGLE: f64 = 5e3;
@@ -48,6 +48,7 @@ pub struct BakeContext<'a> {
     allowance: Allowance,
     budget: Budget,
     n_triangles: usize,
+    pieces: Option<&'a dyn Pieces>,
 }
 
 /// Ignores progress, and cannot be canceled.
@@ -70,7 +71,19 @@ impl<'a> BakeContext<'a> {
             stages: Mutex::default(),
             budget: Budget::default(),
             n_triangles: 0,
+            pieces: None,
         }
+    }
+
+    /// Adds a place for finished pieces: a bake then goes on from those that are there. See [`Pieces`].
+    #[must_use]
+    pub fn keeping(mut self, pieces: &'a dyn Pieces) -> Self {
+        self.pieces = Some(pieces);
+        self
+    }
+
+    pub(crate) fn pieces(&self) -> Option<&'a dyn Pieces> {
+        self.pieces
     }
 
     /// Adds a probe of the process's memory: a bake then ends when that exceeds [`Budget::memory`].
@@ -88,6 +101,7 @@ impl<'a> BakeContext<'a> {
             probe: self.probe,
             budget: *budget,
             n_triangles,
+            pieces: self.pieces,
             ..Self::new(self.progress, self.cancel.clone())
         }
     }

@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | `structure` | the input: walls, stairs, door leaves and panes, slabs; which openings are a pinch |
 //! | [`watershed`], [`bsp`], [`delaunay`] | a division of the air: three methods, independent of each other |
+//! | `pieces`, `shards` | pieces that are kept: for bakes that go on after they were ended, and for several machines |
 //! | `rooms` | where rooms end: which parts are one room, and the openings between rooms, by one rule for all methods |
 //! | [`complex`] | which space is open: convex leaves and the facets between them, exactly |
 //! | `land` | open land as cells, if that is wanted |
@@ -33,10 +34,12 @@ mod marked;
 mod method;
 pub mod names;
 mod output;
+mod pieces;
 mod proposal;
 mod realize;
 pub mod rebake;
 mod rooms;
+mod shards;
 pub mod simplify;
 mod specials;
 mod stage;
@@ -54,4 +57,6 @@ pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;
 pub use method::Method;
 pub use output::{BakeOutput, Resolution};
+pub use pieces::Pieces;
+pub use shards::{bake_pieces, is_piece, piece_keys};
 pub use stage::Stage;

@@ -21,12 +21,14 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::shown;
+use enfilade::import::{ImportReport, RepairOptions};
 use enfilade::world::{Space, WalkMapKey};
 use serde::Serialize;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
 use crate::output::{Outputs, Written, write_whole};
+use crate::pieces::PieceFolder;
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
@@ -50,17 +52,56 @@ pub(crate) struct Bake {
     walk: bool,
     /// Print JSON for machines.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
+    /// Folder for finished pieces of the work: a bake that was killed goes on from them. Removed when the world is written.
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
     /// Write the world although it has no room, as `--leak-path` does, too; otherwise, nothing is written then, and the
     /// exit code is 1.
     #[arg(long)]
     allow_empty: bool,
     #[command(flatten)]
-    options: settings::BakeOptions,
+    pub(crate) options: settings::BakeOptions,
 }
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
+    run_with(args, None)
+}
+
+/// A scene that is ready to be baked.
+pub(crate) struct Readied {
+    pub(crate) scene: Scene,
+    pub(crate) config: BakeConfig,
+    /// Other files that the scene refers to.
+    pub(crate) references: Vec<PathBuf>,
+    report: ImportReport,
+    repair: Option<RepairOptions>,
+}
+
+/// Reads the scene and the settings.
+pub(crate) fn readied(args: &Bake) -> anyhow::Result<Readied> {
     let began = Instant::now();
+    let settings = settings::resolve(&args.options)?;
+    let bar = StageBar::new();
+    bar.start("reading", 0);
+    let imported = import_scene(&args.inputs, &args.options.detail, &settings.import)?;
+    bar.finish();
+    let (mut scene, report) = (imported.scene, imported.report);
+    scene.rooms.extend_from_slice(&settings.bake.names);
+    let mut config = settings.bake.config_for(&scene);
+    config.budget.began = Some(began);
+    config.costs.cost.check(&scene.materials)?;
+    Ok(Readied {
+        references: report.references.clone(),
+        repair: settings.import.repair,
+        scene,
+        config,
+        report,
+    })
+}
+
+/// Takes pieces of the bake from a folder that stays; or from that of `--checkpoint`, which goes when the world is written.
+pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Result<()> {
     let options = &args.options;
     let mut outputs = Outputs::reading(options.inputs(&args.inputs))?;
     outputs.write("-o", Format::World, &args.output)?;
@@ -73,20 +114,16 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
     if let Some(path) = &options.leak {
         outputs.write("--leak", Format::Leak, path)?;
     }
-    let settings = settings::resolve(options)?;
-    let bar = StageBar::new();
-    bar.start("reading", 0);
-    let mut imported = import_scene(&args.inputs, &options.detail, &settings.import)?;
-    imported.scene.rooms.extend_from_slice(&settings.bake.names);
-    bar.finish();
-    outputs.read(&imported.report.references)?;
-    let said = found::doubts(&imported.report)?;
-    found::report_import(&imported.scene, &imported.report, options.verbose)?;
-    let scene = &imported.scene;
-    let mut config = settings.bake.config_for(scene);
-    config.budget.began = Some(began);
-    let config = &config;
-    config.costs.cost.check(&scene.materials)?;
+    let Readied {
+        scene,
+        config,
+        references,
+        report,
+        repair,
+    } = &readied(args)?;
+    outputs.read(references)?;
+    let said = found::doubts(report)?;
+    found::report_import(scene, report, options.verbose)?;
     refuse_leak(scene, config, options)?;
     let mut leak_path = match options.leak_path {
         Some(from) => Some(leak_path::look_as_asked(
@@ -97,14 +134,16 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
         )?),
         None => None,
     };
-    let mut baked = bake_scene(scene, config, options.threads)?;
+    let own = args.checkpoint.clone().map(PieceFolder::at);
+    let pieces = kept.or(own.as_ref());
+    let mut baked = bake_scene(scene, config, options.threads, pieces)?;
     if let Some(path) = &leak_path {
         baked.world.leak_path = path.points();
     } else if baked.n_indoors() == 0 {
         leak_path = Some(leak_path::look_unasked(scene, config, options.threads)?);
     }
     let told = &mut baked.world.graph.provenance.settings;
-    told.extend(found::settings_of(&imported.report, settings.import.repair));
+    told.extend(found::settings_of(report, *repair));
     if is_empty(&baked.world) {
         let why = why_empty(&baked.world);
         // Whoever asks for the way out wants to see it.
@@ -131,6 +170,9 @@ pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
             hash: WalkMapKey::hash(&bytes),
         };
         walk::keep(file, &space, &walks, &walks.map(&space))?;
+    }
+    if let Some(own) = own.filter(|_| kept.is_none()) {
+        finish_pieces(&own)?;
     }
     report_bake(&baked, config, options.verbose)?;
     if let Some(path) = &leak_path {
@@ -192,15 +234,32 @@ pub(crate) fn bake_scene(
     scene: &Scene,
     config: &BakeConfig,
     threads: Option<u16>,
+    pieces: Option<&PieceFolder>,
 ) -> anyhow::Result<BakeOutput> {
     let bar = BakeBar::new(scene, config);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.map_or(0, usize::from))
         .build()?;
-    let context = BakeContext::new(&bar, None).measured_by(held_memory);
+    let mut context = BakeContext::new(&bar, None).measured_by(held_memory);
+    if let Some(pieces) = pieces {
+        context = context.keeping(pieces);
+    }
     let baked = pool.install(|| bake(scene, config, &context))?;
     drop(bar);
     Ok(baked)
+}
+
+/// Tells how far pieces helped, and removes them.
+fn finish_pieces(pieces: &PieceFolder) -> anyhow::Result<()> {
+    if pieces.n_found() > 0 {
+        let n = pieces.n_found();
+        let s = if n == 1 { "" } else { "s" };
+        writeln!(Told, "went on from {n} piece{s} of an earlier bake")?;
+    }
+    if let Some(error) = pieces.take_error() {
+        writeln!(Warned, "--checkpoint: {error:#}; the world is written")?;
+    }
+    pieces.remove()
 }
 
 /// Leaks with a line: those wide enough to be intended.

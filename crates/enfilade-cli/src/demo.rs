@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
 fn baked(generated: &Generated) -> anyhow::Result<(Vec<u8>, World, Vec<u8>)> {
     let model = export_glb(&generated.scene);
     let scene = decode_gltf(&model, &ImportOptions::default())?.scene;
-    let baked = bake_scene(&scene, &BakeConfig::default(), None)?;
+    let baked = bake_scene(&scene, &BakeConfig::default(), None, None)?;
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     Ok((model, baked.world, bytes))
 }

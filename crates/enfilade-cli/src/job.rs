@@ -1,32 +1,38 @@
-//! `enfilade job`: visibility computed in shards, by any number of processes that share a folder.
+//! `enfilade job`: a bake, or visibility, computed in shards by any number of processes that share a folder.
 //!
 //! A job is a folder with a copy of the input, a manifest, and the shards that are done, each a file named by the hash of all
 //! that it depends on. A shard's bytes are always the same, so it may be computed twice, copied, and merged in any
 //! order.
 
+mod baked;
+mod seen;
+mod shards;
+
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use anyhow::{Context, bail};
-use enfilade::vis::{VisBlocks, VisConfig, VisContext, VisPlan, plain_sight};
+use enfilade::bake::Pieces;
+use enfilade::vis::VisConfig;
 use enfilade::whole;
-use enfilade_cli::input::{name_of, read};
+use enfilade_cli::input::{is_stream, name_of, read};
 use enfilade_cli::values::bytes;
 use serde::{Deserialize, Serialize};
 
-use super::blocks::BlockFolder;
-use super::{Input, Pvs, PvsMode, distance, input_of, pool_of, run_with};
 use crate::limits::watch;
-use crate::progress::StageBar;
+use crate::pieces::PieceFolder;
+use crate::pvs::{PvsMode, distance};
 use crate::screen::{print_json, printed};
+use baked::BakedJob;
+use seen::SeenJob;
+use shards::{JobFinish, JobRun, Shards};
 
 const MANIFEST: &str = "manifest.json";
+const SHARDS: &str = "shards";
 
-/// Computes visibility in shards, by several processes or machines that share a folder: `plan`, then `run` anywhere, and
-/// `finish`.
+/// Computes a bake, or visibility, in shards, by several processes or machines that share a folder: `plan`, then `run` anywhere,
+/// and `finish`.
 #[derive(clap::Args)]
 pub(crate) struct Job {
     #[command(subcommand)]
@@ -41,44 +47,34 @@ enum JobStep {
     Finish(JobFinish),
 }
 
-/// Divides the work for a world or a Quake portal file into shards, and prints their keys, one a line.
+/// Divides the work into shards, and prints their keys, one a line. A scene is baked, a shard for each building of it; of a
+/// world or a Quake portal file, it is found what is visible from where.
 #[derive(clap::Args)]
 struct JobPlan {
-    /// World written by `enfilade bake`, or Quake portal file; `-` for standard input.
+    /// Scene in one file, world written by `enfilade bake`, or Quake portal file; `-` for a portal file on standard input.
     input: PathBuf,
     /// Folder of the job; left as it is if the same job is there.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Thoroughness of the search.
-    #[arg(long, value_enum, default_value_t = PvsMode::Exact)]
-    mode: PvsMode,
-    /// Treat everything farther than this as hidden.
+    /// Visibility: thoroughness of the search [default: exact].
+    #[arg(long, value_enum)]
+    mode: Option<PvsMode>,
+    /// Visibility: treat everything farther than this as hidden.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     far: Option<f64>,
-    /// Most memory of a process that computes a shard: a number and K, M, G or T. Less makes more shards.
-    #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = bytes)]
-    max_memory: u64,
-    /// Most special portals on one line of sight.
-    #[arg(long, value_name = "N", default_value_t = VisConfig::default().max_specials)]
-    max_specials: u32,
-    /// Print JSON for machines.
-    #[arg(long)]
-    json: bool,
-}
-
-/// Computes shards that are not there yet.
-#[derive(clap::Args)]
-struct JobRun {
-    /// Folder of the job.
-    dir: PathBuf,
-    /// Keys of shards; all that are missing if not given.
-    keys: Vec<String>,
-    /// Number of threads; one per core if not given. The result is the same.
+    /// Most memory of a process that computes a shard, a number and K, M, G or T [default: 8G]. Less makes more shards of
+    /// visibility.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    max_memory: Option<u64>,
+    /// Visibility: most special portals on one line of sight [default: 4].
     #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    max_specials: Option<u32>,
     /// Print JSON for machines.
     #[arg(long)]
     json: bool,
+    /// Bake: options of `enfilade bake` after `--`. Files that they name must be there on all machines.
+    #[arg(last = true, value_name = "OPTIONS", allow_hyphen_values = true)]
+    options: Vec<String>,
 }
 
 /// Copies shards from other folders of the same job. Any order and grouping gives the same folder.
@@ -94,34 +90,92 @@ struct JobMerge {
     json: bool,
 }
 
-/// Puts all shards together: the same bytes as `enfilade pvs` on one machine.
-#[derive(clap::Args)]
-struct JobFinish {
-    /// Folder of the job.
-    dir: PathBuf,
-    /// File for the answer, as text; `-` for standard output.
-    #[arg(short, long, value_name = "OUT")]
-    output: PathBuf,
-    /// Write the world with the answer in it.
-    #[arg(long, value_name = "OUT.glb")]
-    into: Option<PathBuf>,
-    /// Print JSON for machines.
-    #[arg(long)]
-    json: bool,
-}
-
 /// Settings of a job, and its shards.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Manifest {
-    kind: String,
     version: String,
     /// Name of the input's copy in the folder.
     input: String,
-    mode: PvsMode,
-    far: Option<f64>,
-    max_memory: u64,
-    max_specials: u32,
+    max_memory: Option<u64>,
+    #[serde(flatten)]
+    work: Work,
     shards: Vec<String>,
+}
+
+/// The kind of work, and its settings.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum Work {
+    Pvs {
+        mode: PvsMode,
+        far: Option<f64>,
+        max_specials: u32,
+    },
+    /// Options of `enfilade bake`.
+    Bake { options: Vec<String> },
+}
+
+/// Memory of a process that finds visibility, unless it is set. [Units: bytes]
+const MEMORY: u64 = 8_000_000_000;
+
+impl Manifest {
+    /// Opens the work on the input at `path`.
+    fn work(&self, path: PathBuf, bytes: &[u8]) -> anyhow::Result<Box<dyn Shards>> {
+        Ok(match &self.work {
+            Work::Pvs {
+                mode,
+                far,
+                max_specials,
+            } => {
+                let config = VisConfig {
+                    mode: (*mode).into(),
+                    far: *far,
+                    max_memory: self.max_memory.unwrap_or(MEMORY),
+                    max_specials: *max_specials,
+                    ..VisConfig::default()
+                };
+                Box::new(SeenJob::of(path, bytes, *mode, config)?)
+            }
+            Work::Bake { options } => Box::new(BakedJob::of(&path, options, self.max_memory)?),
+        })
+    }
+}
+
+/// A job that is there.
+struct Opened {
+    manifest: Manifest,
+    work: Box<dyn Shards>,
+}
+
+impl Opened {
+    /// Opens a job. Refused if the shards are not those that this version would plan.
+    fn at(dir: &Path) -> anyhow::Result<Self> {
+        let manifest = manifest_of(dir)?;
+        let path = dir.join(&manifest.input);
+        let bytes = read(&path)?;
+        let work = manifest.work(path, &bytes)?;
+        if work.keys()? != manifest.shards {
+            bail!(
+                "{}: planned by another version, or its input has changed; plan it again in a new folder",
+                dir.display()
+            );
+        }
+        Ok(Self { manifest, work })
+    }
+
+    /// Returns the bytes of a shard in a folder, if it is there and whole.
+    fn whole(&self, folder: &PieceFolder, shard: usize) -> Option<Vec<u8>> {
+        let bytes = folder.get(&self.manifest.shards[shard])?;
+        self.work.is_whole(shard, &bytes).then_some(bytes)
+    }
+
+    /// Returns the shards that are not there, or damaged.
+    fn missing(&self, folder: &PieceFolder) -> Vec<usize> {
+        let shards = 0..self.manifest.shards.len();
+        shards
+            .filter(|&shard| self.whole(folder, shard).is_none())
+            .collect()
+    }
 }
 
 /// Counts of a step.
@@ -143,20 +197,16 @@ pub(crate) fn run(args: &Job) -> anyhow::Result<()> {
 
 fn plan(args: &JobPlan) -> anyhow::Result<()> {
     let bytes = read(&args.input)?;
-    let input = input_of(&args.input, &bytes)?;
-    let extension = if input.world.is_some() { "glb" } else { "prt" };
     let mut manifest = Manifest {
-        kind: "pvs".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        input: format!("input.{extension}"),
-        mode: args.mode,
-        far: args.far,
+        input: String::new(),
         max_memory: args.max_memory,
-        max_specials: args.max_specials,
+        work: work_of(args, &bytes)?,
         shards: Vec::new(),
     };
-    manifest.shards = with_plan(&manifest, &input, |plan| Ok(keys_of(plan)))
-        .with_context(|| name_of(&args.input))?;
+    manifest.input = copy_name(&manifest.work, args, &bytes)?;
+    let work = manifest.work(args.input.clone(), &bytes)?;
+    manifest.shards = work.keys()?;
     if args.output.exists() {
         if manifest_of(&args.output).ok() != Some(manifest_copy(&manifest)?) {
             bail!(
@@ -180,6 +230,60 @@ fn plan(args: &JobPlan) -> anyhow::Result<()> {
     out.flush().context("cannot write to standard output")
 }
 
+/// Returns the work that an input calls for: visibility in a world or a portal file, else a bake.
+fn work_of(args: &JobPlan, bytes: &[u8]) -> anyhow::Result<Work> {
+    if seen::is_graph(&args.input, bytes) {
+        if !args.options.is_empty() {
+            bail!(
+                "{} is baked already: options after `--` are for scenes that a job bakes",
+                name_of(&args.input)
+            );
+        }
+        return Ok(Work::Pvs {
+            mode: args.mode.unwrap_or(PvsMode::Exact),
+            far: args.far,
+            max_specials: args
+                .max_specials
+                .unwrap_or(VisConfig::default().max_specials),
+        });
+    }
+    let of_visibility = [
+        ("--mode", args.mode.is_some()),
+        ("--far", args.far.is_some()),
+        ("--max-specials", args.max_specials.is_some()),
+    ];
+    if let Some((option, _)) = of_visibility.into_iter().find(|o| o.1) {
+        bail!(
+            "{} is a scene, to be baked: {option} is for visibility in a world that `enfilade bake` wrote",
+            name_of(&args.input)
+        );
+    }
+    Ok(Work::Bake {
+        options: args.options.clone(),
+    })
+}
+
+/// Returns the name of the input's copy. A scene keeps its name: it tells the format, and some formats name objects after it.
+fn copy_name(work: &Work, args: &JobPlan, bytes: &[u8]) -> anyhow::Result<String> {
+    if matches!(work, Work::Pvs { .. }) {
+        let is_world = bytes.starts_with(b"glTF");
+        return Ok(if is_world { "input.glb" } else { "input.prt" }.to_owned());
+    }
+    let name = args.input.file_name().and_then(|name| name.to_str());
+    match name {
+        Some(name) if !is_stream(&args.input) && is_copy_name(name) => Ok(name.to_owned()),
+        _ => bail!(
+            "{}: a job takes a scene in a file with a name of its own, such as town.glb",
+            name_of(&args.input)
+        ),
+    }
+}
+
+/// Returns `true` if a file may have this name in a job's folder.
+fn is_copy_name(name: &str) -> bool {
+    Path::new(name).components().count() == 1 && ![MANIFEST, SHARDS, "..", "."].contains(&name)
+}
+
 /// The manifest as it comes back from its file.
 fn manifest_copy(manifest: &Manifest) -> anyhow::Result<Manifest> {
     Ok(serde_json::from_str(&serde_json::to_string(manifest)?)?)
@@ -193,10 +297,13 @@ fn manifest_of(dir: &Path) -> anyhow::Result<Manifest> {
             path.display()
         )
     })?;
-    let manifest: Manifest =
-        serde_json::from_slice(&text).with_context(|| format!("{}: damaged", path.display()))?;
-    let name = &manifest.input;
-    if !["input.glb", "input.prt"].contains(&name.as_str()) || manifest.kind != "pvs" {
+    let manifest: Manifest = serde_json::from_slice(&text).with_context(|| {
+        format!(
+            "{}: damaged, or not a job of this command; plan it again",
+            path.display()
+        )
+    })?;
+    if !is_copy_name(&manifest.input) {
         bail!(
             "{}: not a job of this command; plan it again",
             path.display()
@@ -205,118 +312,41 @@ fn manifest_of(dir: &Path) -> anyhow::Result<Manifest> {
     Ok(manifest)
 }
 
-/// The manifest of a job and its input. Refused if the shards are not those that this version would plan.
-fn open(dir: &Path) -> anyhow::Result<(Manifest, Input)> {
-    let manifest = manifest_of(dir)?;
-    let path = dir.join(&manifest.input);
-    let input = input_of(&path, &read(&path)?)?;
-    let keys = with_plan(&manifest, &input, |plan| Ok(keys_of(plan)))?;
-    if keys != manifest.shards {
-        bail!(
-            "{}: planned by another version, or its input has changed; plan it again in a new folder",
-            dir.display()
-        );
-    }
-    Ok((manifest, input))
-}
-
-fn config_of(manifest: &Manifest) -> VisConfig {
-    VisConfig {
-        mode: manifest.mode.into(),
-        far: manifest.far,
-        max_memory: manifest.max_memory,
-        max_specials: manifest.max_specials,
-        ..VisConfig::default()
-    }
-}
-
-/// Does something with the plan of a job.
-fn with_plan<T>(
-    manifest: &Manifest,
-    input: &Input,
-    then: impl FnOnce(&VisPlan<'_>) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
-    let config = config_of(manifest);
-    let plain = input.world.as_ref().map(|world| plain_sight(&world.graph));
-    let graph = plain.as_ref().unwrap_or(&input.graph);
-    then(&VisPlan::new(graph, &config, input.hash)?)
-}
-
-fn keys_of(plan: &VisPlan<'_>) -> Vec<String> {
-    let blocks = 0..plan.n_blocks();
-    blocks.map(|b| format!("{:016x}", plan.key(b))).collect()
-}
-
-fn shards(dir: &Path) -> BlockFolder {
-    BlockFolder::at(dir.join("shards"))
-}
-
-/// Returns the blocks that are not there, or damaged.
-fn missing(plan: &VisPlan<'_>, folder: &mut BlockFolder) -> Vec<usize> {
-    let is_there = |folder: &mut BlockFolder, block| {
-        let bytes = folder.get(plan.key(block));
-        bytes.is_some_and(|bytes| plan.is_block(block, &bytes))
-    };
-    (0..plan.n_blocks())
-        .filter(|&block| !is_there(folder, block))
-        .collect()
+fn shards_in(dir: &Path) -> PieceFolder {
+    PieceFolder::at(dir.join(SHARDS))
 }
 
 fn run_shards(args: &JobRun) -> anyhow::Result<()> {
-    let (manifest, input) = open(&args.dir)?;
-    watch(None, Some(manifest.max_memory))?;
-    let strange = args.keys.iter().find(|key| !manifest.shards.contains(key));
-    if let Some(key) = strange {
+    let job = Opened::at(&args.dir)?;
+    let Manifest {
+        max_memory, shards, ..
+    } = &job.manifest;
+    watch(None, *max_memory)?;
+    if let Some(strange) = args.keys.iter().find(|key| !shards.contains(key)) {
         bail!(
-            "{key} is not a shard of {}; its manifest lists them",
+            "{strange} is not a shard of {}; its manifest lists them",
             args.dir.display()
         );
     }
-    let mut folder = shards(&args.dir);
-    let pool = pool_of(args.threads)?;
-    let done = with_plan(&manifest, &input, |plan| {
-        let is_asked =
-            |block: &usize| args.keys.is_empty() || args.keys.contains(&manifest.shards[*block]);
-        let mut left = missing(plan, &mut folder);
-        let n_missing = left.len();
-        left.retain(is_asked);
-        let n_asked = (0..plan.n_blocks()).filter(is_asked).count();
-        let bar = StageBar::new();
-        let mut has_begun = false;
-        let is_full = AtomicBool::new(false);
-        let mut context = VisContext {
-            on_round: &mut |done, total| {
-                if !std::mem::replace(&mut has_begun, true) {
-                    bar.start("searching", total);
-                }
-                bar.set(done);
-                !is_full.load(Ordering::Relaxed)
-            },
-            walls: input.walls.as_deref(),
-            checkpoint: None,
-        };
-        pool.install(|| {
-            plan.search(&left, &mut context, &mut |block, bytes, is_complete| {
-                if is_complete {
-                    folder.put(plan.key(block), &bytes);
-                    is_full.store(folder.error.is_some(), Ordering::Relaxed);
-                }
-            })
-        });
-        bar.finish();
-        Ok(ShardCounts {
-            done: left.len(),
-            there: n_asked - left.len(),
-            missing: n_missing - left.len(),
-        })
-    })?;
-    report(folder, &done, args.json, "computed")
+    let folder = shards_in(&args.dir);
+    let is_asked = |shard: &usize| args.keys.is_empty() || args.keys.contains(&shards[*shard]);
+    let mut left = job.missing(&folder);
+    let n_missing = left.len();
+    left.retain(is_asked);
+    let n_asked = (0..shards.len()).filter(is_asked).count();
+    job.work.compute(&left, &folder, args)?;
+    let done = ShardCounts {
+        done: left.len(),
+        there: n_asked - left.len(),
+        missing: n_missing - left.len(),
+    };
+    report(&folder, &done, args.json, "computed")
 }
 
 fn merge(args: &JobMerge) -> anyhow::Result<()> {
-    let (manifest, input) = open(&args.dir)?;
+    let job = Opened::at(&args.dir)?;
     for from in &args.from {
-        if manifest_of(from)? != manifest {
+        if manifest_of(from)? != job.manifest {
             bail!(
                 "{} and {} are different jobs",
                 from.display(),
@@ -324,36 +354,34 @@ fn merge(args: &JobMerge) -> anyhow::Result<()> {
             );
         }
     }
-    let mut folder = shards(&args.dir);
-    let done = with_plan(&manifest, &input, |plan| {
-        let left = missing(plan, &mut folder);
-        let mut n_copied = 0;
-        for &block in &left {
-            let found = args.from.iter().find_map(|from| {
-                let bytes = shards(from).get(plan.key(block));
-                bytes.filter(|bytes| plan.is_block(block, bytes))
-            });
-            if let Some(bytes) = found {
-                folder.put(plan.key(block), &bytes);
-                n_copied += 1;
-            }
+    let folder = shards_in(&args.dir);
+    let left = job.missing(&folder);
+    let mut n_copied = 0;
+    for &shard in &left {
+        let from = args.from.iter();
+        let found = from
+            .filter_map(|from| job.whole(&shards_in(from), shard))
+            .next();
+        if let Some(bytes) = found {
+            folder.put(&job.manifest.shards[shard], &bytes);
+            n_copied += 1;
         }
-        Ok(ShardCounts {
-            done: n_copied,
-            there: plan.n_blocks() - left.len(),
-            missing: left.len() - n_copied,
-        })
-    })?;
-    report(folder, &done, args.json, "copied")
+    }
+    let done = ShardCounts {
+        done: n_copied,
+        there: job.manifest.shards.len() - left.len(),
+        missing: left.len() - n_copied,
+    };
+    report(&folder, &done, args.json, "copied")
 }
 
 fn report(
-    folder: BlockFolder,
+    folder: &PieceFolder,
     done: &ShardCounts,
     is_json: bool,
     word: &str,
 ) -> anyhow::Result<()> {
-    if let Some(error) = folder.error {
+    if let Some(error) = folder.take_error() {
         return Err(error);
     }
     let mut out = printed();
@@ -369,36 +397,17 @@ fn report(
 }
 
 fn finish(args: &JobFinish) -> anyhow::Result<()> {
-    let (manifest, input) = open(&args.dir)?;
-    let mut folder = shards(&args.dir);
-    let left = with_plan(&manifest, &input, |plan| Ok(missing(plan, &mut folder)))?;
+    let job = Opened::at(&args.dir)?;
+    let folder = shards_in(&args.dir);
+    let left = job.missing(&folder);
     if let Some(&first) = left.first() {
         bail!(
             "{} of {} shards are missing or damaged, such as {}; compute them with `enfilade job run {}`",
             left.len(),
-            manifest.shards.len(),
-            manifest.shards[first],
+            job.manifest.shards.len(),
+            job.manifest.shards[first],
             args.dir.display()
         );
     }
-    let pvs = Pvs {
-        input: args.dir.join(&manifest.input),
-        output: Some(args.output.clone()),
-        into: args.into.clone(),
-        parts: false,
-        volumes: false,
-        mode: manifest.mode,
-        budget: None::<Duration>,
-        max_time: None,
-        max_memory: manifest.max_memory,
-        far: manifest.far,
-        evidence: None,
-        max_specials: manifest.max_specials,
-        checkpoint: None,
-        statistics: None,
-        mutual: None,
-        threads: None,
-        json: args.json,
-    };
-    run_with(&pvs, Some(folder))
+    job.work.finish(folder, args)
 }

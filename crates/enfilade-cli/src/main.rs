@@ -16,6 +16,7 @@ mod export;
 mod formats;
 mod generate;
 mod inspect;
+mod job;
 mod kit;
 mod limits;
 mod living;
@@ -25,6 +26,7 @@ mod name;
 mod output;
 mod pack;
 mod path;
+mod pieces;
 mod plan;
 mod portals;
 mod progress;
@@ -76,7 +78,7 @@ enum Command {
     Export(export::Export),
     Generate(generate::Generate),
     Inspect(inspect::Inspect),
-    Job(pvs::job::Job),
+    Job(job::Job),
     Kit(kit::KitCheck),
     Locate(locate::Locate),
     Man(manual::Man),
@@ -113,7 +115,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Export(args) => export::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Inspect(args) => inspect::run(&args),
-        Command::Job(args) => pvs::job::run(&args),
+        Command::Job(args) => job::run(&args),
         Command::Kit(args) => kit::run(&args),
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),

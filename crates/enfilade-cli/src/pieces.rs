@@ -1,44 +1,73 @@
-//! Finished blocks of a large search, in a folder beside the answer, so that a run that was killed goes on from them.
+//! Finished pieces of long work, in a folder, so that a run that was killed goes on from them.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::Context;
+use enfilade::bake::Pieces;
 use enfilade::vis::VisBlocks;
 
 use crate::output::write_whole;
 
 const EXTENSION: &str = "block";
 
-/// A folder with a file for each block, named by its key. Made when the first block is done.
-pub(super) struct BlockFolder {
+/// A folder with a file for each piece, named by its key. Made when the first piece is done.
+pub(crate) struct PieceFolder {
     path: PathBuf,
-    /// The first block that could not be kept. The search goes on without.
-    pub(super) error: Option<anyhow::Error>,
+    /// The first piece that could not be kept. The work goes on without.
+    error: Mutex<Option<anyhow::Error>>,
+    /// Pieces that were asked for and there.
+    n_found: AtomicUsize,
 }
 
-impl BlockFolder {
-    pub(super) fn at(path: PathBuf) -> Self {
-        Self { path, error: None }
+impl PieceFolder {
+    pub(crate) fn at(path: PathBuf) -> Self {
+        Self {
+            path,
+            error: Mutex::default(),
+            n_found: AtomicUsize::new(0),
+        }
     }
 
     /// Takes the folder that belongs to the answer `output`: its name with `.blocks` after it.
-    pub(super) fn beside(output: &Path) -> Self {
+    pub(crate) fn beside(output: &Path) -> Self {
         let mut name = output.file_name().unwrap_or_default().to_owned();
         name.push(".blocks");
         Self::at(output.with_file_name(name))
     }
 
-    fn file(&self, key: u64) -> PathBuf {
-        self.path.join(format!("{key:016x}.{EXTENSION}"))
+    fn file(&self, key: &str) -> PathBuf {
+        self.path.join(format!("{key}.{EXTENSION}"))
     }
 
-    /// Removes the blocks, and the folder if nothing else is in it.
-    pub(super) fn remove(&self) -> anyhow::Result<()> {
+    /// Returns the number of pieces that were asked for and there.
+    pub(crate) fn n_found(&self) -> usize {
+        self.n_found.load(Ordering::Relaxed)
+    }
+
+    /// Returns the first error so far.
+    pub(crate) fn take_error(&self) -> Option<anyhow::Error> {
+        let mut error = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+        error.take()
+    }
+
+    pub(crate) fn has_error(&self) -> bool {
+        let error = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+        error.is_some()
+    }
+
+    /// Removes the pieces, and the folder if nothing else is in it.
+    pub(crate) fn remove(&self) -> anyhow::Result<()> {
         let cannot = || format!("cannot remove {}", self.path.display());
         let entries = match fs::read_dir(&self.path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error)
+                if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) =>
+            {
+                return Ok(());
+            }
             entries => entries.with_context(cannot)?,
         };
         let mut has_others = false;
@@ -59,16 +88,31 @@ impl BlockFolder {
     }
 }
 
-impl VisBlocks for BlockFolder {
-    fn get(&mut self, key: u64) -> Option<Vec<u8>> {
-        fs::read(self.file(key)).ok()
+impl Pieces for PieceFolder {
+    fn get(&self, key: &str) -> Option<Vec<u8>> {
+        let found = fs::read(self.file(key)).ok();
+        let n = usize::from(found.is_some());
+        self.n_found.fetch_add(n, Ordering::Relaxed);
+        found
     }
 
-    fn put(&mut self, key: u64, bytes: &[u8]) {
+    fn put(&self, key: &str, bytes: &[u8]) {
         let made = fs::create_dir_all(&self.path)
             .with_context(|| format!("cannot make the folder {}", self.path.display()));
         if let Err(error) = made.and_then(|()| write_whole(&self.file(key), bytes)) {
-            self.error.get_or_insert(error);
+            let mut first = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+            first.get_or_insert(error);
         }
+    }
+}
+
+/// Blocks of a search are named by 16 hexadecimal digits.
+impl VisBlocks for &PieceFolder {
+    fn get(&mut self, key: u64) -> Option<Vec<u8>> {
+        Pieces::get(*self, &format!("{key:016x}"))
+    }
+
+    fn put(&mut self, key: u64, bytes: &[u8]) {
+        Pieces::put(*self, &format!("{key:016x}"), bytes);
     }
 }

@@ -18,18 +18,16 @@ use enfilade::vis::{
 
 use enfilade_verify::structural_triangles;
 
-use self::blocks::BlockFolder;
 use self::statistics::Statistics;
 use crate::formats::Format;
 use crate::limits::watch;
 use crate::output::{Outputs, is_same_file, write_whole};
+use crate::pieces::PieceFolder;
 use crate::progress::StageBar;
 use crate::screen::{json_text, print_json};
 use enfilade_cli::input::{is_stream, name_of, read};
 use enfilade_cli::values::{bytes, seconds};
 
-mod blocks;
-pub(crate) mod job;
 mod statistics;
 
 /// Computes the potentially visible set of a world or a Quake portal file: for each cell, the cells visible from it,
@@ -37,68 +35,68 @@ mod statistics;
 #[derive(clap::Args)]
 pub(crate) struct Pvs {
     /// World written by `enfilade bake`, or Quake portal file (PRT1, PRT2, PRT1-AM or Quake 3); `-` for standard input.
-    input: PathBuf,
+    pub(crate) input: PathBuf,
     /// File for the answer, as text; `-` for standard output. X.pvs beside the input if not given.
     #[arg(short, long, value_name = "OUT")]
-    output: Option<PathBuf>,
+    pub(crate) output: Option<PathBuf>,
     /// Write the world with the answer in it, for use at run-time; may be the input itself.
     #[arg(long, value_name = "OUT.glb", conflicts_with = "far")]
-    into: Option<PathBuf>,
+    pub(crate) into: Option<PathBuf>,
     /// Also store, for each pair of cells, the triangles and objects of one visible from the other, so that the
     /// run-time draws less.
     #[arg(long, requires = "into")]
-    parts: bool,
+    pub(crate) parts: bool,
     /// Also store the visible volume of each pair of cells: the part of one cell that is visible from the other
     /// through portals, as convex pieces.
     #[arg(long, requires = "into")]
-    volumes: bool,
+    pub(crate) volumes: bool,
     /// Thoroughness of the search.
     #[arg(long, value_enum, default_value_t = PvsMode::Exact)]
-    mode: PvsMode,
+    pub(crate) mode: PvsMode,
     /// Stop searching after this long; the answer is then larger than necessary, but still correct.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    budget: Option<Duration>,
+    pub(crate) budget: Option<Duration>,
     /// End without an answer after this long.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    max_time: Option<Duration>,
+    pub(crate) max_time: Option<Duration>,
     /// Search a graph whose tables would be larger in blocks that fit, refuse one that does not fit itself, and end
     /// rather than use more memory: a number and K, M, G or T.
     #[arg(long, value_name = "BYTES", default_value = "8G", value_parser = bytes)]
-    max_memory: u64,
+    pub(crate) max_memory: u64,
     /// Treat everything farther than this as hidden.
     #[arg(long, value_name = "DISTANCE", value_parser = distance)]
-    far: Option<f64>,
+    pub(crate) far: Option<f64>,
     /// Record why each pair counts as visible or hidden, for `enfilade verify --evidence`. Refused for a world with
     /// special portals.
     #[arg(long, value_name = "FILE")]
-    evidence: Option<PathBuf>,
+    pub(crate) evidence: Option<PathBuf>,
     /// Most special portals on one line of sight. What longer lines show is bounded by the cells they may lead to.
     #[arg(long, value_name = "N", default_value_t = VisConfig::default().max_specials)]
-    max_specials: u32,
+    pub(crate) max_specials: u32,
     /// Save the search to this file every half minute and when --budget ends it, and continue from it next time;
     /// refused for another graph or other settings, removed when the search is done. Large graphs do not need it: the
     /// blocks that are done are kept in OUT.blocks until the answer is written.
     #[arg(long, value_name = "FILE")]
-    checkpoint: Option<PathBuf>,
+    pub(crate) checkpoint: Option<PathBuf>,
     /// Write statistics for modelers as JSON: the cells, objects and triangles visible from each cell, and the ten
     /// worst viewpoints.
     #[arg(long, value_name = "FILE")]
-    statistics: Option<PathBuf>,
+    pub(crate) statistics: Option<PathBuf>,
     /// Write the pairs that see each other, each once, for radiosity and acoustics: pairs of cells, and of the
     /// surfaces of a world; as text.
     #[arg(long, value_name = "FILE")]
-    mutual: Option<PathBuf>,
+    pub(crate) mutual: Option<PathBuf>,
     /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N")]
-    threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     /// Print JSON for machines.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum PvsMode {
+pub(crate) enum PvsMode {
     /// Separating planes only.
     Fast,
     /// All that planes and lines can decide.
@@ -174,7 +172,7 @@ pub(crate) fn run(args: &Pvs) -> anyhow::Result<()> {
 
 /// Takes the blocks of a large search from a folder that stays; or from one beside the answer, which goes when that is
 /// written.
-fn run_with(args: &Pvs, kept: Option<BlockFolder>) -> anyhow::Result<()> {
+pub(crate) fn run_with(args: &Pvs, kept: Option<PieceFolder>) -> anyhow::Result<()> {
     watch(args.max_time, Some(args.max_memory))?;
     let (outputs, output) = outputs_of(args)?;
     let input = read_input(&args.input)?;
@@ -187,8 +185,8 @@ fn run_with(args: &Pvs, kept: Option<BlockFolder>) -> anyhow::Result<()> {
     }
     let start = Instant::now();
     let is_kept = kept.is_some();
-    let mut blocks = kept.or_else(|| (!is_stream(&output)).then(|| BlockFolder::beside(&output)));
-    let found = compute(args, &input, blocks.as_mut())?;
+    let blocks = kept.or_else(|| (!is_stream(&output)).then(|| PieceFolder::beside(&output)));
+    let found = compute(args, &input, blocks.as_ref())?;
     let is_complete = found.vis.is_complete;
     let mut report = report(&input, &found, start.elapsed());
     let WorldVis {
@@ -240,12 +238,12 @@ fn run_with(args: &Pvs, kept: Option<BlockFolder>) -> anyhow::Result<()> {
 }
 
 /// The graph to search, and its world if it has one.
-struct Input {
-    graph: SightGraph,
-    walls: Option<Vec<Triangle>>,
-    world: Option<World>,
+pub(crate) struct Input {
+    pub(crate) graph: SightGraph,
+    pub(crate) walls: Option<Vec<Triangle>>,
+    pub(crate) world: Option<World>,
     /// Hash of the file.
-    hash: u64,
+    pub(crate) hash: u64,
 }
 
 impl Input {
@@ -268,7 +266,7 @@ fn read_input(path: &Path) -> anyhow::Result<Input> {
 }
 
 /// Returns what the bytes of a file hold; `path` is named in errors.
-fn input_of(path: &Path, bytes: &[u8]) -> anyhow::Result<Input> {
+pub(crate) fn input_of(path: &Path, bytes: &[u8]) -> anyhow::Result<Input> {
     // FNV-1a: distinguishes files; not safe against forgery.
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
@@ -343,7 +341,7 @@ fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
 fn compute(
     args: &Pvs,
     input: &Input,
-    mut blocks: Option<&mut BlockFolder>,
+    mut blocks: Option<&PieceFolder>,
 ) -> anyhow::Result<WorldVis> {
     let config = VisConfig {
         mode: args.mode.into(),
@@ -374,7 +372,7 @@ fn compute(
     let resume = args.checkpoint.as_deref().map(read_checkpoint);
     let checkpoint = VisCheckpoint {
         blocks: match &mut blocks {
-            Some(blocks) => Some(&mut **blocks),
+            Some(blocks) => Some(blocks),
             None => None,
         },
         resume: resume.transpose()?.flatten(),
@@ -399,7 +397,7 @@ fn compute(
         Some(path) => format!("{}, {}", name_of(&args.input), path.display()),
         None => name_of(&args.input),
     })?;
-    let unkept = blocks.and_then(|blocks| blocks.error.take());
+    let unkept = blocks.and_then(PieceFolder::take_error);
     if let Some(error) = unsaved.or(unkept) {
         return Err(error.context("cannot save the search"));
     }
@@ -429,7 +427,7 @@ fn pool(args: &Pvs) -> anyhow::Result<rayon::ThreadPool> {
     pool_of(args.threads)
 }
 
-fn pool_of(threads: Option<usize>) -> anyhow::Result<rayon::ThreadPool> {
+pub(crate) fn pool_of(threads: Option<usize>) -> anyhow::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .build()
@@ -566,7 +564,7 @@ fn print(mut out: Box<dyn Write>, report: &PvsReport, is_json: bool) -> anyhow::
     out.flush().context("cannot write to standard output")
 }
 
-fn distance(text: &str) -> Result<f64, String> {
+pub(crate) fn distance(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x >= 0.0 => Ok(x),
         _ => Err("a distance of at least 0 is needed".into()),

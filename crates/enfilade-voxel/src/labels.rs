@@ -60,6 +60,21 @@ impl Labels {
         Self { dims, layers }
     }
 
+    /// Packs the layers, each by itself, for [`Self::unpacked`]. Threads share the work.
+    #[must_use]
+    pub fn packed(&self) -> Vec<Vec<u8>> {
+        self.layers.par_iter().map(Layer::packed).collect()
+    }
+
+    /// Unpacks layers; `None` if they are not those of a box of `dims`.
+    #[must_use]
+    pub fn unpacked(dims: [usize; 3], layers: &[Vec<u8>]) -> Option<Self> {
+        let [bx, by, bz] = dims.map(|n| n.div_ceil(EDGE));
+        let layer = |bytes: &Vec<u8>| Layer::unpacked(bx * by, bytes);
+        let layers: Vec<Layer> = layers.par_iter().map(layer).collect::<Option<_>>()?;
+        (layers.len() == bz).then(|| Self::from_layers(dims, layers))
+    }
+
     /// Returns the number of bricks along x.
     fn width(&self) -> usize {
         self.dims[0].div_ceil(EDGE)

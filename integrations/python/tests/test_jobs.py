@@ -1,5 +1,6 @@
 """Jobs: shards in pools and on a cluster whose workers are killed give the bytes of one machine."""
 
+import contextlib
 import os
 import signal
 import sys
@@ -60,7 +61,7 @@ def slow(command, tmp_path):
 def finished(job, command):
     folder, alone = job
     assert jobs.missing(folder) == []
-    output = folder.parent / "together.pvs"
+    output = folder.parent / f"together{alone.suffix}"
     jobs.finish(folder, output, command=command.program)
     return output.read_bytes() == alone.read_bytes()
 
@@ -93,6 +94,64 @@ def test_dask_computes_the_shards_of_killed_workers_elsewhere(job, slow, command
         jobs.run(job[0], client, command=slow)
         killer.join()
     assert finished(job, command)
+
+
+@pytest.fixture()
+def bakes(command, tmp_path):
+    """A job that bakes houses apart from each other, and the world that one machine writes."""
+    source = tmp_path / "houses.obj"
+    lines = []
+    for n in range(5):
+        x, z = 150.0 * n, 150.0 * (n * n % 5)
+        corners = [(x + a, b, z + c) for a in (0, 5 + n) for b in (0, 3) for c in (0, 4)]
+        lines += [f"v {a} {b} {c}" for a, b, c in corners]
+        # Seen from inside.
+        sides = [(3, 4, 2, 1), (6, 8, 7, 5), (2, 6, 5, 1), (7, 8, 4, 3), (5, 7, 3, 1), (4, 8, 6, 2)]
+        lines += ["f " + " ".join(str(8 * n + at) for at in side) for side in sides]
+    source.write_text("\n".join(lines))
+    alone = tmp_path / "alone.glb"
+    command("bake", source, "-o", alone, "--min-opening", "0.4")
+    folder = tmp_path / "bakes"
+    keys = jobs.plan(source, folder, options=["--min-opening", "0.4"], command=command.program)
+    assert len(keys) == 5 and jobs.missing(folder) == keys
+    return folder, alone
+
+
+def test_dask_bakes_while_one_worker_is_frozen_and_one_killed(bakes, slow, command):
+    distributed = pytest.importorskip("distributed")
+    dask = pytest.importorskip("dask")
+    with dask.config.set({"distributed.scheduler.worker-ttl": "3s"}), distributed.LocalCluster(
+        n_workers=3, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as cluster, distributed.Client(cluster) as client:
+        frozen, killed, _ = client.run(os.getpid).values()
+
+        def harm():
+            time.sleep(0.5)
+            assert jobs.missing(bakes[0])
+            os.kill(frozen, signal.SIGSTOP)
+            os.kill(killed, signal.SIGKILL)
+
+        harmer = threading.Thread(target=harm)
+        harmer.start()
+        jobs.run(bakes[0], client, command=slow)
+        harmer.join()
+        # Its keeper may have replaced it.
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(frozen, signal.SIGCONT)
+    assert finished(bakes, command)
+
+
+def test_two_pools_on_one_folder_write_the_same_bytes(bakes, command):
+    with ThreadPoolExecutor(2) as one, ThreadPoolExecutor(2) as other:
+        pools = [
+            threading.Thread(target=jobs.run, args=(bakes[0], pool), kwargs={"command": command.program})
+            for pool in (one, other)
+        ]
+        for pool in pools:
+            pool.start()
+        for pool in pools:
+            pool.join()
+    assert finished(bakes, command)
 
 
 def test_errors_say_what_to_do(tmp_path):

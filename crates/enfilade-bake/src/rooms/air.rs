@@ -25,14 +25,14 @@ pub(crate) struct VoxelAir {
 }
 
 /// A grid over a part of a scene.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Plot {
     site: Site,
     pub(super) grid: Grid,
     /// Share of all voxels of the scene.
     share: f64,
     /// Resolution of the whole scene.
-    pub(super) resolution: Resolution,
+    pub(crate) resolution: Resolution,
 }
 
 /// Peak memory of a bake by the watershed, rounded from `docs/benchmarks/growth.md`. [Units: bytes/vx]

@@ -136,20 +136,29 @@ fn voids_of(
     voids
 }
 
+/// Names of the counts that [`propose`] makes for the file.
+pub(crate) const COUNTS: [&str; 6] = [
+    "voxel_size",
+    "grid_turn_degrees",
+    "voxels",
+    "occupied_voxels",
+    "basins",
+    "screens",
+];
+
 /// Returns counts for the file: of the grid, and of its contents.
-fn counts_of(
-    grid: &Grid,
-    frame: &Frame,
-    [n_occupied, n_basins, n_screens]: [usize; 3],
-) -> Vec<(&'static str, f64)> {
-    vec![
-        ("voxel_size", grid.voxel),
-        ("grid_turn_degrees", frame.degrees()),
-        ("voxels", grid.n_voxels() as f64),
-        ("occupied_voxels", n_occupied as f64),
-        ("basins", n_basins as f64),
-        ("screens", n_screens as f64),
-    ]
+fn counts_of(grid: &Grid, frame: &Frame, found: [usize; 3]) -> Vec<(&'static str, f64)> {
+    let [n_occupied, n_basins, n_screens] = found.map(|n| n as f64);
+    let n_voxels = grid.n_voxels() as f64;
+    let counts = [
+        grid.voxel,
+        frame.degrees(),
+        n_voxels,
+        n_occupied,
+        n_basins,
+        n_screens,
+    ];
+    COUNTS.into_iter().zip(counts).collect()
 }
 
 /// Returns the region of a point, 0 if there is none.

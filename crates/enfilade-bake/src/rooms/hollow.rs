@@ -82,7 +82,7 @@ pub(crate) fn find_matter(
     open.sort_unstable();
     let wanted: Vec<u32> = enclosed.iter().flatten().chain(&open).copied().collect();
     let points = sample_points(grid, labels, regions, &wanted);
-    // Of air that is open to the outdoors, the first hits are enough.
+    // First hits are enough of air that is open to the outdoors.
     let rays = |region: u32| match open.binary_search(&region) {
         Ok(_) => Rays::First,
         Err(_) => Rays::All,

@@ -27,9 +27,9 @@ mod slabs;
 mod voids;
 mod votes;
 
-pub(crate) use air::{FLOODED, measure, plots, prepare};
+pub(crate) use air::{FLOODED, Plot, measure, plots, prepare};
 pub(crate) use basins::Basins;
-pub(crate) use find::propose;
+pub(crate) use find::{COUNTS, propose};
 pub(crate) use flooded::Flooded;
 pub(crate) use limb_rule::{LimbRule, THICKER};
 pub(crate) use limbs::{Limb, Plan, split_limbs};

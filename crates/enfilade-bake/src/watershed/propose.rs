@@ -2,8 +2,9 @@
 
 use enfilade_geom::Allowance;
 
+use crate::pieces::{Kept, PieceKind};
 use crate::proposal::Proposal;
-use crate::rooms::{self, Basins};
+use crate::rooms::{self, Basins, Plot};
 use crate::structure::Structure;
 use crate::voxel::{BitVolume, DistanceField, Grid, Watershed, WatershedOptions, watershed};
 use crate::{BakeConfig, BakeContext, BakeError, Outdoors, Stage};
@@ -27,17 +28,11 @@ pub(crate) fn propose(
             ..Proposal::new(bounds, Vec::new())
         });
     }
-    let sites = structure.sites(config.min_opening);
+    let kept = Kept::of(structure.scene, config, context.pieces());
     let mut proposal: Option<Proposal> = None;
     // One after the other: each has a grid of its own, and threads share the work on it.
-    for plot in rooms::plots(structure, sites, rooms::FLOODED, config, context)? {
-        let air = rooms::measure(structure, plot, config, context)?;
-        let field = air.solid.field(context.allowance());
-        context.begin(Stage::Flood)?;
-        let basins = flood(&air.grid, &field, config, context.allowance());
-        drop(field);
-        context.check()?;
-        let here = rooms::propose(structure, air, basins, config, context)?;
+    for plot in sites_of(structure, config, context)? {
+        let here = propose_site(structure, plot, kept, config, context)?;
         proposal = Some(match proposal {
             Some(before) => before.beside(here),
             None => here,
@@ -49,6 +44,50 @@ pub(crate) fn propose(
     let noise = ("noise".to_owned(), config.noise.to_string());
     proposal.settings.extend([noise]);
     Ok(proposal)
+}
+
+/// Lays a grid over each site of a scene.
+///
+/// # Errors
+/// If a setting is invalid, or the scene is too large for the voxel budget.
+pub(crate) fn sites_of(
+    structure: &Structure<'_>,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Vec<Plot>, BakeError> {
+    let sites = structure.sites(config.min_opening);
+    rooms::plots(structure, sites, rooms::FLOODED, config, context)
+}
+
+/// Finds the rooms of a site, from its pieces as far as they are there.
+///
+/// # Errors
+/// If the caller cancels.
+pub(crate) fn propose_site(
+    structure: &Structure<'_>,
+    plot: Plot,
+    kept: Kept<'_>,
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<Proposal, BakeError> {
+    let make = || {
+        let air = rooms::measure(structure, plot, config, context)?;
+        let basins = kept.or_make(PieceKind::Basins, &plot, || {
+            let field = air.solid.field(context.allowance());
+            context.begin(Stage::Flood)?;
+            let basins = flood(&air.grid, &field, config, context.allowance());
+            context.check()?;
+            Ok(basins)
+        })?;
+        let found = rooms::propose(structure, air, basins, config, context)?;
+        context.check()?;
+        Ok(found)
+    };
+    let found = kept.or_make(PieceKind::Rooms, &plot, make)?;
+    Ok(Proposal {
+        resolution: plot.resolution,
+        ..found
+    })
 }
 
 /// Floods the air.

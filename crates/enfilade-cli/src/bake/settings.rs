@@ -127,7 +127,7 @@ pub(crate) struct BakeOptions {
     /// Most memory to use, a number and K, M, G or T: sets the number of voxels and points [default: 8G, and less for
     /// few triangles].
     #[arg(long, value_name = "BYTES", value_parser = enfilade_cli::values::bytes)]
-    max_memory: Option<u64>,
+    pub(crate) max_memory: Option<u64>,
     /// End without a world after this long; if not given, when the work is out of proportion to the triangles.
     #[arg(long, value_name = "SECONDS", value_parser = enfilade_cli::values::seconds)]
     max_time: Option<Duration>,

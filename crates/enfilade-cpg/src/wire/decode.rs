@@ -47,6 +47,13 @@ pub fn decode_glb(bytes: &[u8]) -> Result<World, WireError> {
     Ok(world)
 }
 
+/// Returns `false` for a GLB without our data: a scene that was not baked. Whatever else is wrong, [`decode_glb`] tells.
+#[must_use]
+pub fn is_world(bytes: &[u8]) -> bool {
+    let version = chunks(bytes).and_then(|(text, _)| check_version(text));
+    !matches!(version, Err(WireError::NotAWorld))
+}
+
 #[expect(clippy::needless_pass_by_value, reason = "for map_err")]
 pub(super) fn json_error(error: serde_json::Error) -> WireError {
     WireError::Json(error.to_string())

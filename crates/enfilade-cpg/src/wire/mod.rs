@@ -44,7 +44,7 @@ mod special;
 mod transform;
 mod visible;
 
-pub use decode::decode_glb;
+pub use decode::{decode_glb, is_world};
 pub use encode::encode_glb;
 pub use pieces::{PieceContent, SplitFile, join_file, read_piece, split_file};
 

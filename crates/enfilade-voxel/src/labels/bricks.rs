@@ -70,6 +70,26 @@ impl Layer {
         layer
     }
 
+    /// Packs the heads, then the blocks.
+    pub(super) fn packed(&self) -> Vec<u8> {
+        let words: Vec<u32> = self.heads.iter().chain(&self.blocks).copied().collect();
+        lz4_flex::block::compress_prepend_size(bytemuck::cast_slice(&words))
+    }
+
+    /// Unpacks a layer of `n` bricks; `None` if it is none.
+    pub(super) fn unpacked(n: usize, bytes: &[u8]) -> Option<Self> {
+        let bytes = lz4_flex::block::decompress_size_prepended(bytes).ok()?;
+        let words = bytes.as_chunks::<4>().0.iter();
+        let words: Vec<u32> = words.map(|&word| u32::from_ne_bytes(word)).collect();
+        let (heads, blocks) = words.split_at_checked(n)?;
+        // A block of each mixed brick lies within.
+        let is_whole = |&head: &u32| head & MIXED == 0 || block_end(head) <= blocks.len();
+        heads.iter().all(is_whole).then(|| Self {
+            heads: heads.to_vec(),
+            blocks: blocks.to_vec(),
+        })
+    }
+
     pub(super) fn push(&mut self, brick: &Brick) {
         self.heads.push(encode(brick, &mut self.blocks));
     }
@@ -207,6 +227,16 @@ fn encode(brick: &Brick, blocks: &mut Vec<u32>) -> u32 {
 pub(super) fn place(head: u32) -> (usize, u32) {
     let width = head >> WIDTH_SHIFT & 3;
     ((head & POSITION) as usize * UNIT, width)
+}
+
+/// Returns the word after a block, given its brick's head.
+fn block_end(head: u32) -> usize {
+    let (from, width) = place(head);
+    from + if width == PLAIN {
+        VOLUME
+    } else {
+        (1 << (1 << width)) + (VOLUME << width >> 5)
+    }
 }
 
 /// Returns the position of a block that begins at a word.

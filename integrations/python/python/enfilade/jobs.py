@@ -1,4 +1,4 @@
-"""Visibility on many machines: the shards of a job, handed to Dask, to Ray, or to a pool of the standard library.
+"""Bakes and visibility on many machines: the shards of a job, handed to Dask, to Ray, or to a pool of the standard library.
 
 The command ``enfilade`` does the work: it must be on every machine, and the folder of the job where all of them see it. A
 shard computed twice has the same bytes, so nothing is lost or spoilt if a machine dies or is slow:
@@ -25,19 +25,22 @@ class JobError(EnfiladeError):
     """A step of a job failed; the message is the command's."""
 
 
-def plan(source, folder, *, mode="exact", far=None, max_memory=None, command="enfilade"):
-    """Divide the work for a world, or a Quake portal file, into shards; return their keys.
+def plan(source, folder, *, mode=None, far=None, max_memory=None, options=(), command="enfilade"):
+    """Divide the work for a file into shards; return their keys.
 
-    ``max_memory`` is the most memory of a process that computes a shard, in bytes or as the command takes it ("8G"). Less makes
-    more shards; a graph of up to 10,000 portals is a single one unless this is less than its tables. ``far`` is a distance in
-    meters beyond which everything is treated as hidden. The same plan again leaves the folder as it is.
+    A scene is baked, a shard for each building apart from others; ``options`` are those of ``enfilade bake``. Of a world, or a
+    Quake portal file, it is found what is visible from where: ``mode`` is "exact" (the default) or "fast", and ``far`` a distance
+    in meters beyond which everything is treated as hidden. ``max_memory`` is the most memory of a process that computes a
+    shard, in bytes or as the command takes it ("8G"). Less makes more shards of visibility; a graph of up to 10,000 portals
+    is a single one unless this is less than its tables. The same plan again leaves the folder as it is.
     """
-    options = ["--mode", mode]
-    if far is not None:
-        options += ["--far", str(far)]
-    if max_memory is not None:
-        options += ["--max-memory", str(max_memory)]
-    _call(command, "plan", os.fspath(source), "-o", os.fspath(folder), *options)
+    given = []
+    for name, value in [("--mode", mode), ("--far", far), ("--max-memory", max_memory)]:
+        if value is not None:
+            given += [name, str(value)]
+    if options:
+        given += ["--", *options]
+    _call(command, "plan", os.fspath(source), "-o", os.fspath(folder), *given)
     return _shards(folder)
 
 
@@ -69,9 +72,9 @@ def run(folder, pool, *, threads=1, retries=3, command="enfilade"):
 
 
 def finish(folder, output, *, into=None, command="enfilade"):
-    """Put all shards together: write what ``enfilade pvs`` writes on one machine.
+    """Put all shards together: write what ``enfilade bake`` or ``enfilade pvs`` writes on one machine.
 
-    ``into`` is a file for the world with the answer in it.
+    ``into`` is a file for the world with visibility in it.
     """
     options = [] if into is None else ["--into", os.fspath(into)]
     _call(command, "finish", os.fspath(folder), "-o", os.fspath(output), *options)

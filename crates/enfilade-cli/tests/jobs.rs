@@ -1,0 +1,173 @@
+//! Bakes that are killed and go on, and bakes in shards. Covers V13.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+
+use enfilade::import::export_glb;
+use enfilade_geom::DMat4;
+use enfilade_testkit::mixed::rooms_with_closet;
+use enfilade_testkit::{TowerParams, office_tower};
+
+/// A folder of its own, with two buildings far apart in `town.glb`.
+fn folder(name: &str) -> PathBuf {
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(&dir).unwrap();
+    let mut scene = rooms_with_closet().scene;
+    for mut object in scene.objects.clone() {
+        object.transform = DMat4::from_translation([300.0, 0.0, 40.0].into()) * object.transform;
+        scene.objects.push(object);
+    }
+    fs::write(dir.join("town.glb"), export_glb(&scene)).unwrap();
+    dir
+}
+
+fn command(dir: &Path, words: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+    command.current_dir(dir).args(words.split(' '));
+    command
+}
+
+/// Runs a command in words; returns if it succeeded, and all that it said.
+fn said(dir: &Path, words: &str) -> (bool, String) {
+    let done = command(dir, words).output().unwrap();
+    let text = [done.stdout, done.stderr].map(|t| String::from_utf8_lossy(&t).into_owned());
+    (done.status.success(), text.concat())
+}
+
+/// Runs a command that must fail; returns what it said.
+fn refused(dir: &Path, words: &str) -> String {
+    let (is_done, text) = said(dir, words);
+    assert!(!is_done, "{words}: {text}");
+    text
+}
+
+/// Runs a command that must succeed; returns what it said.
+fn done(dir: &Path, words: &str) -> String {
+    let (is_done, text) = said(dir, words);
+    assert!(is_done, "{words}: {text}");
+    text
+}
+
+fn same(dir: &Path, a: &str, b: &str) -> bool {
+    fs::read(dir.join(a)).unwrap() == fs::read(dir.join(b)).unwrap()
+}
+
+#[test]
+fn shards_of_a_bake_from_anywhere_make_the_world_of_one_machine() {
+    let dir = &folder("baked-shards");
+    done(dir, "bake town.glb --min-opening 0.5 -o alone.glb");
+    let keys = done(dir, "job plan town.glb -o a -- --min-opening 0.5");
+    let keys: Vec<&str> = keys.lines().filter(|k| k.len() == 32).collect();
+    assert_eq!(keys.len(), 2, "{keys:?}");
+    done(dir, "job plan town.glb -o b -- --min-opening 0.5");
+    let text = refused(dir, "job plan town.glb -o b");
+    assert!(text.contains("something else"), "{text}");
+    done(dir, &format!("job run a {} --threads 1", keys[1]));
+    let text = refused(dir, "job finish a -o made.glb");
+    assert!(
+        text.contains("are missing") && !dir.join("made.glb").exists(),
+        "{text}"
+    );
+    // Both are computed in the other folder, and one is cut off.
+    done(dir, "job run b");
+    let shard = |folder: &str, key: &str| dir.join(format!("{folder}/shards/{key}.block"));
+    let [mine, other] = ["a", "b"].map(|folder| fs::read(shard(folder, keys[1])).unwrap());
+    assert!(mine == other);
+    fs::write(shard("a", keys[1]), &mine[..mine.len() - 7]).unwrap();
+    let text = done(dir, "job merge a b");
+    assert!(
+        text.contains("2 shards copied, 0 there before; 0 are missing"),
+        "{text}"
+    );
+    done(dir, "job finish a -o made.glb");
+    assert!(same(dir, "made.glb", "alone.glb"));
+    assert!(shard("a", keys[0]).exists());
+    // A job whose input was changed is refused.
+    let tower = office_tower(&TowerParams::with_rooms(2, 1)).scene;
+    fs::write(dir.join("b/town.glb"), export_glb(&tower)).unwrap();
+    let text = refused(dir, "job run b");
+    assert!(text.contains("plan it again"), "{text}");
+}
+
+#[test]
+fn a_job_that_cannot_be_is_refused_with_the_remedy() {
+    let dir = &folder("refused-jobs");
+    let gltf = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"far.bin","byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]}"#;
+    fs::write(dir.join("two.gltf"), gltf).unwrap();
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    fs::write(
+        dir.join("far.bin"),
+        corners.map(f32::to_le_bytes).as_flattened(),
+    )
+    .unwrap();
+    fs::copy(dir.join("town.glb"), dir.join("manifest.json")).unwrap();
+    done(dir, "bake town.glb -o world.glb");
+    for (words, part) in [
+        (
+            "job plan town.glb --mode fast -o j",
+            "--mode is for visibility",
+        ),
+        (
+            "job plan world.glb -o j -- --min-opening 0.5",
+            "is baked already",
+        ),
+        ("job plan town.glb -o j -- --method bsp", "method is bsp"),
+        ("job plan town.glb -o j -- --min-opnig 0.5", "--min-op"),
+        ("job plan manifest.json -o j", "a name of its own"),
+        (
+            "job plan two.gltf -o j",
+            "far.bin: a job takes scenes in one file",
+        ),
+    ] {
+        let text = refused(dir, words);
+        assert!(
+            text.contains(part) && !dir.join("j").exists(),
+            "{words}: {text}"
+        );
+    }
+    done(dir, "job plan town.glb -o j");
+    done(dir, "job run j");
+    let text = refused(dir, "job finish j --into x.glb -o y.glb");
+    assert!(text.contains("--into is for visibility"), "{text}");
+    assert!(!dir.join("y.glb").exists());
+}
+
+#[test]
+fn a_bake_that_is_killed_goes_on_from_its_pieces() {
+    let dir = &folder("killed-bake");
+    // Merging takes much longer than it takes to notice a piece.
+    let tower = office_tower(&TowerParams::with_rooms(64, 1)).scene;
+    fs::write(dir.join("tower.glb"), export_glb(&tower)).unwrap();
+    done(dir, "bake tower.glb -o alone.glb");
+    let words = "bake tower.glb -o made.glb --checkpoint pieces";
+    let pieces = dir.join("pieces");
+    // On a busy machine a bake may end first: then it is tried again.
+    let is_killed = (0..20).any(|_| {
+        let mut child = command(dir, words)
+            .stderr(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        while child.try_wait().unwrap().is_none() {
+            let n = fs::read_dir(&pieces).map_or(0, Iterator::count);
+            if n > 0 {
+                let _ = child.kill();
+            }
+            thread::yield_now();
+        }
+        !child.wait().unwrap().success() && pieces.exists()
+    });
+    assert!(is_killed && !dir.join("made.glb").exists());
+    fs::write(pieces.join("notes.txt"), "mine").unwrap();
+    done(dir, words);
+    assert!(same(dir, "made.glb", "alone.glb"));
+    // Files of others stay.
+    assert_eq!(fs::read_dir(&pieces).unwrap().count(), 1);
+    // A place where nothing can be kept does not stop a bake.
+    let text = done(dir, "bake tower.glb -o made.glb --checkpoint alone.glb");
+    assert!(text.contains("cannot make the folder"), "{text}");
+    assert!(same(dir, "made.glb", "alone.glb"));
+}
