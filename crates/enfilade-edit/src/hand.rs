@@ -15,6 +15,8 @@ const AT: f64 = 0.05;
 const CRATE: f64 = 0.6;
 /// Name of a crate's mesh and material.
 const CRATE_NAME: &str = "crate";
+/// The look of a crate, as glTF: brown wood.
+const CRATE_LOOK: &str = r#"{"name":"crate","pbrMetallicRoughness":{"baseColorFactor":[0.45,0.28,0.13,1.0],"metallicFactor":0.0}}"#;
 /// The light of a lamp, as glTF: a warm bulb of 10 candela.
 const LAMP: &str = r#"{"type":"point","color":[1.0,0.78,0.5],"intensity":10.0}"#;
 
@@ -236,28 +238,30 @@ fn distance(graph: &CellPortalGraph, portal: PortalId, at: DVec3) -> f64 {
 /// Adds a crate that stands on a point.
 fn add_crate(world: &mut World, at: DVec3, turn: f64) -> Result<(), HandEditError> {
     in_air(world, at + DVec3::Y * (CRATE * 0.5), CRATE_NAME)?;
-    let mesh = match world
-        .detail_meshes
-        .iter()
-        .position(|m| m.name == CRATE_NAME)
-    {
-        Some(known) => known,
-        None => {
-            let material = world.materials.len() as u32;
-            world.materials.push(Material {
-                name: CRATE_NAME.into(),
-                gltf: r#"{"name":"crate","pbrMetallicRoughness":{"baseColorFactor":[0.45,0.28,0.13,1.0],"metallicFactor":0.0}}"#
-                    .into(),
-                base_color: [0.45, 0.28, 0.13, 1.0],
-                ..Material::default()
-            });
-            world.detail_meshes.push(Mesh {
-                name: CRATE_NAME.into(),
-                primitives: vec![crate_box(material)],
-            });
-            world.detail_meshes.len() - 1
-        }
+    let own = crate_box();
+    let is_own = |mesh: &Mesh| {
+        mesh.name == CRATE_NAME
+            && mesh
+                .primitives
+                .first()
+                .is_some_and(|p| p.positions == own.positions)
     };
+    let known = world.detail_meshes.iter().position(is_own);
+    let mesh = known.unwrap_or_else(|| {
+        let material = Some(world.materials.len() as u32);
+        world.materials.push(Material {
+            name: CRATE_NAME.into(),
+            gltf: CRATE_LOOK.into(),
+            base_color: [0.45, 0.28, 0.13, 1.0],
+            ..Material::default()
+        });
+        let primitives = vec![Primitive { material, ..own }];
+        world.detail_meshes.push(Mesh {
+            name: CRATE_NAME.into(),
+            primitives,
+        });
+        world.detail_meshes.len() - 1
+    });
     let pose = Pose::about(DVec3::ZERO, DVec3::Y, turn);
     let transform = DMat4::from_translation(at) * pose.matrix();
     let mut cells = Vec::new();
@@ -265,6 +269,12 @@ fn add_crate(world: &mut World, at: DVec3, turn: f64) -> Result<(), HandEditErro
         let placed = triangle.map(|p| transform.transform_point3(p));
         world.graph.locator.cells_touching(&placed, &mut cells);
     }
+    let n = world.detail_meshes[mesh].primitives[0].indices.len() / 3;
+    for cell in &cells {
+        world.graph.cells[cell.0 as usize].n_detail_triangles += n as u32;
+    }
+    // It may list the objects that are seen.
+    world.pvs = None;
     world.details.push(DetailObject {
         name: CRATE_NAME.into(),
         mesh: mesh as u32,
@@ -277,17 +287,14 @@ fn add_crate(world: &mut World, at: DVec3, turn: f64) -> Result<(), HandEditErro
 }
 
 /// Returns a box that stands on its origin, with flat sides.
-fn crate_box(material: u32) -> Primitive {
+fn crate_box() -> Primitive {
     let half = CRATE * 0.5;
     // Off the floor by less than is seen, so that it only touches its own room.
     let bounds = Aabb::new(
         DVec3::new(-half, 1e-3, -half),
         DVec3::new(half, CRATE, half),
     );
-    let mut out = Primitive {
-        material: Some(material),
-        ..Primitive::default()
-    };
+    let mut out = Primitive::default();
     for triangle in bounds.triangles() {
         let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
         for p in triangle {
