@@ -412,7 +412,10 @@ impl App<'_> {
             Outcome::Quiet(is_taken) => return Ok(is_taken),
             Outcome::Said(words) => open.say(words),
             Outcome::Refused(why) => open.warn(why),
-            Outcome::Go { eye, toward } => open.go(eye, toward),
+            Outcome::Go { eye, toward, words } => {
+                open.go(eye, toward);
+                open.say(words);
+            }
             Outcome::Edited(words) => {
                 self.world = editor.world()?.world;
                 self.lines = Sightlines::build(&self.world);
@@ -523,7 +526,7 @@ impl App<'_> {
 }
 
 /// Returns the ray through the pointer, for the editor.
-fn edit_ray(open: &Open, world: &World, lines: &Sightlines) -> EditRay {
+fn edit_ray<'a>(open: &Open, world: &World, lines: &'a Sightlines) -> EditRay<'a> {
     let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
     let ray = open.pointer();
     let length = vector(ray.toward).length().max(1e-9);
@@ -534,5 +537,6 @@ fn edit_ray(open: &Open, world: &World, lines: &Sightlines) -> EditRay {
         toward: vector(pointed.ray.toward).normalize_or(DVec3::X),
         hit: pointed.hit.map(|h| [vector(h.position), vector(h.normal)]),
         portal: portal.map(|(id, _)| vector(world.graph[id].center())),
+        lines,
     }
 }

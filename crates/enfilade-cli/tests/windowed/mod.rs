@@ -21,7 +21,17 @@ pub(crate) struct Display {
 impl Display {
     /// Opens a display.
     pub(crate) fn open() -> Self {
+        Self::with(&[])
+    }
+
+    /// Opens a display on which a key that is held is not repeated: what a busy machine does late counts once.
+    pub(crate) fn without_repeats() -> Self {
+        Self::with(&["-r"])
+    }
+
+    fn with(options: &[&str]) -> Self {
         let mut server = Command::new("Xvfb")
+            .args(options)
             .args([
                 // Otherwise the server restarts when its first client disconnects, and closes the window.
                 "-noreset",

@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use enfilade::geom::{DQuat, DVec3};
 use enfilade::kit::{Assembly, End, InstanceId, Link};
+use enfilade::runtime::Sightlines;
 use enfilade::world::Pose;
 
 /// Distance up to which doorways are aimed at. [Units: wu]
@@ -19,8 +20,8 @@ const INTO: f64 = 0.25;
 const SKIN: f64 = 0.02;
 
 /// A ray from the eye through the pointer.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct EditRay {
+#[derive(Clone, Copy)]
+pub(crate) struct EditRay<'a> {
     pub(crate) eye: DVec3,
     /// Unit vector.
     pub(crate) toward: DVec3,
@@ -28,9 +29,11 @@ pub(crate) struct EditRay {
     pub(crate) hit: Option<[DVec3; 2]>,
     /// Middle of the portal there.
     pub(crate) portal: Option<DVec3>,
+    /// The walls.
+    pub(crate) lines: &'a Sightlines,
 }
 
-impl EditRay {
+impl EditRay<'_> {
     fn wall(&self) -> f64 {
         self.hit.map_or(REACH, |[at, _]| at.distance(self.eye))
     }
@@ -63,7 +66,11 @@ impl EditRay {
 }
 
 /// Returns the open end that a ray points at: the first whose outline it passes before any wall. Those of `except` do not count.
-pub(super) fn end_at(level: &Assembly, ray: &EditRay, except: Option<InstanceId>) -> Option<End> {
+pub(super) fn end_at(
+    level: &Assembly,
+    ray: &EditRay<'_>,
+    except: Option<InstanceId>,
+) -> Option<End> {
     let ends = level.open_ends().filter(|e| Some(e.instance) != except);
     let hit = ends.filter_map(|end| {
         let pose = level.standing(end.instance).ok()?.pose;
@@ -113,7 +120,7 @@ pub(super) fn pose_at_end(
 }
 
 /// Returns the pose of a piece that is put nowhere: on the surface there, or on the ground before the eye.
-pub(super) fn pose_anywhere(ray: &EditRay, turn: i32) -> Pose {
+pub(super) fn pose_anywhere(ray: &EditRay<'_>, turn: i32) -> Pose {
     let floor = ray.hit.filter(|[_, normal]| normal.y > 0.7);
     let ground = || {
         let t = ray.meets(DVec3::ZERO, DVec3::Y).filter(|t| *t < REACH);
@@ -156,23 +163,38 @@ pub(super) fn turned(level: &Assembly, id: InstanceId) -> Option<Pose> {
     Some(host.after(&its.meeting(&own[next].mouth, 0.0)))
 }
 
-/// Returns the upright rectangle between two opposite vertices of a portal, somewhat larger.
+/// Returns the upright rectangle through two opposite vertices of a portal, out to the walls around it, and somewhat into them.
 ///
 /// # Errors
 ///
 /// If the vertices are above each other, or at one height.
-pub(super) fn portal_rectangle([a, b]: [DVec3; 2]) -> Result<Vec<DVec3>, String> {
+pub(super) fn portal_rectangle(
+    [a, b]: [DVec3; 2],
+    lines: &Sightlines,
+) -> Result<Vec<DVec3>, String> {
     let along = DVec3::new(b.x - a.x, 0.0, b.z - a.z);
     if along.length() < 0.1 || (b.y - a.y).abs() < 0.1 {
         return Err(
             "the two corners must differ in place and in height, as the foot of one wall and the head of another".into(),
         );
     }
-    let out = along.normalize() * INTO;
-    let [low, high] = [a.y.min(b.y) - INTO, a.y.max(b.y) + INTO];
-    let [p, q] = [a - out, b + out];
-    let at = |p: DVec3, y: f64| DVec3::new(p.x, y, p.z);
-    Ok(vec![at(p, low), at(q, low), at(q, high), at(p, high)])
+    let (middle, out) = ((a + b) * 0.5, along.normalize());
+    // Where there is no wall, as out of a doorway, it ends at the vertices.
+    let reach = |toward: DVec3, least: f64| {
+        let [from, to] = [middle, middle + toward * REACH].map(|p| p.as_vec3().to_array());
+        let hit = lines.first_hit(from, to);
+        hit.map_or(least, |hit| least.max(hit.t * REACH)) + INTO
+    };
+    let [half, rise] = [along.length() * 0.5, (b.y - a.y).abs() * 0.5];
+    let [back, ahead] = [-out, out].map(|toward| reach(toward, half));
+    let [down, up] = [DVec3::NEG_Y, DVec3::Y].map(|toward| reach(toward, rise));
+    let at = |along: f64, up: f64| middle + out * along + DVec3::Y * up;
+    Ok(vec![
+        at(-back, -down),
+        at(ahead, -down),
+        at(ahead, up),
+        at(-back, up),
+    ])
 }
 
 /// Returns the rectangle between two opposite vertices in a plane, upright if the plane is.
@@ -198,15 +220,36 @@ pub(super) fn rectangle_in([a, b]: [DVec3; 2], normal: DVec3) -> Result<Vec<DVec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use enfilade::World;
+    use enfilade_testkit::{GridParams, room_grid};
 
     #[test]
     fn rectangles_are_upright_and_flat_and_portals_reach_into_walls() {
         let [a, b] = [DVec3::new(0.0, 0.0, 1.0), DVec3::new(2.0, 3.0, 1.0)];
-        let portal = portal_rectangle([a, b]).unwrap();
-        assert_eq!(portal[0], DVec3::new(-INTO, -INTO, 1.0));
-        assert_eq!(portal[2], DVec3::new(2.0 + INTO, 3.0 + INTO, 1.0));
-        assert!(portal_rectangle([a, a + DVec3::Y]).is_err());
-        assert!(portal_rectangle([a, a + DVec3::X]).is_err());
+        let empty = Sightlines::build(&World::default());
+        let portal = portal_rectangle([a, b], &empty).unwrap();
+        assert!(portal[0].distance(DVec3::new(-INTO, -INTO, 1.0)) < 1e-9);
+        assert!(portal[2].distance(DVec3::new(2.0 + INTO, 3.0 + INTO, 1.0)) < 1e-9);
+        assert!(portal_rectangle([a, a + DVec3::Y], &empty).is_err());
+        assert!(portal_rectangle([a, a + DVec3::X], &empty).is_err());
+        // In a room, it reaches into all walls.
+        let room = room_grid(&GridParams {
+            size: [1, 1, 1],
+            doors: 0.0,
+            windows: 0.0,
+            furniture: 0,
+            ..GridParams::offices(1, 1)
+        });
+        let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+        let [low, high] = room.graph.cells[0].aabb.map(vector);
+        let middle = (low + high) * 0.5;
+        let by = DVec3::new(0.3, 0.4, 0.0);
+        let lines = Sightlines::build(&room);
+        let portal = portal_rectangle([middle - by, middle + by], &lines).unwrap();
+        let into = DVec3::new(INTO, INTO, 0.0);
+        let corner = |p: DVec3| DVec3::new(p.x, p.y, middle.z);
+        assert!(portal[0].distance(corner(low) - into) < 1e-3, "{portal:?}");
+        assert!(portal[2].distance(corner(high) + into) < 1e-3, "{portal:?}");
         let wall = rectangle_in([b, a], DVec3::Z).unwrap();
         assert!(wall.iter().all(|p| p.z == 1.0));
         assert_eq!((wall[1].x, wall[1].y, wall[3].y), (0.0, 3.0, 0.0));
@@ -222,6 +265,7 @@ mod tests {
             toward: DVec3::new(0.0, -1.0, -2.0).normalize(),
             hit: None,
             portal: None,
+            lines: &Sightlines::build(&World::default()),
         };
         let pose = pose_anywhere(&ray, 6);
         assert!(pose.at.distance(DVec3::new(0.0, 0.0, -4.0)) < 1e-9);

@@ -31,6 +31,8 @@ pub(crate) enum EditKey {
     OnOff,
     /// Takes the tool of a number.
     Choose(usize),
+    /// Takes a tool of those by hand.
+    ByHand(usize),
     /// Takes the next tool, or the one before.
     Step(i32),
     Turn(i32),
@@ -63,6 +65,7 @@ pub(crate) enum Outcome {
     Go {
         eye: DVec3,
         toward: DVec3,
+        words: String,
     },
 }
 
@@ -218,7 +221,7 @@ impl Editor {
     }
 
     /// Finds what the pointer means.
-    pub(crate) fn look(&mut self, ray: &EditRay) {
+    pub(crate) fn look(&mut self, ray: &EditRay<'_>) {
         self.aim = Aim::default();
         if !self.is_on {
             return;
@@ -238,7 +241,7 @@ impl Editor {
     }
 
     /// Aims a new piece, or one that is moved.
-    fn aim_piece(&self, ray: &EditRay, moved: Option<InstanceId>) -> Aim {
+    fn aim_piece(&self, ray: &EditRay<'_>, moved: Option<InstanceId>) -> Aim {
         let level = self.session.level();
         let number = match (moved, self.tool()) {
             (Some(id), _) => level.standing(id).map_or(0, |i| i.piece),
@@ -269,7 +272,7 @@ impl Editor {
     }
 
     /// Aims the next vertex of a polygon.
-    fn aim_polygon(&self, ray: &EditRay) -> Aim {
+    fn aim_polygon(&self, ray: &EditRay<'_>) -> Aim {
         let is_mirror = self.tool() == Tool::Mirror;
         let Some([at, _]) = ray.hit else {
             return Aim {
@@ -278,10 +281,10 @@ impl Editor {
             };
         };
         let (Some(first), true) = (self.corners.first(), is_mirror) else {
-            return self.with_corner(at);
+            return self.with_corner(at, ray);
         };
         match ray.on_plane(*first, self.normal) {
-            Some(at) => self.with_corner(at),
+            Some(at) => self.with_corner(at, ray),
             None => Aim {
                 refused: Some("the wall of the mirror is not there".into()),
                 ..Aim::default()
@@ -289,10 +292,10 @@ impl Editor {
         }
     }
 
-    fn with_corner(&self, at: DVec3) -> Aim {
+    fn with_corner(&self, at: DVec3, ray: &EditRay<'_>) -> Aim {
         let mut corners = self.corners.clone();
         corners.push(at);
-        let polygon = self.polygon(&corners).unwrap_or(corners);
+        let polygon = self.polygon(&corners, ray).unwrap_or(corners);
         Aim {
             polygon,
             point: Some(at),
@@ -301,9 +304,9 @@ impl Editor {
     }
 
     /// Returns the polygon of some vertices: two are the vertices of a rectangle.
-    fn polygon(&self, corners: &[DVec3]) -> Result<Vec<DVec3>, String> {
+    fn polygon(&self, corners: &[DVec3], ray: &EditRay<'_>) -> Result<Vec<DVec3>, String> {
         match (corners, self.tool()) {
-            (&[a, b], Tool::Portal) => portal_rectangle([a, b]),
+            (&[a, b], Tool::Portal) => portal_rectangle([a, b], ray.lines),
             (&[a, b], _) => rectangle_in([a, b], self.normal),
             (corners, _) if corners.len() > 2 => Ok(corners.to_vec()),
             _ => Err("a polygon needs two vertices at least".into()),
@@ -311,7 +314,7 @@ impl Editor {
     }
 
     /// Aims a lamp, a crate or a door.
-    fn aim_point(&self, ray: &EditRay, tool: Tool) -> Aim {
+    fn aim_point(&self, ray: &EditRay<'_>, tool: Tool) -> Aim {
         let refused = |words: &str| Aim {
             refused: Some(words.to_owned()),
             ..Aim::default()
@@ -387,7 +390,7 @@ impl Editor {
     }
 
     /// Does what a key means.
-    pub(crate) fn press(&mut self, key: EditKey, ray: &EditRay) -> Outcome {
+    pub(crate) fn press(&mut self, key: EditKey, ray: &EditRay<'_>) -> Outcome {
         if key == EditKey::OnOff {
             self.is_on = !self.is_on;
             let now = if self.is_on { "on" } else { "off" };
@@ -401,13 +404,14 @@ impl Editor {
             EditKey::OnOff => {}
             EditKey::Choose(at) if at < self.tools.len() => self.choose(at),
             EditKey::Choose(_) => {}
+            EditKey::ByHand(at) => self.choose(self.tools.len() - Tool::BY_HAND.len() + at),
             EditKey::Step(by) => {
                 let n = self.tools.len() as i32;
                 self.choose((self.chosen as i32 + by).rem_euclid(n) as usize);
             }
             EditKey::Turn(by) => self.turn += by,
             EditKey::Use { more } => return self.use_tool(more, ray),
-            EditKey::Finish => return self.finish(),
+            EditKey::Finish => return self.finish(ray),
             EditKey::Grab => return self.grab(ray),
             EditKey::TurnThere => return self.turn_there(ray),
             EditKey::Delete => return self.delete(ray),
@@ -430,7 +434,7 @@ impl Editor {
         self.corners.clear();
     }
 
-    fn use_tool(&mut self, more: bool, ray: &EditRay) -> Outcome {
+    fn use_tool(&mut self, more: bool, ray: &EditRay<'_>) -> Outcome {
         if let Some(why) = &self.aim.refused {
             return Outcome::Refused(why.clone());
         }
@@ -443,7 +447,7 @@ impl Editor {
             }
             self.corners.push(at);
             return if self.corners.len() == 2 && !more {
-                self.finish()
+                self.finish(ray)
             } else {
                 let n = self.corners.len();
                 Outcome::Said(format!("vertex {n}; Shift adds more, and Enter ends them"))
@@ -472,12 +476,12 @@ impl Editor {
     }
 
     /// Makes the polygon that is drawn.
-    fn finish(&mut self) -> Outcome {
+    fn finish(&mut self, ray: &EditRay<'_>) -> Outcome {
         let corners = std::mem::take(&mut self.corners);
         if corners.is_empty() {
             return Outcome::Quiet(false);
         }
-        let polygon = match self.polygon(&corners) {
+        let polygon = match self.polygon(&corners, ray) {
             Ok(polygon) => polygon,
             Err(why) => return Outcome::Refused(why),
         };
@@ -544,6 +548,7 @@ impl Editor {
         Outcome::Go {
             eye: frame.at + up - out * BACK,
             toward: out,
+            words: format!("before {}", shown(&level.end_name(end))),
         }
     }
 }

@@ -7,7 +7,8 @@ use super::editor::EditKey;
 /// Lines of the help about editing.
 pub(crate) const EDIT_HELP: &str = "\
 B              edit, or only walk
-1 to 9, wheel  take a tool of the palette; [ ]: the next
+1 to 9, wheel  take a piece of the palette; [ ]: the next
+F6 to F10      portal, door, mirror, lamp, crate
 click          place it; Shift+click, Enter: more vertices
 , .            turn what is in hand
 V, G, X        turn, move, take away what is there
@@ -30,6 +31,16 @@ pub(crate) fn edit_key(code: KeyCode) -> Option<EditKey> {
     ];
     if let Some(at) = DIGITS.iter().position(|d| *d == code) {
         return Some(EditKey::Choose(at));
+    }
+    const BY_HAND: [KeyCode; 5] = [
+        KeyCode::F6,
+        KeyCode::F7,
+        KeyCode::F8,
+        KeyCode::F9,
+        KeyCode::F10,
+    ];
+    if let Some(at) = BY_HAND.iter().position(|d| *d == code) {
+        return Some(EditKey::ByHand(at));
     }
     Some(match code {
         KeyCode::KeyB => EditKey::OnOff,

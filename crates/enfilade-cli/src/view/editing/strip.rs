@@ -66,10 +66,11 @@ impl Strip {
         let first = first.min(self.entries.len() - n.min(self.entries.len()));
         let left = screen.left() + BESIDE[0].min(screen.width() * 0.5 - ENTRY.x * 0.5);
         let top = screen.bottom() - ENTRY.y - 10.0;
+        let n_pieces = self.entries.iter().filter(|e| e.is_piece).count();
         for (k, entry) in self.entries.iter_mut().enumerate().skip(first).take(n) {
             let at = Pos2::new(left + (k - first) as f32 * ENTRY.x, top);
             let rect = Rect::from_min_size(at, ENTRY - Vec2::new(6.0, 0.0));
-            entry.draw(painter, rect, k, k == shown.chosen);
+            entry.draw(painter, rect, [k, n_pieces], k == shown.chosen);
         }
         let font = egui::FontId::proportional(14.0);
         let [done, undone] = shown.n_steps;
@@ -92,7 +93,13 @@ impl Strip {
 }
 
 impl StripEntry {
-    fn draw(&mut self, painter: &egui::Painter, rect: Rect, number: usize, is_chosen: bool) {
+    fn draw(
+        &mut self,
+        painter: &egui::Painter,
+        rect: Rect,
+        [number, n_pieces]: [usize; 2],
+        is_chosen: bool,
+    ) {
         let ground = if is_chosen {
             Color32::from_rgb(40, 90, 50)
         } else {
@@ -128,9 +135,10 @@ impl StripEntry {
             painter.rect_stroke(rect, 4.0, stroke, egui::StrokeKind::Inside);
         }
         let font = egui::FontId::proportional(12.0);
-        let key = match number {
-            0..9 => format!("{} ", number + 1),
-            _ => String::new(),
+        let key = match (self.is_piece, number) {
+            (true, 0..9) => format!("{} ", number + 1),
+            (true, _) => String::new(),
+            (false, _) => format!("F{} ", 6 + number - n_pieces),
         };
         let at = Pos2::new(rect.center().x, rect.bottom() - 4.0);
         let text = format!("{key}{}", enfilade::geom::shown(&self.name));

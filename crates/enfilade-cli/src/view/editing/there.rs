@@ -13,14 +13,14 @@ const NEAR: f64 = 0.6;
 
 impl Editor {
     /// Returns the piece there, or the one through whose open doorway the pointer leads outdoors.
-    fn piece_at(&self, ray: &EditRay) -> Option<InstanceId> {
+    fn piece_at(&self, ray: &EditRay<'_>) -> Option<InstanceId> {
         let level = self.session.level();
         let through = || end_at(level, ray, None).map(|end| end.instance);
         ray.instance(level).or_else(through)
     }
 
     /// Takes the piece there in hand, or leaves it.
-    pub(super) fn grab(&mut self, ray: &EditRay) -> Outcome {
+    pub(super) fn grab(&mut self, ray: &EditRay<'_>) -> Outcome {
         if self.grabbed.take().is_some() {
             return Outcome::Said("left where it was".into());
         }
@@ -36,7 +36,7 @@ impl Editor {
     }
 
     /// Turns the piece there.
-    pub(super) fn turn_there(&mut self, ray: &EditRay) -> Outcome {
+    pub(super) fn turn_there(&mut self, ray: &EditRay<'_>) -> Outcome {
         let Some(id) = self.piece_at(ray) else {
             return Outcome::Refused("no piece there".into());
         };
@@ -48,7 +48,7 @@ impl Editor {
     }
 
     /// Takes away what is there, as the tool in hand means it.
-    pub(super) fn delete(&mut self, ray: &EditRay) -> Outcome {
+    pub(super) fn delete(&mut self, ray: &EditRay<'_>) -> Outcome {
         match self.tool() {
             Tool::Piece(_) => match self.piece_at(ray) {
                 Some(id) => {
@@ -65,7 +65,7 @@ impl Editor {
     }
 
     /// Deletes the portal there: takes it away if it was drawn, or else joins its two cells.
-    fn delete_portal(&mut self, ray: &EditRay) -> Outcome {
+    fn delete_portal(&mut self, ray: &EditRay<'_>) -> Outcome {
         let Some(at) = ray.portal else {
             return Outcome::Refused("no portal there".into());
         };
@@ -86,7 +86,7 @@ impl Editor {
     }
 
     /// Takes away the change by hand of a kind that is nearest to the pointer.
-    fn delete_nearest(&mut self, ray: &EditRay, word: &str) -> Outcome {
+    fn delete_nearest(&mut self, ray: &EditRay<'_>, word: &str) -> Outcome {
         let edits = self.session.hand_edits().iter().enumerate();
         let placed = edits.filter_map(|(number, edit)| {
             let kind = self.session.placed(edit).ok()?;

@@ -15,17 +15,19 @@ pub(super) enum Tool {
 }
 
 impl Tool {
+    /// The changes by hand, F6 to F10.
+    pub(super) const BY_HAND: [Self; 5] = [
+        Self::Portal,
+        Self::Door,
+        Self::Mirror,
+        Self::Lamp,
+        Self::Crate,
+    ];
+
     /// Returns the tools of a palette: pieces first.
     pub(super) fn all(kit: &Kit, takes_pieces: bool) -> Vec<Self> {
         let n = if takes_pieces { kit.pieces().len() } else { 0 };
-        let by_hand = [
-            Self::Portal,
-            Self::Door,
-            Self::Mirror,
-            Self::Lamp,
-            Self::Crate,
-        ];
-        (0..n).map(Self::Piece).chain(by_hand).collect()
+        (0..n).map(Self::Piece).chain(Self::BY_HAND).collect()
     }
 
     pub(super) fn name(self, kit: &Kit) -> String {
@@ -52,7 +54,7 @@ impl Tool {
         match self {
             Self::Piece(_) => "click: place it; , .: turn it",
             Self::Portal => {
-                "click two opposite corners of an upright rectangle, on walls or floor; X: delete the portal there"
+                "click two corners of an upright rectangle, which reaches out to the walls; X: delete the portal there"
             }
             Self::Door => "click a doorway: a door, or none",
             Self::Mirror => "click two opposite corners on a wall; X: delete the mirror there",
