@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 22] = [
+const FENCES: [Fence; 23] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -122,6 +122,18 @@ const FENCES: [Fence; 22] = [
         words: &["std::fs", "std::thread", "std::time"],
     },
     Fence {
+        name: "enfilade-edit",
+        siblings: &[
+            "enfilade-geom",
+            "enfilade-cpg",
+            "enfilade-bake",
+            "enfilade-kit",
+            "enfilade-world",
+        ],
+        not: &["rayon", "anyhow", "serde_json", "toml"],
+        words: &["std::thread", "std::time"],
+    },
+    Fence {
         name: "enfilade-stream",
         siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-runtime"],
         not: &["rayon", "anyhow"],
@@ -157,6 +169,7 @@ const FENCES: [Fence; 22] = [
             "enfilade-cpg",
             "enfilade-import",
             "enfilade-bake",
+            "enfilade-edit",
             "enfilade-kit",
             "enfilade-runtime",
             "enfilade-render",

@@ -75,7 +75,7 @@ enum What {
         scene: String,
     },
     /// Levels put together from pieces: a row per figure, with the value that it must reach. Rows: stitched, speed, memory, city,
-    /// bad input.
+    /// local rebuild, undo, bad input.
     Constructive(Chosen),
     /// A measurement of `constructive`, in a process of its own.
     #[command(hide = true)]

@@ -1,147 +1,19 @@
 //! `view`, in a window on its own display: keys and clicks as a user would give them.
 #![cfg(all(target_os = "linux", feature = "view"))]
 
+mod windowed;
+
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, channel};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::io::Read;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::time::Instant;
 
 use enfilade::stream::PackedWorld;
 use enfilade_cpg::World;
 use enfilade_cpg::wire::encode_glb;
 use enfilade_testkit::{GridParams, room_grid};
-
-/// Software draws slowly on a busy machine; a missing answer still fails.
-const PATIENCE: Duration = Duration::from_secs(120);
-
-/// A display that ends with the test.
-struct Display {
-    server: Child,
-    name: String,
-}
-
-impl Display {
-    fn open() -> Self {
-        let mut server = Command::new("Xvfb")
-            .args([
-                // Otherwise the server restarts when its first client disconnects, and closes the window.
-                "-noreset",
-                "-displayfd",
-                "1",
-                "-screen",
-                "0",
-                "640x480x24",
-                "-nolisten",
-                "tcp",
-            ])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("Xvfb starts");
-        let mut number = String::new();
-        let out = server.stdout.take().expect("its output is piped");
-        BufReader::new(out)
-            .read_line(&mut number)
-            .expect("it says its number");
-        let name = format!(":{}", number.trim());
-        assert!(name.len() > 1, "Xvfb found no display");
-        Self { server, name }
-    }
-
-    fn tool(&self, args: &[&str]) -> bool {
-        Command::new("xdotool")
-            .args(args)
-            .env("DISPLAY", &self.name)
-            .output()
-            .expect("xdotool runs")
-            .status
-            .success()
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        // Ignore the error if it has ended already.
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
-/// The window's process, and its standard error.
-struct Viewer {
-    process: Child,
-    said: Receiver<String>,
-}
-
-impl Viewer {
-    fn open(display: &Display, dir: &Path, world: &str, args: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_enfilade"))
-            .args(["view", world, "--size", "320x240", "--adapter", "software"])
-            .args(args)
-            .current_dir(dir)
-            .env("DISPLAY", &display.name)
-            .env_remove("WAYLAND_DISPLAY")
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("it starts");
-        let stderr = process.stderr.take().expect("it is piped");
-        let (sender, said) = channel();
-        std::thread::spawn(move || {
-            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                if sender.send(line).is_err() {
-                    break;
-                }
-            }
-        });
-        Self { process, said }
-    }
-
-    fn heard(&self) -> Vec<String> {
-        self.said.try_iter().collect()
-    }
-
-    /// Waits for a line with `words` in it.
-    fn wait_to_hear(&self, words: &str) -> String {
-        let heard = self.hear_until(words);
-        heard.lines().last().unwrap_or_default().to_owned()
-    }
-
-    /// All lines up to the first with `words` in it.
-    fn hear_until(&self, words: &str) -> String {
-        let end = Instant::now() + PATIENCE;
-        let mut all = String::new();
-        while Instant::now() < end {
-            if let Ok(line) = self.said.recv_timeout(Duration::from_millis(200)) {
-                all += &line;
-                all += "\n";
-                if line.contains(words) {
-                    return all;
-                }
-            }
-        }
-        panic!("it did not say `{words}` but: {all}");
-    }
-
-    fn ends(mut self) -> ExitStatus {
-        let end = Instant::now() + PATIENCE;
-        while Instant::now() < end {
-            if let Some(status) = self.process.try_wait().expect("it is ours") {
-                return status;
-            }
-            sleep(Duration::from_millis(50));
-        }
-        let _ = self.process.kill();
-        panic!("it did not close");
-    }
-}
-
-fn has(tool: &str) -> bool {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).any(|dir| dir.join(tool).is_file())
-}
+use windowed::{Display, PATIENCE, Viewer, WINDOW, can_open_windows, eyes_along_x, folder};
 
 /// A place in front of a doorway that faces along +x.
 fn before_a_doorway(world: &World) -> [f32; 3] {
@@ -161,56 +33,32 @@ fn before_a_doorway(world: &World) -> [f32; 3] {
     [x - 1.2, y + 0.5, z]
 }
 
-/// The x of each recorded eye.
-fn eyes_along_x(path: &Path) -> Vec<f64> {
-    let text = fs::read_to_string(path).unwrap();
-    let lines = text.lines().filter(|l| !l.starts_with('#'));
-    lines
-        .map(|l| l.split(' ').next().unwrap().parse().unwrap())
-        .collect()
-}
-
-fn folder() -> PathBuf {
-    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("window");
-    if dir.exists() {
-        fs::remove_dir_all(&dir).unwrap();
-    }
-    fs::create_dir_all(&dir).unwrap();
-    dir
-}
-
 #[test]
 fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
-    if !(has("Xvfb") && has("xdotool")) {
-        // `cargo xtask test` installs them, and does not let the test pass without.
-        assert!(
-            std::env::var_os("ENFILADE_NEEDS_WINDOW").is_none(),
-            "Xvfb or xdotool is missing"
-        );
-        eprintln!("skipped: no Xvfb and xdotool, which the window is tried with");
+    if !can_open_windows() {
         return;
     }
-    let dir = folder();
+    let dir = folder("window");
     let world = room_grid(&GridParams::offices(24, 1));
     fs::write(dir.join("world.glb"), encode_glb(&world).unwrap()).unwrap();
     let eye = before_a_doorway(&world).map(|x| x.to_string()).join(",");
     fs::create_dir_all(dir.join("walk.txt")).unwrap();
     let display = Display::open();
-    let args = ["--eye", &eye, "--record", "walk.txt", "--free-mouse"];
-    let mut viewer = Viewer::open(&display, &dir, "world.glb", &args);
-    let window = ["search", "--onlyvisible", "--name", "enfilade"];
-    let end = Instant::now() + PATIENCE;
-    while !display.tool(&window) {
-        if let Some(status) = viewer.process.try_wait().expect("it is ours") {
-            panic!("it ended at once, {status}: {:?}", viewer.heard());
-        }
-        assert!(Instant::now() < end, "no window: {:?}", viewer.heard());
-        sleep(Duration::from_millis(100));
-    }
+    let args = [
+        "--eye",
+        &eye,
+        "--record",
+        "walk.txt",
+        "--free-mouse",
+        "--size",
+        "320x240",
+    ];
+    let mut viewer = Viewer::open(&display, &dir, Some("world.glb"), &args);
+    viewer.wait_for_window(&display);
     // F12 goes down while the pointer is at no window, and stays down until the server repeats it: it is not pressed
     // in the window that gets the focus meanwhile.
     assert!(display.tool(&["mousemove", "639", "479", "keydown", "F12"]));
-    assert!(display.tool(&[&window[..], &["windowfocus"]].concat()));
+    assert!(display.tool(&[&WINDOW[..], &["windowfocus"]].concat()));
     assert!(display.tool(&["sleep", "1.5", "keyup", "F12"]));
     let key = |name: &str| assert!(display.tool(&["key", name]));
     key("Tab");
@@ -279,18 +127,28 @@ fn a_window_opens_closes_a_door_walks_records_and_walks_again() {
     assert_eq!(viewer.ends().code(), Some(0));
 
     // Repeats the walk, and closes at its end by itself.
-    let again = Viewer::open(&display, &dir, "world.glb", &["--path", "walk.txt"]);
+    let again = Viewer::open(
+        &display,
+        &dir,
+        Some("world.glb"),
+        &["--path", "walk.txt", "--size", "320x240"],
+    );
     assert_eq!(again.ends().code(), Some(0));
 
     // The same from pieces, and by foot.
     let packed = PackedWorld::pack(&encode_glb(&world).unwrap()).unwrap();
     fs::write(dir.join("world.enf"), packed.one_file().unwrap()).unwrap();
-    let args = ["--path", "walk.txt", "--memory", "64"];
-    let again = Viewer::open(&display, &dir, "world.enf", &args);
+    let args = ["--path", "walk.txt", "--memory", "64", "--size", "320x240"];
+    let again = Viewer::open(&display, &dir, Some("world.enf"), &args);
     assert_eq!(again.ends().code(), Some(0));
-    let viewer = Viewer::open(&display, &dir, "world.enf", &["--eye", &eye]);
+    let viewer = Viewer::open(
+        &display,
+        &dir,
+        Some("world.enf"),
+        &["--eye", &eye, "--size", "320x240"],
+    );
     viewer.wait_to_hear("the mouse is captured");
-    assert!(display.tool(&[&window[..], &["windowfocus"]].concat()));
+    assert!(display.tool(&[&WINDOW[..], &["windowfocus"]].concat()));
     key("F12");
     viewer.wait_to_hear("wrote shot-");
     assert!(

@@ -3,36 +3,40 @@
 //! After Gjørup 1999, section 3.3.3: a world is built of instances of a few hundred prototype segments whose portals snap to
 //! each other. His portals snap on a grid; here, they snap to each other, in any direction.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
-use enfilade_geom::{Aabb, DVec3, LooseGrid};
+use enfilade_geom::{Aabb, DVec3};
 use enfilade_world::Pose;
 
 use crate::error::PlaceError;
-use crate::instance::{End, Instance, InstanceId, Instances, Link, PlaceOptions};
-use crate::kit::{DEFAULT_TOLERANCE, Kit};
-use crate::meet::{Links, Rules, meetings};
+use crate::instance::{End, Instance, InstanceId, Link, PlaceOptions};
+use crate::kit::Kit;
 use crate::piece::Piece;
+use crate::state::{LevelState, Relinked};
 
-/// A change, with what is needed to take it back.
+/// A change, with what is needed to take it back and to make it again.
 #[derive(Clone, Debug)]
-enum Step {
-    /// The last instance was placed.
-    Placed,
+struct Step {
+    change: Change,
+    /// Links of instances other than the one placed or removed.
+    relinked: Vec<Relinked>,
+}
+
+#[derive(Clone, Debug)]
+enum Change {
+    /// The last instance was placed. It is held here while that is taken back.
+    Placed(Option<Instance>),
     Removed(InstanceId),
+    /// Moved from one pose to the other.
+    Moved(InstanceId, [Pose; 2]),
 }
 
 /// Instances of the pieces of a kit.
 #[derive(Clone, Debug)]
 pub struct Assembly {
-    tolerance: f64,
-    instances: Instances,
-    grid: LooseGrid,
-    by_name: HashMap<String, InstanceId>,
+    state: LevelState,
     done: Vec<Step>,
-    undone: Vec<(Step, Option<Instance>)>,
-    n_standing: usize,
+    undone: Vec<Step>,
 }
 
 impl Assembly {
@@ -40,35 +44,28 @@ impl Assembly {
     #[must_use]
     pub fn new(kit: impl Into<Arc<Kit>>) -> Self {
         Self {
-            tolerance: DEFAULT_TOLERANCE,
-            instances: Instances {
-                kit: kit.into(),
-                all: Vec::new(),
-            },
-            grid: LooseGrid::default(),
-            by_name: HashMap::new(),
+            state: LevelState::new(kit.into()),
             done: Vec::new(),
             undone: Vec::new(),
-            n_standing: 0,
         }
     }
 
     /// Sets the most that outlines may differ to fit, that openings may be apart to be joined, and that instances may overlap, for
     /// what is placed from now on. [Units: wu] [Limit: above 0] [Default: [`DEFAULT_TOLERANCE`]]
     pub fn set_tolerance(&mut self, tolerance: f64) {
-        self.tolerance = tolerance;
+        self.state.tolerance = tolerance;
     }
 
     /// Returns the kit.
     #[must_use]
     pub fn kit(&self) -> &Arc<Kit> {
-        &self.instances.kit
+        &self.state.instances.kit
     }
 
     /// Returns the most that openings may differ and be apart to be joined. [Units: wu]
     #[must_use]
     pub fn tolerance(&self) -> f64 {
-        self.tolerance
+        self.state.tolerance
     }
 
     /// Places an instance at a pose, where no opening needs to meet another.
@@ -83,42 +80,40 @@ impl Assembly {
         pose: Pose,
         options: &PlaceOptions,
     ) -> Result<InstanceId, PlaceError> {
-        if piece >= self.kit().pieces().len() {
-            return Err(PlaceError::NoPiece(piece.to_string()));
-        }
-        if !pose.is_rigid() {
-            return Err(PlaceError::NotRigid);
-        }
-        let up = pose.direction(DVec3::Y).angle_between(DVec3::Y);
-        if up > 1e-6 && !options.tilt {
-            let piece = self.kit().pieces()[piece].name().to_owned();
-            return Err(PlaceError::Tilted {
-                piece,
-                degrees: up.to_degrees(),
-            });
-        }
         let name = match &options.name {
-            Some(name) if self.by_name.contains_key(name) => {
+            Some(name) if self.state.by_name.contains_key(name) => {
                 return Err(PlaceError::NamedTwice(name.clone()));
             }
             Some(name) => name.clone(),
-            None => self.free_name(piece),
+            None => self.state.free_name(piece),
         };
-        let bounds = self.bounds(piece, &pose);
-        let links = self.meetings(piece, &pose, &self.near(&bounds), options.overlap)?;
-        self.undone.clear();
-        self.done.push(Step::Placed);
-        self.stand(Instance {
+        let links = self.state.links_at(piece, &pose, options)?;
+        let id = InstanceId(self.state.instances.all.len() as u32);
+        let relinked = self.state.links_to(id, &links);
+        self.state.stand(Instance {
             piece,
             name,
             pose,
-            links: links.own.clone(),
+            links: links.own,
             overlaps: options.overlap,
             is_standing: true,
         });
-        let id = InstanceId(self.instances.all.len() as u32 - 1);
-        self.link(id, &links);
+        self.made(Change::Placed(None), relinked);
         Ok(id)
+    }
+
+    /// Checks that [`Assembly::put`] would place a piece at a pose, as for a preview.
+    ///
+    /// # Errors
+    ///
+    /// As [`Assembly::put`], except for names.
+    pub fn fits(
+        &self,
+        piece: usize,
+        pose: &Pose,
+        options: &PlaceOptions,
+    ) -> Result<(), PlaceError> {
+        self.state.links_at(piece, pose, options).map(|_| ())
     }
 
     /// Places an instance so that its attachment meets that of another.
@@ -186,7 +181,7 @@ impl Assembly {
                 });
             }
             Link::Blocked(other) => {
-                let by = self.instances.all[other.idx()].name.clone();
+                let by = self.state.instances.all[other.idx()].name.clone();
                 return Err(PlaceError::Used {
                     end: self.end_name(onto),
                     by,
@@ -195,7 +190,7 @@ impl Assembly {
         }
         let its = &pieces[host.piece].attachments()[onto.attachment];
         let by = its.mouth.misfit(&end.mouth, spin);
-        if by > self.tolerance {
+        if by > self.state.tolerance {
             return Err(PlaceError::DoesNotFit {
                 end: format!("{}.{}", own.name(), end.name),
                 size: end.mouth.size(),
@@ -253,85 +248,100 @@ impl Assembly {
     /// If there is no such instance.
     pub fn remove(&mut self, id: InstanceId) -> Result<(), PlaceError> {
         self.standing(id)?;
-        self.fall(id);
-        self.undone.clear();
-        self.done.push(Step::Removed(id));
+        let relinked = self.state.fall(id);
+        self.made(Change::Removed(id), relinked);
+        Ok(())
+    }
+
+    /// Moves an instance to another pose. It keeps its number and name, and may overlap others if it did so before.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such instance, or for the reasons of [`Assembly::put`]. Nothing changes then.
+    pub fn move_to(&mut self, id: InstanceId, pose: Pose, tilt: bool) -> Result<(), PlaceError> {
+        let from = self.standing(id)?.pose;
+        let relinked = self.state.moved(id, &pose, tilt)?;
+        self.made(Change::Moved(id, [from, pose]), relinked);
+        Ok(())
+    }
+
+    /// Checks that [`Assembly::move_to`] would move an instance, as for a preview. Nothing changes.
+    ///
+    /// # Errors
+    ///
+    /// As [`Assembly::move_to`].
+    pub fn fits_moved(
+        &mut self,
+        id: InstanceId,
+        pose: &Pose,
+        tilt: bool,
+    ) -> Result<(), PlaceError> {
+        let from = self.standing(id)?.pose;
+        let relinked = self.state.moved(id, pose, tilt)?;
+        self.state.relink(&relinked, false);
+        self.state.shift(id, from);
         Ok(())
     }
 
     /// Takes back the last change that was not taken back; returns `false` if there is none. The level is then as before it.
     pub fn undo(&mut self) -> bool {
-        let Some(step) = self.done.pop() else {
+        let Some(mut step) = self.done.pop() else {
             return false;
         };
-        match step {
-            Step::Placed => {
-                let last = InstanceId(self.instances.all.len() as u32 - 1);
-                self.fall(last);
-                self.grid.pop();
-                let instance = self.instances.all.pop();
-                self.undone.push((Step::Placed, instance));
+        match &mut step.change {
+            Change::Placed(held) => {
+                *held = self.state.pop();
             }
-            Step::Removed(id) => {
-                self.rise(id);
-                self.undone.push((Step::Removed(id), None));
-            }
+            Change::Removed(id) => self.state.rise(*id),
+            Change::Moved(id, [from, _]) => self.state.shift(*id, *from),
         }
+        self.state.relink(&step.relinked, false);
+        self.undone.push(step);
         true
     }
 
     /// Makes the last change again that was taken back; returns `false` if there is none.
     pub fn redo(&mut self) -> bool {
-        match self.undone.pop() {
-            None => return false,
-            Some((Step::Removed(id), _)) => {
-                self.fall(id);
-                self.done.push(Step::Removed(id));
-            }
-            Some((Step::Placed, instance)) => {
-                if let Some(instance) = instance {
-                    self.stand(instance);
-                    self.n_standing -= 1;
-                    self.rise(InstanceId(self.instances.all.len() as u32 - 1));
+        let Some(mut step) = self.undone.pop() else {
+            return false;
+        };
+        match &mut step.change {
+            Change::Placed(held) => {
+                if let Some(mut instance) = held.take() {
+                    instance.is_standing = true;
+                    self.state.stand(instance);
                 }
-                self.done.push(Step::Placed);
             }
+            Change::Removed(id) => self.state.lie_down(*id),
+            Change::Moved(id, [_, to]) => self.state.shift(*id, *to),
         }
+        self.state.relink(&step.relinked, true);
+        self.done.push(step);
         true
     }
 
     /// Returns the instances that stand, in the order in which they were placed.
     pub fn instances(&self) -> impl Iterator<Item = (InstanceId, &Instance)> {
-        let numbered = (0..).map(InstanceId).zip(&self.instances.all);
+        let numbered = (0..).map(InstanceId).zip(&self.state.instances.all);
         numbered.filter(|(_, instance)| instance.is_standing)
     }
 
     /// Returns the number of instances that stand.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.n_standing
+        self.state.n_standing
     }
 
     /// Returns `true` if no instance stands.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.n_standing == 0
-    }
-
-    /// Returns an instance that stands.
-    ///
-    /// # Errors
-    ///
-    /// If there is none of this number.
-    pub fn standing(&self, id: InstanceId) -> Result<&Instance, PlaceError> {
-        let instance = self.instances.all.get(id.idx()).filter(|i| i.is_standing);
-        instance.ok_or_else(|| PlaceError::NoInstance(id.0.to_string()))
+        self.state.n_standing == 0
     }
 
     /// Returns the instance of a name.
     #[must_use]
     pub fn named(&self, name: &str) -> Option<InstanceId> {
-        self.by_name.get(name).copied()
+        self.state.by_name.get(name).copied()
     }
 
     /// Returns the piece of an instance that stands or stood.
@@ -341,7 +351,7 @@ impl Assembly {
     /// If there never was one of this number.
     #[must_use]
     pub fn piece(&self, id: InstanceId) -> &Piece {
-        self.instances.piece(id)
+        self.state.instances.piece(id)
     }
 
     /// Returns the attachments that lead outdoors, in the order of instances.
@@ -355,12 +365,35 @@ impl Assembly {
     ///
     /// If there never was such an instance, as [`Assembly::piece`].
     pub fn open_ends_of(&self, instance: InstanceId) -> impl Iterator<Item = End> {
-        let links = self.instances.get(instance).links.iter().enumerate();
+        let links = self.state.instances.get(instance).links.iter().enumerate();
         let open = links.filter(|(_, link)| **link == Link::Open);
         open.map(move |(attachment, _)| End {
             instance,
             attachment,
         })
+    }
+
+    /// Returns the instance that has a point in a room of it, or else in a wall.
+    #[must_use]
+    pub fn instance_at(&self, p: DVec3) -> Option<InstanceId> {
+        let cell_in = |id: &InstanceId| {
+            let own = self.state.instances.get(*id).pose.point_back(p);
+            self.piece(*id).world().graph.locator.locate(own)
+        };
+        let is_outdoors = |id: &InstanceId| cell_in(id) == Some(self.piece(*id).outdoors);
+        let mut near = self.state.near(&Aabb::of_points(&[p]));
+        near.retain(|id| !is_outdoors(id));
+        let in_room = near.iter().find(|id| cell_in(id).is_some());
+        in_room.or(near.first()).copied()
+    }
+
+    /// Returns an instance that stands.
+    ///
+    /// # Errors
+    ///
+    /// If there is none of this number.
+    pub fn standing(&self, id: InstanceId) -> Result<&Instance, PlaceError> {
+        self.state.standing(id)
     }
 
     /// Returns the name of an attachment: `INSTANCE.ATTACHMENT`.
@@ -370,129 +403,21 @@ impl Assembly {
     /// If there never was such an instance, as [`Assembly::piece`].
     #[must_use]
     pub fn end_name(&self, end: End) -> String {
-        self.instances.end_name(end)
+        self.state.instances.end_name(end)
     }
 
     pub(crate) fn instance(&self, id: InstanceId) -> &Instance {
-        &self.instances.all[id.idx()]
+        &self.state.instances.all[id.idx()]
     }
 
     /// Returns the standing instances near another, in the order of their numbers.
     pub(crate) fn beside(&self, id: InstanceId) -> Vec<InstanceId> {
-        let mut near = self.near(self.grid.bounds(id.0));
-        near.retain(|other| *other != id);
-        near
+        self.state.beside(id)
     }
 
-    /// Returns the standing instances near a box, in the order of their numbers.
-    fn near(&self, bounds: &Aabb) -> Vec<InstanceId> {
-        let mut near = Vec::new();
-        let reach = bounds.expanded(4.0 * self.tolerance);
-        self.grid
-            .for_each_near(&reach, |number| near.push(InstanceId(number)));
-        near.sort_unstable();
-        near
-    }
-
-    fn bounds(&self, piece: usize, pose: &Pose) -> Aabb {
-        let hull = self.kit().pieces()[piece].shape.hull;
-        if hull.is_empty() {
-            return hull;
-        }
-        Aabb::of_points(&hull.corners().map(|p| pose.point(p)))
-    }
-
-    /// Returns what a piece meets at a pose.
-    fn meetings(
-        &self,
-        piece: usize,
-        pose: &Pose,
-        near: &[InstanceId],
-        overlap: bool,
-    ) -> Result<Links, PlaceError> {
-        let rules = Rules {
-            tolerance: self.tolerance,
-            overlap,
-        };
-        meetings(&self.instances, piece, pose, near, rules)
-    }
-
-    fn free_name(&self, piece: usize) -> String {
-        let base = self.kit().pieces()[piece].name();
-        let mut n = self.instances.all.len() + 1;
-        loop {
-            let name = format!("{base}-{n}");
-            if !self.by_name.contains_key(&name) {
-                return name;
-            }
-            n += 1;
-        }
-    }
-
-    /// Adds an instance that stands.
-    fn stand(&mut self, instance: Instance) {
-        let id = InstanceId(self.instances.all.len() as u32);
-        self.grid.push(self.bounds(instance.piece, &instance.pose));
-        self.by_name.insert(instance.name.clone(), id);
-        self.instances.all.push(instance);
-        self.n_standing += 1;
-    }
-
-    /// Sets the links of others to a new instance.
-    fn link(&mut self, id: InstanceId, links: &Links) {
-        for (attachment, link) in links.own.iter().enumerate() {
-            if let Link::Joined(other) = link {
-                let back = Link::Joined(End {
-                    instance: id,
-                    attachment,
-                });
-                self.instances.all[other.instance.idx()].links[other.attachment] = back;
-            }
-        }
-        for other in &links.blocked {
-            self.instances.all[other.instance.idx()].links[other.attachment] = Link::Blocked(id);
-        }
-    }
-
-    /// Lets an instance no longer stand.
-    fn fall(&mut self, id: InstanceId) {
-        self.instances.all[id.idx()].is_standing = false;
-        self.by_name.remove(&self.instances.all[id.idx()].name);
-        self.n_standing -= 1;
-        let bounds = *self.grid.bounds(id.0);
-        self.grid.set(id.0, Aabb::EMPTY);
-        for near in self.near(&bounds) {
-            for link in &mut self.instances.all[near.idx()].links {
-                let is_to_it = match link {
-                    Link::Joined(end) => end.instance == id,
-                    Link::Blocked(by) => *by == id,
-                    Link::Open => false,
-                };
-                if is_to_it {
-                    *link = Link::Open;
-                }
-            }
-        }
-    }
-
-    /// Lets an instance stand again, among the same others as before.
-    fn rise(&mut self, id: InstanceId) {
-        let (piece, pose, overlaps) = {
-            let own = &mut self.instances.all[id.idx()];
-            own.is_standing = true;
-            (own.piece, own.pose, own.overlaps)
-        };
-        let bounds = self.bounds(piece, &pose);
-        self.grid.set(id.0, Aabb::EMPTY);
-        let near = self.near(&bounds);
-        self.grid.set(id.0, bounds);
-        self.by_name
-            .insert(self.instances.all[id.idx()].name.clone(), id);
-        self.n_standing += 1;
-        // It stood there before, so nothing refuses it.
-        if let Ok(links) = self.meetings(piece, &pose, &near, overlaps) {
-            self.instances.all[id.idx()].links.clone_from(&links.own);
-            self.link(id, &links);
-        }
+    /// Remembers a change that was made.
+    fn made(&mut self, change: Change, relinked: Vec<Relinked>) {
+        self.undone.clear();
+        self.done.push(Step { change, relinked });
     }
 }

@@ -53,6 +53,7 @@ mod prepare;
 mod region;
 mod shape;
 mod space;
+mod state;
 mod tree;
 mod tunnel;
 

@@ -59,17 +59,8 @@ pub(crate) fn meetings(
         piece: &level.kit.pieces()[piece],
         pose,
     };
-    let others: Vec<(InstanceId, Placed<'_>)> = (near.iter())
-        .map(|&id| {
-            (
-                id,
-                Placed {
-                    piece: level.piece(id),
-                    pose: &level.get(id).pose,
-                },
-            )
-        })
-        .collect();
+    let others: Vec<(InstanceId, Placed<'_>)> =
+        (near.iter()).map(|&id| (id, placed(level, id))).collect();
     if !rules.overlap {
         for (id, other) in &others {
             if let Some((by, at)) = deepest(own, *other, rules.tolerance) {
@@ -168,6 +159,38 @@ fn blocked(
             Err(partly(end(), sum, behind, of, attachment))
         }
         _ => Ok(None),
+    }
+}
+
+/// Returns the instance of those given that walls up an attachment.
+pub(crate) fn walled_up(
+    level: &Instances,
+    end: End,
+    beside: &[InstanceId],
+    tolerance: f64,
+) -> Option<InstanceId> {
+    let of = placed(level, end.instance);
+    let shares = (beside.iter()).map(|&id| {
+        (
+            id,
+            covered(of, end.attachment, placed(level, id), tolerance),
+        )
+    });
+    let rules = Rules {
+        tolerance,
+        overlap: true,
+    };
+    let name = || level.end_name(end);
+    // Nothing is refused where overlaps are allowed.
+    blocked(level, rules, name, of, end.attachment, shares)
+        .ok()
+        .flatten()
+}
+
+fn placed(level: &Instances, id: InstanceId) -> Placed<'_> {
+    Placed {
+        piece: level.piece(id),
+        pose: &level.get(id).pose,
     }
 }
 

@@ -181,11 +181,37 @@ fn undoing_everything_gives_the_same_bytes_and_redoing_too() {
     let mut level = Assembly::new(dungeon());
     start(&mut level, "chamber", Pose::IDENTITY);
     let mut rng = Rng::new(11);
-    let bytes = |level: &Assembly| encode_glb(&level.flattened().unwrap()).unwrap();
+    let bytes = |level: &Assembly| {
+        let links: Vec<Vec<Link>> = level.instances().map(|i| i.1.links.clone()).collect();
+        (links, encode_glb(&level.flattened().unwrap()).unwrap())
+    };
     let mut past = vec![bytes(&level)];
-    for _ in 0..60 {
+    let mut n_moved = 0;
+    for _ in 0..80 {
         let standing: Vec<InstanceId> = level.instances().map(|i| i.0).collect();
         if rng.chance(0.3) && standing.len() > 3 {
+            let id = standing[1 + rng.below(standing.len() - 1)];
+            let ends: Vec<End> = level.open_ends().filter(|e| e.instance != id).collect();
+            let piece = level.standing(id).unwrap().piece;
+            let own = rng.below(level.piece(id).attachments().len());
+            let onto = ends[rng.below(ends.len())];
+            // Or turned in place, where others' doorways meet it again.
+            let now = level.standing(id).unwrap().pose;
+            let turn = Pose::about(now.at, DVec3::Y, std::f64::consts::FRAC_PI_2);
+            let pose = match level.pose_onto(piece, own, onto, 0.0) {
+                Ok(pose) if rng.chance(0.5) => pose,
+                _ => turn.after(&now),
+            };
+            let before = bytes(&level);
+            let fits = level.fits_moved(id, &pose, false);
+            assert!(bytes(&level) == before);
+            assert_eq!(level.move_to(id, pose, false), fits);
+            if fits.is_err() {
+                assert!(bytes(&level) == before);
+                continue;
+            }
+            n_moved += 1;
+        } else if rng.chance(0.3) && standing.len() > 3 {
             level
                 .remove(standing[1 + rng.below(standing.len() - 1)])
                 .unwrap();
@@ -195,6 +221,7 @@ fn undoing_everything_gives_the_same_bytes_and_redoing_too() {
         }
         past.push(bytes(&level));
     }
+    assert!(n_moved > 5, "{n_moved}");
     let present = past.pop().unwrap();
     for earlier in past.iter().rev() {
         assert!(level.undo());
@@ -204,6 +231,25 @@ fn undoing_everything_gives_the_same_bytes_and_redoing_too() {
     assert!(level.is_empty() && !level.undo());
     while level.redo() {}
     assert!(bytes(&level) == present);
+}
+
+#[test]
+fn a_doorway_behind_two_walls_is_walled_up_until_both_are_gone() {
+    let mut level = Assembly::new(dungeon());
+    let hall = start(&mut level, "hall", Pose::IDENTITY);
+    let plug = piece(&level, "plug");
+    let east = end(&level, hall, "east");
+    let mouth = &level.piece(hall).attachments()[east.attachment].mouth;
+    let pose = mouth.frame;
+    let walls = [0, 1].map(|_| level.put(plug, pose, &PlaceOptions::default()).unwrap());
+    let link = |level: &Assembly| level.standing(hall).unwrap().links[east.attachment];
+    assert_eq!(link(&level), Link::Blocked(walls[0]));
+    level.remove(walls[0]).unwrap();
+    assert_eq!(link(&level), Link::Blocked(walls[1]));
+    level.remove(walls[1]).unwrap();
+    assert_eq!(link(&level), Link::Open);
+    assert!(level.undo() && level.undo());
+    assert_eq!(link(&level), Link::Blocked(walls[0]));
 }
 
 /// Four corridors around a square, and the chambers at its vertices.

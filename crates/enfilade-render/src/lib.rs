@@ -95,6 +95,7 @@ mod prop;
 mod props;
 mod queries;
 mod renderer;
+mod replaced;
 mod resources;
 mod scale;
 mod scene;

@@ -41,7 +41,7 @@ mod walk;
 
 pub use drawing::Drawing;
 pub use html::{Figure, ReportParts, Table, report_html};
-pub use palette_page::{PaletteEntry, palette_html};
+pub use palette_page::{PaletteEntry, palette_html, palette_plan};
 #[cfg(feature = "print")]
 pub use pdf::{PAPERS, Paper, PaperError, to_pdf};
 pub use plain::{

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use enfilade_cpg::World;
 
+use crate::drawing::Drawing;
 use crate::plan::{PlanOptions, Plans};
 use crate::svg::escaped;
 
@@ -16,6 +17,13 @@ pub struct PaletteEntry<'a> {
     pub world: &'a World,
     /// Facts, a line each.
     pub facts: Vec<String>,
+}
+
+/// Returns the plan of a piece as the palette shows it, without a legend: that of its lowest storey. `None` without storeys.
+#[must_use]
+pub fn palette_plan(world: &World) -> Option<Drawing> {
+    let plans = Plans::new(world, &PlanOptions::default());
+    (plans.storeys().len() > 0).then(|| plans.bare(0))
 }
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;margin:2rem;color:#222;background:#fff}\

@@ -49,6 +49,16 @@ impl Drawing {
     ///
     /// [`RasterError::Size`] if a side is 0 or longer than [`MAX_PIXELS`].
     pub fn to_png(&self, width: u32) -> Result<Vec<u8>, RasterError> {
+        let ([width, height], rgb) = self.to_rgb(width)?;
+        encoded(&rgb, width, height)
+    }
+
+    /// Draws the drawing, `width` pixels wide; returns width and height, and three bytes a pixel, row by row from the top.
+    ///
+    /// # Errors
+    ///
+    /// As [`Drawing::to_png`].
+    pub fn to_rgb(&self, width: u32) -> Result<([u32; 2], Vec<u8>), RasterError> {
         let scale = f64::from(width) / self.size.x;
         let height = (self.size.y * scale).ceil() as u32;
         let is_drawable = |x: u32| (1..=MAX_PIXELS).contains(&x);
@@ -87,19 +97,20 @@ impl Drawing {
         brush
             .context
             .render_with(&mut pixels, &mut Resources::new(), settings);
-        encoded(&pixels, width, height)
+        // The paper is opaque.
+        let rgb = pixels.data().iter().flat_map(|p| [p.r, p.g, p.b]);
+        Ok(([width, height], rgb.collect()))
     }
 }
 
-/// Encodes three bytes per pixel: the paper is opaque.
-fn encoded(pixels: &Pixmap, width: u32, height: u32) -> Result<Vec<u8>, RasterError> {
-    let rgb: Vec<u8> = pixels.data().iter().flat_map(|p| [p.r, p.g, p.b]).collect();
+/// Encodes three bytes per pixel.
+fn encoded(rgb: &[u8], width: u32, height: u32) -> Result<Vec<u8>, RasterError> {
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     let done = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(&rgb)?;
+        writer.write_image_data(rgb)?;
         writer.finish()
     });
     done.map_err(|why| RasterError::Encoding(why.to_string()))?;

@@ -115,6 +115,7 @@
 //! | `verify` | `verify` | checks the promises of a world |
 //! | `stream` | `stream` | worlds in pieces, fetched as they come into view and kept within a budget |
 //! | `kit` | `kit` | levels put together from baked pieces |
+//! | `edit` | `edit` | editing sessions: pieces, changes by hand, undo, a journal |
 //! | `world` | `world` | queries of a living world: things, paths, sound, contacts, moving rooms |
 //!
 //! None is on by default: a game that only loads and queries worlds links neither importers nor builders.
@@ -139,6 +140,8 @@ pub use enfilade_runtime as runtime;
 
 #[cfg(feature = "bake")]
 pub use enfilade_bake as bake;
+#[cfg(feature = "edit")]
+pub use enfilade_edit as edit;
 #[cfg(feature = "import")]
 pub use enfilade_import as import;
 #[cfg(feature = "kit")]

@@ -29,7 +29,7 @@ pub(super) fn measure(step: LevelStep, scene: &str) -> anyhow::Result<f64> {
     let make = || -> anyhow::Result<Space> {
         Ok(match step {
             LevelStep::Instances => level.space()?.space,
-            LevelStep::Flattened => Space::new(level.flattened()?)?,
+            LevelStep::Flattened | LevelStep::Edit => Space::new(level.flattened()?)?,
         })
     };
     let n = COPIES[usize::from(step == LevelStep::Flattened)];

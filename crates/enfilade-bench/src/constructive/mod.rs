@@ -7,8 +7,9 @@ mod rebaked;
 mod scenes;
 mod speed;
 mod stitched;
+mod undone;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, ensure};
@@ -30,6 +31,9 @@ const CITY: &[&str] = &["maze-1500"];
 /// Scenes that are edited: a real one, and a generated one of so many rooms.
 const REBAKED: &[&str] = &["institute", "tower-256"];
 
+/// Kits of random sessions.
+const KITS: &[&str] = &["dungeon-kit", "office-kit"];
+
 pub(crate) const ROWS: &[Row] = &[
     made("stitched: cells", STITCHED, stitched::cells),
     made("stitched: portals", STITCHED, stitched::portals),
@@ -47,20 +51,27 @@ pub(crate) const ROWS: &[Row] = &[
     made("city: frame of instances", CITY, city::frame_of_instances),
     made("local rebuild: same", REBAKED, rebaked::same),
     made("local rebuild: time", REBAKED, rebaked::time),
+    made("undo: other bytes", KITS, undone::other_bytes),
+    made("undo: lost", KITS, undone::lost),
     made("bad input", &["pieces"], bad::taken),
 ];
 
-/// Measurements that need a process of their own, as its memory counts.
+/// Measurements that need a process of their own, as its memory counts, or as it is killed.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum LevelStep {
     /// Hold levels as instances.
     Instances,
     /// Hold levels as worlds in one piece.
     Flattened,
+    /// Edit with a journal, whose path is the scene.
+    Edit,
 }
 
 /// Runs a step on a scene; prints its figure.
 pub(crate) fn run_step(step: LevelStep, scene: &str) -> anyhow::Result<()> {
+    if step == LevelStep::Edit {
+        return undone::edit_without_end(Path::new(scene));
+    }
     println!("{}", memory::measure(step, scene)?);
     Ok(())
 }

@@ -12,9 +12,9 @@ use enfilade::geom::{DVec3, shown};
 use enfilade::runtime::Sightlines;
 use enfilade::runtime::View;
 use enfilade::stream::Eye;
-use enfilade::world::PartId;
+use enfilade::world::{PartId, Space};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, FOV, Frame, Paint, PortalTextureOptions, PortalTexturePaint,
+    AdapterChoice, Camera, Culling, Frame, Mark, Paint, PortalTextureOptions, PortalTexturePaint,
     Prop, SpaceShot, Sparing, Studio, Style,
 };
 use winit::dpi::PhysicalSize;
@@ -23,15 +23,13 @@ use winit::window::{CursorGrabMode, Window};
 
 use super::mode::Mode;
 use super::panel::{Panel, Shown};
-use super::walker::Walker;
+use super::walker::{RUN, Walker};
 use crate::formats::Format;
-use crate::living::{Lived, radar_words};
+use crate::living::{Lived, LivingFile, radar_words};
 use crate::output::{Outputs, write_whole};
 use crate::render::{light, portal_marks};
 use enfilade_cli::streamed::{Streamed, cells_in_view, view_of};
 
-/// Greatest speed. [Units: wu/s]
-const RUN: f32 = 5.0;
 /// Time of a frame in which pieces are put on the adapter.
 const SLICE: Duration = Duration::from_millis(1);
 
@@ -105,15 +103,6 @@ pub(super) fn name_here(world: &World, camera: &Camera) -> String {
 }
 
 impl Open {
-    pub(super) fn turn(&mut self, by: [f64; 2], speed: f32) {
-        self.yaw += by[0] as f32 * speed;
-        self.pitch = (self.pitch - by[1] as f32 * speed).clamp(-1.5, 1.5);
-    }
-
-    pub(super) fn zoom(&mut self, notches: f32) {
-        self.shown.zoom = (self.shown.zoom * 1.25_f32.powf(notches)).clamp(1.0, 40.0);
-    }
-
     /// Holds the pointer in the window, or releases it; returns `true` on success.
     pub(super) fn hold(&mut self, on: bool) -> bool {
         // Some systems lock the pointer in place, others only keep it inside.
@@ -161,46 +150,18 @@ impl Open {
             .configure(&self.studio.gpu.device, &self.config);
     }
 
-    pub(super) fn camera(&self) -> Camera {
-        let (sin, cos) = self.yaw.sin_cos();
-        let level = self.pitch.cos();
-        Camera {
-            eye: self.walker.eye.as_vec3().to_array(),
-            toward: [cos * level, self.pitch.sin(), sin * level],
-            fov_y: FOV,
-        }
-    }
-
-    /// The camera in the coordinates of the world.
-    pub(super) fn camera_in_root(&self) -> Camera {
-        let to_root = self.lived.space.between(self.walker.frame, PartId::ROOT);
-        let camera = self.camera();
-        let toward = DVec3::from(camera.toward.map(f64::from));
-        Camera {
-            eye: to_root.point(self.walker.eye).as_vec3().to_array(),
-            toward: to_root.direction(toward).as_vec3().to_array(),
-            ..camera
-        }
-    }
-
-    /// The velocity that the pressed keys request. [Units: wu/s]
-    pub(super) fn wish(&self) -> DVec3 {
-        let [right, _, forward] = self.camera().axes().map(|v| v.as_dvec3());
-        let key = |code| f64::from(u8::from(self.keys.contains(&code)));
-        let ahead = key(KeyCode::KeyW) - key(KeyCode::KeyS);
-        let aside = key(KeyCode::KeyD) - key(KeyCode::KeyA);
-        let up = key(KeyCode::KeyE) - key(KeyCode::KeyQ);
-        let forward = if self.walker.flies {
-            forward
-        } else {
-            DVec3::new(forward.x, 0.0, forward.z).normalize_or_zero()
-        };
-        let speed = if self.keys.contains(&KeyCode::ShiftLeft) {
-            f64::from(RUN)
-        } else {
-            1.8
-        };
-        (forward * ahead + right * aside + DVec3::Y * up).normalize_or_zero() * speed
+    /// Goes on in another world, as after an edit: its doors are as in its file.
+    pub(super) fn replace_world(&mut self, world: &World) -> anyhow::Result<()> {
+        self.studio.replace_world(world)?;
+        let space = Space::with_sight(world.clone(), self.studio.sight.clone());
+        self.lived = Lived::in_space(space, LivingFile::default(), Vec::new(), None)?;
+        self.lived.furnish(&mut self.studio)?;
+        self.is_living = !world.graph.specials.is_empty() || !world.fixtures.is_empty();
+        self.has_asked_for_light = false;
+        self.turning.clear();
+        self.panel.follow_world(world);
+        self.walker.frame = PartId::ROOT;
+        Ok(())
     }
 
     /// Updates what the radar shows.
@@ -293,6 +254,7 @@ impl Open {
         world: &World,
         camera: &Camera,
         seconds: f64,
+        mut marks: Vec<Mark>,
     ) -> anyhow::Result<()> {
         use wgpu::CurrentSurfaceTexture as Got;
         let size = [self.config.width, self.config.height];
@@ -309,7 +271,6 @@ impl Open {
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
         self.stream(&view);
-        let mut marks = Vec::new();
         if self.shown.portals {
             marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
         }
@@ -323,7 +284,7 @@ impl Open {
         self.begin_textures();
         self.scan(world);
         if self.is_living {
-            return self.draw_living(world, (camera, &view), target, seconds);
+            return self.draw_living(world, (camera, &view), target, (seconds, &marks));
         }
         let list = if self.mode == Mode::Queries {
             let (list, counts) = self.studio.list_by_queries(world, camera, size)?;
@@ -384,7 +345,7 @@ impl Open {
         world: &World,
         (camera, view): (&Camera, &View),
         target: wgpu::SurfaceTexture,
-        seconds: f64,
+        (seconds, marks): (f64, &[Mark]),
     ) -> anyhow::Result<()> {
         let size = [self.config.width, self.config.height];
         let output = target
@@ -431,7 +392,7 @@ impl Open {
                 camera: *camera,
                 seen: is_culled.then_some(seen),
                 style,
-                marks: &[],
+                marks,
                 props: &self.props,
                 lamps: Some(if self.shown.plain { &[] } else { lamps }),
             },

@@ -8,6 +8,7 @@ use enfilade_render::{Camera, Gpu, Paint, PortalTextureCounts};
 use winit::event::WindowEvent;
 use winit::window::Window;
 
+use super::editing::{EDIT_HELP, EditShown, Strip};
 use super::map::{Map, MapShown};
 use super::mode::Mode;
 use crate::living::Blip;
@@ -50,6 +51,8 @@ pub(super) struct Shown {
     pub(super) blips: Vec<Blip>,
     pub(super) told: String,
     pub(super) times: VecDeque<f32>,
+    /// The editor, while editing is on.
+    pub(super) edit: Option<EditShown>,
 }
 
 impl Shown {
@@ -68,6 +71,8 @@ pub(super) struct Panel {
     state: egui_winit::State,
     renderer: egui_wgpu::Renderer,
     map: Map,
+    /// The palette, if the world can be edited.
+    strip: Option<Strip>,
 }
 
 const HELP: &str = "\
@@ -95,6 +100,7 @@ impl Panel {
         window: &Window,
         format: wgpu::TextureFormat,
         world: &World,
+        strip: Option<Strip>,
     ) -> Self {
         let context = egui::Context::default();
         let side = gpu.device.limits().max_texture_dimension_2d as usize;
@@ -106,7 +112,13 @@ impl Panel {
             context,
             state,
             map: Map::new(world),
+            strip,
         }
+    }
+
+    /// Shows the map of another world.
+    pub(super) fn follow_world(&mut self, world: &World) {
+        self.map = Map::new(world);
     }
 
     /// Returns `true` if the panel consumes an event.
@@ -127,8 +139,10 @@ impl Panel {
         if let Some(camera) = shown.camera {
             self.map.follow(world, camera.eye);
         }
-        let map = &mut self.map;
-        let mut full = self.context.run_ui(input, |ui| paint(ui, map, shown));
+        let (map, strip) = (&mut self.map, &mut self.strip);
+        let mut full = self
+            .context
+            .run_ui(input, |ui| paint(ui, map, strip, shown));
         self.state
             .handle_platform_output(window, full.platform_output);
         let screen = egui_wgpu::ScreenDescriptor {
@@ -200,7 +214,7 @@ fn textures_told(counts: &PortalTextureCounts) -> String {
     text
 }
 
-fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
+fn paint(ui: &egui::Ui, map: &mut Map, strip: &mut Option<Strip>, shown: &Shown) {
     let painter = ui.painter();
     let screen = ui.max_rect();
     let font = egui::FontId::monospace(13.0);
@@ -264,8 +278,15 @@ fn paint(ui: &egui::Ui, map: &mut Map, shown: &Shown) {
         };
         map.draw(painter, area, &shown);
     }
+    if let (Some(strip), Some(edit)) = (strip.as_mut(), &shown.edit) {
+        strip.draw(painter, edit);
+    }
     if shown.help {
-        write(screen.center(), Align2::CENTER_CENTER, HELP.into());
+        let text = match strip {
+            Some(_) => format!("{EDIT_HELP}\n\n{HELP}"),
+            None => HELP.to_owned(),
+        };
+        write(screen.center(), Align2::CENTER_CENTER, text);
     }
 }
 

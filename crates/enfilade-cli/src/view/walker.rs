@@ -8,6 +8,9 @@ use enfilade_render::EYE_HEIGHT;
 use super::strider::step_in_cells;
 use crate::living::Player;
 
+/// Greatest speed. [Units: wu/s]
+pub(super) const RUN: f32 = 5.0;
+
 /// A body in a space or, when it flies, an eye.
 pub(super) struct Walker {
     body: Body,

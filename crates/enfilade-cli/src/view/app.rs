@@ -1,0 +1,542 @@
+//! The program in the window: events, keys, frames.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::{Context, anyhow};
+use enfilade::cpg::World;
+use enfilade::cpg::wire::encode_glb;
+use enfilade::geom::DVec3;
+use enfilade::runtime::{Sightlines, Target};
+use enfilade::world::PartId;
+use enfilade_render::{
+    Camera, FOV, Paint, PortalTextureOptions, Sparing, Studio, good_camera, portal_looked_at,
+};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{
+    DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent,
+};
+use winit::event_loop::ActiveEventLoop;
+use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::window::{Window, WindowId};
+
+use super::args::View;
+use super::editing::{EditKey, EditRay, Editor, Outcome, Strip, edit_key};
+use super::mode::Mode;
+use super::open::{Open, name_ahead, name_here};
+use super::panel::{Panel, Shown};
+use super::pointed::{FAR, Pointed};
+use super::strider::start_in;
+use super::walker::Walker;
+use crate::formats::Format;
+use crate::living::{Lived, STEP};
+use crate::output::{Outputs, write_whole};
+use enfilade_cli::adapter;
+use enfilade_cli::cameras::path_text;
+use enfilade_cli::streamed::{Packed, Streamed};
+
+/// Reach of a click, in lengths of the view direction.
+const CLICK: f32 = 30.0;
+
+pub(super) struct App<'a> {
+    pub(super) args: &'a View,
+    /// Hollow if it is streamed.
+    pub(super) world: World,
+    pub(super) packed: Option<Packed>,
+    pub(super) lines: Sightlines,
+    /// Until the window opens.
+    pub(super) lived: Option<Lived>,
+    /// Cameras still to show.
+    pub(super) path: Option<VecDeque<Camera>>,
+    /// Files read, and files written in this walk.
+    pub(super) outputs: Outputs,
+    /// The editor, if the world is edited.
+    pub(super) editor: Option<Editor>,
+    pub(super) open: Option<Open>,
+    pub(super) failed: Option<anyhow::Error>,
+}
+
+impl ApplicationHandler for App<'_> {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.open.is_some() {
+            return;
+        }
+        match self.open_window(events) {
+            Ok(mut open) => {
+                if !self.args.free_mouse && self.args.path.is_none() {
+                    open.capture(true);
+                }
+                if let Some(notes) = self.editor.as_mut().and_then(Editor::take_notes) {
+                    open.say(notes);
+                }
+                self.open = Some(open);
+            }
+            Err(why) => self.fail(events, why),
+        }
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(open) = &mut self.open else { return };
+        let is_taken = open.panel.on_event(&open.window, &event);
+        match event {
+            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::Resized(size) => open.resize(size),
+            // The panel has no use for Tab, and keys that it took may still be released.
+            WindowEvent::KeyboardInput {
+                event,
+                is_synthetic,
+                ..
+            } if !is_taken
+                || event.physical_key == KeyCode::Tab
+                || event.state == ElementState::Released =>
+            {
+                if let Err(why) = self.on_key(events, &event, is_synthetic) {
+                    self.fail(events, why);
+                }
+            }
+            WindowEvent::Focused(is_focused) => {
+                open.keys.clear();
+                // The mouse is free while another window has the focus, and held as chosen afterwards.
+                open.hold(is_focused && open.wants_mouse);
+            }
+            WindowEvent::MouseWheel { delta, .. } if !is_taken => {
+                if let Err(why) = self.on_wheel(delta) {
+                    self.fail(events, why);
+                }
+            }
+            WindowEvent::CursorMoved { position, .. } => {
+                let to = [position.x, position.y];
+                if open.pressed_at.is_some() && !is_taken && !open.is_captured {
+                    open.turn([to[0] - open.pointer[0], to[1] - open.pointer[1]], 0.004);
+                }
+                open.pointer = to;
+            }
+            WindowEvent::MouseInput {
+                state,
+                button: MouseButton::Left,
+                ..
+            } if !is_taken => match state {
+                ElementState::Pressed => open.pressed_at = Some(open.pointer),
+                ElementState::Released => {
+                    if let Err(why) = self.on_release() {
+                        self.fail(events, why);
+                    }
+                }
+            },
+            WindowEvent::RedrawRequested => {
+                if let Err(why) = self.frame(events) {
+                    self.fail(events, why);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
+        if let (Some(open), DeviceEvent::MouseMotion { delta }) = (&mut self.open, event)
+            && open.is_captured
+        {
+            open.turn(delta.into(), 0.002);
+        }
+    }
+
+    fn about_to_wait(&mut self, _: &ActiveEventLoop) {
+        if let Some(open) = &self.open {
+            open.window.request_redraw();
+        }
+    }
+}
+
+impl App<'_> {
+    fn fail(&mut self, events: &ActiveEventLoop, why: anyhow::Error) {
+        self.failed = Some(why);
+        events.exit();
+    }
+
+    fn open_window(&mut self, events: &ActiveEventLoop) -> anyhow::Result<Open> {
+        let lived = self.lived.take().context("a window opens once")?;
+        let [w, h] = self.args.size;
+        let attributes = Window::default_attributes()
+            .with_title(format!("enfilade: {}", self.args.name()))
+            .with_inner_size(PhysicalSize::new(w, h));
+        let window = Arc::new(events.create_window(attributes)?);
+        let display = Box::new(events.owned_display_handle());
+        let asked = wgpu::InstanceDescriptor::new_with_display_handle_from_env(display);
+        let instance = wgpu::Instance::new(asked);
+        let surface = instance.create_surface(window.clone())?;
+        let gpu = adapter::open_with(&instance, &self.args.adapter, Some(&surface))?;
+        let size = window.inner_size();
+        let mut config = surface
+            .get_default_config(&gpu.adapter, size.width.max(1), size.height.max(1))
+            .ok_or_else(|| anyhow!("{} cannot draw to this window", gpu.name()))?;
+        let formats = surface.get_capabilities(&gpu.adapter).formats;
+        // Shading is in linear light: the window's texture format converts it.
+        if let Some(&format) = formats.iter().find(|f| f.is_srgb()) {
+            config.format = format;
+        }
+        surface.configure(&gpu.device, &config);
+        let strip = self.editor.as_ref();
+        let strip = strip.map(|editor| Strip::new(editor.kit(), editor.palette()));
+        let panel = Panel::new(&gpu, &window, config.format, &self.world, strip);
+        let (mut studio, streamed) = match &self.packed {
+            Some(packed) => {
+                let sight = lived.space.sight(PartId::ROOT).clone();
+                let memory = self.args.memory << 20;
+                let opened = Streamed::for_walk(packed.clone(), gpu, sight, memory, config.format)?;
+                (opened.0, Some(opened.1))
+            }
+            None => (Studio::with_format(gpu, &self.world, config.format)?, None),
+        };
+        if self.args.lod > 0.0 {
+            studio.add_levels(&self.world)?;
+        }
+        studio.sparing = self.sparing();
+        // A lamp takes the software adapter many milliseconds a frame.
+        if self.args.living.is_some() || !studio.gpu.is_software() {
+            lived.furnish(&mut studio)?;
+        }
+        let start = self.start(&mut studio)?;
+        let [x, y, z] = start.toward;
+        let shown = Shown {
+            // The software adapter draws the plain picture several times as fast.
+            plain: studio.gpu.is_software() || self.editor.is_some(),
+            spares: studio.sparing != Sparing::default(),
+            zoom: 1.0,
+            ..Shown::default()
+        };
+        let mut walker = Walker::new(start.eye, streamed.is_some());
+        walker.flies = self.editor.is_some();
+        Ok(Open {
+            walker,
+            has_company: self.args.living.is_some(),
+            is_living: self.args.living.is_some() || !self.world.graph.specials.is_empty(),
+            lived,
+            window,
+            surface,
+            config,
+            studio,
+            panel,
+            yaw: z.atan2(x),
+            pitch: y.atan2(x.hypot(z)),
+            keys: BTreeSet::new(),
+            pointer: [0.0; 2],
+            pressed_at: None,
+            shown,
+            mode: if self.args.portal_textures || self.args.max_triangles.is_some() {
+                Mode::PortalTextures
+            } else {
+                Mode::default()
+            },
+            textures_ahead: (self.args.textures.as_ref())
+                .map(|path| std::fs::read(path).with_context(|| path.display().to_string()))
+                .transpose()?,
+            texture_options: PortalTextureOptions {
+                max_triangles: self.args.max_triangles.unwrap_or(u64::MAX),
+                ..PortalTextureOptions::default()
+            },
+            is_captured: false,
+            wants_mouse: false,
+            // Daylight needs the whole world.
+            has_asked_for_light: streamed.is_some(),
+            streamed,
+            turning: Vec::new(),
+            recorded: None,
+            n_shots: 0,
+            last: Instant::now(),
+            props: Vec::new(),
+        })
+    }
+
+    /// The first camera.
+    fn start(&self, studio: &mut Studio) -> anyhow::Result<Camera> {
+        if let Some(eye) = self.args.eye {
+            return Ok(Camera {
+                eye,
+                toward: [1.0, 0.0, 0.0],
+                fov_y: FOV,
+            });
+        }
+        if self.packed.is_some() {
+            return Ok(start_in(&self.world, &studio.sight));
+        }
+        if self.editor.is_some() && self.world.graph.rooms().next().is_none() {
+            // Before the place where the first piece will stand.
+            return Ok(Camera {
+                eye: [0.0, 3.0, 14.0],
+                toward: [0.0, -0.2, -1.0],
+                fov_y: FOV,
+            });
+        }
+        Ok(good_camera(studio, &self.world)?)
+    }
+
+    /// Acts once when a key goes down. Synthetic events report keys that were down already when the window got the
+    /// focus.
+    fn on_key(
+        &mut self,
+        events: &ActiveEventLoop,
+        event: &KeyEvent,
+        is_synthetic: bool,
+    ) -> anyhow::Result<()> {
+        let asked = self.sparing();
+        let (Some(open), PhysicalKey::Code(key)) = (&mut self.open, event.physical_key) else {
+            return Ok(());
+        };
+        if event.state == ElementState::Released {
+            open.keys.remove(&key);
+            return Ok(());
+        }
+        let is_held = !open.keys.insert(key);
+        if is_held || is_synthetic {
+            return Ok(());
+        }
+        if let Some(key) = edit_key(key)
+            && self.edit(key)?
+        {
+            return Ok(());
+        }
+        let Some(open) = &mut self.open else {
+            return Ok(());
+        };
+        let shown = &mut open.shown;
+        match key {
+            KeyCode::Escape => self.leave(events),
+            KeyCode::F2 => self.save(),
+            KeyCode::F1 => shown.help = !shown.help,
+            KeyCode::KeyF => open.walker.flies = !open.walker.flies,
+            KeyCode::KeyM => open.mode = open.mode.next(),
+            KeyCode::KeyL => {
+                let on = open.studio.sparing == Sparing::default();
+                open.studio.sparing = match (on, asked == Sparing::default()) {
+                    (false, _) => Sparing::default(),
+                    (true, false) => asked,
+                    // Defaults: portals of 16 by 16 pixels, objects seen through four times that area.
+                    (true, true) => Sparing {
+                        stop_below: 256.0,
+                        objects_below: 1024.0,
+                        ..Sparing::default()
+                    },
+                };
+                shown.spares = on;
+            }
+            KeyCode::Tab => {
+                let on = !open.wants_mouse;
+                open.capture(on);
+            }
+            KeyCode::Equal | KeyCode::NumpadAdd => open.zoom(1.0),
+            KeyCode::Minus | KeyCode::NumpadSubtract => open.zoom(-1.0),
+            KeyCode::KeyC => {
+                shown.paint = match shown.paint {
+                    Paint::Lit => Paint::Cells,
+                    Paint::Cells => Paint::Overdraw,
+                    Paint::Overdraw => Paint::Lit,
+                };
+            }
+            KeyCode::KeyR => shown.radar = !shown.radar,
+            KeyCode::KeyO => shown.portals = !shown.portals,
+            KeyCode::KeyP => shown.plain = !shown.plain,
+            KeyCode::KeyT => shown.tints = !shown.tints,
+            KeyCode::F4 => open.recorded = Some(Vec::new()),
+            KeyCode::F5 => {
+                if let Some(path) = open.recorded.take() {
+                    let record = &self.args.record;
+                    let text = path_text(&path);
+                    let written = self.outputs.write("--record", Format::Cameras, record);
+                    match written.and_then(|()| write_whole(record, text.as_bytes())) {
+                        Ok(()) => open.say(format!("wrote {}", record.display())),
+                        // The recording stays, and so does the window.
+                        Err(why) => {
+                            open.recorded = Some(path);
+                            open.warn(format!("{why:#}"));
+                        }
+                    }
+                }
+            }
+            KeyCode::F12 => {
+                // The walk goes on even if a picture fails.
+                let asked_of_it = (self.args.screenshot.as_path(), &self.args.adapter);
+                if let Err(why) = open.shot(asked_of_it, &self.world, &mut self.outputs) {
+                    open.warn(format!("no picture: {why:#}"));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Takes another tool while editing; otherwise zooms the map.
+    fn on_wheel(&mut self, delta: MouseScrollDelta) -> anyhow::Result<()> {
+        let notches = match delta {
+            MouseScrollDelta::LineDelta(_, y) => y,
+            MouseScrollDelta::PixelDelta(by) => by.y as f32 / 40.0,
+        };
+        let is_taken = self.edit(EditKey::Step(if notches < 0.0 { 1 } else { -1 }))?;
+        if let (Some(open), false) = (&mut self.open, is_taken) {
+            open.zoom(notches);
+        }
+        Ok(())
+    }
+
+    /// Uses the tool in hand, or the door there, unless the view was dragged.
+    fn on_release(&mut self) -> anyhow::Result<()> {
+        let Some(open) = &mut self.open else {
+            return Ok(());
+        };
+        let from = open.pressed_at.take().unwrap_or(open.pointer);
+        let moved = (from[0] - open.pointer[0]).hypot(from[1] - open.pointer[1]);
+        let more = open.keys.contains(&KeyCode::ShiftLeft);
+        let is_click = open.is_captured || moved < 4.0;
+        if is_click && !self.edit(EditKey::Use { more })? {
+            self.toggle_portal();
+        }
+        Ok(())
+    }
+
+    /// Closes the window; tells what is not saved.
+    fn leave(&mut self, events: &ActiveEventLoop) {
+        let words = self.editor.as_ref().and_then(Editor::farewell);
+        if let (Some(words), Some(open)) = (words, &mut self.open) {
+            open.say(words);
+        }
+        events.exit();
+    }
+
+    /// Lets the editor have a key; returns `false` if it means nothing to it.
+    fn edit(&mut self, key: EditKey) -> anyhow::Result<bool> {
+        let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
+            return Ok(false);
+        };
+        match editor.press(key, &edit_ray(open, &self.world, &self.lines)) {
+            Outcome::Quiet(is_taken) => return Ok(is_taken),
+            Outcome::Said(words) => open.say(words),
+            Outcome::Refused(why) => open.warn(why),
+            Outcome::Go { eye, toward, words } => {
+                open.go(eye, toward);
+                open.say(words);
+            }
+            Outcome::Edited(words) => {
+                self.world = editor.world()?.world;
+                self.lines = Sightlines::build(&self.world);
+                open.replace_world(&self.world)?;
+                open.say(words);
+            }
+        }
+        if let Some(notes) = editor.take_notes() {
+            open.say(notes);
+        }
+        Ok(true)
+    }
+
+    /// Writes the world as edited.
+    fn save(&mut self) {
+        let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
+            return;
+        };
+        let path = editor.save().to_owned();
+        let bytes = encode_glb(&self.world).context("the world breaks an invariant (a bug)");
+        let written = bytes.and_then(|bytes| {
+            self.outputs.write("--save", Format::World, &path)?;
+            write_whole(&path, &bytes)
+        });
+        match written {
+            Ok(()) => {
+                editor.saved();
+                let n = self.world.graph.rooms().count();
+                open.say(format!("wrote {}, {n} rooms", path.display()));
+            }
+            Err(why) => open.warn(format!("not saved: {why:#}")),
+        }
+    }
+
+    /// Opens or closes the portal at the pointer.
+    fn toggle_portal(&mut self) {
+        let Some(open) = &mut self.open else { return };
+        let ray = open.pointer();
+        // The leaf at the pointer, or else the opening; in a mirror, what it shows there.
+        let pointed = Pointed::at(&open.lived.space, &self.lines, &ray, CLICK);
+        let leaf_of = match pointed.hit.map(|h| h.target) {
+            Some(Target::Detail { detail, .. }) => open.studio.sight.portals_of(detail).next(),
+            _ => None,
+        };
+        let opening = || Some(portal_looked_at(&self.world, &self.lines, &pointed.ray)?.0);
+        let portal = leaf_of.or_else(opening);
+        match portal {
+            Some(portal) => open.toggle(portal),
+            None => open.say("no portal there".into()),
+        }
+    }
+
+    fn frame(&mut self, events: &ActiveEventLoop) -> anyhow::Result<()> {
+        let Some(open) = &mut self.open else {
+            return Ok(());
+        };
+        let now = Instant::now();
+        let seconds = (now - open.last).as_secs_f64();
+        open.last = now;
+        if let Some(path) = &mut self.path {
+            let Some(camera) = path.pop_front() else {
+                events.exit();
+                return Ok(());
+            };
+            let [x, y, z] = camera.toward;
+            open.walker.frame = PartId::ROOT;
+            open.walker.eye = DVec3::from(camera.eye.map(f64::from));
+            open.lived.step(&open.walker.player(), STEP);
+            (open.yaw, open.pitch) = (z.atan2(x), y.atan2(x.hypot(z)));
+        } else {
+            open.turn_leaves(seconds);
+            let wish = open.wish();
+            open.lived.step(&open.walker.player(), seconds);
+            open.walker.step(wish, seconds, &open.lived.space);
+        }
+        let camera = open.camera();
+        let outside = open.camera_in_root();
+        if let Some(recorded) = &mut open.recorded {
+            recorded.push(outside);
+        }
+        let mut marks = Vec::new();
+        if let Some(editor) = &mut self.editor {
+            editor.look(&edit_ray(open, &self.world, &self.lines));
+            marks = editor.marks();
+            open.shown.edit = editor.shown();
+            if let Err(why) = editor.tick() {
+                open.warn(why.to_string());
+            }
+        }
+        open.shown.ahead = if open.streamed.is_some() {
+            name_here(&self.world, &outside)
+        } else {
+            let pointed = Pointed::at(&open.lived.space, &self.lines, &outside, FAR);
+            name_ahead(&self.world, &self.lines, &pointed.ray)
+        };
+        open.draw(&self.world, &camera, seconds, marks)
+    }
+
+    /// The sparing of distant rooms that the options request.
+    fn sparing(&self) -> Sparing {
+        Sparing {
+            stop_below: self.args.stop,
+            objects_below: self.args.objects,
+            lod: self.args.lod,
+            ..Sparing::default()
+        }
+    }
+}
+
+/// Returns the ray through the pointer, for the editor.
+fn edit_ray<'a>(open: &Open, world: &World, lines: &'a Sightlines) -> EditRay<'a> {
+    let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+    let ray = open.pointer();
+    let length = vector(ray.toward).length().max(1e-9);
+    let pointed = Pointed::at(&open.lived.space, lines, &ray, FAR / length as f32);
+    let portal = portal_looked_at(world, lines, &pointed.ray);
+    EditRay {
+        eye: vector(pointed.ray.eye),
+        toward: vector(pointed.ray.toward).normalize_or(DVec3::X),
+        hit: pointed.hit.map(|h| [vector(h.position), vector(h.normal)]),
+        portal: portal.map(|(id, _)| vector(world.graph[id].center())),
+        lines,
+    }
+}
