@@ -4,7 +4,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::Role;
 use enfilade_import::{
     CleaningOptions, HeightOptions, ImportError, ImportOptions, Imported, Limits, VolumeOptions, cleaning_report, decode_gltf,
-    decode_e57, decode_heights, decode_implicit, decode_map, decode_obj, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
+    decode_e57, decode_heights, decode_implicit, decode_map, decode_obj, decode_patches, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
     write_pvs_text,
 };
 
@@ -31,6 +31,11 @@ pub fn ply(data: &[u8]) {
 /// Implicit scenes.
 pub fn implicit(data: &[u8]) {
     check(decode_implicit(data, &options()));
+}
+
+/// Free-form patches in JSON.
+pub fn patches(data: &[u8]) {
+    check(decode_patches(data, &options()));
 }
 
 /// Volumes: NIfTI, NRRD and headers of raw samples, at a level that most values are not on.

@@ -1,4 +1,4 @@
-//! Reads glTF, GLB, OBJ, PLY, STL, IFC, Quake maps and implicit scenes into one [`Scene`].
+//! Reads glTF, GLB, OBJ, PLY, STL, IFC, Quake maps, and sources that are not triangles into one [`Scene`].
 //!
 //! [`import`] reads any number of files into one scene, in meters and +Y up, with a role for each object and a report
 //! of everything skipped or repaired. Input is not trusted: each count, offset and index is checked before use,
@@ -64,7 +64,7 @@ use builder::Builder;
 use enfilade_geom::scene::Scene;
 pub use enfilade_source::AirSide;
 pub use enfilade_source::HeightOptions;
-use enfilade_source::{HeightMap, ImplicitScene, Volume};
+use enfilade_source::{FreeformScene, HeightMap, ImplicitScene, Volume};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -160,6 +160,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Stl => stl::read(bytes, builder),
         Format::Ifc => ifc::read(bytes, builder),
         Format::Implicit => sources::read_implicit(bytes, builder),
+        Format::Patches => sources::read_patches(bytes, builder),
         Format::Volume => sources::read_volume(bytes, builder),
         Format::E57 => sources::read_e57(bytes, builder),
         Format::Heights => sources::read_heights(bytes, builder),
@@ -176,6 +177,7 @@ enum Format {
     Stl,
     Ifc,
     Implicit,
+    Patches,
     Volume,
     E57,
     Heights,
@@ -193,6 +195,7 @@ impl Format {
             | Self::Map
             | Self::Ifc
             | Self::Implicit
+            | Self::Patches
             | Self::Volume
             | Self::E57
             | Self::Heights => u64::MAX,
@@ -230,6 +233,8 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         Format::Volume
     } else if ImplicitScene::is_one(bytes) {
         Format::Implicit
+    } else if FreeformScene::is_one(bytes) {
+        Format::Patches
     } else if gltf::is_gltf(bytes) {
         Format::Gltf
     } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
@@ -261,6 +266,15 @@ pub fn decode_gltf(bytes: &[u8], options: &ImportOptions) -> Result<Imported, Im
 /// As [`import`].
 pub fn decode_implicit(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.json", options, sources::read_implicit)
+}
+
+/// Reads a scene of free-form patches in JSON from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_patches(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.json", options, sources::read_patches)
 }
 
 /// Reads a volume of samples from memory: NIfTI or NRRD, in one file.

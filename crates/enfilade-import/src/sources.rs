@@ -1,6 +1,6 @@
 //! Sources that are not triangles: their surfaces become the only object of their file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::Cursor;
 
@@ -9,11 +9,11 @@ use e57::{CartesianCoordinate, E57Reader};
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_source::{
-    AirSide, HeightMap, ImplicitScene, Level, Scan, ScanOptions, SourceError, SourceLimits,
-    Surface, Volume, VolumeSummary,
+    AirSide, FreeformScene, HeightMap, ImplicitScene, Level, Scan, ScanOptions, SourceError,
+    SourceLimits, Surface, Volume, VolumeSummary, tessellate,
 };
 
-use crate::builder::Builder;
+use crate::builder::{Builder, Placement};
 use crate::{ImportError, ImportReport, SurfaceReport, Up, soup};
 
 /// Reads a scene of implicit shapes.
@@ -30,6 +30,89 @@ pub(crate) fn read_implicit(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(
     let to_input = DMat4::from_scale(DVec3::splat(unit));
     let step = scene.step() * unit;
     add(builder, surface, to_input, step, Told::default())
+}
+
+/// Largest distance of triangles from patches, unless the options give another. [Units: wu]
+const PATCH_TOLERANCE: f64 = 0.01;
+
+/// Returns the largest distance of triangles from patches. [Units: wu]
+pub(crate) fn patch_tolerance(builder: &Builder<'_>) -> f64 {
+    builder.options.patch_tolerance.unwrap_or(PATCH_TOLERANCE)
+}
+
+pub(crate) fn told_of_patches(n: usize) -> String {
+    format!("{n} free-form patches as triangles (--patch-tolerance gives their largest distance)")
+}
+
+/// Reads a scene of free-form patches. Those of one name are one object.
+pub(crate) fn read_patches(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    builder.set_format("patches");
+    let limits = limits(builder);
+    let bad = |builder: &Builder<'_>, e: SourceError| builder.malformed(e.place, e.problem);
+    let scene = FreeformScene::parse(bytes, &limits).map_err(|e| bad(builder, e))?;
+    let unit = match builder.options.unit {
+        Some(_) => 1.0,
+        None => scene.unit.unwrap_or(1.0),
+    };
+    let meters = builder.base.transform_vector3(DVec3::X).length() * unit;
+    let (mut names, mut surfaces) = (Vec::new(), Vec::new());
+    for patch in scene.patches {
+        names.push(patch.name);
+        surfaces.push(patch.surface);
+    }
+    let mesh = tessellate(&surfaces, patch_tolerance(builder) / meters, &limits);
+    let mesh = mesh.map_err(|e| bad(builder, e))?;
+    let n: usize = mesh.triangles.iter().map(Vec::len).sum();
+    builder.add_read_bytes((n * 36) as u64);
+    let mut positions: Vec<[f64; 3]> = mesh.positions.iter().map(DVec3::to_array).collect();
+    let offset = soup::recenter(&mut positions);
+    let mut objects: BTreeMap<&str, Vec<[u32; 3]>> = BTreeMap::new();
+    for (name, triangles) in names.iter().zip(&mesh.triangles) {
+        objects.entry(name).or_default().extend(triangles);
+    }
+    let stem = soup::stem(builder);
+    for (name, triangles) in objects {
+        let name = if name.is_empty() { &stem } else { name };
+        let place = format!("patches '{}'", soup::shortened(name));
+        // Only the vertices of this object, in the order of their use.
+        let mut index: HashMap<u32, u32> = HashMap::new();
+        let mut primitive = Primitive::default();
+        for v in triangles.into_flattened() {
+            let next = primitive.positions.len() as u32;
+            let i = *index.entry(v).or_insert(next);
+            if i == next {
+                let p = positions[v as usize].map(|c| c as f32);
+                primitive.positions.push(p);
+            }
+            primitive.indices.push(i);
+        }
+        builder.charge_vertices(&place, primitive.positions.len() as u64)?;
+        let mesh = builder.push_mesh(Mesh {
+            name: name.to_owned(),
+            primitives: vec![primitive],
+        });
+        let transform =
+            builder.base * DMat4::from_scale(DVec3::splat(unit)) * DMat4::from_translation(offset);
+        builder.place(&Placement {
+            mesh,
+            names: [name, ""],
+            ancestors: &[],
+            transforms: &[transform],
+            moves: None,
+            place: &place,
+            source: None,
+        })?;
+    }
+    if let Some(file) = builder.report.files.last_mut() {
+        file.surface = Some(SurfaceReport {
+            step: None,
+            distance: mesh.distance * meters,
+            n_samples: mesh.n_samples,
+            enlarged: None,
+            text: told_of_patches(surfaces.len()),
+        });
+    }
+    Ok(())
 }
 
 /// Enlargement of volumes of bodies, whose ways are too narrow for a person: one millimeter becomes 0.128 m, so that the
@@ -308,7 +391,7 @@ fn add_scan(scan: &Scan, builder: &mut Builder<'_>) -> Result<(), ImportError> {
 }
 
 /// Returns the limits of sources that follow from those of the import.
-fn limits(builder: &Builder<'_>) -> SourceLimits {
+pub(crate) fn limits(builder: &Builder<'_>) -> SourceLimits {
     let (most, usual) = (builder.limits(), SourceLimits::default());
     SourceLimits {
         max_triangles: usual.max_triangles.min(most.max_triangles),
@@ -370,7 +453,7 @@ fn add(
     let scale = to_input.transform_vector3(DVec3::X).length();
     if let Some(file) = builder.report.files.last_mut() {
         file.surface = Some(SurfaceReport {
-            step: step * meters,
+            step: Some(step * meters),
             distance: surface.distance * meters * scale,
             n_samples: surface.n_samples,
             enlarged: told.enlarged,
@@ -386,16 +469,12 @@ impl ImportReport {
     #[must_use]
     pub fn surface_settings(&self) -> BTreeMap<String, String> {
         let all = || self.files.iter().filter_map(|f| f.surface.as_ref());
-        let largest = |of: fn(&SurfaceReport) -> f64| all().map(of).fold(0.0, f64::max);
-        if all().next().is_none() {
-            return BTreeMap::new();
-        }
-        let mut told: BTreeMap<_, _> = [
-            ("surface.step", largest(|s| s.step)),
-            ("surface.distance", largest(|s| s.distance)),
-        ]
-        .map(|(name, length)| (name.to_owned(), format!("{length:.3e}")))
-        .into();
+        let steps = all().filter_map(|s| s.step).reduce(f64::max);
+        let distances = all().map(|s| s.distance).reduce(f64::max);
+        let mut told: BTreeMap<_, _> = [("surface.step", steps), ("surface.distance", distances)]
+            .into_iter()
+            .filter_map(|(name, length)| Some((name.to_owned(), format!("{:.3e}", length?))))
+            .collect();
         if let Some(factor) = all().find_map(|s| s.enlarged) {
             told.insert("surface.enlarged".into(), factor.to_string());
         }

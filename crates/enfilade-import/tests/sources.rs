@@ -28,7 +28,8 @@ fn an_implicit_scene_is_one_structural_object_in_meters_with_its_distance() {
         surface.distance > 0.0 && surface.distance < 0.05,
         "{surface:?}"
     );
-    assert!((surface.step - 4.0 / 128.0).abs() < 1e-6, "{surface:?}");
+    let step = surface.step.unwrap();
+    assert!((step - 4.0 / 128.0).abs() < 1e-6, "{surface:?}");
     let told = imported.report.surface_settings();
     assert_eq!(
         told.keys().collect::<Vec<_>>(),

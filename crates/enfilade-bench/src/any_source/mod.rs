@@ -4,6 +4,7 @@
 
 mod implicit;
 mod land;
+mod parametric;
 mod volume;
 
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
@@ -15,6 +16,8 @@ use crate::rows::{Measure, Row};
 
 /// Implicit scenes with as many rooms and openings as they were made with.
 const SHAPES: &[&str] = &["balls", "cavern", "house", "gyroid"];
+/// Scenes of patches, each with a twin of triangles.
+const PATCHES: &[&str] = &["patch-house", "patch-vault", "patch-tube"];
 const AORTA: &[&str] = &["aorta"];
 /// Airway trees of 15 branches, with the noise of computed tomography in its units.
 const AIRWAYS: &[&str] = &["airway-noise-0", "airway-noise-40", "airway-noise-80"];
@@ -44,6 +47,8 @@ pub(crate) const ROWS: &[Row] = &[
     made("implicit: cells", SHAPES, implicit::cells),
     made("implicit: portals", SHAPES, implicit::portals),
     made("implicit: samples by volume", &["balls"], implicit::samples),
+    made("parametric: cells", PATCHES, parametric::cells),
+    made("parametric: portals", PATCHES, parametric::portals),
     made("land: places missed", LANDS, land::missed),
     made("land: rooms lost or made up", BUILT, land::rooms),
     made("land: seconds", LANDS, land::seconds),

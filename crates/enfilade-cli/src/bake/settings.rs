@@ -45,6 +45,9 @@ pub(crate) struct SceneOptions {
     /// Volumes: the side of the level on which air is [default: below a given level, above that of a mask].
     #[arg(long, value_enum)]
     air: Option<AirName>,
+    /// Free-form patches (in OBJ, or in JSON): largest distance of their triangles from them [default: 0.01].
+    #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
+    patch_tolerance: Option<f64>,
     /// Height maps (PNG, TIFF): distance in meters between samples [default: that of a GeoTIFF].
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     cell: Option<f64>,
@@ -317,6 +320,7 @@ impl SceneOptions {
         ImportOptions {
             allow_outside: self.allow_outside,
             ifc: Some(ifc),
+            patch_tolerance: self.patch_tolerance,
             stations: self.station.clone(),
             heights: HeightOptions {
                 cell: self.cell,
