@@ -120,8 +120,8 @@ fn patches_that_share_the_curve_of_a_side_share_its_vertices() {
         .flat_map(|p| [(*p + DVec3::Z * 4.0, 1.0), (*p, 1.0)])
         .collect();
     let far = [0.0, 2.0, 5.0].map(|z| {
-        let bow = if z == 2.0 { 3.0 } else { 0.0 };
-        arc.map(|p| (p + DVec3::new(0.0, bow, -z), 1.0))
+        let bow = if z == 5.0 { 20.0 } else { 0.0 };
+        arc.map(|p| (p + DVec3::new(0.0, p.y / 3.0 * bow, -z), 1.0))
     });
     let patches = [patch([1, 2], near), patch([2, 2], far.concat())];
     let mesh = mesh(&patches);
@@ -207,24 +207,30 @@ fn creases_are_edges_of_triangles() {
         controls: [row(0.0), row(2.0)].concat(),
         loops: Vec::new(),
     };
-    let square = [
-        [0.5, 0.25],
-        [2.5, 0.25],
-        [2.5, 0.75],
-        [0.5, 0.75],
-        [0.5, 0.25],
+    // A strip across a crease whose shortest edges would cross it.
+    let strip = [
+        [0.75, 0.05],
+        [1.08, 0.38],
+        [1.5, 0.8],
+        [1.5, 1.0],
+        [0.92, 0.42],
+        [0.55, 0.05],
+        [0.75, 0.05],
     ];
-    zigzag.trim(
-        Vec::new(),
-        vec![vec![TrimCurve::whole(FreeformCurve {
-            basis: SplineBasis::clamped(1, 5),
-            controls: square.map(|p| (p.into(), 1.0)).to_vec(),
-        })]],
-    );
-    let mesh = mesh(&[zigzag]);
-    assert!(mesh.distance < 1e-9, "{}", mesh.distance);
-    let wanted = 2.0_f64.sqrt() * (3.0 * 2.0 - 2.0 * 1.0);
-    assert!((area(&mesh) - wanted).abs() < 1e-9, "{}", area(&mesh));
+    let strip = TrimCurve::whole(FreeformCurve {
+        basis: SplineBasis::clamped(1, strip.len()),
+        controls: strip.map(|p| (p.into(), 1.0)).to_vec(),
+    });
+    let loops = vec![vec![strip]];
+    zigzag.trim(loops.clone(), Vec::new());
+    let kept = mesh(std::slice::from_ref(&zigzag));
+    assert!(kept.distance < 1e-9, "{}", kept.distance);
+    zigzag.trim(Vec::new(), loops);
+    let cut = mesh(&[zigzag]);
+    assert!(cut.distance < 1e-9, "{}", cut.distance);
+    let whole = 2.0_f64.sqrt() * 3.0 * 2.0;
+    let sum = area(&kept) + area(&cut);
+    assert!((sum - whole).abs() < 1e-9, "{sum} {whole}");
 }
 
 #[test]
