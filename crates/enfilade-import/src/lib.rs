@@ -42,6 +42,7 @@ mod prt;
 mod pvs_text;
 mod report;
 mod rooms;
+mod scans;
 mod soup;
 mod sources;
 mod stl;
@@ -162,7 +163,8 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Implicit => sources::read_implicit(bytes, builder),
         Format::Patches => sources::read_patches(bytes, builder),
         Format::Volume => sources::read_volume(bytes, builder),
-        Format::E57 => sources::read_e57(bytes, builder),
+        Format::E57 => scans::read_e57(bytes, builder),
+        Format::Las => scans::read_las(bytes, builder),
         Format::Heights => sources::read_heights(bytes, builder),
     }
 }
@@ -180,6 +182,7 @@ enum Format {
     Patches,
     Volume,
     E57,
+    Las,
     Heights,
 }
 
@@ -198,6 +201,7 @@ impl Format {
             | Self::Patches
             | Self::Volume
             | Self::E57
+            | Self::Las
             | Self::Heights => u64::MAX,
         }
     }
@@ -227,6 +231,8 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         return Err(error);
     } else if bytes.starts_with(b"ASTM-E57") {
         Format::E57
+    } else if bytes.starts_with(b"LASF") {
+        Format::Las
     } else if HeightMap::is_one(bytes) {
         Format::Heights
     } else if Volume::is_one(bytes) {
@@ -292,7 +298,16 @@ pub fn decode_volume(bytes: &[u8], options: &ImportOptions) -> Result<Imported, 
 ///
 /// As [`import`].
 pub fn decode_e57(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
-    decode(bytes, "memory.e57", options, sources::read_e57)
+    decode(bytes, "memory.e57", options, scans::read_e57)
+}
+
+/// Reads a scan in LAS or LAZ from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_las(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.las", options, scans::read_las)
 }
 
 /// Reads a height map from memory: gray PNG or TIFF.

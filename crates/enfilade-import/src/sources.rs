@@ -2,15 +2,12 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
-use std::io::Cursor;
-
-use e57::{CartesianCoordinate, E57Reader};
 
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_source::{
-    AirSide, FreeformScene, HeightMap, ImplicitScene, Level, Scan, ScanOptions, SourceError,
-    SourceLimits, Surface, Volume, VolumeSummary, tessellate,
+    AirSide, FreeformScene, HeightMap, ImplicitScene, Level, SourceError, SourceLimits, Surface,
+    Volume, VolumeSummary, tessellate,
 };
 
 use crate::builder::{Builder, Placement};
@@ -270,126 +267,6 @@ pub(crate) fn read_heights(bytes: &[u8], builder: &mut Builder<'_>) -> Result<()
     )
 }
 
-/// Edge of the voxels of a scan: walls are at least two of them thick. [Units: wu]
-const SCAN_STEP: f64 = 0.05;
-/// Farthest points from the stations that matter, along an axis. [Units: wu]
-const SCAN_REACH: f64 = 12.0;
-/// Pieces of surface smaller than this are noise: half the width of the narrowest doorway. [Units: wu]
-const SCAN_PIECE: f64 = 0.3;
-
-/// Reads the scans of an E57 file, each with the pose of its scanner. The third axis is up.
-pub(crate) fn read_e57(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    builder.set_format("E57");
-    let file = Cursor::new(bytes);
-    let mut reader = E57Reader::new(file).map_err(|e| damaged(builder, "file", &e))?;
-    let (mut points, mut station_of, mut stations) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, cloud) in reader.pointclouds().iter().enumerate() {
-        let place = format!("scan {i}");
-        builder.charge_vertices(&place, cloud.records)?;
-        let Some(pose) = &cloud.transform else {
-            builder.note(
-                place,
-                "a scan without a pose, so that its station is not known; left out",
-            );
-            continue;
-        };
-        let Ok(station) = u16::try_from(stations.len()) else {
-            return Err(builder.malformed(place, "more than 65,535 scans; split the file"));
-        };
-        let at = &pose.translation;
-        stations.push(DVec3::new(at.x, at.y, at.z));
-        let all = reader
-            .pointcloud_simple(cloud)
-            .map_err(|e| damaged(builder, &place, &e))?;
-        for point in all {
-            let point = point.map_err(|e| damaged(builder, &place, &e))?;
-            // A direction alone met nothing: the sky, or a surface as black as it.
-            if let CartesianCoordinate::Valid { x, y, z } = point.cartesian {
-                points.push(DVec3::new(x, y, z));
-                station_of.push(station);
-            }
-        }
-    }
-    if builder.options.up.is_none() {
-        let turn = |p: &mut DVec3| *p = DVec3::new(p.x, p.z, -p.y);
-        points.iter_mut().chain(&mut stations).for_each(turn);
-    }
-    if stations.is_empty() {
-        return Ok(());
-    }
-    let cloud = Scan {
-        points,
-        station_of,
-        stations,
-    };
-    add_scan(&cloud, builder)
-}
-
-fn damaged(builder: &Builder<'_>, place: &str, e: &e57::Error) -> ImportError {
-    builder.malformed(place, format!("{e}; is the file cut off?"))
-}
-
-/// Reads the points of a scan. Without a place of the scanner, the file has no surface, and this is noted.
-///
-/// `station_of` is empty if the file does not say which station saw which point.
-pub(crate) fn read_points(
-    points: Vec<DVec3>,
-    station_of: Vec<u16>,
-    mut stations: Vec<DVec3>,
-    builder: &mut Builder<'_>,
-) -> Result<(), ImportError> {
-    // Options are in meters of the scene, with y up.
-    let from_scene = builder.base.inverse();
-    let given = builder.options.stations.iter();
-    stations.extend(given.map(|p| from_scene.transform_point3(*p)));
-    if stations.is_empty() {
-        let text = "a cloud of points without faces; give the place of the scanner as --station X,Y,Z, so that its surface can be \
-                    made";
-        builder.note("element vertex", text);
-        return Ok(());
-    }
-    if stations.len() > 1 && station_of.is_empty() {
-        let problem = format!(
-            "{} stations, and no property 'station' of the points that tells which saw each; give each scan a file of its own",
-            stations.len()
-        );
-        return Err(builder.malformed("element vertex", problem));
-    }
-    let scan = Scan {
-        station_of: match station_of.is_empty() {
-            true => vec![0; points.len()],
-            false => station_of,
-        },
-        points,
-        stations,
-    };
-    add_scan(&scan, builder)
-}
-
-/// Adds the surface of a scan in the space of the input.
-fn add_scan(scan: &Scan, builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    let meters = builder.base.transform_vector3(DVec3::X).length();
-    let options = ScanOptions {
-        step: SCAN_STEP / meters,
-        reach: SCAN_REACH / meters,
-        least_piece: SCAN_PIECE / meters,
-    };
-    let limits = limits(builder);
-    let step = scan.step(&options, &limits);
-    let surface = scan.surface(&options, &limits);
-    let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
-    let text = format!(
-        "a scan of {} points, stations: {}; what no station saw is matter",
-        scan.points.len(),
-        scan.stations.len()
-    );
-    let told = Told {
-        text,
-        enlarged: None,
-    };
-    add(builder, surface, DMat4::IDENTITY, step, told)
-}
-
 /// Returns the limits of sources that follow from those of the import.
 pub(crate) fn limits(builder: &Builder<'_>) -> SourceLimits {
     let (most, usual) = (builder.limits(), SourceLimits::default());
@@ -406,13 +283,13 @@ pub(crate) fn limits(builder: &Builder<'_>) -> SourceLimits {
 
 /// Assumptions about a source, for people.
 #[derive(Default)]
-struct Told {
-    text: String,
-    enlarged: Option<f64>,
+pub(crate) struct Told {
+    pub(crate) text: String,
+    pub(crate) enlarged: Option<f64>,
 }
 
 /// Adds the surface of a source, from its space to that of the input.
-fn add(
+pub(crate) fn add(
     builder: &mut Builder<'_>,
     mut surface: Surface,
     to_input: DMat4,

@@ -54,7 +54,8 @@ pub(crate) struct SceneOptions {
     /// Height maps of grays: heights in meters of black and of white.
     #[arg(long, value_name = "MIN,MAX", value_parser = parse_place, allow_hyphen_values = true)]
     heights: Option<[f64; 2]>,
-    /// Scans (clouds of points in PLY): a place of the scanner, in meters with y up, if the file does not tell it; repeatable.
+    /// Scans (clouds of points in PLY, LAS, LAZ): a place of the scanner, in meters with y up, if the file does not tell it;
+    /// repeatable: in LAS, one for each point source id, in their order.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     station: Vec<DVec3>,
     /// Also read files outside the scene's folder that the scene refers to (buffers, pictures, materials); unsafe for
