@@ -4,7 +4,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::Role;
 use enfilade_import::{
     CleaningOptions, HeightOptions, ImportError, ImportOptions, Imported, Limits, VolumeOptions, cleaning_report, decode_gltf,
-    decode_e57, decode_heights, decode_implicit, decode_map, decode_obj, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
+    decode_e57, decode_heights, decode_implicit, decode_las, decode_map, decode_obj, decode_patches, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
     write_pvs_text,
 };
 
@@ -31,6 +31,11 @@ pub fn ply(data: &[u8]) {
 /// Implicit scenes.
 pub fn implicit(data: &[u8]) {
     check(decode_implicit(data, &options()));
+}
+
+/// Free-form patches in JSON.
+pub fn patches(data: &[u8]) {
+    check(decode_patches(data, &options()));
 }
 
 /// Volumes: NIfTI, NRRD and headers of raw samples, at a level that most values are not on.
@@ -68,7 +73,34 @@ pub fn heights(data: &[u8]) {
 
 /// Scans in E57.
 pub fn e57(data: &[u8]) {
+    quiet();
     check(decode_e57(data, &options()));
+}
+
+/// Scans in LAS and LAZ, with a place of the scanner.
+pub fn las(data: &[u8]) {
+    let options = ImportOptions {
+        stations: vec![DVec3::new(0.5, 0.5, 0.5)],
+        ..options()
+    };
+    quiet();
+    check(decode_las(data, &options));
+}
+
+/// Lets panics through that the importer turns into errors: those of readers of other projects.
+fn quiet() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        let abort = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            let is_theirs = |l: &std::panic::Location<'_>| {
+                ["/e57-", "/las-", "/laz-"].iter().any(|c| l.file().contains(c))
+            };
+            if !info.location().is_some_and(is_theirs) {
+                abort(info);
+            }
+        }));
+    });
 }
 
 /// STL.

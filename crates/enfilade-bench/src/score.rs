@@ -182,7 +182,7 @@ pub(crate) fn locate(world: &Path, points: &[V3]) -> anyhow::Result<Vec<String>>
     Ok(lines)
 }
 
-fn text(v: &Value) -> String {
+pub(crate) fn text(v: &Value) -> String {
     v.as_str().map_or_else(|| v.to_string(), str::to_owned)
 }
 

@@ -13,7 +13,7 @@ struct Foreign {
     advice: &'static str,
 }
 
-const FOREIGN: [Foreign; 10] = [
+const FOREIGN: [Foreign; 9] = [
     Foreign {
         name: "FBX",
         magic: &[b"Kaydara FBX Binary", b"; FBX"],
@@ -56,12 +56,6 @@ const FOREIGN: [Foreign; 10] = [
         magic: &[b"VBSP", b"BSP2"],
         endings: &["bsp"],
         advice: "give its .map, or convert it: bsputil --decompile {in}",
-    },
-    Foreign {
-        name: "a point cloud (LAS)",
-        magic: &[b"LASF"],
-        endings: &["las", "laz"],
-        advice: "it has no surfaces; make some: pdal translate {in} {out}.ply normal poisson --writers.ply.faces=true",
     },
     Foreign {
         name: "DWG",
@@ -130,12 +124,6 @@ mod tests {
                 "q3map2 -convert -format map a.bsp",
             ),
             (b"\x1d\0\0\0", "a.bsp", "BSP", "bsputil --decompile a.bsp"),
-            (
-                b"LASF",
-                "a.laz",
-                "point cloud",
-                "pdal translate a.laz a.ply",
-            ),
             (b"AC1032", "a.dwg", "DWG", "STLOUT"),
             (b"BLENDER", "a.blend", "Blender", "blender -b a.blend"),
         ] {

@@ -1,4 +1,4 @@
-//! Reads glTF, GLB, OBJ, PLY, STL, IFC, Quake maps and implicit scenes into one [`Scene`].
+//! Reads glTF, GLB, OBJ, PLY, STL, IFC, Quake maps, and sources that are not triangles into one [`Scene`].
 //!
 //! [`import`] reads any number of files into one scene, in meters and +Y up, with a role for each object and a report
 //! of everything skipped or repaired. Input is not trusted: each count, offset and index is checked before use,
@@ -42,6 +42,7 @@ mod prt;
 mod pvs_text;
 mod report;
 mod rooms;
+mod scans;
 mod soup;
 mod sources;
 mod stl;
@@ -64,7 +65,7 @@ use builder::Builder;
 use enfilade_geom::scene::Scene;
 pub use enfilade_source::AirSide;
 pub use enfilade_source::HeightOptions;
-use enfilade_source::{HeightMap, ImplicitScene, Volume};
+use enfilade_source::{FreeformScene, HeightMap, ImplicitScene, Volume};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -160,8 +161,10 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Stl => stl::read(bytes, builder),
         Format::Ifc => ifc::read(bytes, builder),
         Format::Implicit => sources::read_implicit(bytes, builder),
+        Format::Patches => sources::read_patches(bytes, builder),
         Format::Volume => sources::read_volume(bytes, builder),
-        Format::E57 => sources::read_e57(bytes, builder),
+        Format::E57 => scans::read_e57(bytes, builder),
+        Format::Las => scans::read_las(bytes, builder),
         Format::Heights => sources::read_heights(bytes, builder),
     }
 }
@@ -176,8 +179,10 @@ enum Format {
     Stl,
     Ifc,
     Implicit,
+    Patches,
     Volume,
     E57,
+    Las,
     Heights,
 }
 
@@ -193,8 +198,10 @@ impl Format {
             | Self::Map
             | Self::Ifc
             | Self::Implicit
+            | Self::Patches
             | Self::Volume
             | Self::E57
+            | Self::Las
             | Self::Heights => u64::MAX,
         }
     }
@@ -224,12 +231,16 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         return Err(error);
     } else if bytes.starts_with(b"ASTM-E57") {
         Format::E57
+    } else if bytes.starts_with(b"LASF") {
+        Format::Las
     } else if HeightMap::is_one(bytes) {
         Format::Heights
     } else if Volume::is_one(bytes) {
         Format::Volume
     } else if ImplicitScene::is_one(bytes) {
         Format::Implicit
+    } else if FreeformScene::is_one(bytes) {
+        Format::Patches
     } else if gltf::is_gltf(bytes) {
         Format::Gltf
     } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
@@ -263,6 +274,15 @@ pub fn decode_implicit(bytes: &[u8], options: &ImportOptions) -> Result<Imported
     decode(bytes, "memory.json", options, sources::read_implicit)
 }
 
+/// Reads a scene of free-form patches in JSON from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_patches(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.json", options, sources::read_patches)
+}
+
 /// Reads a volume of samples from memory: NIfTI or NRRD, in one file.
 ///
 /// # Errors
@@ -278,7 +298,16 @@ pub fn decode_volume(bytes: &[u8], options: &ImportOptions) -> Result<Imported, 
 ///
 /// As [`import`].
 pub fn decode_e57(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
-    decode(bytes, "memory.e57", options, sources::read_e57)
+    decode(bytes, "memory.e57", options, scans::read_e57)
+}
+
+/// Reads a scan in LAS or LAZ from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_las(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.las", options, scans::read_las)
 }
 
 /// Reads a height map from memory: gray PNG or TIFF.

@@ -1,22 +1,26 @@
-//! Wavefront OBJ (Wavefront, *Advanced Visualizer Manual*, appendix B1): polygons, groups,
+//! Wavefront OBJ (Wavefront, *Advanced Visualizer Manual*, appendix B1): polygons, free-form surfaces, groups,
 //! materials.
 //!
 //! This reader replaces `tobj`, which does not join lines that end in `\`, makes a new object of a group that is
 //! named again, and reports errors without line numbers (`docs/dependencies.md`).
 
+mod freeform;
+
 use crate::ImportError;
 use crate::builder::Builder;
 use crate::polygon::Splitter;
-use crate::soup::shortened;
-use crate::{mtl, soup};
+use crate::soup::{resolve, shortened};
+use crate::{SurfaceReport, mtl, soup, sources};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};
+use enfilade_source::{FreeformSurface, tessellate};
+use freeform::{Controls, Ended, FreeformReader};
 use std::collections::HashMap;
 
 /// Returns `true` if the text looks like OBJ: its first directive is one of OBJ's.
 pub(crate) fn is_obj(bytes: &[u8]) -> bool {
-    const DIRECTIVES: [&[u8]; 10] = [
-        b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"mtllib", b"s", b"vp",
+    const DIRECTIVES: [&[u8]; 12] = [
+        b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"mtllib", b"s", b"vp", b"cstype", b"deg",
     ];
     let head = &bytes[..bytes.len().min(1 << 16)];
     let mut lines = head.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
@@ -32,6 +36,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     let mut reader = ObjReader {
         builder,
         positions: Vec::new(),
+        weights: Vec::new(),
         colors: Vec::new(),
         uvs: Vec::new(),
         normals: Vec::new(),
@@ -44,6 +49,9 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         meshes: Vec::new(),
         by_name: HashMap::new(),
         current: None,
+        freeform: FreeformReader::new(),
+        patches: Vec::new(),
+        patch_parts: Vec::new(),
     };
     let mut joined = String::new();
     for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
@@ -90,6 +98,8 @@ struct MeshDraft {
 struct ObjReader<'r, 'a> {
     builder: &'r mut Builder<'a>,
     positions: Vec<[f64; 3]>,
+    /// Weights of the first positions as control points; 1 for the rest.
+    weights: Vec<f64>,
     /// Colors of the first positions; empty if the file has none.
     colors: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
@@ -104,6 +114,10 @@ struct ObjReader<'r, 'a> {
     by_name: HashMap<[String; 2], usize>,
     /// The part that the next face joins, until a name or material changes.
     current: Option<usize>,
+    freeform: FreeformReader,
+    patches: Vec<FreeformSurface>,
+    /// The part that each patch belongs to.
+    patch_parts: Vec<usize>,
 }
 
 impl ObjReader<'_, '_> {
@@ -117,6 +131,10 @@ impl ObjReader<'_, '_> {
                 let numbers = self.numbers::<7>(rest, number, 3)?;
                 self.positions
                     .push([numbers.0[0], numbers.0[1], numbers.0[2]]);
+                if matches!(numbers.1, 4 | 7) {
+                    self.weights.resize(self.positions.len() - 1, 1.0);
+                    self.weights.push(numbers.0[3]);
+                }
                 if numbers.1 >= 6 {
                     // White for earlier vertices without a color.
                     self.colors.resize(self.positions.len() - 1, [1.0; 3]);
@@ -163,13 +181,79 @@ impl ObjReader<'_, '_> {
                 self.builder
                     .note(format!("line {number}"), "points or lines; left out");
             }
-            "curv" | "curv2" | "surf" => {
-                self.builder.note(
-                    format!("line {number}"),
-                    "free-form curves or surfaces; left out, export them as polygons",
-                );
-            }
+            "vp" | "cstype" | "deg" | "surf" | "curv" | "curv2" | "parm" | "trim" | "hole"
+            | "end" => self.read_freeform(word, rest, number)?,
             _ => {}
+        }
+        Ok(())
+    }
+
+    fn read_freeform(&mut self, word: &str, rest: &str, number: usize) -> Result<(), ImportError> {
+        let vertices = Controls {
+            positions: &self.positions,
+            weights: &self.weights,
+        };
+        let place = format!("line {number}");
+        match self.freeform.read(word, rest, number, &vertices) {
+            Ok(Ended::Nothing) => {}
+            Ok(Ended::Surface(surface)) => {
+                let part = match self.current {
+                    Some(part) => part,
+                    None => self.open_part(number)?,
+                };
+                self.patches.push(surface);
+                self.patch_parts.push(part);
+            }
+            Ok(Ended::LeftOut) => self.builder.note(
+                place,
+                "free-form curves in space, or surfaces that are neither bezier nor bspline; left out, export them as bspline \
+                 or as polygons",
+            ),
+            Err(problem) => return Err(self.builder.malformed(place, problem)),
+        }
+        Ok(())
+    }
+
+    /// Turns patches into faces of their parts.
+    fn divide_patches(&mut self) -> Result<(), ImportError> {
+        if let Some(line) = self.freeform.unfinished() {
+            let problem = "the surface or curve has no 'end'; is the file cut off?";
+            return Err(self.builder.malformed(format!("line {line}"), problem));
+        }
+        if self.patches.is_empty() {
+            return Ok(());
+        }
+        let tolerance = sources::patch_tolerance(self.builder);
+        let unit = soup::unit(self.builder);
+        let limits = sources::limits(self.builder);
+        let mesh = tessellate(&self.patches, tolerance / unit, &limits)
+            .map_err(|e| self.builder.malformed(e.place, e.problem))?;
+        // Triangles are as many as it takes, whatever the length of the file.
+        let n: usize = mesh.triangles.iter().map(Vec::len).sum();
+        self.builder.add_read_bytes((n * 36) as u64);
+        let first = self.positions.len() as u32;
+        let positions = mesh.positions.iter().map(DVec3::to_array);
+        self.positions.extend(positions);
+        for (&part, triangles) in self.patch_parts.iter().zip(&mesh.triangles) {
+            let part = &mut self.parts[part];
+            for triangle in triangles {
+                part.faces.push(ObjFace {
+                    first: part.corners.len(),
+                    n: 3,
+                    line: 0,
+                });
+                let corners = triangle.map(|v| (first + v, None, None));
+                part.corners.extend(corners);
+            }
+        }
+        if let Some(file) = self.builder.report.files.last_mut() {
+            file.surface = Some(SurfaceReport {
+                step: None,
+                distance: mesh.distance * unit,
+                n_samples: mesh.n_samples,
+                enlarged: None,
+                text: sources::told_of_patches(self.patches.len()),
+            });
         }
         Ok(())
     }
@@ -319,6 +403,7 @@ impl ObjReader<'_, '_> {
     }
 
     fn finish(mut self) -> Result<(), ImportError> {
+        self.divide_patches()?;
         let offset = soup::recenter(&mut self.positions);
         if !self.colors.is_empty() {
             self.colors.resize(self.positions.len(), [1.0; 3]);
@@ -439,15 +524,4 @@ fn unit_normal(n: [f32; 3]) -> [f32; 3] {
 fn finite(c: f64) -> f32 {
     let c = c as f32;
     if c.is_finite() { c } else { 0.0 }
-}
-
-/// Returns an index from 0 for one from 1, or from the end if negative.
-fn resolve(field: &str, n: usize) -> Option<u32> {
-    let index: i64 = field.parse().ok()?;
-    let index = match index {
-        1.. => index - 1,
-        0 => return None,
-        _ => index.checked_add(i64::try_from(n).ok()?)?,
-    };
-    u32::try_from(index).ok().filter(|&i| (i as usize) < n)
 }

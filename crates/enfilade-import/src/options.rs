@@ -68,6 +68,8 @@ pub struct ImportOptions {
     pub volume: VolumeOptions,
     /// Size and heights of height maps.
     pub heights: HeightOptions,
+    /// Largest distance of triangles from free-form patches; `None` is 0.01. [Units: wu]
+    pub patch_tolerance: Option<f64>,
     /// Places of the scanner, for clouds of points that do not tell them; in meters, +Y up. [Units: wu]
     pub stations: Vec<DVec3>,
     /// Repairs of structural triangles; `None` repairs nothing.

@@ -6,7 +6,7 @@
 use crate::builder::Builder;
 use crate::polygon::Splitter;
 use crate::soup::shortened;
-use crate::{ImportError, soup, sources};
+use crate::{ImportError, scans, soup};
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Mesh, Primitive};
 
@@ -30,7 +30,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     }
     if cloud.ends.is_empty() && cloud.strips.is_empty() && !cloud.positions.is_empty() {
         let points = cloud.positions.into_iter().map(DVec3::from_array).collect();
-        return sources::read_points(points, cloud.station_of, header.stations, builder);
+        return scans::read_points(points, cloud.station_of, header.stations, builder);
     }
     cloud.finish(builder)
 }

@@ -64,21 +64,22 @@ pub struct UpDoubt {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `implicit`, `NIfTI`, `NRRD`, `raw volume` or `E57`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `implicit`, `patches`, `NIfTI`, `NRRD`, `raw volume`, `E57` or `LAS`.
     pub format: &'static str,
     /// Objects read from it.
     pub n_objects: u64,
     /// Triangles of these objects.
     pub n_triangles: u64,
-    /// The surface made of it, if it has no triangles of its own.
+    /// The surface made of it, or of its patches, if it has more than triangles of its own.
     pub surface: Option<SurfaceReport>,
 }
 
 /// A surface made of a source that is not triangles. All promises hold for the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceReport {
-    /// Distance between the points at which the source was evaluated; details thinner than this may be lost. [Units: wu]
-    pub step: f64,
+    /// Distance between the points at which the source was evaluated; details thinner than this may be lost. Patches have none, and lose
+    /// none. [Units: wu]
+    pub step: Option<f64>,
     /// Largest distance found between surface and source. [Units: wu]
     pub distance: f64,
     /// Points at which the source was evaluated.

@@ -85,3 +85,14 @@ pub(crate) fn shortened(word: &str) -> String {
         word.chars().take(57).chain("...".chars()).collect()
     }
 }
+
+/// Returns an index from 0 for one from 1, or from the end if negative.
+pub(crate) fn resolve(field: &str, n: usize) -> Option<u32> {
+    let index: i64 = field.parse().ok()?;
+    let index = match index {
+        1.. => index - 1,
+        0 => return None,
+        _ => index.checked_add(i64::try_from(n).ok()?)?,
+    };
+    u32::try_from(index).ok().filter(|&i| (i as usize) < n)
+}

@@ -1,19 +1,16 @@
 //! Sources that are not triangles: their surfaces become the only object of their file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
-use std::io::Cursor;
-
-use e57::{CartesianCoordinate, E57Reader};
 
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_source::{
-    AirSide, HeightMap, ImplicitScene, Level, Scan, ScanOptions, SourceError, SourceLimits,
-    Surface, Volume, VolumeSummary,
+    AirSide, FreeformScene, HeightMap, ImplicitScene, Level, SourceError, SourceLimits, Surface,
+    Volume, VolumeSummary, tessellate,
 };
 
-use crate::builder::Builder;
+use crate::builder::{Builder, Placement};
 use crate::{ImportError, ImportReport, SurfaceReport, Up, soup};
 
 /// Reads a scene of implicit shapes.
@@ -30,6 +27,89 @@ pub(crate) fn read_implicit(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(
     let to_input = DMat4::from_scale(DVec3::splat(unit));
     let step = scene.step() * unit;
     add(builder, surface, to_input, step, Told::default())
+}
+
+/// Largest distance of triangles from patches, unless the options give another. [Units: wu]
+const PATCH_TOLERANCE: f64 = 0.01;
+
+/// Returns the largest distance of triangles from patches. [Units: wu]
+pub(crate) fn patch_tolerance(builder: &Builder<'_>) -> f64 {
+    builder.options.patch_tolerance.unwrap_or(PATCH_TOLERANCE)
+}
+
+pub(crate) fn told_of_patches(n: usize) -> String {
+    format!("{n} free-form patches as triangles (--patch-tolerance gives their largest distance)")
+}
+
+/// Reads a scene of free-form patches. Those of one name are one object.
+pub(crate) fn read_patches(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
+    builder.set_format("patches");
+    let limits = limits(builder);
+    let bad = |builder: &Builder<'_>, e: SourceError| builder.malformed(e.place, e.problem);
+    let scene = FreeformScene::parse(bytes, &limits).map_err(|e| bad(builder, e))?;
+    let unit = match builder.options.unit {
+        Some(_) => 1.0,
+        None => scene.unit.unwrap_or(1.0),
+    };
+    let meters = builder.base.transform_vector3(DVec3::X).length() * unit;
+    let (mut names, mut surfaces) = (Vec::new(), Vec::new());
+    for patch in scene.patches {
+        names.push(patch.name);
+        surfaces.push(patch.surface);
+    }
+    let mesh = tessellate(&surfaces, patch_tolerance(builder) / meters, &limits);
+    let mesh = mesh.map_err(|e| bad(builder, e))?;
+    let n: usize = mesh.triangles.iter().map(Vec::len).sum();
+    builder.add_read_bytes((n * 36) as u64);
+    let mut positions: Vec<[f64; 3]> = mesh.positions.iter().map(DVec3::to_array).collect();
+    let offset = soup::recenter(&mut positions);
+    let mut objects: BTreeMap<&str, Vec<[u32; 3]>> = BTreeMap::new();
+    for (name, triangles) in names.iter().zip(&mesh.triangles) {
+        objects.entry(name).or_default().extend(triangles);
+    }
+    let stem = soup::stem(builder);
+    for (name, triangles) in objects {
+        let name = if name.is_empty() { &stem } else { name };
+        let place = format!("patches '{}'", soup::shortened(name));
+        // Only the vertices of this object, in the order of their use.
+        let mut index: HashMap<u32, u32> = HashMap::new();
+        let mut primitive = Primitive::default();
+        for v in triangles.into_flattened() {
+            let next = primitive.positions.len() as u32;
+            let i = *index.entry(v).or_insert(next);
+            if i == next {
+                let p = positions[v as usize].map(|c| c as f32);
+                primitive.positions.push(p);
+            }
+            primitive.indices.push(i);
+        }
+        builder.charge_vertices(&place, primitive.positions.len() as u64)?;
+        let mesh = builder.push_mesh(Mesh {
+            name: name.to_owned(),
+            primitives: vec![primitive],
+        });
+        let transform =
+            builder.base * DMat4::from_scale(DVec3::splat(unit)) * DMat4::from_translation(offset);
+        builder.place(&Placement {
+            mesh,
+            names: [name, ""],
+            ancestors: &[],
+            transforms: &[transform],
+            moves: None,
+            place: &place,
+            source: None,
+        })?;
+    }
+    if let Some(file) = builder.report.files.last_mut() {
+        file.surface = Some(SurfaceReport {
+            step: None,
+            distance: mesh.distance * meters,
+            n_samples: mesh.n_samples,
+            enlarged: None,
+            text: told_of_patches(surfaces.len()),
+        });
+    }
+    Ok(())
 }
 
 /// Enlargement of volumes of bodies, whose ways are too narrow for a person: one millimeter becomes 0.128 m, so that the
@@ -187,128 +267,8 @@ pub(crate) fn read_heights(bytes: &[u8], builder: &mut Builder<'_>) -> Result<()
     )
 }
 
-/// Edge of the voxels of a scan: walls are at least two of them thick. [Units: wu]
-const SCAN_STEP: f64 = 0.05;
-/// Farthest points from the stations that matter, along an axis. [Units: wu]
-const SCAN_REACH: f64 = 12.0;
-/// Pieces of surface smaller than this are noise: half the width of the narrowest doorway. [Units: wu]
-const SCAN_PIECE: f64 = 0.3;
-
-/// Reads the scans of an E57 file, each with the pose of its scanner. The third axis is up.
-pub(crate) fn read_e57(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    builder.set_format("E57");
-    let file = Cursor::new(bytes);
-    let mut reader = E57Reader::new(file).map_err(|e| damaged(builder, "file", &e))?;
-    let (mut points, mut station_of, mut stations) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, cloud) in reader.pointclouds().iter().enumerate() {
-        let place = format!("scan {i}");
-        builder.charge_vertices(&place, cloud.records)?;
-        let Some(pose) = &cloud.transform else {
-            builder.note(
-                place,
-                "a scan without a pose, so that its station is not known; left out",
-            );
-            continue;
-        };
-        let Ok(station) = u16::try_from(stations.len()) else {
-            return Err(builder.malformed(place, "more than 65,535 scans; split the file"));
-        };
-        let at = &pose.translation;
-        stations.push(DVec3::new(at.x, at.y, at.z));
-        let all = reader
-            .pointcloud_simple(cloud)
-            .map_err(|e| damaged(builder, &place, &e))?;
-        for point in all {
-            let point = point.map_err(|e| damaged(builder, &place, &e))?;
-            // A direction alone met nothing: the sky, or a surface as black as it.
-            if let CartesianCoordinate::Valid { x, y, z } = point.cartesian {
-                points.push(DVec3::new(x, y, z));
-                station_of.push(station);
-            }
-        }
-    }
-    if builder.options.up.is_none() {
-        let turn = |p: &mut DVec3| *p = DVec3::new(p.x, p.z, -p.y);
-        points.iter_mut().chain(&mut stations).for_each(turn);
-    }
-    if stations.is_empty() {
-        return Ok(());
-    }
-    let cloud = Scan {
-        points,
-        station_of,
-        stations,
-    };
-    add_scan(&cloud, builder)
-}
-
-fn damaged(builder: &Builder<'_>, place: &str, e: &e57::Error) -> ImportError {
-    builder.malformed(place, format!("{e}; is the file cut off?"))
-}
-
-/// Reads the points of a scan. Without a place of the scanner, the file has no surface, and this is noted.
-///
-/// `station_of` is empty if the file does not say which station saw which point.
-pub(crate) fn read_points(
-    points: Vec<DVec3>,
-    station_of: Vec<u16>,
-    mut stations: Vec<DVec3>,
-    builder: &mut Builder<'_>,
-) -> Result<(), ImportError> {
-    // Options are in meters of the scene, with y up.
-    let from_scene = builder.base.inverse();
-    let given = builder.options.stations.iter();
-    stations.extend(given.map(|p| from_scene.transform_point3(*p)));
-    if stations.is_empty() {
-        let text = "a cloud of points without faces; give the place of the scanner as --station X,Y,Z, so that its surface can be \
-                    made";
-        builder.note("element vertex", text);
-        return Ok(());
-    }
-    if stations.len() > 1 && station_of.is_empty() {
-        let problem = format!(
-            "{} stations, and no property 'station' of the points that tells which saw each; give each scan a file of its own",
-            stations.len()
-        );
-        return Err(builder.malformed("element vertex", problem));
-    }
-    let scan = Scan {
-        station_of: match station_of.is_empty() {
-            true => vec![0; points.len()],
-            false => station_of,
-        },
-        points,
-        stations,
-    };
-    add_scan(&scan, builder)
-}
-
-/// Adds the surface of a scan in the space of the input.
-fn add_scan(scan: &Scan, builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    let meters = builder.base.transform_vector3(DVec3::X).length();
-    let options = ScanOptions {
-        step: SCAN_STEP / meters,
-        reach: SCAN_REACH / meters,
-        least_piece: SCAN_PIECE / meters,
-    };
-    let limits = limits(builder);
-    let step = scan.step(&options, &limits);
-    let surface = scan.surface(&options, &limits);
-    let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
-    let text = format!(
-        "a scan of {} points, stations: {}; what no station saw is matter",
-        scan.points.len(),
-        scan.stations.len()
-    );
-    let told = Told {
-        text,
-        enlarged: None,
-    };
-    add(builder, surface, DMat4::IDENTITY, step, told)
-}
-
 /// Returns the limits of sources that follow from those of the import.
-fn limits(builder: &Builder<'_>) -> SourceLimits {
+pub(crate) fn limits(builder: &Builder<'_>) -> SourceLimits {
     let (most, usual) = (builder.limits(), SourceLimits::default());
     SourceLimits {
         max_triangles: usual.max_triangles.min(most.max_triangles),
@@ -323,13 +283,13 @@ fn limits(builder: &Builder<'_>) -> SourceLimits {
 
 /// Assumptions about a source, for people.
 #[derive(Default)]
-struct Told {
-    text: String,
-    enlarged: Option<f64>,
+pub(crate) struct Told {
+    pub(crate) text: String,
+    pub(crate) enlarged: Option<f64>,
 }
 
 /// Adds the surface of a source, from its space to that of the input.
-fn add(
+pub(crate) fn add(
     builder: &mut Builder<'_>,
     mut surface: Surface,
     to_input: DMat4,
@@ -370,7 +330,7 @@ fn add(
     let scale = to_input.transform_vector3(DVec3::X).length();
     if let Some(file) = builder.report.files.last_mut() {
         file.surface = Some(SurfaceReport {
-            step: step * meters,
+            step: Some(step * meters),
             distance: surface.distance * meters * scale,
             n_samples: surface.n_samples,
             enlarged: told.enlarged,
@@ -386,16 +346,12 @@ impl ImportReport {
     #[must_use]
     pub fn surface_settings(&self) -> BTreeMap<String, String> {
         let all = || self.files.iter().filter_map(|f| f.surface.as_ref());
-        let largest = |of: fn(&SurfaceReport) -> f64| all().map(of).fold(0.0, f64::max);
-        if all().next().is_none() {
-            return BTreeMap::new();
-        }
-        let mut told: BTreeMap<_, _> = [
-            ("surface.step", largest(|s| s.step)),
-            ("surface.distance", largest(|s| s.distance)),
-        ]
-        .map(|(name, length)| (name.to_owned(), format!("{length:.3e}")))
-        .into();
+        let steps = all().filter_map(|s| s.step).reduce(f64::max);
+        let distances = all().map(|s| s.distance).reduce(f64::max);
+        let mut told: BTreeMap<_, _> = [("surface.step", steps), ("surface.distance", distances)]
+            .into_iter()
+            .filter_map(|(name, length)| Some((name.to_owned(), format!("{:.3e}", length?))))
+            .collect();
         if let Some(factor) = all().find_map(|s| s.enlarged) {
             told.insert("surface.enlarged".into(), factor.to_string());
         }

@@ -7,7 +7,7 @@ use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_import::{
     HeightOptions, ImportOptions, SceneSource, decode_e57, decode_heights, decode_implicit,
-    decode_ply, import_sources,
+    decode_las, decode_ply, import_sources,
 };
 
 const BALL: &str = r#"{ "enfilade": "implicit", "unit": "cm", "air": { "ball": { "at": [100, 0, 0], "radius": 200 } } }"#;
@@ -28,7 +28,8 @@ fn an_implicit_scene_is_one_structural_object_in_meters_with_its_distance() {
         surface.distance > 0.0 && surface.distance < 0.05,
         "{surface:?}"
     );
-    assert!((surface.step - 4.0 / 128.0).abs() < 1e-6, "{surface:?}");
+    let step = surface.step.unwrap();
+    assert!((step - 4.0 / 128.0).abs() < 1e-6, "{surface:?}");
     let told = imported.report.surface_settings();
     assert_eq!(
         told.keys().collect::<Vec<_>>(),
@@ -230,4 +231,73 @@ fn a_height_map_is_land_in_meters_alone_or_beside_models() {
     let imported = import_sources(both, &ImportOptions::default()).unwrap();
     let formats: Vec<_> = imported.report.files.iter().map(|f| f.format).collect();
     assert_eq!(formats, ["TIFF", "OBJ"]);
+}
+
+/// Points of two rooms beside each other, z up, with the sources 5 and 9 seen from the middle of each.
+fn rooms_las(is_compressed: bool) -> Vec<u8> {
+    let mut header = las::Builder::from((1, 4));
+    header.point_format = las::point::Format::new(1).unwrap();
+    header.point_format.is_compressed = is_compressed;
+    let header = header.into_header().unwrap();
+    let mut writer = las::Writer::new(Cursor::new(Vec::new()), header).unwrap();
+    for (source, middle) in [(9, 4.2), (5, 0.0)] {
+        for i in 0..40_000 {
+            let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / 40_000.0;
+            let (turn, r) = (f64::from(i) * 2.399_963, (1.0 - y * y).sqrt());
+            let d = DVec3::new(r * turn.cos(), r * turn.sin(), y);
+            let p = d * (DVec3::new(2.0, 1.5, 1.25) / d.abs()).min_element();
+            let point = las::Point {
+                x: p.x + middle,
+                y: p.y,
+                z: p.z,
+                point_source_id: source,
+                gps_time: Some(0.0),
+                ..las::Point::default()
+            };
+            writer.write_point(point).unwrap();
+        }
+    }
+    writer.close().unwrap();
+    writer.into_inner().unwrap().into_inner()
+}
+
+#[test]
+fn las_and_laz_are_scans_if_the_stations_of_their_sources_are_given() {
+    let stations = |all: &[[f64; 3]]| ImportOptions {
+        stations: all.iter().map(|p| DVec3::from_array(*p)).collect(),
+        ..ImportOptions::default()
+    };
+    let both = stations(&[[0.0; 3], [4.2, 0.0, 0.0]]);
+    let las = rooms_las(false);
+    let imported = decode_las(&las, &both).unwrap();
+    let size = imported.scene.object_aabb(0).size();
+    // A block of matter around both rooms, with its height along y.
+    assert!(size.x > 8.2 && size.x < 9.0, "{size}");
+    assert!(size.z > size.y + 0.4, "{size}");
+    let compressed = decode_las(&rooms_las(true), &both).unwrap();
+    let all = |i: &enfilade_import::Imported| i.scene.meshes[0].primitives[0].positions.clone();
+    assert!(all(&compressed) == all(&imported));
+    let said =
+        |bytes: &[u8], options: &ImportOptions| decode_las(bytes, options).unwrap_err().to_string();
+    assert!(said(&las, &stations(&[])).contains("--station"));
+    let error = said(&las, &stations(&[[0.0; 3], [1.0; 3], [2.0; 3]]));
+    assert!(
+        error.contains("2 sources") && error.contains("3 stations"),
+        "{error}"
+    );
+    let laz = rooms_las(true);
+    for (whole, cuts) in [(&las, [3, 100, 300]), (&laz, [3, 100, 2000])] {
+        for n in cuts.into_iter().chain([whole.len() / 2, whole.len() - 9]) {
+            assert!(decode_las(&whole[..n], &both).is_err(), "{n}");
+        }
+    }
+    // A thousand million points that are not there.
+    let mut many = las.clone();
+    many[107..111].copy_from_slice(&1_000_000_000_u32.to_le_bytes());
+    many[247..255].copy_from_slice(&1_000_000_000_u64.to_le_bytes());
+    let error = said(&many, &both);
+    assert!(
+        error.contains("vertices") && error.contains("1000000000"),
+        "{error}"
+    );
 }

@@ -19,6 +19,7 @@
 mod blocks;
 mod error;
 mod field;
+mod freeform;
 mod heights;
 mod implicit;
 mod json;
@@ -32,6 +33,10 @@ mod volume;
 pub use blocks::Lattice;
 pub use error::{SourceError, SourceLimits};
 pub use field::{Field, Interval};
+pub use freeform::{
+    FreeformCurve, FreeformMesh, FreeformPatch, FreeformScene, FreeformSurface, SplineBasis,
+    TrimCurve, tessellate,
+};
 pub use heights::{HeightMap, HeightOptions};
 pub use implicit::ImplicitScene;
 pub use scan::{Scan, ScanOptions};

@@ -6,6 +6,7 @@
 
 mod carve;
 mod cells;
+mod gaps;
 mod planes;
 
 use enfilade_geom::{Aabb, DMat4, DVec3};

@@ -87,21 +87,55 @@ fn noisy_rooms_become_flat_walls_with_the_wall_between_them() {
     );
 }
 
-#[test]
-fn the_unknown_is_not_free() {
-    let mut scan = rooms(0.0);
-    // Nothing was seen through a window in the far wall: no point there.
-    let is_window = |p: &DVec3| p.x < 0.01 && (p.y - 1.2).abs() < 0.5 && (p.z - 1.5).abs() < 0.5;
+/// Leaves out points.
+fn without(scan: &mut Scan, is_lost: impl Fn(&DVec3) -> bool) {
     let seen: Vec<usize> = (0..scan.points.len())
-        .filter(|&i| !is_window(&scan.points[i]))
+        .filter(|&i| !is_lost(&scan.points[i]))
         .collect();
     scan.station_of = seen.iter().map(|&i| scan.station_of[i]).collect();
     scan.points = seen.iter().map(|&i| scan.points[i]).collect();
+}
+
+#[test]
+fn a_gap_in_a_view_is_closed_by_its_rim() {
+    // Nothing was seen through a window, and none of the floor below the scanner.
+    let mut scan = rooms(0.0);
+    let is_window = |p: &DVec3| p.x < 0.01 && (p.y - 1.2).abs() < 0.5 && (p.z - 1.5).abs() < 0.5;
+    let is_below = |p: &DVec3| p.y < 0.01 && (p.x - 2.0).hypot(p.z - 1.5) < 0.7;
+    without(&mut scan, |p| is_window(p) || is_below(p));
     let surface = scan.surface(&OPTIONS, &SourceLimits::default()).unwrap();
-    // A wedge towards the window stays matter.
-    let is_deep =
-        |p: &&DVec3| p.x > 0.5 && p.x < 1.5 && (p.y - 1.2).abs() < 0.3 && (p.z - 1.5).abs() < 0.4;
-    assert!(surface.positions.iter().any(|p| is_deep(&p)));
+    // No wedge towards the window, and no cone below the scanner.
+    let is_wedge =
+        |p: &&DVec3| p.x > 0.2 && p.x < 1.5 && (p.y - 1.2).abs() < 0.3 && (p.z - 1.5).abs() < 0.4;
+    assert_eq!(surface.positions.iter().find(is_wedge), None);
+    let near = scan.bounds(&OPTIONS).expanded(0.1);
+    let air = -volume_of(&surface, |p| near.contains(p));
+    let truth = 4.0 * 2.5 * 3.0 + 2.88 * 2.5 * 3.0;
+    assert!((air / truth - 1.0).abs() < 0.05, "{air} {truth}");
+}
+
+#[test]
+fn the_unknown_is_not_free() {
+    // Behind a box in the middle of the room, nothing was seen.
+    let mut scan = rooms(0.0);
+    let station = scan.stations[0];
+    let (min, max) = (DVec3::new(1.0, 0.6, 1.1), DVec3::new(1.3, 1.6, 1.9));
+    for (p, s) in scan.points.iter_mut().zip(&scan.station_of) {
+        let way = *p - station;
+        let share = (max.x - station.x) / way.x;
+        let on = station + way * share;
+        let is_hit = *s == 0 && share > 0.0 && share < 1.0;
+        if is_hit && on.y > min.y && on.y < max.y && on.z > min.z && on.z < max.z {
+            *p = on;
+        }
+    }
+    let surface = scan.surface(&OPTIONS, &SourceLimits::default()).unwrap();
+    let near = scan.bounds(&OPTIONS).expanded(0.1);
+    let air = -volume_of(&surface, |p| near.contains(p));
+    // The shadow of 0.8 m² at 0.7 m ends at 2 m, 8 times as large.
+    let shadow = 0.8 / (0.7 * 0.7) * (8.0 - 0.7_f64.powi(3)) / 3.0;
+    let truth = 4.0 * 2.5 * 3.0 + 2.88 * 2.5 * 3.0 - shadow;
+    assert!((air / truth - 1.0).abs() < 0.05, "{air} {truth}");
 }
 
 #[test]

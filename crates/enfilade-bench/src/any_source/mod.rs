@@ -4,6 +4,8 @@
 
 mod implicit;
 mod land;
+mod parametric;
+mod scan;
 mod volume;
 
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
@@ -15,6 +17,8 @@ use crate::rows::{Measure, Row};
 
 /// Implicit scenes with as many rooms and openings as they were made with.
 const SHAPES: &[&str] = &["balls", "cavern", "house", "gyroid"];
+/// Scenes of patches, each with a twin of triangles.
+const PATCHES: &[&str] = &["patch-house", "patch-vault", "patch-tube"];
 const AORTA: &[&str] = &["aorta"];
 /// Airway trees of 15 branches, with the noise of computed tomography in its units.
 const AIRWAYS: &[&str] = &["airway-noise-0", "airway-noise-40", "airway-noise-80"];
@@ -24,26 +28,57 @@ const LANDS: &[&str] = &["valleys", "hamlets", "city-1", "city-2"];
 const BUILT: &[&str] = &["hamlets", "city-1", "city-2"];
 const CITIES: &[&str] = &["city-1", "city-2"];
 
-const fn of_aorta(
+/// Buildings that are scanned.
+const HOUSE: &[&str] = &["fzk-haus"];
+const BUILDINGS: &[&str] = &["fzk-haus", "institute"];
+
+const fn named(
     name: &'static str,
+    scenes: &'static [&'static str],
     measure: fn(&World, &str) -> anyhow::Result<crate::rows::Figure>,
 ) -> Row {
     let measure = Measure::Named(measure);
     Row {
         name,
-        scenes: AORTA,
+        scenes,
         measure,
     }
 }
 
 pub(crate) const ROWS: &[Row] = &[
-    of_aorta("volume: cells, 0.5 mm", |w, s| volume::cells(w, s, 0.5)),
-    of_aorta("volume: cells, 0.8 mm", |w, s| volume::cells(w, s, 0.8)),
-    of_aorta("volume: cells, 1.2 mm", |w, s| volume::cells(w, s, 1.2)),
+    named("volume: cells, 0.5 mm", AORTA, |w, s| {
+        volume::cells(w, s, 0.5)
+    }),
+    named("volume: cells, 0.8 mm", AORTA, |w, s| {
+        volume::cells(w, s, 0.8)
+    }),
+    named("volume: cells, 1.2 mm", AORTA, |w, s| {
+        volume::cells(w, s, 1.2)
+    }),
     made("volume: branches missed", AIRWAYS, volume::missed),
     made("implicit: cells", SHAPES, implicit::cells),
     made("implicit: portals", SHAPES, implicit::portals),
     made("implicit: samples by volume", &["balls"], implicit::samples),
+    made("parametric: cells", PATCHES, parametric::cells),
+    made("parametric: portals", PATCHES, parametric::portals),
+    named("scan: rooms missed, 3 stations", HOUSE, |w, s| {
+        scan::rooms(w, s, 3)
+    }),
+    named("scan: doors missed, 3 stations", HOUSE, |w, s| {
+        scan::doors(w, s, 3)
+    }),
+    named("scan: rooms missed, 12 stations", HOUSE, |w, s| {
+        scan::rooms(w, s, 12)
+    }),
+    named("scan: doors missed, 12 stations", HOUSE, |w, s| {
+        scan::doors(w, s, 12)
+    }),
+    named("scan: rooms missed, 30 stations", BUILDINGS, |w, s| {
+        scan::rooms(w, s, 30)
+    }),
+    named("scan: doors missed, 30 stations", BUILDINGS, |w, s| {
+        scan::doors(w, s, 30)
+    }),
     made("land: places missed", LANDS, land::missed),
     made("land: rooms lost or made up", BUILT, land::rooms),
     made("land: seconds", LANDS, land::seconds),

@@ -24,11 +24,15 @@ pub(crate) fn report_import(
             if !surface.text.is_empty() {
                 writeln!(err, "{path}: {}", surface.text)?;
             }
+            let steps = match surface.step {
+                Some(step) => format!(" in steps of {step:.3} m"),
+                None => String::new(),
+            };
             writeln!(
                 err,
-                "{path}: {}, a surface of {} triangles in steps of {:.3} m; it is at most {:.3} m from its source, and all \
-                 promises hold for it",
-                file.format, file.n_triangles, surface.step, surface.distance
+                "{path}: {}, a surface of {} triangles{steps}; it is at most {:.3} m from its source, and all promises hold \
+                 for it",
+                file.format, file.n_triangles, surface.distance
             )?;
         }
     }

@@ -45,13 +45,17 @@ pub(crate) struct SceneOptions {
     /// Volumes: the side of the level on which air is [default: below a given level, above that of a mask].
     #[arg(long, value_enum)]
     air: Option<AirName>,
+    /// Free-form patches (in OBJ, or in JSON): largest distance of their triangles from them [default: 0.01].
+    #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
+    patch_tolerance: Option<f64>,
     /// Height maps (PNG, TIFF): distance in meters between samples [default: that of a GeoTIFF].
     #[arg(long, value_name = "METERS", value_parser = parse_length, allow_hyphen_values = true)]
     cell: Option<f64>,
     /// Height maps of grays: heights in meters of black and of white.
     #[arg(long, value_name = "MIN,MAX", value_parser = parse_place, allow_hyphen_values = true)]
     heights: Option<[f64; 2]>,
-    /// Scans (clouds of points in PLY): a place of the scanner, in meters with y up, if the file does not tell it; repeatable.
+    /// Scans (clouds of points in PLY, LAS, LAZ): a place of the scanner, in meters with y up, if the file does not tell it;
+    /// repeatable: in LAS, one for each point source id, in their order.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     station: Vec<DVec3>,
     /// Also read files outside the scene's folder that the scene refers to (buffers, pictures, materials); unsafe for
@@ -317,6 +321,7 @@ impl SceneOptions {
         ImportOptions {
             allow_outside: self.allow_outside,
             ifc: Some(ifc),
+            patch_tolerance: self.patch_tolerance,
             stations: self.station.clone(),
             heights: HeightOptions {
                 cell: self.cell,

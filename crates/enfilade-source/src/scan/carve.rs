@@ -22,13 +22,20 @@ pub(super) fn carve(scan: &Scan, grid: &ScanGrid, free: &mut [bool]) {
             continue;
         }
         *n += 1;
-        let from = scan.stations[usize::from(s)];
-        let way = *p - from;
-        let length = way.length();
-        let end = length - (REACH - 0.5) * grid.step;
-        if end > 0.0 {
-            walk(grid, from, from + way * (end / length), free);
-        }
+        free_way(grid, scan.stations[usize::from(s)], *p, free);
+    }
+    for (s, end) in super::gaps::ends(scan) {
+        free_way(grid, scan.stations[usize::from(s)], end, free);
+    }
+}
+
+/// Marks the voxels of a way, except near its end.
+fn free_way(grid: &ScanGrid, from: DVec3, to: DVec3, free: &mut [bool]) {
+    let way = to - from;
+    let length = way.length();
+    let end = length - (REACH - 0.5) * grid.step;
+    if end > 0.0 {
+        walk(grid, from, from + way * (end / length), free);
     }
 }
 
