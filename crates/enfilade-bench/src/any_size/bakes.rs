@@ -148,7 +148,7 @@ fn lost(alone: &World, scene: &str, places: &[DVec3]) -> anyhow::Result<Figure> 
 }
 
 /// Places copies of a scene on hills, each on level ground of its own.
-fn on_land(alone: &World, name: &str, places: &[DVec3]) -> anyhow::Result<Scene> {
+pub(super) fn on_land(alone: &World, name: &str, places: &[DVec3]) -> anyhow::Result<Scene> {
     let dir = folder_of(name).context("the scene is missing")?;
     let (files, details) = files_of(&dir);
     let mut scene = import(&files, &details, &ImportOptions::default())?.scene;

@@ -5,6 +5,7 @@
 
 mod bakes;
 mod pvs;
+mod shards;
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -37,6 +38,8 @@ pub(crate) const ROWS: &[Row] = &[
     named("land: seconds", HOUSE, bakes::seconds_on_land),
     named("land: rooms lost", BUILDINGS, bakes::lost_on_land),
     named("land: rooms lost of three", BUILDINGS, bakes::lost_on_site),
+    named("shards: differing", BUILDINGS, shards::differing),
+    named("shards: time of two", BUILDINGS, shards::time_of_two),
     made("pvs: memory", LARGE, pvs::memory_of),
     made("pvs: rate", LARGE, pvs::rate),
     made("pvs: missed", TOWNS, pvs::missed),
