@@ -187,7 +187,7 @@ fn taken_in(scene: &str, folder: &Path) -> anyhow::Result<Figure> {
         ("would be outdoors", HandEditKind::NoPortal(doorway)),
         ("no portal is at", HandEditKind::Door(DVec3::ZERO)),
         ("needs air", HandEditKind::Lamp(corner(0.0, -0.1))),
-        ("needs air", HandEditKind::Crate(corner(0.0, -2.0), 0.0)),
+        ("needs air", HandEditKind::Crate(corner(0.0, -0.4), 0.0)),
         (
             "a way leads around it at",
             HandEditKind::Portal(
