@@ -1,5 +1,5 @@
 //! Editing in the window of `view`: a level is built with keys and clicks as a user would give them, killed, gone on with, saved and
-//! walked through.
+//! walked through. Covers W14 and P4.
 #![cfg(all(target_os = "linux", feature = "view"))]
 
 mod windowed;

@@ -1,7 +1,7 @@
 //! The session: a level, changes by hand, and the history of both.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::World;
 use enfilade_geom::DVec3;
@@ -89,6 +89,8 @@ pub struct EditSession {
     done: Vec<Done>,
     undone: Vec<Done>,
     journal: Option<Journal>,
+    /// The world as it is now, if it was asked for.
+    latest: OnceLock<Arc<EditedWorld>>,
 }
 
 impl EditSession {
@@ -119,6 +121,7 @@ impl EditSession {
             done: Vec::new(),
             undone: Vec::new(),
             journal: None,
+            latest: OnceLock::new(),
         })
     }
 
@@ -205,16 +208,22 @@ impl EditSession {
     ///
     /// Why it is refused: nothing changes then. That the journal cannot be written: then it is not made either.
     pub fn apply(&mut self, operation: EditOperation) -> Result<(), EditError> {
+        let mut edited = None;
         if let EditOperation::Make(edit) = &operation {
             // Those that were made before are made in any case.
             let kind = self.placed(edit)?;
-            kind.make(&mut self.world()?.world)?;
+            let next = edited.insert(EditedWorld::clone(&*self.world()?));
+            kind.make(&mut next.world)?;
         }
         self.replayed(&operation)?;
         let written = self.write(&Entry::Operation(operation));
-        if written.is_err() {
-            self.step_back();
-            self.undone.clear();
+        match (&written, edited) {
+            (Ok(()), Some(edited)) => self.latest = Arc::new(edited).into(),
+            (Ok(()), None) => {}
+            (Err(_), _) => {
+                self.step_back();
+                self.undone.clear();
+            }
         }
         written
     }
@@ -254,6 +263,7 @@ impl EditSession {
         };
         self.undone.clear();
         self.done.push(done);
+        self.latest = OnceLock::new();
         Ok(())
     }
 
@@ -293,6 +303,7 @@ impl EditSession {
             }
         }
         self.done.push(step);
+        self.latest = OnceLock::new();
         Ok(true)
     }
 
@@ -308,15 +319,20 @@ impl EditSession {
             Done::Unmade(at, edit) => self.edits.insert(*at, edit.clone()),
         }
         self.undone.push(step);
+        self.latest = OnceLock::new();
         true
     }
 
-    /// Returns the world as it is now. Time: linear in the level, and that of each change by hand.
+    /// Returns the world as it is now. Time: linear in the level, and that of each change by hand; none if it was asked for already,
+    /// or made for the last change by hand.
     ///
     /// # Errors
     ///
     /// None for levels made by operations; as [`Assembly::flattened`].
-    pub fn world(&self) -> Result<EditedWorld, EditError> {
+    pub fn world(&self) -> Result<Arc<EditedWorld>, EditError> {
+        if let Some(latest) = self.latest.get() {
+            return Ok(Arc::clone(latest));
+        }
         let mut world = match &self.base {
             Some(base) => World::clone(base),
             None => self.level.flattened()?,
@@ -328,7 +344,8 @@ impl EditSession {
                 resting.push((number, why));
             }
         }
-        Ok(EditedWorld { world, resting })
+        let made = Arc::new(EditedWorld { world, resting });
+        Ok(Arc::clone(self.latest.get_or_init(|| made)))
     }
 
     /// Returns a change by hand, given in the frame of the world, as one that moves with the instance there.

@@ -147,9 +147,13 @@ fn a_world_with_all_changes_by_hand_keeps_its_promises_and_they_move_with_their_
         };
         let report = verify_world(&edited.world, None, &options);
         assert!(report.holds(), "{:?}", report.problems);
-        edited.world
+        edited.world.clone()
     };
     let world = checked(&session);
+    // As made change by change, and as made at once.
+    let before = bytes(&session);
+    assert!(session.undo().unwrap() && bytes(&session) != before);
+    assert!(session.redo().unwrap() && bytes(&session) == before);
     assert_eq!(world.graph.indoor_cells().count(), 3);
     assert_eq!(world.graph.specials.len(), 1);
     assert_eq!((world.fixtures.len(), world.details.len()), (1, 1));

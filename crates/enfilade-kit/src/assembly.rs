@@ -80,14 +80,13 @@ impl Assembly {
         pose: Pose,
         options: &PlaceOptions,
     ) -> Result<InstanceId, PlaceError> {
-        let name = match &options.name {
-            Some(name) if self.state.by_name.contains_key(name) => {
-                return Err(PlaceError::NamedTwice(name.clone()));
-            }
-            Some(name) => name.clone(),
-            None => self.state.free_name(piece),
-        };
+        let named = options.name.as_ref();
+        if let Some(name) = named.filter(|name| self.state.by_name.contains_key(*name)) {
+            return Err(PlaceError::NamedTwice(name.clone()));
+        }
         let links = self.state.links_at(piece, &pose, options)?;
+        let name = named.cloned();
+        let name = name.unwrap_or_else(|| self.state.free_name(piece));
         let id = InstanceId(self.state.instances.all.len() as u32);
         let relinked = self.state.links_to(id, &links);
         self.state.stand(Instance {

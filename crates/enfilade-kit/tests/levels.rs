@@ -234,6 +234,16 @@ fn undoing_everything_gives_the_same_bytes_and_redoing_too() {
 }
 
 #[test]
+fn a_piece_that_the_kit_does_not_have_is_refused() {
+    let mut level = Assembly::new(dungeon());
+    let n = level.kit().pieces().len();
+    let options = PlaceOptions::default();
+    let refused = level.put(n, Pose::IDENTITY, &options);
+    assert_eq!(refused, Err(PlaceError::NoPiece(n.to_string())));
+    assert_eq!(level.fits(n, &Pose::IDENTITY, &options), refused.map(drop));
+}
+
+#[test]
 fn a_doorway_behind_two_walls_is_walled_up_until_both_are_gone() {
     let mut level = Assembly::new(dungeon());
     let hall = start(&mut level, "hall", Pose::IDENTITY);

@@ -54,6 +54,11 @@ pub(crate) const ROWS: &[Row] = &[
     made("undo: other bytes", KITS, undone::other_bytes),
     made("undo: lost", KITS, undone::lost),
     made("bad input", &["pieces"], bad::taken),
+    made(
+        "bad input: edits",
+        &["dungeon-kit"],
+        undone::bad_edits_taken,
+    ),
 ];
 
 /// Measurements that need a process of their own, as its memory counts, or as it is killed.

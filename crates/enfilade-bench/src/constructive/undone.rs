@@ -9,8 +9,10 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::edit::random::random_operation;
-use enfilade::edit::{EditGround, EditSession, Resumed};
-use enfilade::kit::{DEFAULT_TOLERANCE, Kit};
+use enfilade::edit::{EditGround, EditOperation, EditSession, HandEditKind, Resumed};
+use enfilade::geom::DVec3;
+use enfilade::kit::{DEFAULT_TOLERANCE, InstanceId, Kit};
+use enfilade::world::Pose;
 use enfilade_testkit::{Rng, dungeon_kit, office_kit};
 
 use super::scenes::kit_of;
@@ -164,4 +166,82 @@ pub(super) fn edit_without_end(path: &Path) -> anyhow::Result<()> {
             writeln!(out, "{n}")?;
         }
     }
+}
+
+/// Bad edits and journals that are taken, or refused in other words.
+pub(super) fn bad_edits_taken(scene: &str) -> anyhow::Result<Figure> {
+    let folder = std::env::temp_dir().join(format!("enfilade-bad-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let taken = taken_in(scene, &folder);
+    std::fs::remove_dir_all(&folder)?;
+    taken
+}
+
+fn taken_in(scene: &str, folder: &Path) -> anyhow::Result<Figure> {
+    let mut said: Vec<(&str, Option<String>)> = Vec::new();
+    let mut session = EditSession::new(kit(scene)?, EditGround::Open)?;
+    session.apply(EditOperation::put("chamber", None, Pose::IDENTITY))?;
+    let corner = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+    let doorway = DVec3::new(0.0, 1.0, 3.0);
+    for (words, kind) in [
+        ("would be outdoors", HandEditKind::NoPortal(doorway)),
+        ("no portal is at", HandEditKind::Door(DVec3::ZERO)),
+        ("needs air", HandEditKind::Lamp(corner(0.0, -0.1))),
+        ("needs air", HandEditKind::Crate(corner(0.0, -0.4), 0.0)),
+        (
+            "a way leads around it at",
+            HandEditKind::Portal(
+                [[0.0, 1.0], [1.0, 1.0], [0.0, 2.0]]
+                    .map(|[x, y]| corner(x, y))
+                    .to_vec(),
+            ),
+        ),
+        (
+            "one line",
+            HandEditKind::Mirror([0.0, 1.0, 2.0].map(|x| corner(x, 1.0)).to_vec()),
+        ),
+    ] {
+        let edit = session.hosted(&kind);
+        let refused = session.apply(EditOperation::Make(edit)).err();
+        said.push((words, refused.map(|e| e.to_string())));
+    }
+    for (words, operation) in [
+        (
+            "no piece \"cellar\"",
+            EditOperation::put("cellar", None, Pose::IDENTITY),
+        ),
+        ("no instance", EditOperation::Take(InstanceId(9))),
+        ("there are 0", EditOperation::Unmake(0)),
+    ] {
+        let refused = session.apply(operation).err();
+        said.push((words, refused.map(|e| e.to_string())));
+    }
+    // The file's name is that of the kit.
+    let path = folder.join(scene);
+    for (words, text) in [
+        ("no journal", "a letter to a friend\n"),
+        ("another world", "enfilade edits 1\tother\n"),
+        (
+            "line 2 of the journal: 'erase'",
+            "enfilade edits 1\t-\nerase\n",
+        ),
+        (
+            "line 3 of the journal: there is no instance",
+            "enfilade edits 1\t-\nundo\ntake\t4\n",
+        ),
+    ] {
+        std::fs::write(&path, text)?;
+        said.push((words, opened(&path).err().map(|e| e.to_string())));
+    }
+    let is_wrong = |(words, refused): &&(&str, Option<String>)| {
+        !refused.as_ref().is_some_and(|why| why.contains(words))
+    };
+    let wrong: Vec<String> = (said.iter().filter(is_wrong))
+        .map(|(words, refused)| format!("{words}: {refused:?}"))
+        .collect();
+    Ok(Figure {
+        value: wrong.len() as f64,
+        most: 0.0,
+        note: format!("of {}; {}", said.len(), wrong.join("; ")),
+    })
 }

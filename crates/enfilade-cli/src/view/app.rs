@@ -417,7 +417,7 @@ impl App<'_> {
                 open.say(words);
             }
             Outcome::Edited(words) => {
-                self.world = editor.world()?.world;
+                self.world.clone_from(&editor.world()?.world);
                 self.lines = Sightlines::build(&self.world);
                 open.replace_world(&self.world)?;
                 open.say(words);

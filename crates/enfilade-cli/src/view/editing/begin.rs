@@ -71,5 +71,5 @@ pub(crate) fn begin(
     let edited = session.world()?;
     let mut editor = Editor::new(session, save.to_owned(), journal);
     editor.resumed(&resumed, &edited.resting);
-    Ok((editor, edited.world))
+    Ok((editor, edited.world.clone()))
 }

@@ -1,6 +1,7 @@
 //! The editor: a session, the tool in hand, and what the pointer means for it.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use enfilade::edit::{
@@ -173,7 +174,7 @@ impl Editor {
         &self.save
     }
 
-    pub(crate) fn world(&mut self) -> Result<EditedWorld, EditError> {
+    pub(crate) fn world(&mut self) -> Result<Arc<EditedWorld>, EditError> {
         let edited = self.session.world()?;
         let words = self.resting_words(&edited.resting);
         self.notes.extend(words);
