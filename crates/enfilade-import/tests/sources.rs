@@ -6,7 +6,7 @@ use std::io::Cursor;
 use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use enfilade_geom::{Aabb, DVec3};
 use enfilade_import::{
-    HeightOptions, ImportOptions, SceneSource, decode_e57, decode_heights, decode_implicit,
+    HeightOptions, ImportOptions, Limits, SceneSource, decode_e57, decode_heights, decode_implicit,
     decode_las, decode_ply, import_sources,
 };
 
@@ -121,7 +121,7 @@ fn a_cloud_of_points_is_a_scan_if_its_station_is_known() {
 }
 
 /// An E57 file with one scan of a room of 4 by 3 by 2.5 m, z up, 10 m east of the origin.
-fn room_e57(has_pose: bool) -> Vec<u8> {
+fn room_e57(has_pose: bool, n: u32) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
     let records = vec![
@@ -140,7 +140,6 @@ fn room_e57(has_pose: bool) -> Vec<u8> {
         rotation,
         translation,
     }));
-    let n = 40_000;
     for i in 0..n {
         let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n);
         let (turn, r) = (f64::from(i) * 2.399_963, (1.0 - y * y).sqrt());
@@ -159,7 +158,7 @@ fn room_e57(has_pose: bool) -> Vec<u8> {
 #[test]
 fn scans_in_e57_stand_where_their_poses_say_with_z_up() {
     let plain = ImportOptions::default();
-    let imported = decode_e57(&room_e57(true), &plain).unwrap();
+    let imported = decode_e57(&room_e57(true, 40_000), &plain).unwrap();
     let bounds = imported.scene.object_aabb(0);
     let middle = (bounds.min + bounds.max) * 0.5;
     assert!(
@@ -169,11 +168,11 @@ fn scans_in_e57_stand_where_their_poses_say_with_z_up() {
     // A block of matter around the room, with its height along y.
     let size = bounds.size();
     assert!(size.x > size.z + 0.9 && size.z > size.y + 0.4, "{size}");
-    let error = decode_e57(&room_e57(false), &plain)
+    let error = decode_e57(&room_e57(false, 40_000), &plain)
         .unwrap_err()
         .to_string();
     assert!(error.contains("without a pose"), "{error}");
-    let whole = room_e57(true);
+    let whole = room_e57(true, 40_000);
     for n in [10, 48, 500, whole.len() / 2, whole.len() - 1] {
         assert!(decode_e57(&whole[..n], &plain).is_err(), "{n}");
     }
@@ -234,15 +233,15 @@ fn a_height_map_is_land_in_meters_alone_or_beside_models() {
 }
 
 /// Points of two rooms beside each other, z up, with the sources 5 and 9 seen from the middle of each.
-fn rooms_las(is_compressed: bool) -> Vec<u8> {
+fn rooms_las(is_compressed: bool, n: u32) -> Vec<u8> {
     let mut header = las::Builder::from((1, 4));
     header.point_format = las::point::Format::new(1).unwrap();
     header.point_format.is_compressed = is_compressed;
     let header = header.into_header().unwrap();
     let mut writer = las::Writer::new(Cursor::new(Vec::new()), header).unwrap();
     for (source, middle) in [(9, 4.2), (5, 0.0)] {
-        for i in 0..40_000 {
-            let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / 40_000.0;
+        for i in 0..n {
+            let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n);
             let (turn, r) = (f64::from(i) * 2.399_963, (1.0 - y * y).sqrt());
             let d = DVec3::new(r * turn.cos(), r * turn.sin(), y);
             let p = d * (DVec3::new(2.0, 1.5, 1.25) / d.abs()).min_element();
@@ -268,13 +267,13 @@ fn las_and_laz_are_scans_if_the_stations_of_their_sources_are_given() {
         ..ImportOptions::default()
     };
     let both = stations(&[[0.0; 3], [4.2, 0.0, 0.0]]);
-    let las = rooms_las(false);
+    let las = rooms_las(false, 40_000);
     let imported = decode_las(&las, &both).unwrap();
     let size = imported.scene.object_aabb(0).size();
     // A block of matter around both rooms, with its height along y.
     assert!(size.x > 8.2 && size.x < 9.0, "{size}");
     assert!(size.z > size.y + 0.4, "{size}");
-    let compressed = decode_las(&rooms_las(true), &both).unwrap();
+    let compressed = decode_las(&rooms_las(true, 40_000), &both).unwrap();
     let all = |i: &enfilade_import::Imported| i.scene.meshes[0].primitives[0].positions.clone();
     assert!(all(&compressed) == all(&imported));
     let said =
@@ -285,7 +284,7 @@ fn las_and_laz_are_scans_if_the_stations_of_their_sources_are_given() {
         error.contains("2 sources") && error.contains("3 stations"),
         "{error}"
     );
-    let laz = rooms_las(true);
+    let laz = rooms_las(true, 40_000);
     for (whole, cuts) in [(&las, [3, 100, 300]), (&laz, [3, 100, 2000])] {
         for n in cuts.into_iter().chain([whole.len() / 2, whole.len() - 9]) {
             assert!(decode_las(&whole[..n], &both).is_err(), "{n}");
@@ -300,4 +299,54 @@ fn las_and_laz_are_scans_if_the_stations_of_their_sources_are_given() {
         error.contains("vertices") && error.contains("1000000000"),
         "{error}"
     );
+}
+
+#[test]
+fn damaged_scans_never_panic() {
+    let options = ImportOptions {
+        stations: vec![DVec3::ZERO],
+        limits: Limits {
+            min_extent: 0.0,
+            ..Limits::tiny()
+        },
+        ..ImportOptions::default()
+    };
+    let mut seed = 1_u64;
+    let mut random = |n: usize| {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as usize % n
+    };
+    let files = [
+        room_e57(true, 200),
+        rooms_las(false, 100),
+        rooms_las(true, 100),
+    ];
+    for (kind, whole) in files.iter().enumerate() {
+        for _ in 0..40 {
+            let mut bytes = whole.clone();
+            for _ in 0..=random(4) {
+                // Headers are at the start, and those of E57 at the end, too.
+                let far = if random(2) == 0 {
+                    bytes.len()
+                } else {
+                    bytes.len().min(400)
+                };
+                let at = random(far);
+                bytes[at] = [0, 0xff, random(256) as u8][random(3)];
+            }
+            bytes.truncate(if random(4) == 0 {
+                1 + random(bytes.len())
+            } else {
+                bytes.len()
+            });
+            let read = if kind == 0 {
+                decode_e57(&bytes, &options)
+            } else {
+                decode_las(&bytes, &options)
+            };
+            drop(read);
+        }
+    }
 }

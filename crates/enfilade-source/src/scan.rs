@@ -97,7 +97,9 @@ impl Scan {
         let found = planes::of_scan(self, &grid);
         let mut free = vec![false; n];
         carve::carve(self, &grid, &mut free);
+        let crossed = free.clone();
         carve::close_gaps(&grid, &mut free);
+        planes::fill_behind(&found, &grid, &crossed, &mut free);
         let reach = (REACH * step) as f32;
         let start = |is_free: &bool| if *is_free { reach } else { -reach };
         let mut values: Vec<f32> = free.iter().map(start).collect();

@@ -115,6 +115,19 @@ fn a_gap_in_a_view_is_closed_by_its_rim() {
 }
 
 #[test]
+fn a_wall_seen_from_both_sides_is_whole() {
+    // Thicker than what planes of both sides reach, thinner than gaps between ways.
+    let mut scan = Scan::default();
+    room(&mut scan, DVec3::ZERO, DVec3::new(3.0, 2.5, 3.0), 0.005);
+    let (min, max) = (DVec3::new(3.26, 0.0, 0.0), DVec3::new(6.0, 2.5, 3.0));
+    room(&mut scan, min, max, 0.005);
+    let surface = scan.surface(&OPTIONS, &SourceLimits::default()).unwrap();
+    let is_inside =
+        |p: &&DVec3| (p.x - 3.13).abs() < 0.09 && p.y > 0.2 && p.y < 2.3 && p.z > 0.2 && p.z < 2.8;
+    assert_eq!(surface.positions.iter().find(is_inside), None);
+}
+
+#[test]
 fn the_unknown_is_not_free() {
     // Behind a box in the middle of the room, nothing was seen.
     let mut scan = rooms(0.0);

@@ -62,22 +62,28 @@ pub(crate) const ROWS: &[Row] = &[
     made("parametric: cells", PATCHES, parametric::cells),
     made("parametric: portals", PATCHES, parametric::portals),
     named("scan: rooms missed, 3 stations", HOUSE, |w, s| {
-        scan::rooms(w, s, 3)
+        scan::rooms(w, s, (3, false))
     }),
     named("scan: doors missed, 3 stations", HOUSE, |w, s| {
-        scan::doors(w, s, 3)
+        scan::doors(w, s, (3, false))
     }),
     named("scan: rooms missed, 12 stations", HOUSE, |w, s| {
-        scan::rooms(w, s, 12)
+        scan::rooms(w, s, (12, false))
     }),
     named("scan: doors missed, 12 stations", HOUSE, |w, s| {
-        scan::doors(w, s, 12)
+        scan::doors(w, s, (12, false))
     }),
     named("scan: rooms missed, 30 stations", BUILDINGS, |w, s| {
-        scan::rooms(w, s, 30)
+        scan::rooms(w, s, (30, false))
     }),
     named("scan: doors missed, 30 stations", BUILDINGS, |w, s| {
-        scan::doors(w, s, 30)
+        scan::doors(w, s, (30, false))
+    }),
+    named("scan: rooms missed, 7 and 4 outdoors", HOUSE, |w, s| {
+        scan::rooms(w, s, (7, true))
+    }),
+    named("scan: doors missed, 7 and 4 outdoors", HOUSE, |w, s| {
+        scan::doors(w, s, (7, true))
     }),
     made("land: places missed", LANDS, land::missed),
     made("land: rooms lost or made up", BUILT, land::rooms),

@@ -200,7 +200,11 @@ fn tube() -> Twin {
     let ring = |x: f64, r: f64| {
         let point = |k: usize| {
             let (sin, cos) = (k as f64 * std::f64::consts::FRAC_PI_4).sin_cos();
-            let (far, w) = if k % 2 == 0 { (r, 1.0) } else { (r / d, d) };
+            let (far, w) = if k.is_multiple_of(2) {
+                (r, 1.0)
+            } else {
+                (r / d, d)
+            };
             [x, far * sin, far * cos, w]
         };
         (0..9).map(point).collect::<Vec<_>>()

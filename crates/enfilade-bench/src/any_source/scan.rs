@@ -87,22 +87,26 @@ impl Building {
         })
     }
 
-    /// Returns `n` stations: one in each of as many rooms as there are stations, then outdoors, then again in the rooms.
-    fn stations(&self, n: usize) -> Vec<DVec3> {
-        let first = self.places.iter().map(|(_, p)| p[0]);
-        let second = self.places.iter().filter_map(|(_, p)| {
-            let far = |q: &&DVec3| q.distance(p[0]);
-            p.iter().max_by(|a, b| far(a).total_cmp(&far(b))).copied()
-        });
-        let third = self
-            .places
-            .iter()
-            .filter_map(|(_, p)| p.get(p.len() / 2).copied());
-        let all = first
-            .chain(self.outdoors.iter().copied())
-            .chain(second)
-            .chain(third);
-        all.take(n).collect()
+    /// Returns `n` stations in rooms: one in each of as many as there are stations, then the second in each, and so on; and those
+    /// outdoors.
+    fn stations(&self, n: usize, is_outdoors_too: bool) -> Vec<DVec3> {
+        let apart = |points: &[DVec3]| {
+            let mut chosen: Vec<DVec3> = vec![points[0]];
+            for p in points {
+                if chosen.iter().all(|c| c.distance(*p) > 1.5) {
+                    chosen.push(*p);
+                }
+            }
+            chosen
+        };
+        let places: Vec<Vec<DVec3>> = self.places.iter().map(|(_, p)| apart(p)).collect();
+        let most = places.iter().map(Vec::len).max().unwrap_or(0);
+        let all = (0..most).flat_map(|k| places.iter().filter_map(move |p| p.get(k).copied()));
+        let mut all: Vec<DVec3> = all.take(n).collect();
+        if is_outdoors_too {
+            all.extend(&self.outdoors);
+        }
+        all
     }
 
     /// Puts boxes on the floors of rooms, away from stations, and returns them.
@@ -217,13 +221,17 @@ fn ply(triangles: &[Triangle], stations: &[DVec3], rng: &mut Rng) -> Vec<u8> {
     file
 }
 
+/// Number of stations in rooms; and whether there are some outdoors.
+pub(super) type Stations = (usize, bool);
+
 /// A score, or the reason why a scan could not be baked.
 type Scored = Result<Arc<Score>, String>;
 
 /// Scores that rows share.
-static SCORES: LazyLock<Mutex<BTreeMap<(String, usize), Scored>>> = LazyLock::new(Mutex::default);
+static SCORES: LazyLock<Mutex<BTreeMap<(String, Stations), Scored>>> =
+    LazyLock::new(Mutex::default);
 
-fn score(name: &str, n_stations: usize) -> Scored {
+fn score(name: &str, n_stations: Stations) -> Scored {
     let mut all = SCORES.lock().unwrap_or_else(PoisonError::into_inner);
     let key = (name.to_owned(), n_stations);
     let new = || {
@@ -234,10 +242,10 @@ fn score(name: &str, n_stations: usize) -> Scored {
     all.entry(key).or_insert_with(new).clone()
 }
 
-fn scored(name: &str, n_stations: usize) -> anyhow::Result<Score> {
+fn scored(name: &str, n_stations: Stations) -> anyhow::Result<Score> {
     let folder = folder_of(name).context("the scene is missing")?;
     let mut building = Building::read(&folder)?;
-    let stations = building.stations(n_stations);
+    let stations = building.stations(n_stations.0, n_stations.1);
     let mut rng = Rng::new(3);
     let boxes = building.clutter(&stations, &mut rng);
     let file = ply(&building.triangles, &stations, &mut rng);
@@ -264,7 +272,7 @@ fn not_baked(most: f64, reason: String) -> Figure {
 }
 
 /// Share of the rooms with a station without a cell of their own.
-pub(super) fn rooms(_: &World, name: &str, n_stations: usize) -> anyhow::Result<Figure> {
+pub(super) fn rooms(_: &World, name: &str, n_stations: Stations) -> anyhow::Result<Figure> {
     let score = match score(name, n_stations) {
         Ok(score) => score,
         Err(reason) => return Ok(not_baked(ROOMS, reason)),
@@ -282,7 +290,7 @@ pub(super) fn rooms(_: &World, name: &str, n_stations: usize) -> anyhow::Result<
 }
 
 /// Share of the doors between rooms with stations and to the outdoors without a portal.
-pub(super) fn doors(_: &World, name: &str, n_stations: usize) -> anyhow::Result<Figure> {
+pub(super) fn doors(_: &World, name: &str, n_stations: Stations) -> anyhow::Result<Figure> {
     let score = match score(name, n_stations) {
         Ok(score) => score,
         Err(reason) => return Ok(not_baked(DOORS, reason)),

@@ -11,7 +11,7 @@ use super::{REACH, Scan};
 const WAYS: u8 = 3;
 /// Half the width of unknown space that is a gap between ways, not a thing: less than the thinnest walls and the air in front of them
 /// that is left to planes. [Units: voxels]
-const BETWEEN: usize = 3;
+pub(super) const BETWEEN: usize = 3;
 
 /// Marks the vertices whose voxel a way crosses, except near its point.
 pub(super) fn carve(scan: &Scan, grid: &ScanGrid, free: &mut [bool]) {
@@ -77,7 +77,7 @@ fn walk(grid: &ScanGrid, from: DVec3, to: DVec3, free: &mut [bool]) {
 
 /// Makes voxels free that lie between ways: all unknown space that is at most `2 * BETWEEN` voxels wide along each axis.
 ///
-/// Space behind seen points is matter all the same: see [`super::planes::blend`].
+/// Space behind seen points is matter all the same: see [`super::planes::fill_behind`].
 pub(super) fn close_gaps(grid: &ScanGrid, free: &mut [bool]) {
     for (is_grown, axis) in [
         (true, 0),

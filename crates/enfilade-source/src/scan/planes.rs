@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use enfilade_geom::{DMat3, DVec3};
 
+use super::carve::BETWEEN;
 use super::cells::ScanGrid;
 use super::{REACH, Scan};
 use crate::qef::eigen;
@@ -106,6 +107,24 @@ pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
         });
     }
     found
+}
+
+/// Makes matter of the voxels behind planes that no way crossed, as deep as gaps between ways are closed: the middle of a wall that was
+/// seen from both sides lies between ways, too.
+pub(super) fn fill_behind(
+    planes: &[PointPlane],
+    grid: &ScanGrid,
+    crossed: &[bool],
+    free: &mut [bool],
+) {
+    for plane in planes {
+        for half in 1..=2 * BETWEEN + 1 {
+            let p = plane.at - plane.normal * (half as f64 * 0.5 * grid.step);
+            if let Some(index) = grid.voxel(p).map(|at| grid.index(at)) {
+                free[index] &= crossed[index];
+            }
+        }
+    }
 }
 
 /// Edge of a block of sums. [Units: voxels]
