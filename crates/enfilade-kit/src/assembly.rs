@@ -51,7 +51,7 @@ impl Assembly {
     }
 
     /// Sets the most that outlines may differ to fit, that openings may be apart to be joined, and that instances may overlap, for
-    /// what is placed from now on. [Units: wu] [Limit: above 0] [Default: [`DEFAULT_TOLERANCE`]]
+    /// what is placed from now on. [Units: wu] [Limit: above 0] [Default: [`DEFAULT_TOLERANCE`](crate::DEFAULT_TOLERANCE)]
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.state.tolerance = tolerance;
     }
