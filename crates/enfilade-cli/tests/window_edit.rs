@@ -7,7 +7,8 @@ mod windowed;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::time::Instant;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use enfilade_cpg::PortalKind;
 use enfilade_cpg::wire::decode_glb;
@@ -20,14 +21,26 @@ struct Hand<'a> {
 }
 
 impl<'a> Hand<'a> {
-    fn open(display: &'a Display, dir: &Path, args: &[&str]) -> Self {
+    /// Opens the window, and waits until it greets and answers a key.
+    fn open(display: &'a Display, dir: &Path, args: &[&str], greets: &str) -> Self {
         let fixed = ["--kit", "kit", "--save", "level.glb", "--size", "640x480"];
         let args = [&fixed[..], args].concat();
         let mut viewer = Viewer::open(display, dir, None, &args);
         viewer.wait_for_window(display);
+        viewer.wait_to_hear(greets);
+        let hand = Self { display, viewer };
+        // A window that was just opened may not have the keys yet.
+        let end = Instant::now() + PATIENCE;
         let focus = [&WINDOW[..], &["windowfocus"]].concat();
-        assert!(display.tool(&focus));
-        Self { display, viewer }
+        loop {
+            assert!(Instant::now() < end && display.tool(&focus));
+            hand.keys(&["y"]);
+            sleep(Duration::from_secs(1));
+            let heard = hand.viewer.heard();
+            if heard.iter().any(|line| line.contains("nothing to redo")) {
+                return hand;
+            }
+        }
     }
 
     fn keys(&self, names: &[&str]) {
@@ -79,8 +92,8 @@ fn three_rooms_are_built_by_hand_killed_gone_on_with_saved_and_walked_through() 
     let generate = "generate dungeon --rooms 1 -o other.glb --pieces kit";
     enfilade(&generate.split(' ').collect::<Vec<_>>());
     let display = Display::without_repeats();
-    let mut hand = Hand::open(&display, &dir, &["--free-mouse"]);
-    hand.viewer.wait_to_hear("is kept in level.journal");
+    let greets = "is kept in level.journal";
+    let mut hand = Hand::open(&display, &dir, &["--free-mouse"], greets);
 
     // A chamber, and through its east doorway a corridor, and through that a hall.
     hand.keys(&["2"]);
@@ -118,9 +131,8 @@ fn three_rooms_are_built_by_hand_killed_gone_on_with_saved_and_walked_through() 
     let journal = fs::read_to_string(dir.join("level.journal")).unwrap();
     let n = journal.lines().count() - 1;
     let eye = ["--eye", "0,1.6,-1", "--record", "walk.txt"];
-    let hand = Hand::open(&display, &dir, &eye);
     let again = format!("{n} operations of level.journal are made again");
-    hand.viewer.wait_to_hear(&again);
+    let hand = Hand::open(&display, &dir, &eye, &again);
     hand.says("F2", "wrote level.glb, 3 rooms");
     let world = decode_glb(&fs::read(dir.join("level.glb")).unwrap()).unwrap();
     let doors = world.graph.portals.iter();
