@@ -98,7 +98,14 @@ fn a_bake_goes_on_from_whole_pieces_and_makes_the_same_world() {
             pieces.put(key, bytes);
         }
     }
-    assert_eq!(all.values().filter(|bytes| is_piece(bytes)).count(), 2);
+    let rooms: Vec<_> = all.values().filter(|bytes| is_piece(bytes)).collect();
+    assert_eq!(rooms.len(), 2);
+    // A bit that is wrong anywhere.
+    for at in (0..rooms[0].len()).step_by(rooms[0].len() / 50) {
+        let mut spoilt = rooms[0].clone();
+        spoilt[at] ^= 4;
+        assert!(!is_piece(&spoilt), "byte {at}");
+    }
 }
 
 #[test]
@@ -120,6 +127,11 @@ fn other_scenes_and_settings_have_other_pieces() {
         min_opening: 0.5,
         ..config.clone()
     };
+    // In the same voxels.
+    let rough = BakeConfig {
+        noise: 2.0 * config.noise,
+        ..config.clone()
+    };
     // Few voxels are larger ones.
     let coarse = BakeConfig {
         max_voxels: 200_000,
@@ -135,6 +147,7 @@ fn other_scenes_and_settings_have_other_pieces() {
     for others in [
         keys(&scene, &little),
         keys(&moved, &config),
+        keys(&scene, &rough),
         keys(&scene, &narrow),
         keys(&scene, &coarse),
     ] {
