@@ -53,6 +53,11 @@ pub fn bake(
         let note = "`choices` ignored: they apply only to the Delaunay builder";
         baked.notes.push(note.to_owned());
     }
+    if baked.method != Method::Watershed && context.pieces().is_some() {
+        let note =
+            "no pieces kept: only the watershed makes any, and a bake that is killed begins anew";
+        baked.notes.push(note.to_owned());
+    }
     keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
     name_cells(&mut baked.world, &mut baked.notes, &scene.rooms);
     make_marked(&mut baked.world, &mut baked.notes, scene);

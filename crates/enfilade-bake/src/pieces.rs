@@ -1,8 +1,8 @@
 //! Pieces of a bake that are kept, so that a bake that was ended goes on from them, and several machines share its work.
 //!
 //! A scene falls into *sites*, buildings apart from each other, and each is worked on by itself. For each there are two pieces:
-//! the basins of its air, and the rooms and openings found among them. The exact cells of all sites are made at the end, in
-//! little time, from the latter.
+//! the basins of its air, and the rooms and openings found among them. The exact cells of all sites are made from the latter at the
+//! end, all at once.
 //!
 //! **Keys** are hashes of everything that a piece depends on: the scene, the settings that change a result, the version, the kind
 //! of piece and the site. So pieces of other bakes never match, and two processes that make the same piece write the same bytes.
@@ -49,7 +49,7 @@ impl<'a> Kept<'a> {
         }
     }
 
-    /// Returns the key of a piece of a site, of which `plot` tells all: 32 hexadecimal digits.
+    /// Returns the key of a piece, 32 hexadecimal digits, given the place and the voxels of its site.
     pub(crate) fn key(&self, kind: PieceKind, plot: &impl fmt::Debug) -> String {
         let mut hasher = XxHash3_128::new();
         hasher.write(&self.scene.to_le_bytes());

@@ -47,7 +47,7 @@ pub fn bake_pieces(
         return Err(BakeError::Setting {
             name: "method",
             value: method.name().to_owned(),
-            limit: "watershed, the only method whose work is divided",
+            limit: "watershed, the only method whose work is divided; set it, or bake on one machine",
         });
     }
     context.begin_method(method, &reason)?;

@@ -157,6 +157,10 @@ fn other_scenes_and_settings_have_other_pieces() {
         method: Some(Method::Bsp),
         ..config
     };
+    let pieces = InMemory::default();
+    let context = BakeContext::default().keeping(&pieces);
+    let baked = bake(&scene, &by_planes, &context).unwrap();
+    assert!(baked.notes.iter().any(|n| n.starts_with("no pieces kept")) && pieces.all().is_empty());
     let refused = piece_keys(&scene, &by_planes, &BakeContext::default());
     assert!(matches!(
         refused,

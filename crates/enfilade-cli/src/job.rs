@@ -205,6 +205,12 @@ fn plan(args: &JobPlan) -> anyhow::Result<()> {
         shards: Vec::new(),
     };
     manifest.input = copy_name(&manifest.work, args, &bytes)?;
+    let bytes = match manifest.work {
+        Work::Pvs { .. } => bytes,
+        // So far, the beginning was enough for formats of scenes.
+        Work::Bake { .. } => fs::read(&args.input)
+            .with_context(|| format!("cannot read {}", args.input.display()))?,
+    };
     let work = manifest.work(args.input.clone(), &bytes)?;
     manifest.shards = work.keys()?;
     if args.output.exists() {

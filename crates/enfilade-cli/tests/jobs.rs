@@ -93,6 +93,34 @@ fn shards_of_a_bake_from_anywhere_make_the_world_of_one_machine() {
 }
 
 #[test]
+fn a_long_file_of_text_is_copied_whole() {
+    let dir = &folder("long-text");
+    // Two rooms seen from inside, 200 m apart, after a long comment.
+    let mut text = "# a model\n".repeat(2000);
+    for at in [0, 200] {
+        for corner in 0..8 {
+            let [x, y, z] = [corner / 4 * 5 + at, corner / 2 % 2 * 3, corner % 2 * 4 + at];
+            text += &format!("v {x} {y} {z}\n");
+        }
+        for side in [
+            "3 4 2 1", "6 8 7 5", "2 6 5 1", "7 8 4 3", "5 7 3 1", "4 8 6 2",
+        ] {
+            let corners = side.split(' ').map(|c| c.parse::<i32>().unwrap() - 9);
+            let corners: Vec<_> = corners.map(|c| c.to_string()).collect();
+            text += &format!("f {}\n", corners.join(" "));
+        }
+    }
+    fs::write(dir.join("rooms.obj"), text).unwrap();
+    done(dir, "bake rooms.obj -o alone.glb");
+    done(dir, "job plan rooms.obj -o job");
+    assert!(same(dir, "rooms.obj", "job/rooms.obj"));
+    let text = done(dir, "job run job");
+    assert!(text.contains("2 shards computed"), "{text}");
+    done(dir, "job finish job -o made.glb");
+    assert!(same(dir, "made.glb", "alone.glb"));
+}
+
+#[test]
 fn a_job_that_cannot_be_is_refused_with_the_remedy() {
     let dir = &folder("refused-jobs");
     let gltf = r#"{"asset":{"version":"2.0"},"buffers":[{"uri":"far.bin","byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]}"#;

@@ -95,17 +95,21 @@ pub(super) fn taken(_scene: &str) -> anyhow::Result<Figure> {
         "in use: it leads to niche-2.south",
         refused.map(|e| e.to_string()),
     );
-    let wrong = said.iter().filter(|(words, refused)| {
-        !refused
-            .as_ref()
-            .is_some_and(|refused| refused.contains(words))
-    });
+    Ok(not_refused(&said))
+}
+
+/// Counts the cases that were taken, or refused without the expected words. Each is these words, and the refusal.
+pub(super) fn not_refused(said: &[(&str, Option<String>)]) -> Figure {
+    let is_wrong = |(words, refused): &&(&str, Option<String>)| {
+        !refused.as_ref().is_some_and(|why| why.contains(words))
+    };
+    let wrong = said.iter().filter(is_wrong);
     let wrong: Vec<String> = wrong
         .map(|(words, refused)| format!("{words}: {refused:?}"))
         .collect();
-    Ok(Figure {
+    Figure {
         value: wrong.len() as f64,
         most: 0.0,
         note: format!("of {}; {}", said.len(), wrong.join("; ")),
-    })
+    }
 }

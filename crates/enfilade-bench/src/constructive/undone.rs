@@ -15,6 +15,7 @@ use enfilade::kit::{DEFAULT_TOLERANCE, InstanceId, Kit};
 use enfilade::world::Pose;
 use enfilade_testkit::{Rng, dungeon_kit, office_kit};
 
+use super::bad::not_refused;
 use super::scenes::kit_of;
 use crate::rows::Figure;
 
@@ -233,15 +234,5 @@ fn taken_in(scene: &str, folder: &Path) -> anyhow::Result<Figure> {
         std::fs::write(&path, text)?;
         said.push((words, opened(&path).err().map(|e| e.to_string())));
     }
-    let is_wrong = |(words, refused): &&(&str, Option<String>)| {
-        !refused.as_ref().is_some_and(|why| why.contains(words))
-    };
-    let wrong: Vec<String> = (said.iter().filter(is_wrong))
-        .map(|(words, refused)| format!("{words}: {refused:?}"))
-        .collect();
-    Ok(Figure {
-        value: wrong.len() as f64,
-        most: 0.0,
-        note: format!("of {}; {}", said.len(), wrong.join("; ")),
-    })
+    Ok(not_refused(&said))
 }
