@@ -9,6 +9,7 @@ use crate::shells::Shells;
 use crate::{BadOption, crossing, tjunction};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene, TriangleSource};
 use enfilade_geom::{DVec3, Triangle, shown, triangle_area_normal};
+use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -197,8 +198,11 @@ pub fn cleaning_report(
     report.n_triangles = soup.triangles.len() as u64;
     find_odd_triangles(&mut report, scene, &soup, options.weld);
     find_odd_edges(&mut report, scene, &soup, options);
-    find_crossing(&mut report, scene, &soup, options);
-    find_holes(&mut report, scene);
+    let (crossing, ()) = rayon::join(
+        || crossing_triangles(scene, &soup, options),
+        || find_holes(&mut report, scene),
+    );
+    (report.crossing_triangles, report.is_crossing_complete) = crossing;
     Ok(report)
 }
 
@@ -379,7 +383,7 @@ fn find_odd_triangles(report: &mut CleaningReport, scene: &Scene, soup: &Soup, w
         sorted.sort_unstable();
         order.push((sorted, t as u32));
     }
-    order.sort_unstable();
+    order.par_sort_unstable();
     for pair in order.windows(2) {
         if pair[0].0 == pair[1].0 && !is_collapsed(&pair[0].0) {
             let t = pair[1].1 as usize;
@@ -425,7 +429,7 @@ fn find_odd_edges(
             });
         }
     }
-    uses.sort_unstable();
+    uses.par_sort_unstable();
     let mut shells = Shells::new(soup.triangles.len());
     let mut open: Vec<[u32; 2]> = Vec::new();
     for edge in uses.chunk_by(|a, b| a.ends == b.ends) {
@@ -475,25 +479,22 @@ struct ShellSum {
     volume: f64,
 }
 
-/// Counts crossing pairs of triangles of one object.
-fn find_crossing(
-    report: &mut CleaningReport,
-    scene: &Scene,
-    soup: &Soup,
-    options: &CleaningOptions,
-) {
+/// Counts crossing pairs of triangles of one object; `false` if the search was stopped.
+fn crossing_triangles(scene: &Scene, soup: &Soup, options: &CleaningOptions) -> (Finding, bool) {
+    let mut found = Finding::default();
     let corners: Vec<Triangle> = (0..soup.triangles.len()).map(|t| soup.corners(t)).collect();
     let is_pair = |a: usize, b: usize| {
         let (t, u) = (soup.triangles[a], soup.triangles[b]);
         soup.sources[a].object == soup.sources[b].object && !t.iter().any(|p| u.contains(p))
     };
-    report.is_crossing_complete = crossing::for_each(
+    let is_complete = crossing::for_each(
         &corners,
         options.weld,
         options.crossing_pairs,
         is_pair,
-        |t, at| report.crossing_triangles.add(at, || soup.name(scene, t)),
+        |t, at| found.add(at, || soup.name(scene, t)),
     );
+    (found, is_complete)
 }
 
 fn find_odd_shells(report: &mut CleaningReport, scene: &Scene, soup: &Soup, shells: &mut Shells) {

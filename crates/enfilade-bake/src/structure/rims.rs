@@ -11,6 +11,7 @@
 //! Cost: a sort of the edges, `O(n log n)` in triangles.
 
 use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
+use rayon::prelude::*;
 
 /// If more rims than this begin at one vertex, sheets end there, and no triangle is missing. It bounds the search.
 const MAX_RIMS: usize = 16;
@@ -31,19 +32,19 @@ impl Rims {
     pub(crate) fn of(triangles: &[Triangle]) -> Self {
         let key = |p: &DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
         let mut points: Vec<DVec3> = triangles.iter().flatten().copied().collect();
-        points.sort_by_cached_key(key);
+        points.par_sort_by_cached_key(key);
         points.dedup();
         let keys: Vec<[u64; 3]> = points.iter().map(key).collect();
         let index = |p: &DVec3| keys.partition_point(|k| *k < key(p)) as u32;
         let mut edges: Vec<[u32; 3]> = triangles
-            .iter()
-            .flat_map(|t| {
+            .par_iter()
+            .flat_map_iter(|t| {
                 let v = [0, 1, 2].map(|k| index(&t[k]));
                 [[v[0], v[1], v[2]], [v[1], v[2], v[0]], [v[2], v[0], v[1]]]
             })
             .collect();
         let ends = |e: &[u32; 3]| (e[0].min(e[1]), e[0].max(e[1]));
-        edges.sort_unstable_by_key(|e| (ends(e), *e));
+        edges.par_sort_unstable_by_key(|e| (ends(e), *e));
         let mut single: Vec<[u32; 3]> = edges
             .chunk_by(|a, b| ends(a) == ends(b))
             .filter_map(odd_one)

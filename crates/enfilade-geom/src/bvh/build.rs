@@ -10,6 +10,8 @@ const LEAF_SIZE: usize = 4;
 const N_BINS: usize = 16;
 /// Depth from which nodes are split by count, so that hostile input cannot make the tree deep.
 const MAX_SAH_DEPTH: usize = 40;
+/// Number of triangles from which the children of a node are built apart from each other: fewer take less time than that.
+const LEAST_FORKED: usize = 1 << 12;
 /// Largest coordinate; beyond it `f32` products overflow, and triangles are ignored.
 const MAX_COORDINATE: f64 = 1e15;
 
@@ -29,6 +31,19 @@ const UNUSED: Node = Node {
     children: [0; 4],
     counts: [0; 4],
 };
+
+impl Node {
+    /// Returns the node for a list that begins `by` nodes before the one it was in.
+    fn moved_by(mut self, by: u32) -> Self {
+        for (child, &count) in self.children.iter_mut().zip(&self.counts) {
+            // Unused children and leaves are no nodes; the first node is nobody's child.
+            if count == 0 && *child != 0 {
+                *child += by;
+            }
+        }
+        self
+    }
+}
 
 /// A triangle during the construction.
 struct Entry {
@@ -149,21 +164,78 @@ fn build_node(nodes: &mut Vec<Node>, entries: &mut [Entry], offset: usize, depth
     }
     let this = nodes.len();
     nodes.push(UNUSED);
+    let mut below: Vec<Subtree<'_>> = Vec::new();
+    let (mut rest, mut taken) = (entries, 0);
     for (k, part) in parts.iter().enumerate() {
         let (min, max) = (round_down(part.bounds.min), round_up(part.bounds.max));
         for axis in 0..3 {
             nodes[this].bounds[0][axis][k] = min[axis];
             nodes[this].bounds[1][axis][k] = max[axis];
         }
+        let (own, after) = rest.split_at_mut(part.first + part.count - taken);
+        let entries = &mut own[part.first - taken..];
+        (rest, taken) = (after, part.first + part.count);
         if part.count <= LEAF_SIZE {
             nodes[this].children[k] = (offset + part.first) as u32;
             nodes[this].counts[k] = part.count as u32;
         } else {
-            nodes[this].children[k] = nodes.len() as u32;
-            let slice = &mut entries[part.first..part.first + part.count];
-            build_node(nodes, slice, offset + part.first, depth + 1);
+            below.push(Subtree {
+                child: k,
+                entries,
+                offset: offset + part.first,
+                depth: depth + 1,
+                nodes: Vec::new(),
+            });
         }
     }
+    let is_forked = taken >= LEAST_FORKED;
+    if is_forked {
+        build_all(&mut below);
+    }
+    for subtree in below {
+        let start = nodes.len() as u32;
+        nodes[this].children[subtree.child] = start;
+        if is_forked {
+            nodes.extend(subtree.nodes.into_iter().map(|n| n.moved_by(start)));
+        } else {
+            build_node(nodes, subtree.entries, subtree.offset, subtree.depth);
+        }
+    }
+}
+
+/// A child of a node with nodes of its own.
+struct Subtree<'a> {
+    /// Its place among the children.
+    child: usize,
+    entries: &'a mut [Entry],
+    offset: usize,
+    depth: usize,
+    /// Its nodes, if it was built apart from the others.
+    nodes: Vec<Node>,
+}
+
+/// Builds subtrees apart from each other, so that threads can share the work.
+fn build_all(subtrees: &mut [Subtree<'_>]) {
+    match subtrees {
+        [] => {}
+        [s] => build_node(&mut s.nodes, s.entries, s.offset, s.depth),
+        _ => {
+            let (a, b) = subtrees.split_at_mut(subtrees.len() / 2);
+            join(|| build_all(a), || build_all(b));
+        }
+    }
+}
+
+/// Does both, at the same time with the feature `rayon`.
+#[cfg(feature = "rayon")]
+fn join(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+    rayon::join(a, b);
+}
+
+#[cfg(not(feature = "rayon"))]
+fn join(a: impl FnOnce(), b: impl FnOnce()) {
+    a();
+    b();
 }
 
 /// Reorders `entries` into two parts, neither empty, and returns the size of the first.

@@ -323,3 +323,28 @@ fn of_equal_triangles_the_first_is_hit_and_nearest() {
     assert_eq!(hit.map(|h| h.triangle), Some(41));
     assert_eq!(bvh.nearest(p, 2.0).map(|n| n.triangle), Some(40));
 }
+
+#[test]
+fn each_triangle_of_a_large_tree_is_in_it_once() {
+    // Larger than what is built in one go, with many in one place.
+    let at = |k: u32| {
+        let h = f64::from(k.wrapping_mul(2_654_435_761) >> 16);
+        let p = DVec3::new(h % 251.0, h % 67.0, (h / 16_000.0).floor());
+        [p, p + DVec3::X, p + DVec3::Y]
+    };
+    let triangles: Vec<Triangle> = (0..30_000).map(at).collect();
+    let bvh = Bvh::build(&triangles);
+    let mut found = Vec::new();
+    bvh.for_each_in_box(&Aabb::of_points(triangles.as_flattened()), |t| {
+        found.push(t)
+    });
+    found.sort_unstable();
+    assert!(found.iter().copied().eq(0..30_000));
+    for t in (0..30_000).step_by(997) {
+        let [a, b, c] = triangles[t as usize];
+        let middle = (a + b + c) / 3.0;
+        let mut here = Vec::new();
+        bvh.for_each_in_box(&Aabb::of_points(&[middle]), |t| here.push(t));
+        assert!(here.contains(&t), "{t} is not at {middle}");
+    }
+}
