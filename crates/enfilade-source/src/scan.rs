@@ -1,13 +1,15 @@
 //! Scans: points on surfaces, each seen from a station, and the surface of the air that the stations saw.
 //!
-//! The way from a station to a point is free; what no way crosses is unknown, and counts as matter. Near points the field is the
+//! What lies between a station and what it saw is free; the rest is unknown, and counts as matter. Near points the field is the
 //! distance from the planes through them (Kolluri, "Provably good moving least squares", 2005), which averages the noise of
 //! the scanner.
 
 mod carve;
 mod cells;
+mod frontier;
 mod gaps;
 mod planes;
+mod view;
 
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
@@ -88,22 +90,19 @@ impl Scan {
             .ceil()
             .to_array()
             .map(|n| n as usize + 1);
-        let n = Volume::check_size(size, limits)?;
+        Volume::check_size(size, limits)?;
         let grid = cells::ScanGrid {
             origin: bounds.min,
             step,
             size,
         };
         let found = planes::of_scan(self, &grid);
-        let mut free = vec![false; n];
-        carve::carve(self, &grid, &mut free);
-        let crossed = free.clone();
-        carve::close_gaps(&grid, &mut free);
-        planes::fill_behind(&found, &grid, &crossed, &mut free);
+        let free = carve::carve(self, &grid);
         let reach = (REACH * step) as f32;
         let start = |is_free: &bool| if *is_free { reach } else { -reach };
         let mut values: Vec<f32> = free.iter().map(start).collect();
-        planes::blend(&found, &grid, &free, &mut values);
+        let is_measured = planes::blend(&found, &grid, &free, &mut values);
+        frontier::smooth(&grid, &is_measured, &mut values);
         Ok(Volume {
             size,
             values,

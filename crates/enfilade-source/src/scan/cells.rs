@@ -19,12 +19,6 @@ impl ScanGrid {
         self.origin + DVec3::from_array(at.map(|c| c as f64)) * self.step
     }
 
-    /// Returns the indices of the vertex nearest to a point in the box.
-    pub(super) fn nearest(&self, p: DVec3) -> [usize; 3] {
-        let q = self.scaled(p).round().to_array();
-        [0, 1, 2].map(|a| (q[a].max(0.0) as usize).min(self.size[a] - 1))
-    }
-
     /// Returns the indices of the vertex nearest to a point; `None` beyond the box.
     pub(super) fn voxel(&self, p: DVec3) -> Option<[usize; 3]> {
         let q = self.scaled(p).round().to_array();

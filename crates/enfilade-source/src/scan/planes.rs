@@ -4,7 +4,6 @@ use std::collections::HashMap;
 
 use enfilade_geom::{DMat3, DVec3};
 
-use super::carve::BETWEEN;
 use super::cells::ScanGrid;
 use super::{REACH, Scan};
 use crate::qef::eigen;
@@ -109,31 +108,19 @@ pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
     found
 }
 
-/// Makes matter of the voxels behind planes that no way crossed, as deep as gaps between ways are closed: the middle of a wall that was
-/// seen from both sides lies between ways, too.
-pub(super) fn fill_behind(
-    planes: &[PointPlane],
-    grid: &ScanGrid,
-    crossed: &[bool],
-    free: &mut [bool],
-) {
-    for plane in planes {
-        for half in 1..=2 * BETWEEN + 1 {
-            let p = plane.at - plane.normal * (half as f64 * 0.5 * grid.step);
-            if let Some(index) = grid.voxel(p).map(|at| grid.index(at)) {
-                free[index] &= crossed[index];
-            }
-        }
-    }
-}
-
 /// Edge of a block of sums. [Units: voxels]
 const BLOCK: usize = 8;
 /// Sums of weighted distances, and of weights, of the vertices in a block.
 type BlockSums = Box<[[f32; 2]; BLOCK * BLOCK * BLOCK]>;
 
-/// Replaces the values near planes by the distance from them.
-pub(super) fn blend(planes: &[PointPlane], grid: &ScanGrid, free: &[bool], values: &mut [f32]) {
+/// Replaces the values near planes by the distance from them; returns the vertices that got one.
+pub(super) fn blend(
+    planes: &[PointPlane],
+    grid: &ScanGrid,
+    free: &[bool],
+    values: &mut [f32],
+) -> Vec<bool> {
+    let mut is_measured = vec![false; values.len()];
     let mut blocks: HashMap<[usize; 3], BlockSums> = HashMap::new();
     for plane in planes {
         let near = |a: usize, by: f64| {
@@ -167,9 +154,11 @@ pub(super) fn blend(planes: &[PointPlane], grid: &ScanGrid, free: &[bool], value
             // Planes go on beyond the edges of what was seen; the unknown does not become air there.
             if d < 0.0 || free[index] || f64::from(weight) >= SURE_WEIGHT {
                 values[index] = d as f32;
+                is_measured[index] = true;
             }
         }
     }
+    is_measured
 }
 
 /// Adds a plane to the sums of the vertices of a block that lie within two limits.
