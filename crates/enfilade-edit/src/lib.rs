@@ -32,13 +32,17 @@
 //! A change by hand is held in the frame of the instance that it is in. Where its instance is gone, or what it changes is not
 //! there, such as a doorway that is walled up, it rests: [`EditedWorld::resting`] tells why.
 
+mod followed;
 mod hand;
 mod journal;
 mod operation;
+mod own;
 pub mod random;
 mod session;
 
+pub use followed::EditedSpace;
 pub use hand::{HandEdit, HandEditError, HandEditKind};
 pub use journal::JournalError;
 pub use operation::EditOperation;
+pub use own::OwnWorlds;
 pub use session::{EditError, EditGround, EditSession, EditedWorld, Resumed};

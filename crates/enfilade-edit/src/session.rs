@@ -5,12 +5,13 @@ use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::World;
 use enfilade_geom::DVec3;
-use enfilade_kit::{Assembly, FlattenError, Kit, PlaceError, PlaceOptions};
-use enfilade_world::Pose;
+use enfilade_kit::{Assembly, FlattenError, Kit, PlaceError, PlaceOptions, open_air};
+use enfilade_world::{Pose, SpaceError};
 
 use crate::hand::{HandEdit, HandEditError, HandEditKind};
 use crate::journal::{Entry, Journal, JournalError};
 use crate::operation::EditOperation;
+use crate::own::{OwnWorlds, kinds_of, own_base};
 
 /// State that a session starts from.
 #[derive(Clone, Debug)]
@@ -47,6 +48,9 @@ pub enum EditError {
     /// An instance was allowed to overlap others.
     #[error(transparent)]
     Flatten(#[from] FlattenError),
+    /// The space of the level cannot be made.
+    #[error(transparent)]
+    Space(#[from] SpaceError),
     /// The journal cannot be read or written.
     #[error(transparent)]
     Journal(#[from] JournalError),
@@ -85,12 +89,15 @@ pub struct EditSession {
     level: Assembly,
     /// The finished world, if pieces cannot be placed.
     base: Option<Arc<World>>,
+    /// The finished world, or open air.
+    around: Arc<World>,
     edits: Vec<HandEdit>,
     done: Vec<Done>,
     undone: Vec<Done>,
     journal: Option<Journal>,
     /// The world as it is now, if it was asked for.
     latest: OnceLock<Arc<EditedWorld>>,
+    own: OwnWorlds,
 }
 
 impl EditSession {
@@ -116,12 +123,14 @@ impl EditSession {
         };
         Ok(Self {
             level,
+            around: base.clone().unwrap_or_else(|| Arc::new(open_air())),
             base,
             edits: Vec::new(),
             done: Vec::new(),
             undone: Vec::new(),
             journal: None,
             latest: OnceLock::new(),
+            own: OwnWorlds::default(),
         })
     }
 
@@ -202,28 +211,25 @@ impl EditSession {
 
     /// Makes an operation, and writes it to the journal. What was undone cannot be redone after that.
     ///
-    /// Pieces take time by what is beside them; a change by hand takes that of [`EditSession::world`].
+    /// Pieces take time by what is beside them; a change by hand takes that of the world of its instance, or of a finished world.
     ///
     /// # Errors
     ///
     /// Why it is refused: nothing changes then. That the journal cannot be written: then it is not made either.
     pub fn apply(&mut self, operation: EditOperation) -> Result<(), EditError> {
-        let mut edited = None;
         if let EditOperation::Make(edit) = &operation {
-            // Those that were made before are made in any case.
-            let kind = self.placed(edit)?;
-            let next = edited.insert(EditedWorld::clone(&*self.world()?));
-            kind.make(&mut next.world)?;
+            self.placed(edit)?;
+            let host = edit.host;
+            let before = kinds_of(&self.edits, host);
+            let base = own_base(&self.around, &self.level, host);
+            let base = base.ok_or(HandEditError::HostGone)?;
+            self.own.make(host, (&base, before), &edit.kind)?;
         }
         self.replayed(&operation)?;
         let written = self.write(&Entry::Operation(operation));
-        match (&written, edited) {
-            (Ok(()), Some(edited)) => self.latest = Arc::new(edited).into(),
-            (Ok(()), None) => {}
-            (Err(_), _) => {
-                self.step_back();
-                self.undone.clear();
-            }
+        if written.is_err() {
+            self.step_back();
+            self.undone.clear();
         }
         written
     }
@@ -323,8 +329,8 @@ impl EditSession {
         true
     }
 
-    /// Returns the world as it is now. Time: linear in the level, and that of each change by hand; none if it was asked for already,
-    /// or made for the last change by hand.
+    /// Returns the world as it is now, in one piece, as it is saved. Time: linear in the level, and that of each change by hand; none
+    /// if it was asked for already. [`EditedSpace`](crate::EditedSpace) follows a session in less.
     ///
     /// # Errors
     ///
@@ -332,6 +338,15 @@ impl EditSession {
     pub fn world(&self) -> Result<Arc<EditedWorld>, EditError> {
         if let Some(latest) = self.latest.get() {
             return Ok(Arc::clone(latest));
+        }
+        let known = self.base.as_ref();
+        let known = known.and_then(|_| self.own.known(None, &self.edits));
+        if let Some((world, resting)) = known {
+            let made = Arc::new(EditedWorld {
+                world: World::clone(world),
+                resting: resting.to_vec(),
+            });
+            return Ok(Arc::clone(self.latest.get_or_init(|| made)));
         }
         let mut world = match &self.base {
             Some(base) => World::clone(base),
@@ -346,6 +361,20 @@ impl EditSession {
         }
         let made = Arc::new(EditedWorld { world, resting });
         Ok(Arc::clone(self.latest.get_or_init(|| made)))
+    }
+
+    /// Returns the worlds of instances with changes by hand in them, in their own frames; under `None`, those that are in none, in the
+    /// finished world or in open air. Each is kept until it changes again. What cannot be made is not in it, such as two cells of
+    /// different instances as one.
+    pub fn own_worlds(&mut self) -> &OwnWorlds {
+        let (around, level) = (&self.around, &self.level);
+        (self.own).follow(&self.edits, |host| own_base(around, level, host));
+        &self.own
+    }
+
+    /// Returns the worlds of the last [`EditSession::own_worlds`].
+    pub(crate) fn known_own(&self) -> &OwnWorlds {
+        &self.own
     }
 
     /// Returns a change by hand, given in the frame of the world, as one that moves with the instance there.

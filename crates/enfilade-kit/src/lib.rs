@@ -65,4 +65,4 @@ pub use instance::{End, Instance, InstanceId, Link, PlaceOptions};
 pub use kit::{DEFAULT_TOLERANCE, Kit, KitFault, PieceNamedTwice};
 pub use piece::{Choice, Chosen, Piece, PieceError, Spot};
 pub use shape::Attachment;
-pub use space::LevelSpace;
+pub use space::{LevelParts, LevelSpace, open_air};

@@ -146,7 +146,10 @@ fn points_are_in_the_same_cells_as_in_their_pieces_and_as_in_the_space() {
                 instance.name
             );
             let place = space.space.locate(PartId::ROOT, p).unwrap();
-            assert_eq!((place.part, place.cell), (space.parts[&id], cell));
+            assert_eq!(
+                (place.part, place.cell),
+                (space.parts.part_of(id).unwrap(), cell)
+            );
         } else {
             assert!(
                 found.is_none_or(|name| name == "outdoors"),
@@ -163,11 +166,13 @@ fn joined_openings_lead_from_part_to_part_in_the_space() {
     let space = level.space().unwrap();
     for (id, instance) in level.instances() {
         for (attachment, link) in level.piece(id).attachments().iter().zip(&instance.links) {
-            let met = space.space.meets(space.parts[&id], attachment.portal);
+            let met = space
+                .space
+                .meets(space.parts.part_of(id).unwrap(), attachment.portal);
             let expected: Vec<_> = match link {
                 Link::Joined(other) => {
                     let its = &level.piece(other.instance).attachments()[other.attachment];
-                    vec![(space.parts[&other.instance], its.portal)]
+                    vec![(space.parts.part_of(other.instance).unwrap(), its.portal)]
                 }
                 _ => Vec::new(),
             };
@@ -547,7 +552,7 @@ fn views_of_the_space_see_the_instances_that_views_of_the_world_see() {
     let mut viewer = Viewer::new(&sight);
     let mut space_viewer = SpaceViewer::new(&space.space);
     let part_of: BTreeMap<&str, PartId> = (level.instances())
-        .map(|(id, instance)| (&*instance.name, space.parts[&id]))
+        .map(|(id, instance)| (&*instance.name, space.parts.part_of(id).unwrap()))
         .collect();
     let mut rng = Rng::new(2);
     let (mut n, mut n_parts, mut n_outside) = (0, 0, 0);

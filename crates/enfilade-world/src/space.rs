@@ -13,7 +13,7 @@ use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::{CellId, PortalId, World};
 use enfilade_geom::{Aabb, DVec3, LooseGrid};
-use enfilade_runtime::{DetailId, Sight, SightError, SightState};
+use enfilade_runtime::{DetailId, Sight, SightError, SightState, Sightlines};
 
 use crate::layout::Layout;
 use crate::pose::Pose;
@@ -47,6 +47,7 @@ mod seen;
 mod sweep;
 mod trace;
 pub(crate) mod walls;
+mod withdrawn;
 
 /// Reason why a part cannot be added or moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -76,9 +77,17 @@ pub enum SpaceError {
         /// Its index.
         part: u32,
     },
-    /// The root cannot move.
-    #[error("part 0 is the world that all others move in; it cannot be moved")]
+    /// The root cannot move or be taken out.
+    #[error("part 0 is the world that all others move in; it cannot be moved or taken out")]
     RootMoved,
+    /// A part is to be taken out in which others stand.
+    #[error("part {guest} stands in part {part}; it must be taken out first")]
+    HasGuests {
+        /// Its index.
+        part: u32,
+        /// Index of the first that stands in it.
+        guest: u32,
+    },
 }
 
 /// A world that stands in another.
@@ -89,6 +98,8 @@ pub(crate) struct Part {
     pub(crate) sight: Arc<Sight>,
     /// Made by the first query of contacts.
     walls: Arc<OnceLock<Walls>>,
+    /// Made by the first query of a line.
+    lines: Arc<OnceLock<Sightlines>>,
     pub(crate) state: SightState,
     /// The cell that stands for the surroundings.
     pub(crate) border: Option<CellId>,
@@ -108,6 +119,8 @@ pub(crate) struct Part {
     pub(crate) has_guests: Vec<bool>,
     /// Index of its first cell among those of all parts.
     pub(crate) first_cell: u32,
+    /// `false` while it is [withdrawn](Space::withdraw).
+    pub(crate) is_present: bool,
 }
 
 impl Part {
@@ -117,6 +130,7 @@ impl Part {
             layout: Arc::clone(&self.layout),
             sight: Arc::clone(&self.sight),
             walls: Arc::clone(&self.walls),
+            lines: Arc::clone(&self.lines),
             hull: self.hull,
         }
     }
@@ -137,6 +151,7 @@ struct Model {
     layout: Arc<Layout>,
     sight: Arc<Sight>,
     walls: Arc<OnceLock<Walls>>,
+    lines: Arc<OnceLock<Sightlines>>,
     hull: Aabb,
 }
 
@@ -148,6 +163,7 @@ impl Model {
             layout: Arc::new(layout),
             sight: Arc::new(sight),
             walls: Arc::default(),
+            lines: Arc::default(),
             world,
         }
     }
@@ -281,6 +297,7 @@ impl Space {
             layout,
             sight,
             walls,
+            lines,
             hull,
         } = model;
         let n_cells = layout.n_cells();
@@ -311,8 +328,10 @@ impl Space {
             has_guests: vec![false; n_cells],
             first_cell: self.n_cells as u32,
             walls,
+            lines,
             layout,
             world,
+            is_present: true,
         });
         self.n_cells += n_cells;
         self.neighbors.push(Aabb::EMPTY);
@@ -333,6 +352,7 @@ impl Space {
             return Err(SpaceError::NotRigid { part: part.0 });
         }
         self.parts[part.idx()].local = pose;
+        self.bring_back(part);
         let mut buffers = std::mem::take(&mut self.buffers);
         buffers.order.clear();
         buffers.order.push(part);
@@ -360,15 +380,7 @@ impl Space {
 
     /// Updates the places where a part stands, and those to which its doors lead.
     fn settle(&mut self, id: PartId, buffers: &mut Buffers) {
-        let mut stands_in = std::mem::take(&mut self.parts[id.idx()].stands_in);
-        for place in stands_in.drain(..) {
-            let host = &mut self.parts[place.part.idx()];
-            let guests = &mut host.guests[place.cell.idx()];
-            if let Ok(at) = guests.binary_search(&id) {
-                guests.remove(at);
-            }
-            host.has_guests[place.cell.idx()] = !guests.is_empty();
-        }
+        let mut stands_in = self.unsettle(id);
         let own = &self.parts[id.idx()];
         buffers.points.clear();
         let corners = own.hull.corners();
@@ -397,6 +409,20 @@ impl Space {
             self.parts[id.idx()].doors[door].leads_to = leads_to;
         }
         self.meet(id, buffers);
+    }
+
+    /// Takes a part off the lists of the places where it stands; returns the empty list of these.
+    fn unsettle(&mut self, id: PartId) -> Vec<Place> {
+        let mut stands_in = std::mem::take(&mut self.parts[id.idx()].stands_in);
+        for place in stands_in.drain(..) {
+            let host = &mut self.parts[place.part.idx()];
+            let guests = &mut host.guests[place.cell.idx()];
+            if let Ok(at) = guests.binary_search(&id) {
+                guests.remove(at);
+            }
+            host.has_guests[place.cell.idx()] = !guests.is_empty();
+        }
+        stands_in
     }
 
     /// Adds the places that the hull of `buffers.points`, in the frame of `host`, may touch; beyond a host's border those of
@@ -478,6 +504,13 @@ impl Space {
     pub(crate) fn walls(&self, part: PartId) -> &Walls {
         let part = &self.parts[part.idx()];
         (part.walls).get_or_init(|| Walls::new(&part.world, &part.sight, &part.layout))
+    }
+
+    /// Returns what lines of sight can hit in a part. The first query of one of its copies prepares it.
+    #[must_use]
+    pub fn sightlines(&self, part: PartId) -> &Sightlines {
+        let part = &self.parts[part.idx()];
+        (part.lines).get_or_init(|| Sightlines::build(&part.world))
     }
 
     /// Returns the state of a part's doors.

@@ -131,7 +131,7 @@ fn rays_hit_what_straight_lines_hit_in_the_moved_world() {
                 most: 7,
                 ..SightRay::new(PartId::ROOT, from, by)
             };
-            let traced = space.pick(&lines, &ray, &mut passed).unwrap();
+            let traced = space.pick(&ray, &mut passed).unwrap();
             assert_eq!(traced.n_passed, passed.len());
             n_by_depth[passed.len()] += 1;
             let mut seem = DMat4::IDENTITY;
@@ -258,7 +258,7 @@ fn facing_mirrors_end_a_ray_after_as_many_as_it_may_pass() {
     let [low, high] = aabb;
     across(&mut world, low.z, -1.0, aabb, vec![Pass::new(Way::Mirror)]);
     across(&mut world, high.z, 1.0, aabb, vec![Pass::new(Way::Mirror)]);
-    let (lines, space) = (Sightlines::build(&world), Space::new(world).unwrap());
+    let space = Space::new(world).unwrap();
     let from = (low + high) * 0.5;
     let depth = high.z - low.z;
     let mut passed = Vec::new();
@@ -267,7 +267,7 @@ fn facing_mirrors_end_a_ray_after_as_many_as_it_may_pass() {
             most,
             ..SightRay::new(PartId::ROOT, from, DVec3::Z * 1e4)
         };
-        let traced = space.pick(&lines, &ray, &mut passed).unwrap();
+        let traced = space.pick(&ray, &mut passed).unwrap();
         assert_eq!(traced.n_passed, most);
         let next = SpecialId(1 - most as u32 % 2);
         assert_eq!(traced.end, TraceEnd::Capped(PartId::ROOT, next));
@@ -285,14 +285,14 @@ fn facing_mirrors_end_a_ray_after_as_many_as_it_may_pass() {
     }
     // A ray that is too short for the next mirror ends in the air.
     let ray = SightRay::new(PartId::ROOT, from, DVec3::Z * depth * 1.75);
-    let traced = space.pick(&lines, &ray, &mut passed).unwrap();
+    let traced = space.pick(&ray, &mut passed).unwrap();
     assert_eq!((traced.end, traced.n_passed), (TraceEnd::Open, 2));
     assert!(
         traced.at.distance(from + DVec3::Z * depth * -0.25) < 1e-6,
         "{traced:?}"
     );
     let bad = SightRay::new(PartId::ROOT, from, DVec3::NAN);
-    assert!(space.pick(&lines, &bad, &mut passed).is_err());
+    assert!(space.pick(&bad, &mut passed).is_err());
     let nothing = space.trace(&bad, &mut passed, |_, _, _| Some((0.0, ())));
     assert_eq!(nothing.end, TraceEnd::Open);
 }
@@ -342,20 +342,17 @@ fn monitors_stop_rays_panes_do_not_and_links_scale_lengths() {
         shape: SpecialShape::Portal(PortalId(0)),
         passes: vec![Pass::new(Way::Through), pane],
     });
-    let (lines, mut space) = (
-        Sightlines::build(&world),
-        Space::new(world.clone()).unwrap(),
-    );
+    let mut space = Space::new(world.clone()).unwrap();
     let mut passed = Vec::new();
     let ray = SightRay::new(PartId::ROOT, from, DVec3::NEG_Z * 50.0);
-    let seen = space.pick(&lines, &ray, &mut passed).unwrap();
+    let seen = space.pick(&ray, &mut passed).unwrap();
     assert_eq!(seen.end, TraceEnd::Monitor(PartId::ROOT, SpecialId(0)));
     assert!((seen.length - (from.z - low.z)).abs() < 1e-6 && passed.is_empty());
 
     let ray = SightRay::new(PartId::ROOT, from, DVec3::Z * 50.0);
-    let seen = space.pick(&lines, &ray, &mut passed).unwrap();
+    let seen = space.pick(&ray, &mut passed).unwrap();
     assert_eq!(passed, [(PartId::ROOT, SpecialId(1))]);
-    let hit = seen.surface().expect("a wall");
+    let (_, hit) = seen.surface().expect("a wall");
     let off = hit.position[0] as f64 - from.x;
     assert!(
         off > 0.1 && (point(hit.position) - from).dot(DVec3::Z).abs() < 1e-6,
@@ -374,10 +371,13 @@ fn monitors_stop_rays_panes_do_not_and_links_scale_lengths() {
         / 4.0;
     let normal = point(portal.normal);
     let ray = SightRay::new(PartId::ROOT, middle - normal * 0.5, normal * 2.0);
-    let seen = space.pick(&lines, &ray, &mut passed).unwrap();
+    let seen = space.pick(&ray, &mut passed).unwrap();
     assert!(seen.length > 0.6 && passed.is_empty(), "{seen:?}");
     // Shut, the doorway is what is hit.
     space.close(PartId::ROOT, PortalId(0));
-    let seen = space.pick(&lines, &ray, &mut passed).unwrap();
-    assert_eq!(seen.surface().unwrap().target, Target::Portal(PortalId(0)));
+    let seen = space.pick(&ray, &mut passed).unwrap();
+    assert_eq!(
+        seen.surface().unwrap().1.target,
+        Target::Portal(PortalId(0))
+    );
 }

@@ -28,9 +28,10 @@ pub(super) fn place(scene: &str) -> anyhow::Result<Figure> {
     let mut times = Vec::new();
     for (id, piece, onto) in ends.into_iter().step_by(step) {
         level.remove(id)?;
+        space.follow(&level)?;
         let start = Instant::now();
-        let placed = level.place(piece, 0, onto, &PlaceOptions::default())?;
-        space.add(&level, placed)?;
+        level.place(piece, 0, onto, &PlaceOptions::default())?;
+        space.follow(&level)?;
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     anyhow::ensure!(

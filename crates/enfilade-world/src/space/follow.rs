@@ -86,7 +86,7 @@ impl Space {
         let mut first: Option<(f64, PartId, SpecialId)> = None;
         for (id, part) in (0..).map(PartId).zip(&self.parts) {
             let n = part.layout.n_specials();
-            if n == 0 {
+            if n == 0 || !part.is_present {
                 continue;
             }
             let (a, b) = if id == frame {

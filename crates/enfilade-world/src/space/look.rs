@@ -232,7 +232,10 @@ impl SpaceViewer {
         );
         if at.is_none() {
             for id in (1..space.parts.len() as u32).map(PartId) {
-                if let Some(border) = space.parts[id.idx()].border {
+                if let Some(border) = space.parts[id.idx()]
+                    .border
+                    .filter(|_| space.is_present(id))
+                {
                     buffers.queue.push((id, border, Window::screen()));
                 }
             }

@@ -49,6 +49,9 @@ impl Space {
         self.docking = docking;
         let mut buffers = std::mem::take(&mut self.buffers);
         for part in (1..self.parts.len() as u32).map(PartId) {
+            if !self.is_present(part) {
+                continue;
+            }
             self.meet(part, &mut buffers);
         }
         self.buffers = buffers;
@@ -129,7 +132,7 @@ impl Space {
     }
 
     /// Removes the meetings of a part's doors, on both sides.
-    fn part_from_all(&mut self, id: PartId) {
+    pub(super) fn part_from_all(&mut self, id: PartId) {
         for a in 0..self.parts[id.idx()].doors.len() {
             let mut meets = std::mem::take(&mut self.parts[id.idx()].doors[a].meets);
             for (other, portal) in meets.drain(..) {

@@ -5,8 +5,8 @@
 //! special portal counts as before it, as it does in pictures.
 
 use enfilade_cpg::{SpecialId, Way};
-use enfilade_geom::{DVec3, Similarity};
-use enfilade_runtime::{Hit, NotFinite, Sightlines};
+use enfilade_geom::{Aabb, DVec3, Similarity};
+use enfilade_runtime::{Hit, NotFinite};
 
 use super::{PartId, Space};
 
@@ -175,30 +175,62 @@ impl Space {
         }
     }
 
-    /// Follows a ray in a world without moving parts, and picks what it meets there, as [`Sightlines::pick`] does. `lines` are those of
-    /// the root.
+    /// Follows a ray, and picks what it meets in any part, as [`Sightlines::pick`](enfilade_runtime::Sightlines::pick) does. The hit
+    /// is in the frame of its part, its `t` a share of the last stretch.
     ///
     /// # Errors
     ///
     /// If a coordinate is not finite.
     pub fn pick(
         &self,
-        lines: &Sightlines,
         ray: &SightRay,
         passed: &mut Vec<(PartId, SpecialId)>,
-    ) -> Result<Traced<Hit>, NotFinite> {
+    ) -> Result<Traced<(PartId, Hit)>, NotFinite> {
         let ends = [ray.from, ray.from + ray.by].map(|p| p.as_vec3().to_array());
         if !ends.as_flattened().iter().all(|x| x.is_finite()) {
             let [from, to] = ends;
             return Err(NotFinite { from, to });
         }
-        let state = self.state(PartId::ROOT);
         Ok(self.trace(ray, passed, |frame, from, to| {
-            let pose = self.between(frame, PartId::ROOT);
-            let [from, to] = [from, to].map(|p| pose.point(p).as_vec3().to_array());
-            let hit = lines.pick(state, from, to).ok().flatten()?;
-            Some((hit.t, hit))
+            let hits = self.parts_along(frame, [from, to]).filter_map(|id| {
+                let [from, to] = self.ends_in(id, frame, [from, to]);
+                let hit = self.sightlines(id).pick(self.state(id), from, to).ok()??;
+                Some((hit.t, (id, hit)))
+            });
+            hits.min_by(|a, b| a.0.total_cmp(&b.0))
         }))
+    }
+
+    /// Returns the share of a segment, in the frame of a part, before the first wall of any part, if there is one. As
+    /// [`Sightlines::first_hit`](enfilade_runtime::Sightlines::first_hit), without objects.
+    #[must_use]
+    pub fn first_wall(&self, frame: PartId, ends: [DVec3; 2]) -> Option<f64> {
+        let hits = self.parts_along(frame, ends).filter_map(|id| {
+            let [from, to] = self.ends_in(id, frame, ends);
+            Some(self.sightlines(id).first_hit(from, to)?.t)
+        });
+        hits.min_by(f64::total_cmp)
+    }
+
+    /// Returns the parts whose boxes a segment, in the frame of a part, meets, and the root, which comes first.
+    pub fn parts_along(
+        &self,
+        frame: PartId,
+        ends: [DVec3; 2],
+    ) -> impl Iterator<Item = PartId> + use<'_> {
+        let pose = self.pose(frame);
+        let [from, to] = ends.map(|p| pose.point(p));
+        let others = (1..self.parts.len() as u32).map(PartId);
+        let met = others.filter(move |id| {
+            let bounds = self.neighbors.bounds(id.0);
+            !bounds.is_empty() && meets(bounds, from, to)
+        });
+        std::iter::once(PartId::ROOT).chain(met)
+    }
+
+    fn ends_in(&self, part: PartId, frame: PartId, ends: [DVec3; 2]) -> [[f32; 3]; 2] {
+        let map = self.between(frame, part);
+        ends.map(|p| map.point(p).as_vec3().to_array())
     }
 
     /// Returns the pass of a special portal that a ray takes; `None` for one through which it goes on straight.
@@ -231,4 +263,21 @@ impl Space {
         let share = IN_PLANE * layout.tolerance() / normal.dot(left).abs();
         share.min(1.0)
     }
+}
+
+/// Returns `true` if a segment meets a box.
+fn meets(bounds: &Aabb, from: DVec3, to: DVec3) -> bool {
+    let by = to - from;
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    for k in 0..3 {
+        if by[k] == 0.0 {
+            if from[k] < bounds.min[k] || from[k] > bounds.max[k] {
+                return false;
+            }
+            continue;
+        }
+        let [a, b] = [bounds.min[k], bounds.max[k]].map(|x| (x - from[k]) / by[k]);
+        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+    }
+    enter <= leave
 }
