@@ -5,7 +5,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use enfilade::cpg::World;
-use enfilade::world::PartId;
+use enfilade::geom::DVec3;
+use enfilade::runtime::Seen;
+use enfilade::world::{PartId, Pose};
 use enfilade_render::{
     Camera, Culling, Mark, MarkShape, Paint, Picture, PortalTextureCounts, Sparing, Studio, Style,
 };
@@ -327,18 +329,29 @@ pub(crate) fn portal_marks(
     let view = camera.view(size[0] as f32 / size[1] as f32)?;
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let mut marks = Vec::new();
+    add_portal_marks(&mut marks, (world, &Pose::IDENTITY), &seen, camera, size);
+    Ok(marks)
+}
+
+/// Adds the marks of a world that stands at a pose in the frame of the camera.
+pub(crate) fn add_portal_marks(
+    marks: &mut Vec<Mark>,
+    (world, pose): (&World, &Pose),
+    seen: &Seen<'_>,
+    camera: &Camera,
+    size: [u32; 2],
+) {
+    let eye = DVec3::from(camera.eye.map(f64::from));
     for p in seen.portals() {
-        let outline = &world.graph[*p].outline;
+        let outline = world.graph[*p].outline.iter();
+        let outline: Vec<DVec3> = outline
+            .map(|p| pose.point(DVec3::from(p.map(f64::from))))
+            .collect();
         // As wide as a frame of 20 mm, so that far ones are thin; at least a pixel of the finished picture.
         let focal = size[1] as f32 * 0.5 / (camera.fov_y * 0.5).tan();
-        let nearest = (outline.iter())
-            .map(|c| {
-                (0..3)
-                    .map(|k| (c[k] - camera.eye[k]).powi(2))
-                    .sum::<f32>()
-                    .sqrt()
-            })
-            .fold(f32::INFINITY, f32::min);
+        let nearest = outline.iter().map(|p| p.distance(eye) as f32);
+        let nearest = nearest.fold(f32::INFINITY, f32::min);
+        let outline: Vec<[f32; 3]> = outline.iter().map(|p| p.as_vec3().to_array()).collect();
         let (least, most) = (size[1] as f32 / 540.0, size[1] as f32 / 110.0);
         let width = (0.02 * focal / nearest.max(0.1)).clamp(least, most);
         let mark = |shape, color, width, on_top| Mark {
@@ -349,15 +362,12 @@ pub(crate) fn portal_marks(
         };
         let area = MarkShape::Area(outline.clone());
         marks.push(mark(area, [1.0, 0.62, 0.05, 0.10], 0.0, false));
-        let line = MarkShape::Outline(outline.clone());
+        let line = MarkShape::Outline(outline);
         marks.push(mark(line.clone(), [1.0, 0.45, 0.02, 0.22], width, true));
         marks.push(mark(line, [1.0, 0.45, 0.02, 1.0], width, false));
     }
-    for v in seen
-        .visits()
-        .iter()
-        .filter(|v| v.via.is_some() && v.face == 0)
-    {
+    let visits = seen.visits().iter();
+    for v in visits.filter(|v| v.via.is_some() && v.face == 0) {
         marks.push(Mark {
             shape: MarkShape::Rectangle(v.rectangle),
             color: [0.05, 0.55, 0.9, 0.8],
@@ -365,5 +375,4 @@ pub(crate) fn portal_marks(
             on_top: true,
         });
     }
-    Ok(marks)
 }

@@ -113,6 +113,14 @@ impl HandEditKind {
         }
     }
 
+    /// Returns the reason for which it rests where its portal is gone.
+    pub(crate) fn unfound(&self) -> HandEditError {
+        HandEditError::NoPortalAt {
+            at: self.at(),
+            nearest: None,
+        }
+    }
+
     /// Returns its middle.
     #[must_use]
     pub fn at(&self) -> DVec3 {
@@ -202,6 +210,11 @@ impl HandEditKind {
 fn in_air(world: &World, at: DVec3, what: &'static str) -> Result<CellId, HandEditError> {
     let cell = world.graph.locator.locate(at);
     cell.ok_or(HandEditError::InSolid { at, what })
+}
+
+/// Returns `true` if a point is in a portal.
+pub(crate) fn is_portal_at(graph: &CellPortalGraph, portal: PortalId, at: DVec3) -> bool {
+    distance(graph, portal, at) <= AT
 }
 
 /// Returns the portal that a point is in.

@@ -79,6 +79,13 @@ impl OwnWorlds {
         is_same.then_some((&known.world, &known.resting))
     }
 
+    /// Returns the reason for which a change of a host, counted among its own, is not in its world.
+    pub(crate) fn resting(&self, host: Option<InstanceId>, at: usize) -> Option<HandEditError> {
+        let mut resting = self.by_host.get(&host)?.resting.iter();
+        let found = resting.find(|(number, _)| *number == at);
+        found.map(|(_, why)| why.clone())
+    }
+
     /// Makes a change by hand after those before.
     pub(crate) fn make(
         &mut self,

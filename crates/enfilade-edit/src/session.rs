@@ -1,14 +1,17 @@
 //! The session: a level, changes by hand, and the history of both.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::World;
 use enfilade_geom::DVec3;
-use enfilade_kit::{Assembly, FlattenError, Kit, PlaceError, PlaceOptions, open_air};
+use enfilade_kit::{
+    Assembly, FlattenError, InstanceId, Kit, Link, PlaceError, PlaceOptions, open_air,
+};
 use enfilade_world::{Pose, SpaceError};
 
-use crate::hand::{HandEdit, HandEditError, HandEditKind};
+use crate::hand::{HandEdit, HandEditError, HandEditKind, is_portal_at};
 use crate::journal::{Entry, Journal, JournalError};
 use crate::operation::EditOperation;
 use crate::own::{OwnWorlds, kinds_of, own_base};
@@ -370,6 +373,45 @@ impl EditSession {
         let (around, level) = (&self.around, &self.level);
         (self.own).follow(&self.edits, |host| own_base(around, level, host));
         &self.own
+    }
+
+    /// Returns the changes by hand that cannot be made now, by their number, each with the reason: as [`EditSession::world`], without
+    /// making the whole.
+    pub fn resting(&mut self) -> Vec<(usize, HandEditError)> {
+        self.own_worlds();
+        let mut resting = Vec::new();
+        let mut n_of: BTreeMap<Option<InstanceId>, usize> = BTreeMap::new();
+        for (number, edit) in self.edits.iter().enumerate() {
+            let at = n_of.entry(edit.host).or_default();
+            let why = match self.placed(edit) {
+                Err(why) => Some(why),
+                Ok(kind) => {
+                    let walled = || self.is_walled_up(edit).then(|| kind.unfound());
+                    self.own.resting(edit.host, *at).or_else(walled)
+                }
+            };
+            *at += 1;
+            resting.extend(why.map(|why| (number, why)));
+        }
+        resting
+    }
+
+    /// Returns `true` if a change by hand is of a doorway in front of a wall.
+    fn is_walled_up(&self, edit: &HandEdit) -> bool {
+        let (HandEditKind::Door(at) | HandEditKind::NoPortal(at), Some(id)) =
+            (&edit.kind, edit.host)
+        else {
+            return false;
+        };
+        let Ok(instance) = self.level.standing(id) else {
+            return false;
+        };
+        let piece = self.level.piece(id);
+        let mut links = piece.attachments().iter().zip(&instance.links);
+        links.any(|(attachment, link)| {
+            matches!(link, Link::Blocked(_))
+                && is_portal_at(&piece.world().graph, attachment.portal, *at)
+        })
     }
 
     /// Returns the worlds of the last [`EditSession::own_worlds`].

@@ -23,8 +23,7 @@
 //!     let mut viewer = SpaceViewer::new(&space);
 //!     let mut studio = Studio::new(Gpu::open(&AdapterChoice::Best)?, &tower)?;
 //!     studio.add_light(&tower)?;
-//!     // Once for each part, in their order.
-//!     studio.add_part(&cabin, space.sight(lift))?;
+//!     studio.follow_parts(&space)?;
 //!     studio.add_part_light(lift, &cabin, space.sight(lift))?;
 //!     studio.set_lamps(vec![LampLight {
 //!         part: lift,

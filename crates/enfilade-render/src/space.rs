@@ -3,6 +3,8 @@
 //! Each part of a [`Space`] is drawn in its own frame, by the same camera in that frame's coordinates: a part ten kilometers
 //! away is as exact as a near one. All parts share one depth, one sun with its shadows, one sky and one exposure.
 
+use std::sync::Arc;
+
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, View};
 use enfilade_world::{PartId, Pose, Space, SpaceSeen, SpaceViewer};
@@ -62,20 +64,45 @@ pub struct SpaceCounts {
 }
 
 impl Studio {
-    /// Uploads a world that stands in the studio's. Call it once for each part of a [`Space`] but the root, in their order;
-    /// the root is the studio's own world. `sight` is [the part's](Space::sight).
+    /// Uploads the worlds that stand in the studio's, or what has changed of them: after parts were added, or are others. The root is
+    /// the studio's own world. Copies of a part are uploaded once. O(parts), and the size of each new world.
     ///
     /// # Errors
     ///
     /// As [`Studio::new`].
-    pub fn add_part(&mut self, world: &World, sight: &Sight) -> Result<PartId, RenderError> {
-        self.parts.push(StudioPart {
-            world: GpuWorld::load(&self.gpu, world, sight)?,
-            stage: self.renderer.stage(&self.gpu, Light::uniform(&self.gpu)?),
-            placed: Vec::new(),
-        });
-        self.shadows_of = None;
-        Ok(PartId(self.parts.len() as u32))
+    pub fn follow_parts(&mut self, space: &Space) -> Result<(), RenderError> {
+        for id in (1..space.n_parts() as u32).map(PartId) {
+            let (at, of) = (id.0 as usize - 1, space.world(id));
+            let known = self.parts.get(at);
+            if known.is_some_and(|known| Arc::ptr_eq(&known.of, of)) {
+                continue;
+            }
+            let twin = self.parts.iter().find(|part| Arc::ptr_eq(&part.of, of));
+            let world = match twin {
+                // Leaves are placed anew for each frame.
+                Some(twin) => Arc::clone(&twin.world),
+                None => Arc::new(GpuWorld::load(&self.gpu, of, space.sight(id))?),
+            };
+            let part = StudioPart {
+                of: Arc::clone(of),
+                placed: twin.map_or_else(Vec::new, |twin| twin.placed.clone()),
+                world,
+                stage: self.renderer.stage(&self.gpu, Light::uniform(&self.gpu)?),
+            };
+            match self.parts.get_mut(at) {
+                Some(known) => *known = part,
+                None => self.parts.push(part),
+            }
+            self.shadows_of = None;
+        }
+        Ok(())
+    }
+
+    /// Returns the number of triangles of structure and placed objects of all worlds.
+    #[must_use]
+    pub fn n_triangles(&self) -> u64 {
+        let parts = self.parts.iter().map(|part| part.world.n_triangles());
+        self.world.n_triangles() + parts.sum::<u64>()
     }
 
     /// Computes daylight in a part, as [`Studio::add_light`] does for the first world: that of a place outdoors, which
@@ -112,7 +139,7 @@ impl Studio {
     ///
     /// # Panics
     ///
-    /// If the space has parts that were not [added](Studio::add_part).
+    /// If the space has parts that were not [followed](Studio::follow_parts).
     pub fn draw_space(
         &mut self,
         shot: &SpaceShot<'_>,
@@ -241,7 +268,7 @@ impl Studio {
             part.stage.surroundings = brightness;
             if part.placed != space.state(id).shares() {
                 part.placed = space.state(id).shares().to_vec();
-                part.world.place(space.state(id));
+                Arc::make_mut(&mut part.world).place(space.state(id));
                 self.shadows_of = None;
             }
         }

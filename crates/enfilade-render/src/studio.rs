@@ -1,5 +1,7 @@
 //! Everything needed to draw one world.
 
+use std::sync::Arc;
+
 use enfilade_cpg::World;
 use enfilade_runtime::{Sight, SightState, View, Viewer};
 use enfilade_world::{PartId, Pose, Space, SpaceViewer};
@@ -43,7 +45,10 @@ pub struct StudioTarget {
 
 /// A world beside the first, on the adapter.
 pub(crate) struct StudioPart {
-    pub(crate) world: GpuWorld,
+    /// The world, to tell it from others.
+    pub(crate) of: Arc<World>,
+    /// Copies of a part share it until their leaves move.
+    pub(crate) world: Arc<GpuWorld>,
     pub(crate) stage: RenderStage,
     /// Positions of the leaves as drawn last.
     pub(crate) placed: Vec<Option<f32>>,
@@ -524,6 +529,9 @@ impl Studio {
 
     /// Lists everything of a part, with the doors of the space, or of the studio without one.
     pub(crate) fn everything_of(&mut self, space: Option<&Space>, id: PartId) -> RenderList {
+        if space.is_some_and(|space| !space.is_present(id)) {
+            return RenderList::default();
+        }
         let world = world_of(&self.world, &self.parts, id);
         let (sight, state) = match space {
             Some(space) => (space.sight(id), space.state(id)),
@@ -551,7 +559,7 @@ pub(crate) fn staged_worlds<'a>(
     root_stage: &'a mut RenderStage,
     others: &'a mut [StudioPart],
 ) -> Vec<StagedWorld<'a>> {
-    let others = others.iter_mut().map(|p| (&p.world, &mut p.stage));
+    let others = others.iter_mut().map(|p| (&*p.world, &mut p.stage));
     std::iter::once((root, root_stage)).chain(others).collect()
 }
 
@@ -562,7 +570,7 @@ pub(crate) fn drawn_parts<'a>(
     others: &'a mut [StudioPart],
     lists: &'a [(PartId, RenderList)],
 ) -> Vec<DrawnPart<'a>> {
-    let others = others.iter_mut().map(|p| (&p.world, &mut p.stage));
+    let others = others.iter_mut().map(|p| (&*p.world, &mut p.stage));
     let worlds = std::iter::once((root, root_stage)).chain(others);
     let mut lists = lists.iter().peekable();
     let drawn = (0..).map(PartId).zip(worlds).filter_map(|(id, part)| {

@@ -1,7 +1,9 @@
 //! Viewpoints: found automatically, or on a walk.
 
 use enfilade_cpg::{Cell, CellId, PortalId, World};
+use enfilade_geom::DVec3;
 use enfilade_runtime::{Sight, Sightlines};
+use enfilade_world::{PartId, Space};
 
 use crate::camera::Camera;
 use crate::gpu::RenderError;
@@ -321,47 +323,40 @@ pub fn walk_cameras(world: &World, sight: &Sight, views: usize, fov_y: f32) -> V
         .collect()
 }
 
-/// The openable portal nearest to the center of a camera's view, with its distance. [Units: wu] Time grows with the
-/// portals.
+/// The openable portal of any part nearest to the center of a camera's view, with its distance. The camera is in the frame of the
+/// root. [Units: wu] Time grows with the portals of parts on the way.
 #[must_use]
-pub fn portal_looked_at(
-    world: &World,
-    lines: &Sightlines,
-    camera: &Camera,
-) -> Option<(PortalId, f32)> {
-    let length = camera.toward.iter().map(|x| x * x).sum::<f32>().sqrt();
-    let forward = camera.toward.map(|x| x / length.max(1e-9));
-    let far = 30.0;
-    let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * far);
-    let wall = lines
-        .first_hit(camera.eye, end)
-        .map_or(far, |h| h.t as f32 * far);
-    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|k| a[k] - b[k]);
-    let cross = |a: [f32; 3], b: [f32; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let mut best: Option<(PortalId, f32)> = None;
-    for (i, portal) in (0..).zip(&world.graph.portals) {
-        let facing = dot(portal.normal, forward);
-        let t = dot(portal.normal, sub(portal.outline[0], camera.eye)) / facing;
-        if facing.abs() < 1e-6 || t <= 0.0 || t > wall + 0.05 || best.is_some_and(|b| b.1 <= t) {
-            continue;
-        }
-        let p = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * t);
-        let next = portal.outline.iter().cycle().skip(1);
-        let is_inside = portal
-            .outline
-            .iter()
-            .zip(next)
-            .all(|(a, b)| dot(portal.normal, cross(sub(*b, *a), sub(p, *a))) >= 0.0);
-        if is_inside {
-            best = Some((PortalId(i), t));
+pub fn portal_looked_at(space: &Space, camera: &Camera) -> Option<(PartId, PortalId, f32)> {
+    const FAR: f64 = 30.0;
+    let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+    let (eye, forward) = (
+        vector(camera.eye),
+        vector(camera.toward).normalize_or_zero(),
+    );
+    let ends = [eye, eye + forward * FAR];
+    let wall = space.first_wall(PartId::ROOT, ends).unwrap_or(1.0) * FAR;
+    let mut best: Option<(PartId, PortalId, f64)> = None;
+    for part in space.parts_along(PartId::ROOT, ends) {
+        let pose = space.pose(part);
+        let (eye, forward) = (pose.point_back(eye), pose.inverse().direction(forward));
+        for (i, portal) in (0..).zip(&space.world(part).graph.portals) {
+            let normal = vector(portal.normal);
+            let facing = normal.dot(forward);
+            let t = normal.dot(vector(portal.outline[0]) - eye) / facing;
+            let is_near = t > 0.0 && t <= wall + 0.05 && best.is_none_or(|b| t < b.2);
+            if facing.abs() < 1e-6 || !is_near {
+                continue;
+            }
+            let p = eye + forward * t;
+            let next = portal.outline.iter().cycle().skip(1);
+            let mut sides = portal.outline.iter().zip(next).map(|(a, b)| {
+                let (a, b) = (vector(*a), vector(*b));
+                normal.dot((b - a).cross(p - a))
+            });
+            if sides.all(|side| side >= 0.0) {
+                best = Some((part, PortalId(i), t));
+            }
         }
     }
-    best
+    best.map(|(part, portal, t)| (part, portal, t as f32))
 }

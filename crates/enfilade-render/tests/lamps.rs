@@ -256,9 +256,9 @@ fn a_lamp_of_a_moving_room_lights_what_it_then_reaches() {
         };
         vec![own, lamp(a + DVec3::new(4.0, 2.0, 4.0))]
     };
-    let make = |space: &Space, part| {
+    let make = |space: &Space| {
         let mut studio = Studio::new(gpu(), &host).unwrap();
-        studio.add_part(&guest, space.sight(part)).unwrap();
+        studio.follow_parts(space).unwrap();
         studio.set_lamps(lights()).unwrap();
         studio
     };
@@ -266,7 +266,7 @@ fn a_lamp_of_a_moving_room_lights_what_it_then_reaches() {
     let part = space
         .add_part(guest.clone(), PartId::ROOT, pose(0))
         .unwrap();
-    let mut kept = make(&space, part);
+    let mut kept = make(&space);
     let mut before: Option<Picture> = None;
     for i in 0..4 {
         space.set_pose(part, pose(i)).unwrap();
@@ -286,7 +286,7 @@ fn a_lamp_of_a_moving_room_lights_what_it_then_reaches() {
         };
         let (picture, _) = kept.space_picture(&shot, SIZE).unwrap();
         show(&format!("ride-{i}"), &picture);
-        let mut fresh = make(&space, part);
+        let mut fresh = make(&space);
         let (expected, _) = fresh.space_picture(&shot, SIZE).unwrap();
         assert_eq!(picture, expected, "step {i}");
         let every = SpaceShot {

@@ -478,6 +478,12 @@ impl Space {
         self.n_cells
     }
 
+    /// Returns the number of a cell among those of all parts; those of the root come first.
+    #[must_use]
+    pub fn cell_number(&self, place: Place) -> u32 {
+        self.parts[place.part.idx()].first_cell + place.cell.0
+    }
+
     /// Returns the world of a part.
     #[must_use]
     pub fn world(&self, part: PartId) -> &Arc<World> {

@@ -190,9 +190,9 @@ impl Lived {
     ///
     /// If the adapter cannot hold them.
     pub(crate) fn furnish(&self, studio: &mut Studio) -> Result<(), RenderError> {
+        studio.follow_parts(&self.space)?;
         for lift in &self.lifts {
             let (world, sight) = (self.space.world(lift.part), self.space.sight(lift.part));
-            studio.add_part(world, sight)?;
             studio.add_part_light(lift.part, world, sight)?;
         }
         studio.set_lamps(self.lamps.clone())
@@ -234,6 +234,11 @@ impl Lived {
             lamps: Some(lamps),
         };
         Ok(studio.space_picture(&shot, size)?.0)
+    }
+
+    /// Makes the radar anew when it is asked for next, as after parts came or went.
+    pub(crate) fn forget_radar(&mut self) {
+        self.radar = None;
     }
 
     /// Leaves a door to whoever opens and closes it by hand.

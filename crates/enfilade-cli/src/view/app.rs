@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
-use enfilade::cpg::World;
+use enfilade::cpg::{PortalId, World};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::DVec3;
-use enfilade::runtime::{Sightlines, Target};
-use enfilade::world::PartId;
+use enfilade::runtime::Target;
+use enfilade::world::{PartId, Pose, Space};
 use enfilade_render::{
     Camera, FOV, Paint, PortalTextureOptions, Sparing, Studio, good_camera, portal_looked_at,
 };
@@ -25,10 +25,11 @@ use winit::window::{Window, WindowId};
 use super::args::View;
 use super::editing::{EditKey, EditRay, Editor, Outcome, Strip, edit_key};
 use super::mode::Mode;
-use super::open::{Open, name_ahead, name_here};
+use super::open::Open;
 use super::panel::{Panel, Shown};
 use super::pointed::{FAR, Pointed};
 use super::strider::start_in;
+use super::titles::Titles;
 use super::walker::Walker;
 use crate::formats::Format;
 use crate::living::{Lived, STEP};
@@ -43,9 +44,8 @@ const CLICK: f32 = 30.0;
 pub(super) struct App<'a> {
     pub(super) args: &'a View,
     /// Hollow if it is streamed.
-    pub(super) world: World,
+    pub(super) world: Arc<World>,
     pub(super) packed: Option<Packed>,
-    pub(super) lines: Sightlines,
     /// Until the window opens.
     pub(super) lived: Option<Lived>,
     /// Cameras still to show.
@@ -179,7 +179,7 @@ impl App<'_> {
         surface.configure(&gpu.device, &config);
         let strip = self.editor.as_ref();
         let strip = strip.map(|editor| Strip::new(editor.kit(), editor.palette()));
-        let panel = Panel::new(&gpu, &window, config.format, &self.world, strip);
+        let mut panel = Panel::new(&gpu, &window, config.format, strip);
         let (mut studio, streamed) = match &self.packed {
             Some(packed) => {
                 let sight = lived.space.sight(PartId::ROOT).clone();
@@ -197,7 +197,12 @@ impl App<'_> {
         if self.args.living.is_some() || !studio.gpu.is_software() {
             lived.furnish(&mut studio)?;
         }
-        let start = self.start(&mut studio)?;
+        let is_in_parts = self.editor.as_ref().is_some_and(Editor::has_parts);
+        if is_in_parts {
+            studio.follow_parts(&lived.space)?;
+        }
+        panel.renew_map(is_in_parts);
+        let start = self.start(&mut studio, &lived.space)?;
         let [x, y, z] = start.toward;
         let shown = Shown {
             // The software adapter draws the plain picture several times as fast.
@@ -208,10 +213,16 @@ impl App<'_> {
         };
         let mut walker = Walker::new(start.eye, streamed.is_some());
         walker.flies = self.editor.is_some();
+        walker.rides = self.args.living.is_some();
+        let titles = self.editor.as_ref().map(Editor::titles);
         Ok(Open {
             walker,
             has_company: self.args.living.is_some(),
-            is_living: self.args.living.is_some() || !self.world.graph.specials.is_empty(),
+            is_living: self.args.living.is_some()
+                || is_in_parts
+                || !self.world.graph.specials.is_empty(),
+            is_in_parts,
+            titles: Titles(titles.unwrap_or_default()),
             lived,
             window,
             surface,
@@ -250,7 +261,7 @@ impl App<'_> {
     }
 
     /// The first camera.
-    fn start(&self, studio: &mut Studio) -> anyhow::Result<Camera> {
+    fn start(&self, studio: &mut Studio, space: &Space) -> anyhow::Result<Camera> {
         if let Some(eye) = self.args.eye {
             return Ok(Camera {
                 eye,
@@ -260,6 +271,12 @@ impl App<'_> {
         }
         if self.packed.is_some() {
             return Ok(start_in(&self.world, &studio.sight));
+        }
+        let parts = (1..space.n_parts() as u32).map(PartId);
+        let mut parts = parts.filter(|part| space.world(*part).graph.rooms().next().is_some());
+        if let (true, Some(first)) = (self.editor.is_some(), parts.next()) {
+            let own = start_in(space.world(first), space.sight(first));
+            return Ok(moved(&own, space.pose(first)));
         }
         if self.editor.is_some() && self.world.graph.rooms().next().is_none() {
             // Before the place where the first piece will stand.
@@ -408,7 +425,7 @@ impl App<'_> {
         let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
             return Ok(false);
         };
-        match editor.press(key, &edit_ray(open, &self.world, &self.lines)) {
+        match editor.press(key, &edit_ray(open)) {
             Outcome::Quiet(is_taken) => return Ok(is_taken),
             Outcome::Said(words) => open.say(words),
             Outcome::Refused(why) => open.warn(why),
@@ -417,9 +434,12 @@ impl App<'_> {
                 open.say(words);
             }
             Outcome::Edited(words) => {
-                self.world.clone_from(&editor.world()?.world);
-                self.lines = Sightlines::build(&self.world);
-                open.replace_world(&self.world)?;
+                if open.is_in_parts {
+                    open.follow_edit(editor)?;
+                } else {
+                    self.world = Arc::new(editor.world()?.world.clone());
+                    open.show_world(&self.world)?;
+                }
                 open.say(words);
             }
         }
@@ -435,15 +455,20 @@ impl App<'_> {
             return;
         };
         let path = editor.save().to_owned();
-        let bytes = encode_glb(&self.world).context("the world breaks an invariant (a bug)");
-        let written = bytes.and_then(|bytes| {
+        let world = editor.world().map_err(anyhow::Error::from);
+        let bytes = world.and_then(|edited| {
+            let bytes = encode_glb(&edited.world);
+            let bytes = bytes.context("the world breaks an invariant (a bug)")?;
+            Ok((bytes, edited.world.graph.rooms().count()))
+        });
+        let written = bytes.and_then(|(bytes, n)| {
             self.outputs.write("--save", Format::World, &path)?;
-            write_whole(&path, &bytes)
+            write_whole(&path, &bytes)?;
+            Ok(n)
         });
         match written {
-            Ok(()) => {
+            Ok(n) => {
                 editor.saved();
-                let n = self.world.graph.rooms().count();
                 open.say(format!("wrote {}, {n} rooms", path.display()));
             }
             Err(why) => open.warn(format!("not saved: {why:#}")),
@@ -455,12 +480,16 @@ impl App<'_> {
         let Some(open) = &mut self.open else { return };
         let ray = open.pointer();
         // The leaf at the pointer, or else the opening; in a mirror, what it shows there.
-        let pointed = Pointed::at(&open.lived.space, &self.lines, &ray, CLICK);
-        let leaf_of = match pointed.hit.map(|h| h.target) {
-            Some(Target::Detail { detail, .. }) => open.studio.sight.portals_of(detail).next(),
+        let space = &open.lived.space;
+        let pointed = Pointed::at(space, &ray, CLICK);
+        let leaf_of = match pointed.hit.map(|h| (h.part, h.target)) {
+            Some((part, Target::Detail { detail, .. })) => {
+                let leaf_of = space.sight(part).portals_of(detail).next();
+                leaf_of.map(|portal| (part, portal))
+            }
             _ => None,
         };
-        let opening = || Some(portal_looked_at(&self.world, &self.lines, &pointed.ray)?.0);
+        let opening = || portal_looked_at(space, &pointed.ray).map(|found| (found.0, found.1));
         let portal = leaf_of.or_else(opening);
         match portal {
             Some(portal) => open.toggle(portal),
@@ -491,6 +520,16 @@ impl App<'_> {
             open.lived.step(&open.walker.player(), seconds);
             open.walker.step(wish, seconds, &open.lived.space);
         }
+        if let Some(editor) = &mut self.editor {
+            let wants_parts = editor.has_parts() && open.can_show_parts();
+            if wants_parts && !open.is_in_parts {
+                open.show_parts(editor)?;
+                self.world = Arc::clone(open.lived.space.world(PartId::ROOT));
+            } else if !wants_parts && open.is_in_parts {
+                self.world = Arc::new(editor.world()?.world.clone());
+                open.show_world(&self.world)?;
+            }
+        }
         let camera = open.camera();
         let outside = open.camera_in_root();
         if let Some(recorded) = &mut open.recorded {
@@ -498,7 +537,7 @@ impl App<'_> {
         }
         let mut marks = Vec::new();
         if let Some(editor) = &mut self.editor {
-            editor.look(&edit_ray(open, &self.world, &self.lines));
+            editor.look(&edit_ray(open));
             marks = editor.marks();
             open.shown.edit = editor.shown();
             if let Err(why) = editor.tick() {
@@ -506,10 +545,10 @@ impl App<'_> {
             }
         }
         open.shown.ahead = if open.streamed.is_some() {
-            name_here(&self.world, &outside)
+            open.titles.here(&open.lived.space, &outside)
         } else {
-            let pointed = Pointed::at(&open.lived.space, &self.lines, &outside, FAR);
-            name_ahead(&self.world, &self.lines, &pointed.ray)
+            let pointed = Pointed::at(&open.lived.space, &outside, FAR);
+            open.titles.ahead(&open.lived.space, &pointed.ray)
         };
         open.draw(&self.world, &camera, seconds, marks)
     }
@@ -526,17 +565,31 @@ impl App<'_> {
 }
 
 /// Returns the ray through the pointer, for the editor.
-fn edit_ray<'a>(open: &Open, world: &World, lines: &'a Sightlines) -> EditRay<'a> {
+fn edit_ray(open: &Open) -> EditRay<'_> {
     let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
-    let ray = open.pointer();
+    let (ray, space) = (open.pointer(), &open.lived.space);
     let length = vector(ray.toward).length().max(1e-9);
-    let pointed = Pointed::at(&open.lived.space, lines, &ray, FAR / length as f32);
-    let portal = portal_looked_at(world, lines, &pointed.ray);
+    let pointed = Pointed::at(space, &ray, FAR / length as f32);
+    let portal = portal_looked_at(space, &pointed.ray);
+    let center = |(part, portal, _): (PartId, PortalId, f32)| {
+        let own = space.world(part).graph[portal].center();
+        space.pose(part).point(vector(own))
+    };
     EditRay {
         eye: vector(pointed.ray.eye),
         toward: vector(pointed.ray.toward).normalize_or(DVec3::X),
-        hit: pointed.hit.map(|h| [vector(h.position), vector(h.normal)]),
-        portal: portal.map(|(id, _)| vector(world.graph[id].center())),
-        lines,
+        hit: pointed.hit.map(|h| [h.at, h.normal]),
+        portal: portal.map(center),
+        space,
+    }
+}
+
+/// Returns a camera that stands in a part.
+fn moved(camera: &Camera, pose: &Pose) -> Camera {
+    let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+    Camera {
+        eye: pose.point(vector(camera.eye)).as_vec3().to_array(),
+        toward: pose.direction(vector(camera.toward)).as_vec3().to_array(),
+        ..*camera
     }
 }

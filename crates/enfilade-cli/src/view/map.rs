@@ -1,10 +1,12 @@
 //! The map in the window: a level cut at the eye's height, from the locator.
 
 use egui::{Align2, Color32, ColorImage, Pos2, Rect, Stroke, TextureHandle, TextureOptions, Vec2};
-use enfilade::cpg::{Cell, CellId, World, cell_color};
-use enfilade::geom::{DVec3, shown};
+use enfilade::cpg::{CellId, PortalId, cell_color};
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::world::{PartId, Place, Space};
 use enfilade_render::Camera;
 
+use super::titles::Titles;
 use crate::living::{Blip, BlipKind, RADAR_REACH};
 
 /// Most points along the longer side of the map.
@@ -17,12 +19,16 @@ const ROOM_FOR_A_NAME: f32 = 900.0;
 /// Things higher or lower than this are on another storey. [Units: wu]
 const STOREY: f64 = 2.0;
 
+/// Points of the cut that are found in a frame, so that no frame waits for the map.
+const SLICE: usize = 4096;
+
 /// State of a frame that the map shows.
 pub(super) struct MapShown<'a> {
     pub(super) camera: Camera,
-    /// Visible cells, ascending.
+    /// [Numbers](Space::cell_number) of visible cells, ascending.
     pub(super) cells: &'a [u32],
-    pub(super) closed: &'a [u32],
+    /// Ascending.
+    pub(super) closed: &'a [(PartId, PortalId)],
     /// 1 for the whole world; more for the surroundings of the eye.
     pub(super) zoom: f32,
     /// Things on the radar; none if it is off.
@@ -36,195 +42,135 @@ struct Label {
     n: u32,
 }
 
+/// A portal from above: two ends, and the height range.
+struct Line {
+    of: (PartId, PortalId),
+    ends: [[f32; 2]; 2],
+    heights: [f32; 2],
+}
+
 /// Cells and portals as seen from above.
+#[derive(Default)]
 pub(super) struct Map {
+    sheet: Option<Sheet>,
+    /// The next one, as far as it is found.
+    begun: Option<Sheet>,
+    /// `true` if the world has changed since.
+    is_stale: bool,
+    /// `true` if parts are on it: in levels, where they stay where they are.
+    has_parts: bool,
+    /// The cut in colors, and the cells visible in it.
+    picture: Option<(TextureHandle, Vec<u32>)>,
+}
+
+/// A map at one height.
+struct Sheet {
     names: Vec<String>,
     is_room: Vec<bool>,
-    /// For each portal: two ends and the height range.
-    portals: Vec<([f32; 2], [f32; 2], [f32; 2])>,
+    portals: Vec<Line>,
     low: [f32; 2],
     high: [f32; 2],
     /// Points in a row, and number of rows.
     n: [usize; 2],
     /// Height of the cut, and the cell of each of its points.
-    cut: Option<(f32, Vec<Option<CellId>>)>,
+    height: f32,
+    cells: Vec<Option<u32>>,
     labels: Vec<Label>,
-    /// The cut in colors, and the cells visible in it.
-    picture: Option<(TextureHandle, Vec<u32>)>,
 }
 
 impl Map {
-    pub(super) fn new(world: &World) -> Self {
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for (_, cell) in world.graph.indoor_cells() {
-            for (k, axis) in [0, 2].into_iter().enumerate() {
-                // With a margin for outer walls.
-                low[k] = low[k].min(cell.aabb[0][axis] - 0.5);
-                high[k] = high[k].max(cell.aabb[1][axis] + 0.5);
-            }
-        }
-        let portals = world.graph.portals.iter().map(|p| {
-            let flat = |c: &[f32; 3]| [c[0], c[2]];
-            // The two vertices farthest apart, seen from above.
-            let mut ends = ([0.0; 2], [0.0; 2]);
-            let mut longest = -1.0;
-            let (mut bottom, mut top) = (f32::INFINITY, f32::NEG_INFINITY);
-            for a in &p.outline {
-                (bottom, top) = (bottom.min(a[1]), top.max(a[1]));
-                for b in &p.outline {
-                    let d = (a[0] - b[0]).hypot(a[2] - b[2]);
-                    if d > longest {
-                        (longest, ends) = (d, (flat(a), flat(b)));
-                    }
-                }
-            }
-            (ends.0, ends.1, [bottom, top])
-        });
-        let size = [high[0] - low[0], high[1] - low[1]];
-        let density = POINTS / size[0].max(size[1]).max(0.1);
-        Self {
-            names: (world.graph.cells.iter())
-                .map(|c| shown(&c.name).to_string())
-                .collect(),
-            is_room: world.graph.cells.iter().map(Cell::is_place).collect(),
-            portals: portals.collect(),
-            n: size.map(|s| (s * density).max(1.0) as usize),
-            low,
-            high,
-            cut: None,
-            labels: Vec::new(),
-            picture: None,
-        }
+    /// Finds the map anew, with what stands in the world if `has_parts`. The old one is shown until that is done.
+    pub(super) fn renew(&mut self, has_parts: bool) {
+        (self.is_stale, self.begun, self.has_parts) = (true, None, has_parts);
     }
 
-    fn is_empty(&self) -> bool {
-        self.low[0] >= self.high[0]
-    }
-
-    /// The center of a point of the cut. [Units: wu]
-    fn point(&self, i: usize) -> [f32; 2] {
-        let at = [i % self.n[0], i / self.n[0]];
-        [0, 1].map(|k| {
-            let t = (at[k] as f32 + 0.5) / self.n[k] as f32;
-            self.low[k] + (self.high[k] - self.low[k]) * t
-        })
-    }
-
-    /// Cuts the world again if the eye is at another height.
-    pub(super) fn follow(&mut self, world: &World, eye: [f32; 3]) {
-        let is_near = |cut: &(f32, _)| (cut.0 - eye[1]).abs() < STEP;
-        if self.is_empty() || self.cut.as_ref().is_some_and(is_near) {
-            return;
-        }
-        let cells: Vec<Option<CellId>> = (0..self.n[0] * self.n[1])
-            .map(|i| {
-                let [x, z] = self.point(i);
-                let p = DVec3::new(f64::from(x), f64::from(eye[1]), f64::from(z));
-                (world.graph.locator.locate(p)).filter(|c| !world.graph[*c].outdoor)
-            })
-            .collect();
-        let mut sums = vec![([0.0_f32; 2], 0_u32); self.names.len()];
-        for (i, cell) in cells.iter().enumerate() {
-            if let Some(cell) = cell {
-                let p = self.point(i);
-                let (sum, n) = &mut sums[cell.idx()];
-                (*sum, *n) = ([sum[0] + p[0], sum[1] + p[1]], *n + 1);
+    /// Goes on with a map for the height of the eye, for a while.
+    pub(super) fn follow(&mut self, space: &Space, titles: &Titles, eye: [f32; 3]) {
+        let is_near = |sheet: &Sheet| (sheet.height - eye[1]).abs() < STEP;
+        if self.begun.is_none() {
+            if !self.is_stale && self.sheet.as_ref().is_some_and(is_near) {
+                return;
             }
+            self.is_stale = false;
+            self.begun = Some(Sheet::begin(space, titles, self.has_parts, eye[1]));
         }
-        // The middle of an L-shaped room may lie in another cell.
-        let mut nearest = vec![(f32::INFINITY, [0.0; 2]); self.names.len()];
-        for (i, cell) in cells.iter().enumerate() {
-            if let Some(cell) = cell {
-                let (p, (sum, n)) = (self.point(i), sums[cell.idx()]);
-                let d = (p[0] - sum[0] / n as f32).hypot(p[1] - sum[1] / n as f32);
-                if d < nearest[cell.idx()].0 {
-                    nearest[cell.idx()] = (d, p);
-                }
-            }
+        if let Some(mut sheet) = self.begun.take_if(|sheet| sheet.advance(space)) {
+            sheet.label();
+            (self.sheet, self.picture) = (Some(sheet), None);
         }
-        self.labels = (0..)
-            .zip(sums.iter().zip(&nearest))
-            .filter(|(_, ((_, n), _))| *n > 0)
-            .map(|(cell, ((_, n), (_, at)))| Label {
-                cell,
-                at: *at,
-                n: *n,
-            })
-            .collect();
-        self.cut = Some((eye[1], cells));
-        self.picture = None;
     }
 
     /// Colors the cut: visible cells are bright.
     fn paint(&mut self, context: &egui::Context, seen: &[u32]) {
-        let Some((_, cells)) = &self.cut else { return };
+        let Some(sheet) = &self.sheet else { return };
         if self.picture.as_ref().is_some_and(|(_, of)| of == seen) {
             return;
         }
-        let color = |cell: &Option<CellId>| {
+        let color = |cell: &Option<u32>| {
             let Some(cell) = cell else {
                 return Color32::TRANSPARENT;
             };
-            let [r, g, b] = cell_color(*cell);
-            let is_seen = seen.binary_search(&cell.0).is_ok();
+            let [r, g, b] = cell_color(CellId(*cell));
+            let is_seen = seen.binary_search(cell).is_ok();
             Color32::from_rgba_unmultiplied(r, g, b, if is_seen { 215 } else { 60 })
         };
-        let pixels = cells.iter().map(color).collect();
-        let image = ColorImage::new(self.n, pixels);
+        let pixels = sheet.cells.iter().map(color).collect();
+        let image = ColorImage::new(sheet.n, pixels);
         let texture = context.load_texture("map", image, TextureOptions::LINEAR);
         self.picture = Some((texture, seen.to_vec()));
     }
 
     pub(super) fn draw(&mut self, painter: &egui::Painter, area: Rect, shown: &MapShown<'_>) {
         painter.rect_filled(area, 4.0, Color32::from_black_alpha(170));
-        if self.is_empty() {
-            return;
-        }
         self.paint(painter.ctx(), shown.cells);
+        let Some(sheet) = self.sheet.as_ref().filter(|sheet| !sheet.is_empty()) else {
+            return;
+        };
         let painter = painter.with_clip_rect(area.intersect(painter.clip_rect()));
-        let size = [self.high[0] - self.low[0], self.high[1] - self.low[1]];
+        let size = [sheet.high[0] - sheet.low[0], sheet.high[1] - sheet.low[1]];
         let whole = ((area.width() - 12.0) / size[0]).min((area.height() - 12.0) / size[1]);
         let scale = whole * shown.zoom;
         let eye = [shown.camera.eye[0], shown.camera.eye[2]];
         // Around the eye, but no farther out than the map reaches.
         let middle = [0, 1].map(|k| {
             let half = [area.width(), area.height()][k] * 0.5 / scale;
-            let (least, most) = (self.low[k] + half, self.high[k] - half);
+            let (least, most) = (sheet.low[k] + half, sheet.high[k] - half);
             if least < most {
                 eye[k].clamp(least, most)
             } else {
-                (self.low[k] + self.high[k]) * 0.5
+                (sheet.low[k] + sheet.high[k]) * 0.5
             }
         });
         let place = |p: [f32; 2]| -> Pos2 {
             area.center() + Vec2::from([p[0] - middle[0], p[1] - middle[1]]) * scale
         };
         if let Some((picture, _)) = &self.picture {
-            let rect = Rect::from_two_pos(place(self.low), place(self.high));
+            let rect = Rect::from_two_pos(place(sheet.low), place(sheet.high));
             let all = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             painter.image(picture.id(), rect, all, Color32::WHITE);
         }
         let y = shown.camera.eye[1];
-        for (i, (a, b, [bottom, top])) in (0..).zip(&self.portals) {
-            if y < *bottom - 1.0 || y > *top + 1.0 {
+        for line in &sheet.portals {
+            let [bottom, top] = line.heights;
+            if y < bottom - 1.0 || y > top + 1.0 {
                 continue;
             }
-            let color = if shown.closed.contains(&i) {
+            let color = if shown.closed.binary_search(&line.of).is_ok() {
                 Color32::RED
             } else {
                 Color32::from_rgb(255, 150, 30)
             };
-            painter.line_segment([place(*a), place(*b)], Stroke::new(2.0, color));
+            painter.line_segment(line.ends.map(place), Stroke::new(2.0, color));
         }
         // The screen points that one point of the cut covers.
-        let cover = scale * scale * size[0] * size[1] / (self.n[0] * self.n[1]) as f32;
-        for label in &self.labels {
-            let is_room = self.is_room[label.cell as usize];
+        let cover = scale * scale * size[0] * size[1] / (sheet.n[0] * sheet.n[1]) as f32;
+        for label in &sheet.labels {
+            let is_room = sheet.is_room[label.cell as usize];
             if !is_room || (label.n as f32) * cover < ROOM_FOR_A_NAME {
                 continue;
             }
             let font = egui::FontId::proportional(11.0);
-            let name = &self.names[label.cell as usize];
+            let name = &sheet.names[label.cell as usize];
             let at = place(label.at);
             let shadow = at + Vec2::splat(1.0);
             painter.text(
@@ -267,6 +213,144 @@ impl Map {
     }
 }
 
+impl Sheet {
+    fn begin(space: &Space, titles: &Titles, has_parts: bool, height: f32) -> Self {
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        let (mut names, mut is_room, mut portals) = (Vec::new(), Vec::new(), Vec::new());
+        let n_parts = if has_parts { space.n_parts() } else { 1 };
+        for part in (0..n_parts as u32).map(PartId) {
+            let (graph, pose) = (&space.world(part).graph, space.pose(part));
+            for cell in graph.cell_ids() {
+                names.push(titles.of(space, Place { part, cell }));
+                is_room.push(graph[cell].is_place());
+            }
+            if !space.is_present(part) {
+                continue;
+            }
+            for (_, cell) in graph.indoor_cells() {
+                let box_of = Aabb::of_points(&cell.aabb.map(|p| DVec3::from(p.map(f64::from))));
+                let bounds = Aabb::of_points(&box_of.corners().map(|p| pose.point(p)));
+                for (k, axis) in [0, 2].into_iter().enumerate() {
+                    // With a margin for outer walls.
+                    low[k] = low[k].min(bounds.min[axis] as f32 - 0.5);
+                    high[k] = high[k].max(bounds.max[axis] as f32 + 0.5);
+                }
+            }
+            // A doorway of a part that is shut is one in front of a wall.
+            let state = space.state(part);
+            let is_way = |p: &PortalId| part == PartId::ROOT || state.is_open(*p);
+            let ways = graph.portal_ids().filter(is_way);
+            portals.extend(ways.map(|portal| {
+                let outline = graph[portal].outline.iter();
+                let outline = outline.map(|p| pose.point(DVec3::from(p.map(f64::from))));
+                Line::of((part, portal), &outline.collect::<Vec<_>>())
+            }));
+        }
+        let size = [high[0] - low[0], high[1] - low[1]];
+        let density = POINTS / size[0].max(size[1]).max(0.1);
+        Self {
+            names,
+            is_room,
+            portals,
+            n: size.map(|s| (s * density).max(1.0) as usize),
+            low,
+            high,
+            height,
+            cells: Vec::new(),
+            labels: Vec::new(),
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.low[0] >= self.high[0]
+    }
+
+    /// The center of a point of the cut. [Units: wu]
+    fn point(&self, i: usize) -> [f32; 2] {
+        let at = [i % self.n[0], i / self.n[0]];
+        [0, 1].map(|k| {
+            let t = (at[k] as f32 + 0.5) / self.n[k] as f32;
+            self.low[k] + (self.high[k] - self.low[k]) * t
+        })
+    }
+
+    /// Finds the cells of some more points; returns `true` if there are no others.
+    fn advance(&mut self, space: &Space) -> bool {
+        if self.is_empty() {
+            return true;
+        }
+        let n = self.n[0] * self.n[1];
+        for i in self.cells.len()..n.min(self.cells.len() + SLICE) {
+            let [x, z] = self.point(i);
+            let p = DVec3::new(f64::from(x), f64::from(self.height), f64::from(z));
+            let place = space.locate(PartId::ROOT, p);
+            let indoors = place.filter(|p| !space.world(p.part).graph[p.cell].outdoor);
+            let number = indoors.map(|place| space.cell_number(place));
+            // Those of parts that are not on the map are no names.
+            let named = number.filter(|number| (*number as usize) < self.names.len());
+            self.cells.push(named);
+        }
+        self.cells.len() == n
+    }
+
+    /// Finds the places of names.
+    fn label(&mut self) {
+        let mut sums = vec![([0.0_f32; 2], 0_u32); self.names.len()];
+        for (i, cell) in self.cells.iter().enumerate() {
+            if let Some(cell) = cell {
+                let p = self.point(i);
+                let (sum, n) = &mut sums[*cell as usize];
+                (*sum, *n) = ([sum[0] + p[0], sum[1] + p[1]], *n + 1);
+            }
+        }
+        // The middle of an L-shaped room may lie in another cell.
+        let mut nearest = vec![(f32::INFINITY, [0.0; 2]); self.names.len()];
+        for (i, cell) in self.cells.iter().enumerate() {
+            if let Some(cell) = cell {
+                let cell = *cell as usize;
+                let (p, (sum, n)) = (self.point(i), sums[cell]);
+                let d = (p[0] - sum[0] / n as f32).hypot(p[1] - sum[1] / n as f32);
+                if d < nearest[cell].0 {
+                    nearest[cell] = (d, p);
+                }
+            }
+        }
+        self.labels = (0..)
+            .zip(sums.iter().zip(&nearest))
+            .filter(|(_, ((_, n), _))| *n > 0)
+            .map(|(cell, ((_, n), (_, at)))| Label {
+                cell,
+                at: *at,
+                n: *n,
+            })
+            .collect();
+    }
+}
+
+impl Line {
+    fn of(of: (PartId, PortalId), outline: &[DVec3]) -> Self {
+        let flat = |p: &DVec3| [p.x as f32, p.z as f32];
+        // The two vertices farthest apart, seen from above.
+        let mut ends = [[0.0; 2]; 2];
+        let mut longest = -1.0;
+        let (mut bottom, mut top) = (f64::INFINITY, f64::NEG_INFINITY);
+        for a in outline {
+            (bottom, top) = (bottom.min(a.y), top.max(a.y));
+            for b in outline {
+                let d = (a.x - b.x).hypot(a.z - b.z);
+                if d > longest {
+                    (longest, ends) = (d, [flat(a), flat(b)]);
+                }
+            }
+        }
+        Self {
+            of,
+            ends,
+            heights: [bottom as f32, top as f32],
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -275,14 +359,18 @@ mod tests {
     #[test]
     fn the_map_shows_the_cells_at_the_eyes_height_where_they_are() {
         let world = room_grid(&GridParams::offices(24, 2));
-        let mut map = Map::new(&world);
+        let space = Space::new(world.clone()).unwrap();
+        let mut map = Map::default();
         for (id, cell) in world.graph.indoor_cells() {
             let middle = [0, 1, 2].map(|k| (cell.aabb[0][k] + cell.aabb[1][k]) * 0.5);
-            map.follow(&world, middle);
-            let (_, cells) = map.cut.as_ref().unwrap();
-            let of_it: Vec<[f32; 2]> = (0..cells.len())
-                .filter(|&i| cells[i] == Some(id))
-                .map(|i| map.point(i))
+            map.follow(&space, &Titles::default(), middle);
+            while map.begun.is_some() {
+                map.follow(&space, &Titles::default(), middle);
+            }
+            let sheet = map.sheet.as_ref().unwrap();
+            let of_it: Vec<[f32; 2]> = (0..sheet.cells.len())
+                .filter(|&i| sheet.cells[i] == Some(id.0))
+                .map(|i| sheet.point(i))
                 .collect();
             assert!(!of_it.is_empty(), "{id}");
             let is_inside = |p: &[f32; 2]| {
@@ -290,7 +378,7 @@ mod tests {
                 p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[2] && p[1] <= high[2]
             };
             assert!(of_it.iter().all(is_inside));
-            let label = map.labels.iter().find(|l| l.cell == id.0).unwrap();
+            let label = sheet.labels.iter().find(|l| l.cell == id.0).unwrap();
             assert!(is_inside(&label.at), "its name stands in it");
         }
     }

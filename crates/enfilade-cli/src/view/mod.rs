@@ -2,6 +2,7 @@
 
 mod app;
 mod args;
+mod doors;
 mod editing;
 mod map;
 mod mode;
@@ -10,14 +11,14 @@ mod panel;
 mod pointed;
 mod steering;
 mod strider;
+mod titles;
 mod walker;
 
 use std::io::Write as _;
+use std::sync::Arc;
 
 use anyhow::Context;
-use enfilade::cpg::World;
-use enfilade::runtime::Sightlines;
-use enfilade::world::Space;
+use enfilade::world::{PartId, Space};
 use enfilade_render::FOV;
 use winit::event_loop::{ControlFlow, EventLoop};
 
@@ -58,10 +59,10 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         }
         None => None,
     };
-    let (editor, (world, lived, packed)) = match begun {
-        Some((editor, world)) => {
-            let lived = Lived::new(world.clone(), LivingFile::default(), Vec::new(), None)?;
-            (Some(editor), (world, lived, None))
+    let (editor, (lived, packed)) = match begun {
+        Some((editor, space)) => {
+            let lived = Lived::in_space(space, LivingFile::default(), Vec::new(), None)?;
+            (Some(editor), (lived, None))
         }
         None => (None, read(args)?),
     };
@@ -70,8 +71,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
     events.set_control_flow(ControlFlow::Poll);
     let mut app = App {
         args,
-        lines: Sightlines::build(&world),
-        world,
+        world: Arc::clone(lived.space.world(PartId::ROOT)),
         packed,
         path: path.map(Into::into),
         lived: Some(lived),
@@ -88,7 +88,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
 }
 
 /// Reads the world, and what lives in it; of a packed one only the head, if that is enough.
-fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
+fn read(args: &View) -> anyhow::Result<(Lived, Option<Packed>)> {
     let path = args.world.as_ref().context("a world is needed")?;
     if Packed::is_at(path) {
         let needs_whole = [
@@ -100,7 +100,7 @@ fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
         let Some((_, option)) = needs_whole.into_iter().find(|n| n.0) else {
             let packed = Packed::open(path)?;
             let world = packed.head.world.clone();
-            let space = Space::with_sight(world.clone(), packed.head.sight()?);
+            let space = Space::with_sight(world, packed.head.sight()?);
             let lived = Lived::in_space(space, LivingFile::default(), Vec::new(), None)?;
             let name = path.display();
             let memory = args.memory;
@@ -108,7 +108,7 @@ fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
                 Told,
                 "enfilade: {name} is streamed into {memory} MiB, without daylight and shadows of the sun"
             )?;
-            return Ok((world, lived, Some(packed)));
+            return Ok((lived, Some(packed)));
         };
         let name = path.display();
         writeln!(
@@ -120,7 +120,7 @@ fn read(args: &View) -> anyhow::Result<(World, Lived, Option<Packed>)> {
     let file = WorldFile { path, hash };
     let lived = match &args.living {
         Some(living) => Lived::read(living, &world, Some(file))?,
-        None => Lived::new(world.clone(), LivingFile::default(), Vec::new(), None)?,
+        None => Lived::new(world, LivingFile::default(), Vec::new(), None)?,
     };
-    Ok((world, lived, None))
+    Ok((lived, None))
 }

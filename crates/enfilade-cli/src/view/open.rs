@@ -6,13 +6,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::pointed::FAR;
-use enfilade::cpg::{Cell, CellId, PortalId, World};
-use enfilade::geom::{DVec3, shown};
-use enfilade::runtime::Sightlines;
+use enfilade::cpg::{CellId, PortalId, World};
+use enfilade::geom::shown;
 use enfilade::runtime::View;
 use enfilade::stream::Eye;
-use enfilade::world::{PartId, Space};
+use enfilade::world::{PartId, Place, Space};
 use enfilade_render::{
     AdapterChoice, Camera, Culling, Frame, Mark, Paint, PortalTextureOptions, PortalTexturePaint,
     Prop, SpaceShot, Sparing, Studio, Style,
@@ -21,13 +19,15 @@ use winit::dpi::PhysicalSize;
 use winit::keyboard::KeyCode;
 use winit::window::{CursorGrabMode, Window};
 
+use super::editing::Editor;
 use super::mode::Mode;
 use super::panel::{Panel, Shown};
+use super::titles::Titles;
 use super::walker::{RUN, Walker};
 use crate::formats::Format;
 use crate::living::{Lived, LivingFile, radar_words};
 use crate::output::{Outputs, write_whole};
-use crate::render::{light, portal_marks};
+use crate::render::{add_portal_marks, light, portal_marks};
 use enfilade_cli::streamed::{Streamed, cells_in_view, view_of};
 
 /// Time of a frame in which pieces are put on the adapter.
@@ -46,8 +46,11 @@ pub(super) struct Open {
     pub(super) lived: Lived,
     /// `true` if something lives in the world.
     pub(super) has_company: bool,
-    /// `true` if that is so, or if the world has special portals: then it is drawn as a space.
+    /// `true` if that is so, or if the world has special portals or parts: then it is drawn as a space.
     pub(super) is_living: bool,
+    /// `true` if the world is a level that is edited part by part.
+    pub(super) is_in_parts: bool,
+    pub(super) titles: Titles,
     pub(super) yaw: f32,
     pub(super) pitch: f32,
     pub(super) keys: BTreeSet<KeyCode>,
@@ -67,39 +70,11 @@ pub(super) struct Open {
     /// `true` if the light of each place was computed, or cannot be.
     pub(super) has_asked_for_light: bool,
     /// Moving doors: how far their leaves are open now, and at the end.
-    pub(super) turning: Vec<(PortalId, [f32; 2])>,
+    pub(super) turning: Vec<((PartId, PortalId), [f32; 2])>,
     pub(super) recorded: Option<Vec<Camera>>,
     pub(super) n_shots: u32,
     pub(super) last: Instant,
     pub(super) props: Vec<Prop>,
-}
-
-/// The name of a cell, and what it is unless a room or the outdoors.
-fn titled(cell: &Cell) -> String {
-    let kind = match cell {
-        _ if cell.is_void => " (void)",
-        _ if cell.is_land => " (land)",
-        _ => "",
-    };
-    format!("{}{kind}", shown(&cell.name))
-}
-
-/// The name of the cell in the middle of the picture: of the air before the surface there.
-pub(super) fn name_ahead(world: &World, lines: &Sightlines, camera: &Camera) -> String {
-    let [.., forward] = camera.axes();
-    let end = [0, 1, 2].map(|k| camera.eye[k] + forward[k] * FAR);
-    let t = lines.first_hit(camera.eye, end).map_or(1.0, |h| h.t as f32);
-    let away = (t * FAR - 0.02).max(0.0);
-    let p = [0, 1, 2].map(|k| f64::from(camera.eye[k] + forward[k] * away));
-    let cell = world.graph.locator.locate(DVec3::from(p));
-    cell.map_or_else(|| "no cell".into(), |c| titled(&world.graph[c]))
-}
-
-/// The name of the cell of the eye.
-pub(super) fn name_here(world: &World, camera: &Camera) -> String {
-    let eye = DVec3::from(camera.eye.map(f64::from));
-    let cell = world.graph.locator.locate(eye);
-    cell.map_or_else(|| "no cell".into(), |c| titled(&world.graph[c]))
 }
 
 impl Open {
@@ -150,17 +125,50 @@ impl Open {
             .configure(&self.studio.gpu.device, &self.config);
     }
 
-    /// Goes on in another world, as after an edit: its doors are as in its file.
-    pub(super) fn replace_world(&mut self, world: &World) -> anyhow::Result<()> {
+    /// Goes on in another world in one piece, as after an edit: its doors are as in its file.
+    pub(super) fn show_world(&mut self, world: &Arc<World>) -> anyhow::Result<()> {
         self.studio.replace_world(world)?;
-        let space = Space::with_sight(world.clone(), self.studio.sight.clone());
+        let space = Space::with_sight(Arc::clone(world), self.studio.sight.clone());
+        self.is_living = !world.graph.specials.is_empty() || !world.fixtures.is_empty();
+        self.titles = Titles::default();
+        self.show_space(space, false)
+    }
+
+    /// Goes on in a level of parts, which [`Open::follow_edit`] then keeps as it is edited.
+    pub(super) fn show_parts(&mut self, editor: &mut Editor) -> anyhow::Result<()> {
+        let space = editor.new_space()?;
+        self.studio.replace_world(space.world(PartId::ROOT))?;
+        self.is_living = true;
+        self.titles = Titles(editor.titles());
+        self.show_space(space, true)
+    }
+
+    /// Returns `true` if nothing asked for needs the world in one piece: light, or what is made from its list of draws.
+    pub(super) fn can_show_parts(&self) -> bool {
+        let is_by_list = matches!(self.mode, Mode::PortalTextures | Mode::Queries);
+        self.shown.plain && self.shown.paint != Paint::Cells && !is_by_list
+    }
+
+    fn show_space(&mut self, space: Space, is_in_parts: bool) -> anyhow::Result<()> {
         self.lived = Lived::in_space(space, LivingFile::default(), Vec::new(), None)?;
         self.lived.furnish(&mut self.studio)?;
-        self.is_living = !world.graph.specials.is_empty() || !world.fixtures.is_empty();
+        self.is_in_parts = is_in_parts;
         self.has_asked_for_light = false;
         self.turning.clear();
-        self.panel.follow_world(world);
+        self.panel.renew_map(is_in_parts);
         self.walker.frame = PartId::ROOT;
+        Ok(())
+    }
+
+    /// Changes a level of parts by what has changed in the session.
+    pub(super) fn follow_edit(&mut self, editor: &mut Editor) -> anyhow::Result<()> {
+        editor.follow(&mut self.lived.space)?;
+        self.studio.follow_parts(&self.lived.space)?;
+        let space = &self.lived.space;
+        self.turning.retain(|((part, _), _)| space.is_present(*part));
+        self.titles = Titles(editor.titles());
+        self.lived.forget_radar();
+        self.panel.renew_map(true);
         Ok(())
     }
 
@@ -271,7 +279,7 @@ impl Open {
         let aspect = size[0] as f32 / size[1] as f32;
         let view = camera.view(aspect)?;
         self.stream(&view);
-        if self.shown.portals {
+        if self.shown.portals && !self.is_living {
             marks.extend(portal_marks(&mut self.studio, world, camera, size)?);
         }
         let style = self.style();
@@ -284,7 +292,7 @@ impl Open {
         self.begin_textures();
         self.scan(world);
         if self.is_living {
-            return self.draw_living(world, (camera, &view), target, (seconds, &marks));
+            return self.draw_living((camera, &view), target, (seconds, &marks));
         }
         let list = if self.mode == Mode::Queries {
             let (list, counts) = self.studio.list_by_queries(world, camera, size)?;
@@ -322,7 +330,8 @@ impl Open {
         ];
         self.shown.camera = Some(*camera);
         self.shown.mode = self.mode;
-        self.shown.closed = self.studio.state.shut_portals().map(|p| p.0).collect();
+        let shut = self.studio.state.shut_portals();
+        self.shown.closed = shut.map(|p| (PartId::ROOT, p)).collect();
         self.shown.is_recording = self.recorded.is_some();
         self.shown.flies = self.walker.flies;
         self.studio.give_list(list);
@@ -331,7 +340,7 @@ impl Open {
             &self.window,
             &output,
             size,
-            world,
+            (&self.lived.space, &self.titles),
             &self.shown,
         );
         self.window.pre_present_notify();
@@ -342,7 +351,6 @@ impl Open {
     /// Draws a world that is lived in: all of its parts, people, lamps.
     fn draw_living(
         &mut self,
-        world: &World,
         (camera, view): (&Camera, &View),
         target: wgpu::SurfaceTexture,
         (seconds, marks): (f64, &[Mark]),
@@ -372,15 +380,21 @@ impl Open {
         let behind = self.studio.cells_in_portal_textures();
         let (space, seen, lamps) =
             (self.lived).see_to(&player, view, &mut self.props, stops.map(|s| (s, behind)));
-        let cells = seen.of_part(PartId::ROOT);
         self.shown.cells.clear();
-        (self.shown.cells).extend(cells.iter().flat_map(enfilade::Seen::cells).map(|c| c.0));
+        self.shown.closed.clear();
+        let mut marks = marks.to_vec();
+        for (part, seen) in seen.parts() {
+            let numbers = seen.cells().iter();
+            let numbers = numbers.map(|cell| space.cell_number(Place { part, cell: *cell }));
+            self.shown.cells.extend(numbers);
+            let shut = space.state(part).shut_portals();
+            self.shown.closed.extend(shut.map(|portal| (part, portal)));
+            if self.shown.portals {
+                let of = (&**space.world(part), &space.between(part, player.frame));
+                add_portal_marks(&mut marks, of, &seen, camera, size);
+            }
+        }
         self.shown.cells.sort_unstable();
-        self.shown.closed = space
-            .state(PartId::ROOT)
-            .shut_portals()
-            .map(|p| p.0)
-            .collect();
         let is_culled = matches!(
             self.mode.culling(),
             Culling::Portals | Culling::PortalTextures
@@ -392,7 +406,7 @@ impl Open {
                 camera: *camera,
                 seen: is_culled.then_some(seen),
                 style,
-                marks,
+                marks: &marks,
                 props: &self.props,
                 lamps: Some(if self.shown.plain { &[] } else { lamps }),
             },
@@ -402,7 +416,7 @@ impl Open {
         self.shown.seconds(seconds);
         self.shown.counts = [
             counts.n_triangles,
-            self.studio.world.n_triangles(),
+            self.studio.n_triangles(),
             counts.n_draws as u64,
         ];
         self.shown.camera = Some(outside);
@@ -414,56 +428,10 @@ impl Open {
         }
         let (gpu, window) = (&self.studio.gpu, &self.window);
         self.panel
-            .draw(gpu, window, &output, size, world, &self.shown);
+            .draw(gpu, window, &output, size, (&self.lived.space, &self.titles), &self.shown);
         self.window.pre_present_notify();
         self.studio.gpu.queue.present(target);
         Ok(())
-    }
-
-    /// Opens or closes a portal: its leaves begin to move; one without leaves changes at once. It no longer opens by itself.
-    pub(super) fn toggle(&mut self, portal: PortalId) {
-        self.lived.leave_alone(portal);
-        let state = self.lived.space.state(PartId::ROOT);
-        let before = self.turning.iter().position(|(p, _)| *p == portal);
-        let before = before.map(|i| self.turning.swap_remove(i).1);
-        let share = before.map(|b| b[0]).or_else(|| state.leaves(portal));
-        let Some(share) = share else {
-            let is_open = state.is_open(portal);
-            if is_open {
-                self.studio.state.close(portal);
-                self.lived.space.close(PartId::ROOT, portal);
-            } else {
-                self.studio.state.open(portal);
-                self.lived.space.open(PartId::ROOT, portal);
-            }
-            let now = if is_open { "closed" } else { "open" };
-            self.say(format!("{portal} is {now}"));
-            return;
-        };
-        let is_open = before.map_or(share, |b| b[1]) >= 0.5;
-        self.turning
-            .push((portal, [share, if is_open { 0.0 } else { 1.0 }]));
-        self.say(format!(
-            "{portal} {}",
-            if is_open { "closes" } else { "opens" }
-        ));
-    }
-
-    /// Moves leaves for a time step.
-    pub(super) fn turn_leaves(&mut self, seconds: f64) {
-        /// Time from shut to open. [Units: s]
-        const TIME: f32 = 0.7;
-        let by = seconds as f32 / TIME;
-        for (portal, [share, to]) in &mut self.turning {
-            *share = if *to > *share {
-                (*share + by).min(*to)
-            } else {
-                (*share - by).max(*to)
-            };
-            self.studio.state.set_leaves(*portal, *share);
-            self.lived.space.set_leaves(PartId::ROOT, *portal, *share);
-        }
-        self.turning.retain(|(_, [share, to])| share != to);
     }
 
     /// Writes a picture of the world as shown now, without the panel.
@@ -524,20 +492,5 @@ impl Open {
         let [drawn, ..] = self.shown.counts;
         self.say(format!("wrote {}, {drawn} triangles", to.display()));
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_title_is_one_line_whatever_the_name() {
-        let cell = Cell {
-            name: "Ha\nll\u{1b}".into(),
-            is_void: true,
-            ..Cell::default()
-        };
-        assert_eq!(titled(&cell), r"Ha\nll\u{1b} (void)");
     }
 }

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use egui::{Align2, Color32, Pos2, Rect, Stroke, Vec2};
-use enfilade::cpg::World;
+use enfilade::cpg::PortalId;
+use enfilade::world::{PartId, Space};
 use enfilade_render::{Camera, Gpu, Paint, PortalTextureCounts};
 use winit::event::WindowEvent;
 use winit::window::Window;
@@ -11,6 +12,7 @@ use winit::window::Window;
 use super::editing::{EDIT_HELP, EditShown, Strip};
 use super::map::{Map, MapShown};
 use super::mode::Mode;
+use super::titles::Titles;
 use crate::living::Blip;
 
 /// The contents of the panel.
@@ -23,7 +25,7 @@ pub(super) struct Shown {
     pub(super) plain: bool,
     pub(super) paint: Paint,
     pub(super) cells: Vec<u32>,
-    pub(super) closed: Vec<u32>,
+    pub(super) closed: Vec<(PartId, PortalId)>,
     /// Triangles drawn, triangles in total, and draw calls.
     pub(super) counts: [u64; 3],
     pub(super) camera: Option<Camera>,
@@ -99,7 +101,6 @@ impl Panel {
         gpu: &Gpu,
         window: &Window,
         format: wgpu::TextureFormat,
-        world: &World,
         strip: Option<Strip>,
     ) -> Self {
         let context = egui::Context::default();
@@ -111,14 +112,14 @@ impl Panel {
             renderer: egui_wgpu::Renderer::new(&gpu.device, format, options),
             context,
             state,
-            map: Map::new(world),
+            map: Map::default(),
             strip,
         }
     }
 
-    /// Shows the map of another world.
-    pub(super) fn follow_world(&mut self, world: &World) {
-        self.map = Map::new(world);
+    /// Shows the map of another world, with what stands in it if `has_parts`.
+    pub(super) fn renew_map(&mut self, has_parts: bool) {
+        self.map.renew(has_parts);
     }
 
     /// Returns `true` if the panel consumes an event.
@@ -132,12 +133,12 @@ impl Panel {
         window: &Window,
         output: &wgpu::TextureView,
         size: [u32; 2],
-        world: &World,
+        (space, titles): (&Space, &Titles),
         shown: &Shown,
     ) {
         let input = self.state.take_egui_input(window);
         if let Some(camera) = shown.camera {
-            self.map.follow(world, camera.eye);
+            self.map.follow(space, titles, camera.eye);
         }
         let (map, strip) = (&mut self.map, &mut self.strip);
         let mut full = self

@@ -1,28 +1,38 @@
 //! The thing at the pointer: straight ahead, or as a mirror or a link shows it.
 
 use enfilade::geom::DVec3;
-use enfilade::runtime::{Hit, Sightlines};
+use enfilade::runtime::Target;
 use enfilade::world::{PartId, SightRay, Space, TraceEnd};
 use enfilade_render::Camera;
 
 /// Distance up to which the cell ahead is named. [Units: wu]
 pub(super) const FAR: f32 = 1000.0;
 
+/// A surface at the pointer.
+#[derive(Clone, Copy)]
+pub(super) struct PointedAt {
+    pub(super) part: PartId,
+    pub(super) target: Target,
+    /// Point and unit normal, in the frame of the root.
+    pub(super) at: DVec3,
+    pub(super) normal: DVec3,
+}
+
 /// The end of a ray from an eye.
 pub(super) struct Pointed {
     /// The surface, if one is near enough.
-    pub(super) hit: Option<Hit>,
+    pub(super) hit: Option<PointedAt>,
     /// The camera from where the ray leaves the last special portal, along it; otherwise the eye's own.
     pub(super) ray: Camera,
 }
 
 impl Pointed {
     /// Follows the direction of a camera in the root's frame, up to `most` times its length.
-    pub(super) fn at(space: &Space, lines: &Sightlines, camera: &Camera, most: f32) -> Self {
+    pub(super) fn at(space: &Space, camera: &Camera, most: f32) -> Self {
         let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
         let by = vector(camera.toward) * f64::from(most);
         let ray = SightRay::new(PartId::ROOT, vector(camera.eye), by);
-        let Ok(traced) = space.pick(lines, &ray, &mut Vec::new()) else {
+        let Ok(traced) = space.pick(&ray, &mut Vec::new()) else {
             let ray = *camera;
             return Self { hit: None, ray };
         };
@@ -34,7 +44,15 @@ impl Pointed {
             ray.toward = toward.as_vec3().to_array();
         }
         let hit = match traced.end {
-            TraceEnd::Surface(hit) => Some(hit),
+            TraceEnd::Surface((part, hit)) => {
+                let pose = space.pose(part);
+                Some(PointedAt {
+                    part,
+                    target: hit.target,
+                    at: pose.point(vector(hit.position)),
+                    normal: pose.direction(vector(hit.normal)),
+                })
+            }
             _ => None,
         };
         Self { hit, ray }
@@ -80,9 +98,9 @@ mod tests {
             fov_y: 1.0,
         };
         let found = |world: &enfilade::cpg::World| {
-            let (lines, space) = (Sightlines::build(world), Space::new(world.clone()).unwrap());
-            let pointed = Pointed::at(&space, &lines, &camera, 50.0);
-            portal_looked_at(world, &lines, &pointed.ray).map(|f| f.0)
+            let space = Space::new(world.clone()).unwrap();
+            let pointed = Pointed::at(&space, &camera, 50.0);
+            portal_looked_at(&space, &pointed.ray).map(|f| f.1)
         };
         assert_eq!(found(&world), None);
         mirror(&mut world, &Spot::Wall(wall.to_vec())).unwrap();

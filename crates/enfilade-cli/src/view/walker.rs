@@ -19,6 +19,8 @@ pub(super) struct Walker {
     /// Position of the eye in the frame of its part.
     pub(super) eye: DVec3,
     pub(super) flies: bool,
+    /// `true` where parts move, and carry those who stand on them. Otherwise the frame is always that of the root.
+    pub(super) rides: bool,
     /// `true` in worlds whose walls and furniture may be absent: then cells are the guide.
     by_cells: bool,
 }
@@ -35,6 +37,7 @@ impl Walker {
             frame: PartId::ROOT,
             eye,
             flies: false,
+            rides: false,
             by_cells,
         }
     }
@@ -49,8 +52,7 @@ impl Walker {
     /// Moves by `wish` (meters per second) for `seconds`; walls, furniture, leaves of doors and shut portals stop it.
     pub(super) fn step(&mut self, wish: DVec3, seconds: f64, space: &Space) {
         if self.flies {
-            self.eye = space.between(self.frame, PartId::ROOT).point(self.eye);
-            self.frame = PartId::ROOT;
+            self.leave(space);
             self.eye += wish * seconds.clamp(0.0, 0.1);
             return;
         }
@@ -61,6 +63,15 @@ impl Walker {
         (self.body.eye, self.body.frame) = (self.eye, self.frame);
         self.body.step(space, wish, seconds);
         (self.eye, self.frame) = (self.body.eye, self.body.frame);
+        if !self.rides {
+            self.leave(space);
+        }
+    }
+
+    /// Goes on in the frame of the root.
+    fn leave(&mut self, space: &Space) {
+        self.eye = space.between(self.frame, PartId::ROOT).point(self.eye);
+        self.frame = PartId::ROOT;
     }
 }
 

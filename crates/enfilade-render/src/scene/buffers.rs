@@ -8,6 +8,7 @@ use super::filling::{Corner, listed};
 use crate::gpu::{Gpu, RenderError};
 
 /// Vertices and indices.
+#[derive(Clone)]
 pub(crate) struct TriangleBuffers {
     pub(crate) corners: wgpu::Buffer,
     pub(crate) indices: wgpu::Buffer,

@@ -16,6 +16,7 @@ use crate::marks::{Mark, MarkShape};
 use crate::materials::looks_of;
 
 /// A world on the adapter, ready to be drawn.
+#[derive(Clone)]
 pub struct GpuWorld {
     pub(crate) triangles: TriangleBuffers,
     /// Instances: structure first, then objects.

@@ -58,6 +58,7 @@ pub(crate) struct Placed {
 }
 
 /// The leaf of a door.
+#[derive(Clone)]
 pub(super) struct Moving {
     pub(super) detail: DetailId,
     /// As modeled.

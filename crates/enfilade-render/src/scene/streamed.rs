@@ -10,6 +10,7 @@ use super::pieces::PieceMaker;
 use super::room::FreeRoom;
 
 /// The pieces of a hollow world, and its memory.
+#[derive(Clone)]
 pub(super) struct Streamed {
     pub(super) maker: PieceMaker,
     pub(super) corners: FreeRoom,
@@ -33,7 +34,7 @@ pub(super) struct Streamed {
 }
 
 /// Where a piece is.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Held {
     pub(super) corners: Vec<Range<u32>>,
     pub(super) indices: Vec<Range<u32>>,
@@ -42,6 +43,7 @@ pub(super) struct Held {
 }
 
 /// A texture of the world.
+#[derive(Clone)]
 pub(super) struct TextureSlot {
     pub(super) image: u32,
     /// Index into [`super::GpuWorld::textures`].

@@ -4,8 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use enfilade::geom::{DQuat, DVec3};
 use enfilade::kit::{Assembly, End, InstanceId, Link};
-use enfilade::runtime::Sightlines;
-use enfilade::world::Pose;
+use enfilade::world::{PartId, Pose, Space};
 
 /// Distance up to which doorways are aimed at. [Units: wu]
 const REACH: f64 = 40.0;
@@ -30,7 +29,7 @@ pub(crate) struct EditRay<'a> {
     /// Middle of the portal there.
     pub(crate) portal: Option<DVec3>,
     /// The walls.
-    pub(crate) lines: &'a Sightlines,
+    pub(crate) space: &'a Space,
 }
 
 impl EditRay<'_> {
@@ -170,7 +169,7 @@ pub(super) fn turned(level: &Assembly, id: InstanceId) -> Option<Pose> {
 /// If the vertices are above each other, or at one height.
 pub(super) fn portal_rectangle(
     [a, b]: [DVec3; 2],
-    lines: &Sightlines,
+    space: &Space,
 ) -> Result<Vec<DVec3>, String> {
     let along = DVec3::new(b.x - a.x, 0.0, b.z - a.z);
     if along.length() < 0.1 || (b.y - a.y).abs() < 0.1 {
@@ -181,9 +180,8 @@ pub(super) fn portal_rectangle(
     let (middle, out) = ((a + b) * 0.5, along.normalize());
     // Where there is no wall, as out of a doorway, it ends at the vertices.
     let reach = |toward: DVec3, least: f64| {
-        let [from, to] = [middle, middle + toward * REACH].map(|p| p.as_vec3().to_array());
-        let hit = lines.first_hit(from, to);
-        hit.map_or(least, |hit| least.max(hit.t * REACH)) + INTO
+        let hit = space.first_wall(PartId::ROOT, [middle, middle + toward * REACH]);
+        hit.map_or(least, |t| least.max(t * REACH)) + INTO
     };
     let [half, rise] = [along.length() * 0.5, (b.y - a.y).abs() * 0.5];
     let [back, ahead] = [-out, out].map(|toward| reach(toward, half));
@@ -226,7 +224,7 @@ mod tests {
     #[test]
     fn rectangles_are_upright_and_flat_and_portals_reach_into_walls() {
         let [a, b] = [DVec3::new(0.0, 0.0, 1.0), DVec3::new(2.0, 3.0, 1.0)];
-        let empty = Sightlines::build(&World::default());
+        let empty = Space::new(World::default()).unwrap();
         let portal = portal_rectangle([a, b], &empty).unwrap();
         assert!(portal[0].distance(DVec3::new(-INTO, -INTO, 1.0)) < 1e-9);
         assert!(portal[2].distance(DVec3::new(2.0 + INTO, 3.0 + INTO, 1.0)) < 1e-9);
@@ -244,8 +242,8 @@ mod tests {
         let [low, high] = room.graph.cells[0].aabb.map(vector);
         let middle = (low + high) * 0.5;
         let by = DVec3::new(0.3, 0.4, 0.0);
-        let lines = Sightlines::build(&room);
-        let portal = portal_rectangle([middle - by, middle + by], &lines).unwrap();
+        let space = Space::new(room.clone()).unwrap();
+        let portal = portal_rectangle([middle - by, middle + by], &space).unwrap();
         let into = DVec3::new(INTO, INTO, 0.0);
         let corner = |p: DVec3| DVec3::new(p.x, p.y, middle.z);
         assert!(portal[0].distance(corner(low) - into) < 1e-3, "{portal:?}");
@@ -265,7 +263,7 @@ mod tests {
             toward: DVec3::new(0.0, -1.0, -2.0).normalize(),
             hit: None,
             portal: None,
-            lines: &Sightlines::build(&World::default()),
+            space: &Space::new(World::default()).unwrap(),
         };
         let pose = pose_anywhere(&ray, 6);
         assert!(pose.at.distance(DVec3::new(0.0, 0.0, -4.0)) < 1e-9);

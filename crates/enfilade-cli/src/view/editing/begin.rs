@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
-use enfilade::cpg::World;
 use enfilade::edit::{EditGround, EditSession};
 use enfilade::geom::shown;
 use enfilade::kit::{Choice, DEFAULT_TOLERANCE, Kit, Piece};
+use enfilade::world::Space;
 
 use super::editor::Editor;
 use crate::formats::Format;
@@ -25,7 +25,7 @@ pub(crate) fn begin(
     kit: Option<&Path>,
     save: &Path,
     outputs: &mut Outputs,
-) -> anyhow::Result<(Editor, World)> {
+) -> anyhow::Result<(Editor, Space)> {
     refuse_stream("--save", save, "a world with its journal")?;
     let journal = save.with_extension("journal");
     if save.exists() && !journal.exists() {
@@ -68,8 +68,12 @@ pub(crate) fn begin(
     };
     let opened = EditSession::open(&journal, Arc::new(kit), (ground, &mark), tolerance);
     let (session, resumed) = opened.with_context(|| journal.display().to_string())?;
-    let edited = session.world()?;
     let mut editor = Editor::new(session, save.to_owned(), journal);
-    editor.resumed(&resumed, &edited.resting);
-    Ok((editor, edited.world.clone()))
+    editor.resumed(&resumed);
+    let space = if editor.has_parts() {
+        editor.new_space()?
+    } else {
+        Space::new(editor.world()?.world.clone())?
+    };
+    Ok((editor, space))
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use enfilade::edit::{
-    EditError, EditOperation, EditSession, EditedWorld, HandEditError, HandEditKind, Resumed,
+    EditError, EditOperation, EditSession, EditedSpace, EditedWorld, HandEditError, HandEditKind, Resumed,
 };
 use enfilade::geom::{DVec3, shown};
 use enfilade::kit::{End, InstanceId, Kit};
@@ -104,7 +104,9 @@ pub(crate) struct Editor {
     last_end: usize,
     unsynced: Option<Instant>,
     is_saved: bool,
-    notes: Vec<String>,
+    pub(super) notes: Vec<String>,
+    /// The parts of the level as it is shown.
+    pub(super) followed: EditedSpace,
 }
 
 impl Editor {
@@ -127,11 +129,12 @@ impl Editor {
             unsynced: None,
             is_saved: true,
             notes: Vec::new(),
+            followed: EditedSpace::default(),
         }
     }
 
     /// Notes what is told first.
-    pub(super) fn resumed(&mut self, resumed: &Resumed, resting: &[(usize, HandEditError)]) {
+    pub(super) fn resumed(&mut self, resumed: &Resumed) {
         let journal = self.journal.display();
         let kept = match resumed.n_entries {
             0 => format!("all that is done is kept in {journal}; F2 saves the world"),
@@ -145,7 +148,8 @@ impl Editor {
             ));
         }
         self.is_saved = resumed.n_entries == 0;
-        self.notes.extend(self.resting_words(resting));
+        let resting = self.session.resting();
+        self.notes.extend(self.resting_words(&resting));
     }
 
     /// Returns what is to be told.
@@ -207,7 +211,7 @@ impl Editor {
         Ok(())
     }
 
-    fn resting_words(&self, resting: &[(usize, HandEditError)]) -> Option<String> {
+    pub(super) fn resting_words(&self, resting: &[(usize, HandEditError)]) -> Option<String> {
         let (first, why) = resting.first()?;
         let word = self.session.hand_edits()[*first].kind.word();
         let more = match resting.len() {
@@ -307,7 +311,7 @@ impl Editor {
     /// Returns the polygon of some vertices: two are the vertices of a rectangle.
     fn polygon(&self, corners: &[DVec3], ray: &EditRay<'_>) -> Result<Vec<DVec3>, String> {
         match (corners, self.tool()) {
-            (&[a, b], Tool::Portal) => portal_rectangle([a, b], ray.lines),
+            (&[a, b], Tool::Portal) => portal_rectangle([a, b], ray.space),
             (&[a, b], _) => rectangle_in([a, b], self.normal),
             (corners, _) if corners.len() > 2 => Ok(corners.to_vec()),
             _ => Err("a polygon needs two vertices at least".into()),

@@ -3,6 +3,7 @@
 mod aim;
 mod begin;
 mod editor;
+mod follow;
 mod ghost;
 mod keys;
 mod strip;
