@@ -2,6 +2,7 @@
 
 mod bad;
 mod city;
+mod edited;
 mod memory;
 mod rebaked;
 mod scenes;
@@ -41,6 +42,11 @@ pub(crate) const ROWS: &[Row] = &[
     made("stitched: pixels", STITCHED, stitched::pixels),
     made("speed: place", &["dungeon-380"], speed::place),
     made("speed: flatten", CITY, speed::flatten),
+    made(
+        "edit: milliseconds of an operation in the window",
+        &["dungeon-380"],
+        edited::operation,
+    ),
     made(
         "memory: instances",
         &["dungeon-380", "maze-1500"],

@@ -102,7 +102,9 @@ impl Map {
 
     /// Colors the cut: visible cells are bright.
     fn paint(&mut self, context: &egui::Context, seen: &[u32]) {
-        let Some(sheet) = &self.sheet else { return };
+        let Some(sheet) = self.sheet.as_ref().filter(|sheet| !sheet.is_empty()) else {
+            return;
+        };
         if self.picture.as_ref().is_some_and(|(_, of)| of == seen) {
             return;
         }
