@@ -76,6 +76,24 @@ impl<'a> Hand<'a> {
     }
 }
 
+#[test]
+fn no_journal_is_left_where_no_window_can_be_opened() {
+    let dir = folder("window-edit-none");
+    let enfilade = |args: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_enfilade"));
+        let nowhere = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+        let args = args.split(' ');
+        nowhere.args(args).current_dir(&dir).output().unwrap()
+    };
+    let made = enfilade("generate dungeon --rooms 1 -o other.glb --pieces kit");
+    assert!(made.status.success(), "{made:?}");
+    let output = enfilade("view --kit kit --save level.glb");
+    let says = String::from_utf8_lossy(&output.stderr);
+    assert!(says.contains("no window can be opened here"), "{says}");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!dir.join("level.journal").exists());
+}
+
 const MIDDLE: [u32; 2] = [320, 240];
 
 #[test]
@@ -112,6 +130,8 @@ fn three_rooms_are_built_by_hand_killed_gone_on_with_saved_and_walked_through() 
     // A door in the nearer doorway.
     hand.keys(&["F7"]);
     hand.click(MIDDLE, "made: door");
+    hand.click(MIDDLE, "it is what it was before");
+    hand.says("z", "undone; 4 more to undo");
     // A mirror, a lamp and a crate, to the right of the doorway.
     hand.drag([100, 240], [492, 240]);
     hand.keys(&["F8"]);

@@ -98,11 +98,13 @@ impl Studio {
         Ok(())
     }
 
-    /// Returns the number of triangles of structure and placed objects of all worlds.
+    /// Returns the number of triangles of structure and placed objects of all worlds that are present in a space.
     #[must_use]
-    pub fn n_triangles(&self) -> u64 {
-        let parts = self.parts.iter().map(|part| part.world.n_triangles());
-        self.world.n_triangles() + parts.sum::<u64>()
+    pub fn n_triangles_in(&self, space: &Space) -> u64 {
+        let parts = (1..).map(PartId).zip(&self.parts);
+        let present = parts.filter(|(id, _)| space.is_present(*id));
+        let own = present.map(|(_, part)| part.world.n_triangles());
+        self.world.n_triangles() + own.sum::<u64>()
     }
 
     /// Computes daylight in a part, as [`Studio::add_light`] does for the first world: that of a place outdoors, which

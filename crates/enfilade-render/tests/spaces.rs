@@ -264,3 +264,54 @@ fn props_are_hidden_by_walls_and_stand_in_rooms() {
         "{of_root} pixels in the root's frame"
     );
 }
+
+#[test]
+fn a_studio_that_follows_a_space_draws_what_one_made_anew_draws() {
+    let (host, guest, poses) = rooms();
+    let mut space = Space::new(host.clone()).unwrap();
+    let mut studio = Studio::new(gpu(), &host).unwrap();
+    let look = |studio: &mut Studio, space: &Space| {
+        let eye = middle(&host) + DVec3::new(4.5, 0.3, 0.4);
+        let at = middle(&host).as_vec3().to_array();
+        let camera = Camera::looking_at(eye.as_vec3().to_array(), at);
+        let shot = SpaceShot {
+            space,
+            frame: PartId::ROOT,
+            camera,
+            seen: None,
+            style: Style::default(),
+            marks: &[],
+            props: &[],
+            lamps: None,
+        };
+        let picture = studio.space_picture(&shot, SIZE).unwrap().0;
+        (picture, studio.n_triangles_in(space))
+    };
+    let mut pictures = Vec::new();
+    let mut both = |space: &Space| {
+        studio.follow_parts(space).unwrap();
+        let mut anew = Studio::new(gpu(), &host).unwrap();
+        anew.follow_parts(space).unwrap();
+        let (now, fresh) = (look(&mut studio, space), look(&mut anew, space));
+        assert_eq!(now.1, fresh.1);
+        assert_eq!(n_differing(&now.0, &fresh.0), 0, "step {}", pictures.len());
+        pictures.push(now.0);
+    };
+    both(&space);
+    let part = space
+        .add_part(guest.clone(), PartId::ROOT, poses[0])
+        .unwrap();
+    both(&space);
+    space.withdraw(part).unwrap();
+    both(&space);
+    // Its place is taken by another world, and a copy of it.
+    space.forget(part).unwrap();
+    let other = space
+        .add_part(cabin(3, 0.5, 0), PartId::ROOT, poses[0])
+        .unwrap();
+    space.add_copy(other, PartId::ROOT, poses[1]).unwrap();
+    both(&space);
+    assert_eq!(n_differing(&pictures[0], &pictures[2]), 0);
+    let n_seen = [(0, 1), (1, 3)].map(|(a, b)| n_differing(&pictures[a], &pictures[b]));
+    assert!(n_seen.iter().all(|n| *n > 50), "{n_seen:?}");
+}

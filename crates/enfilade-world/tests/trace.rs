@@ -4,7 +4,7 @@ use enfilade_cpg::{
     CellId, MonitorCamera, Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World,
 };
 use enfilade_geom::{DMat4, DQuat, DVec3, Triangle};
-use enfilade_runtime::{Sightlines, Target};
+use enfilade_runtime::Target;
 use enfilade_testkit::{GridParams, Rng, room_grid, with_specials};
 use enfilade_world::{PartId, SightRay, Space, TraceEnd};
 
@@ -114,7 +114,7 @@ fn rays_hit_what_straight_lines_hit_in_the_moved_world() {
             ..GridParams::offices(4, seed)
         };
         let world = with_specials(room_grid(&params), 5, seed);
-        let (plain, lines) = (Plain::new(&world), Sightlines::build(&world));
+        let plain = Plain::new(&world);
         let space = Space::new(world.clone()).unwrap();
         let mut rng = Rng::new(seed);
         let mut passed = Vec::new();
@@ -173,7 +173,7 @@ fn rays_hit_what_straight_lines_hit_in_the_moved_world() {
                 (nearest.0 - ends).abs() * 60.0 < NEAR,
                 "seed {seed} {ray:?}: {nearest:?} {ends}"
             );
-            let Target::Wall { batch, triangle } = hit.target else {
+            let Target::Wall { batch, triangle } = hit.1.target else {
                 panic!("{hit:?}");
             };
             let same = walls

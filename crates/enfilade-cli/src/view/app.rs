@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, anyhow};
-use enfilade::cpg::{PortalId, World};
 use enfilade::cpg::wire::encode_glb;
+use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::runtime::Target;
 use enfilade::world::{PartId, Pose, Space};

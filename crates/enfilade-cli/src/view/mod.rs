@@ -52,10 +52,15 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         .as_deref()
         .map(|p| read_path(p, FOV))
         .transpose()?;
+    let mut events = None;
     let begun = match &args.save {
         Some(save) => {
             let (world, kit) = (args.world.as_deref(), args.kit.as_deref());
-            Some(begin(world, kit, save, &mut outputs)?)
+            let open = || {
+                events = Some(open_events()?);
+                Ok(())
+            };
+            Some(begin(world, kit, save, &mut outputs, open)?)
         }
         None => None,
     };
@@ -66,8 +71,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         }
         None => (None, read(args)?),
     };
-    let events = EventLoop::new()
-        .context("no window can be opened here; `enfilade render` draws without one")?;
+    let events = events.map_or_else(open_events, Ok)?;
     events.set_control_flow(ControlFlow::Poll);
     let mut app = App {
         args,
@@ -85,6 +89,10 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         Some(why) => Err(why),
         None => Ok(()),
     }
+}
+
+fn open_events() -> anyhow::Result<EventLoop<()>> {
+    EventLoop::new().context("no window can be opened here; `enfilade render` draws without one")
 }
 
 /// Reads the world, and what lives in it; of a packed one only the head, if that is enough.

@@ -165,7 +165,8 @@ impl Open {
         editor.follow(&mut self.lived.space)?;
         self.studio.follow_parts(&self.lived.space)?;
         let space = &self.lived.space;
-        self.turning.retain(|((part, _), _)| space.is_present(*part));
+        self.turning
+            .retain(|((part, _), _)| space.is_present(*part));
         self.titles = Titles(editor.titles());
         self.lived.forget_radar();
         self.panel.renew_map(true);
@@ -416,7 +417,7 @@ impl Open {
         self.shown.seconds(seconds);
         self.shown.counts = [
             counts.n_triangles,
-            self.studio.n_triangles(),
+            self.studio.n_triangles_in(&self.lived.space),
             counts.n_draws as u64,
         ];
         self.shown.camera = Some(outside);
@@ -427,8 +428,14 @@ impl Open {
             self.shown.living = self.lived.words(&player);
         }
         let (gpu, window) = (&self.studio.gpu, &self.window);
-        self.panel
-            .draw(gpu, window, &output, size, (&self.lived.space, &self.titles), &self.shown);
+        self.panel.draw(
+            gpu,
+            window,
+            &output,
+            size,
+            (&self.lived.space, &self.titles),
+            &self.shown,
+        );
         self.window.pre_present_notify();
         self.studio.gpu.queue.present(target);
         Ok(())

@@ -167,10 +167,7 @@ pub(super) fn turned(level: &Assembly, id: InstanceId) -> Option<Pose> {
 /// # Errors
 ///
 /// If the vertices are above each other, or at one height.
-pub(super) fn portal_rectangle(
-    [a, b]: [DVec3; 2],
-    space: &Space,
-) -> Result<Vec<DVec3>, String> {
+pub(super) fn portal_rectangle([a, b]: [DVec3; 2], space: &Space) -> Result<Vec<DVec3>, String> {
     let along = DVec3::new(b.x - a.x, 0.0, b.z - a.z);
     if along.length() < 0.1 || (b.y - a.y).abs() < 0.1 {
         return Err(

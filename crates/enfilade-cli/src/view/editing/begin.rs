@@ -17,6 +17,8 @@ use enfilade_cli::world::read_world_hashed;
 
 /// Opens the session of a world that is to be saved at `save`: over `world`, if there is one, with the pieces of `kit`.
 ///
+/// `before_journal` is called before a journal is made; if it fails, none is.
+///
 /// # Errors
 ///
 /// If the world, the kit or the journal cannot be used, or if the file to save is not one that was edited here.
@@ -25,6 +27,7 @@ pub(crate) fn begin(
     kit: Option<&Path>,
     save: &Path,
     outputs: &mut Outputs,
+    before_journal: impl FnOnce() -> anyhow::Result<()>,
 ) -> anyhow::Result<(Editor, Space)> {
     refuse_stream("--save", save, "a world with its journal")?;
     let journal = save.with_extension("journal");
@@ -66,6 +69,7 @@ pub(crate) fn begin(
             (Kit::new(pieces)?, ground, format!("piece-{hash:016x}"))
         }
     };
+    before_journal()?;
     let opened = EditSession::open(&journal, Arc::new(kit), (ground, &mark), tolerance);
     let (session, resumed) = opened.with_context(|| journal.display().to_string())?;
     let mut editor = Editor::new(session, save.to_owned(), journal);

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use enfilade::edit::{
-    EditError, EditOperation, EditSession, EditedSpace, EditedWorld, HandEditError, HandEditKind, Resumed,
+    EditError, EditOperation, EditSession, EditedSpace, EditedWorld, HandEditError, HandEditKind,
+    Resumed,
 };
 use enfilade::geom::{DVec3, shown};
 use enfilade::kit::{End, InstanceId, Kit};
@@ -336,9 +337,11 @@ impl Editor {
             }
             _ => return refused("a crate stands on a floor"),
         };
+        let known = self.made_door(&kind).map(EditOperation::Unmake);
+        let make = || EditOperation::Make(self.session.hosted(&kind));
         Aim {
             point: Some(kind.at()),
-            operation: Some(EditOperation::Make(self.session.hosted(&kind))),
+            operation: Some(known.unwrap_or_else(make)),
             ..Aim::default()
         }
     }
@@ -465,6 +468,7 @@ impl Editor {
             EditOperation::Put { .. } => "placed ".to_owned(),
             EditOperation::Move(id, _) => format!("moved {}", self.name(*id)),
             EditOperation::Make(edit) => format!("made: {}", edit.kind.word()),
+            EditOperation::Unmake(_) => "it is what it was before".to_owned(),
             _ => String::new(),
         };
         let is_put = matches!(operation, EditOperation::Put { .. });

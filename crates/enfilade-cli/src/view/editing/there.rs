@@ -10,6 +10,8 @@ use super::tool::Tool;
 
 /// Distance from the ray up to which a lamp, a crate or a mirror is meant. [Units: wu]
 const NEAR: f64 = 0.6;
+/// Distance of the middles of one doorway, as its pieces have it. [Units: wu]
+const SAME: f64 = 0.05;
 
 impl Editor {
     /// Returns the piece there, or the one through whose open doorway the pointer leads outdoors.
@@ -62,6 +64,17 @@ impl Editor {
             Tool::Lamp => self.delete_nearest(ray, "lamp"),
             Tool::Crate => self.delete_nearest(ray, "crate"),
         }
+    }
+
+    /// Returns the number of the change by hand that made a door of the doorway of another, so that a second click takes that away.
+    pub(super) fn made_door(&self, kind: &HandEditKind) -> Option<usize> {
+        let HandEditKind::Door(at) = kind else {
+            return None;
+        };
+        let mut edits = self.session.hand_edits().iter();
+        edits.position(|edit| {
+            matches!(self.session.placed(edit), Ok(HandEditKind::Door(made)) if made.distance(*at) < SAME)
+        })
     }
 
     /// Deletes the portal there: takes it away if it was drawn, or else joins its two cells.
