@@ -131,7 +131,7 @@ fn three_rooms_are_built_by_hand_killed_gone_on_with_saved_and_walked_through() 
     hand.keys(&["F7"]);
     hand.click(MIDDLE, "made: door");
     hand.click(MIDDLE, "it is what it was before");
-    hand.says("z", "undone; 4 more to undo");
+    hand.says("z", "undone; 5 more to undo");
     // A mirror, a lamp and a crate, to the right of the doorway.
     hand.drag([100, 240], [492, 240]);
     hand.keys(&["F8"]);
