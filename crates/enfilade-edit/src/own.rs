@@ -73,10 +73,10 @@ impl OwnWorlds {
         &self,
         host: Option<InstanceId>,
         edits: &[HandEdit],
-    ) -> Option<(&Arc<World>, &[(usize, HandEditError)])> {
+    ) -> Option<(World, Vec<(usize, HandEditError)>)> {
         let known = self.by_host.get(&host)?;
         let is_same = edits.iter().map(|edit| &edit.kind).eq(&known.kinds);
-        is_same.then_some((&known.world, &known.resting))
+        is_same.then(|| (World::clone(&known.world), known.resting.clone()))
     }
 
     /// Returns the reason for which a change of a host, counted among its own, is not in its world.

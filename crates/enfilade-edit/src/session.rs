@@ -345,10 +345,7 @@ impl EditSession {
         let known = self.base.as_ref();
         let known = known.and_then(|_| self.own.known(None, &self.edits));
         if let Some((world, resting)) = known {
-            let made = Arc::new(EditedWorld {
-                world: World::clone(world),
-                resting: resting.to_vec(),
-            });
+            let made = Arc::new(EditedWorld { world, resting });
             return Ok(Arc::clone(self.latest.get_or_init(|| made)));
         }
         let mut world = match &self.base {

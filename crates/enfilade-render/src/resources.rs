@@ -12,7 +12,8 @@ impl Grown {
     pub(crate) fn new(gpu: &Gpu, usage: wgpu::BufferUsages) -> Self {
         let usage = usage | wgpu::BufferUsages::COPY_DST;
         Self {
-            buffer: Self::make(gpu, usage, 1 << 16),
+            // A level of thousands of rooms has one for each.
+            buffer: Self::make(gpu, usage, 1 << 12),
             usage,
         }
     }

@@ -91,7 +91,7 @@ fn a_room_in_a_room_is_drawn_as_one_world_would_be() {
         let whole = merged(&host, &guest, pose);
         let mut one = Studio::new(gpu(), &whole).unwrap();
         let mut space = Space::new(host.clone()).unwrap();
-        let part = space.add_part(guest.clone(), PartId::ROOT, *pose).unwrap();
+        space.add_part(guest.clone(), PartId::ROOT, *pose).unwrap();
         let mut studio = Studio::new(gpu(), &host).unwrap();
         studio.follow_parts(&space).unwrap();
         let mut viewer = SpaceViewer::new(&space);
