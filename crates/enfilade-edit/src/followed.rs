@@ -11,8 +11,8 @@ use crate::session::{EditError, EditSession};
 /// The parts of a space that are the instances of a session, with the changes by hand in them.
 ///
 /// The space has the cells, portals and walls of [`EditSession::world`], part by part, with two exceptions. Where a doorway between
-/// two instances was deleted, they stay two cells. What changes by hand do reaches to the doorways of their instance: a crate
-/// in a doorway is in one of the two rooms.
+/// two instances was deleted, they stay two cells. The effect of a change by hand ends at the doorways of its instance: a crate in
+/// a doorway is in one of the two rooms.
 #[derive(Debug, Default)]
 pub struct EditedSpace {
     parts: LevelParts,

@@ -12,7 +12,7 @@ use enfilade_geom::{Aabb, DVec3};
 use enfilade_kit::{Choice, InstanceId, Kit, Piece};
 use enfilade_runtime::Sightlines;
 use enfilade_testkit::{Rng, dungeon_kit};
-use enfilade_world::{PartId, Place, Space};
+use enfilade_world::{PartId, Place, Pose, Space};
 
 fn kit() -> Arc<Kit> {
     static KIT: OnceLock<Arc<Kit>> = OnceLock::new();
@@ -189,4 +189,25 @@ fn points_and_lines_meet_the_same_cells_and_walls_as_in_the_world_that_is_saved(
         n_points > 20_000 && n_other * 1_000 <= n_lines,
         "{n_checked:?}"
     );
+}
+
+#[test]
+fn a_number_that_an_undo_frees_does_not_bring_back_the_old_world() {
+    let mut session = EditSession::new(kit(), EditGround::Open).unwrap();
+    let (mut parts, mut space) = EditedSpace::new(&mut session).unwrap();
+    let lamp = HandEditKind::Lamp(DVec3::new(0.0, 2.0, 0.0));
+    for piece in ["chamber", "hall"] {
+        let put = EditOperation::put(piece, None, Pose::IDENTITY);
+        session.apply(put).unwrap();
+        let edit = session.hosted(&lamp);
+        session.apply(EditOperation::Make(edit)).unwrap();
+        parts.follow(&mut space, &mut session).unwrap();
+        let part = parts.part_of(InstanceId(0)).unwrap();
+        assert_eq!(space.world(part).fixtures.len(), 1);
+        let number = kit().named(piece).unwrap();
+        let own = kit().pieces()[number].world().graph.cells[1].aabb;
+        assert_eq!(space.world(part).graph.cells[1].aabb, own, "{piece}");
+        // The next session of this number begins without the space being asked.
+        assert!(session.undo().unwrap() && session.undo().unwrap());
+    }
 }

@@ -62,24 +62,24 @@ impl Shown {
 }
 
 /// A step of the window.
-enum Step {
+enum EditStep {
     Made(EditOperation),
     Undo,
     Redo,
 }
 
 /// Returns a step by chance: a change by hand or of a piece in turn, with an undo and a redo between them.
-fn step(session: &EditSession, n: usize, rng: &mut Rng) -> Step {
+fn step(session: &EditSession, n: usize, rng: &mut Rng) -> EditStep {
     let wants_hand = match n % 6 {
-        1 | 4 => return Step::Undo,
-        2 | 5 => return Step::Redo,
+        1 | 4 => return EditStep::Undo,
+        2 | 5 => return EditStep::Redo,
         turn => turn == 0,
     };
     loop {
         let operation = random_operation(session, &mut |n| rng.below(n));
         let is_by_hand = matches!(operation, EditOperation::Make(_) | EditOperation::Unmake(_));
         if is_by_hand == wants_hand {
-            return Step::Made(operation);
+            return EditStep::Made(operation);
         }
     }
 }
@@ -95,9 +95,9 @@ pub(super) fn operation(scene: &str) -> anyhow::Result<Figure> {
         let step = step(&shown.session, times.len(), &mut rng);
         let start = Instant::now();
         let is_made = match step {
-            Step::Undo => shown.session.undo()?,
-            Step::Redo => shown.session.redo()?,
-            Step::Made(operation) => shown.session.apply(operation).is_ok(),
+            EditStep::Undo => shown.session.undo()?,
+            EditStep::Redo => shown.session.redo()?,
+            EditStep::Made(operation) => shown.session.apply(operation).is_ok(),
         };
         shown.show(eye)?;
         if !is_made {

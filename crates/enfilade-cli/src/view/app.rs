@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
@@ -14,15 +14,15 @@ use enfilade_render::{
     Camera, FOV, Paint, PortalTextureOptions, Sparing, Studio, good_camera, portal_looked_at,
 };
 use winit::application::ApplicationHandler;
-use winit::dpi::PhysicalSize;
 use winit::event::{
     DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent,
 };
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::{KeyCode, PhysicalKey};
-use winit::window::{Window, WindowId};
+use winit::window::WindowId;
 
 use super::args::View;
+use super::bare::BareWindow;
 use super::editing::{EditKey, EditRay, Editor, Outcome, Strip, edit_key};
 use super::mode::Mode;
 use super::open::Open;
@@ -34,7 +34,6 @@ use super::walker::Walker;
 use crate::formats::Format;
 use crate::living::{Lived, STEP};
 use crate::output::{Outputs, write_whole};
-use enfilade_cli::adapter;
 use enfilade_cli::cameras::path_text;
 use enfilade_cli::streamed::{Packed, Streamed};
 
@@ -157,26 +156,13 @@ impl App<'_> {
 
     fn open_window(&mut self, events: &ActiveEventLoop) -> anyhow::Result<Open> {
         let lived = self.lived.take().context("a window opens once")?;
-        let [w, h] = self.args.size;
-        let attributes = Window::default_attributes()
-            .with_title(format!("enfilade: {}", self.args.name()))
-            .with_inner_size(PhysicalSize::new(w, h));
-        let window = Arc::new(events.create_window(attributes)?);
-        let display = Box::new(events.owned_display_handle());
-        let asked = wgpu::InstanceDescriptor::new_with_display_handle_from_env(display);
-        let instance = wgpu::Instance::new(asked);
-        let surface = instance.create_surface(window.clone())?;
-        let gpu = adapter::open_with(&instance, &self.args.adapter, Some(&surface))?;
-        let size = window.inner_size();
-        let mut config = surface
-            .get_default_config(&gpu.adapter, size.width.max(1), size.height.max(1))
-            .ok_or_else(|| anyhow!("{} cannot draw to this window", gpu.name()))?;
-        let formats = surface.get_capabilities(&gpu.adapter).formats;
-        // Shading is in linear light: the window's texture format converts it.
-        if let Some(&format) = formats.iter().find(|f| f.is_srgb()) {
-            config.format = format;
-        }
-        surface.configure(&gpu.device, &config);
+        let title = format!("enfilade: {}", self.args.name());
+        let BareWindow {
+            window,
+            surface,
+            config,
+            gpu,
+        } = BareWindow::open(events, title, self.args.size, &self.args.adapter)?;
         let strip = self.editor.as_ref();
         let strip = strip.map(|editor| Strip::new(editor.kit(), editor.palette()));
         let mut panel = Panel::new(&gpu, &window, config.format, strip);

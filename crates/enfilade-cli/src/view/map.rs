@@ -288,7 +288,7 @@ impl Sheet {
             let place = space.locate(PartId::ROOT, p);
             let indoors = place.filter(|p| !space.world(p.part).graph[p.cell].outdoor);
             let number = indoors.map(|place| space.cell_number(place));
-            // Those of parts that are not on the map are no names.
+            // Parts that are not on the map have no names.
             let named = number.filter(|number| (*number as usize) < self.names.len());
             self.cells.push(named);
         }

@@ -2,6 +2,7 @@
 
 mod app;
 mod args;
+mod bare;
 mod doors;
 mod editing;
 mod map;
