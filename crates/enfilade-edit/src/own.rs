@@ -16,8 +16,6 @@ pub struct OwnWorlds {
 
 #[derive(Clone, Debug)]
 struct OwnWorld {
-    /// The world without them. After an undo, the number of an instance may be that of another piece.
-    base: Arc<World>,
     /// The changes that were made, or could not be, in order.
     kinds: Vec<HandEditKind>,
     /// Those that could not be, by their place in the list.
@@ -112,12 +110,12 @@ impl OwnWorlds {
         }
         self.by_host.retain(|host, _| kinds.contains_key(host));
         for (host, kinds) in kinds {
-            let Some(base) = base(host) else {
-                self.by_host.remove(&host);
-                continue;
-            };
             let known = self.by_host.get(&host);
-            if !known.is_some_and(|known| known.is_of(&base) && known.kinds == kinds) {
+            if known.is_some_and(|known| known.kinds == kinds) {
+                continue;
+            }
+            // One that does not stand is not shown.
+            if let Some(base) = base(host) {
                 let own = self.made(host, &base, &kinds);
                 self.by_host.insert(host, own);
             }
@@ -127,9 +125,8 @@ impl OwnWorlds {
     /// Returns the world of a host with some changes, from what is known of it.
     fn made(&self, host: Option<InstanceId>, base: &OwnBase, kinds: &[HandEditKind]) -> OwnWorld {
         let known = self.by_host.get(&host);
-        let begun = known.filter(|known| known.is_of(base) && kinds.starts_with(&known.kinds));
+        let begun = known.filter(|known| kinds.starts_with(&known.kinds));
         let mut own = begun.cloned().unwrap_or_else(|| OwnWorld {
-            base: Arc::clone(&base.world),
             kinds: Vec::new(),
             resting: Vec::new(),
             world: Arc::clone(&base.world),
@@ -140,12 +137,6 @@ impl OwnWorlds {
             }
         }
         own
-    }
-}
-
-impl OwnWorld {
-    fn is_of(&self, base: &OwnBase) -> bool {
-        Arc::ptr_eq(&self.base, &base.world)
     }
 }
 
