@@ -16,7 +16,7 @@ use crate::session::{EditError, EditSession};
 #[derive(Debug, Default)]
 pub struct EditedSpace {
     parts: LevelParts,
-    /// What was made by hand in no instance.
+    /// The changes by hand in no instance.
     ground: Option<(PartId, Arc<World>)>,
 }
 
