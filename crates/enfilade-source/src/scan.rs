@@ -1,6 +1,6 @@
 //! Scans: points on surfaces, each seen from a station, and the surface of the air that the stations saw.
 //!
-//! What lies between a station and what it saw is free; the rest is unknown, and counts as matter. Near points the field is the
+//! The space between a station and what it saw is free; the rest is unknown, and counts as matter. Near points the field is the
 //! distance from the planes through them (Kolluri, "Provably good moving least squares", 2005), which averages the noise of
 //! the scanner.
 

@@ -36,7 +36,7 @@ impl Node {
     /// Returns the node for a list that begins `by` nodes before the one it was in.
     fn moved_by(mut self, by: u32) -> Self {
         for (child, &count) in self.children.iter_mut().zip(&self.counts) {
-            // Unused children and leaves are no nodes; the first node is nobody's child.
+            // Neither unused children nor leaves count; nothing has the first node as a child.
             if count == 0 && *child != 0 {
                 *child += by;
             }

@@ -1,4 +1,4 @@
-//! What a station sees: the least distance in each direction.
+//! The view of a station: the distance of what it saw in each direction.
 
 use enfilade_geom::DVec3;
 
