@@ -8,6 +8,7 @@
 //! | `structure` | the input: walls, stairs, door leaves and panes, slabs; which openings are a pinch |
 //! | [`watershed`], [`bsp`], [`delaunay`] | a division of the air: three methods, independent of each other |
 //! | `pieces`, `shards` | pieces that are kept: for bakes that go on after they were ended, and for several machines |
+//! | `tubes` | where tubes of one width meet |
 //! | `rooms` | where rooms end: which parts are one room, and the openings between rooms, by one rule for all methods |
 //! | [`complex`] | which space is open: convex leaves and the facets between them, exactly |
 //! | `land` | open land as cells, if that is wanted |
@@ -45,6 +46,7 @@ mod specials;
 mod stage;
 mod structure;
 mod subset;
+mod tubes;
 mod vessel;
 mod void;
 pub use enfilade_voxel as voxel;

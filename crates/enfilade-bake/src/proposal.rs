@@ -28,6 +28,8 @@ pub(crate) struct Proposal {
     pub(crate) label: LabelSettings,
     /// Joins regions that no plane separates, and voids that open to each other: see [`crate::join`].
     pub(crate) joins_unparted: bool,
+    /// Volume of the regions in which tubes meet, and of all. [Units: wu³]
+    pub(crate) tubes: [f64; 2],
     /// Numbers for the statistics of the file.
     pub(crate) counts: Vec<(&'static str, f64)>,
     /// Assumptions and doubtful decisions, one sentence each.
@@ -48,6 +50,7 @@ impl Proposal {
             land: 0..0,
             label: LabelSettings::default(),
             joins_unparted: true,
+            tubes: [0.0; 2],
             counts: Vec::new(),
             notes: Vec::new(),
             settings: BTreeMap::new(),
@@ -61,6 +64,12 @@ impl Proposal {
         let votes = self.votes.iter().map(|v| region(&v.label));
         let last = votes.chain(self.voids.iter().map(|v| v.1)).max();
         last.unwrap_or(OUTDOORS)
+    }
+
+    /// Returns `true` if most of the air is in tubes that meet: of an airway, a vessel or a burrow. There, a low place is a
+    /// branch like another.
+    pub(crate) fn is_tree(&self) -> bool {
+        2.0 * self.tubes[0] > self.tubes[1]
     }
 
     /// Adds the proposal for another part of the scene that nothing but the outdoors connects with this one.
@@ -82,6 +91,7 @@ impl Proposal {
         self.candidates.append(&mut other.candidates);
         self.votes.append(&mut other.votes);
         self.voids.append(&mut other.voids);
+        self.tubes = [0, 1].map(|i| self.tubes[i] + other.tubes[i]);
         for ((name, count), (_, more)) in self.counts.iter_mut().zip(other.counts) {
             match *name {
                 "grid_turn_degrees" => {}

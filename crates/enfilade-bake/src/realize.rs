@@ -97,6 +97,7 @@ pub(crate) fn part(
     proposal: &mut Proposal,
     allowance: &Allowance,
 ) -> Partition {
+    let is_tree = proposal.is_tree();
     let Proposal {
         votes,
         voids,
@@ -141,7 +142,9 @@ pub(crate) fn part(
     }
     let mut partition = complex.realize(cells);
     join_enclosed(&mut partition);
-    mark_voids(&mut partition, allowance);
+    if !is_tree {
+        mark_voids(&mut partition, allowance);
+    }
     // Methods whose regions are never joined make the cells that they are asked for.
     if *joins_unparted {
         join_voids(&mut partition);

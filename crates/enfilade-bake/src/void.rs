@@ -5,7 +5,7 @@
 //! a crawl space with a hatch is a void.
 //!
 //! Where nobody can stand in any cell, the scene is not a building on the scale of people (a vessel, a model in another
-//! unit), and none is a void.
+//! unit), and none is a void. Nor is one where most of the air is in tubes that meet.
 //!
 //! Cost: up to `MAX_COLUMNS`² walks down the locator's tree for each cell.
 

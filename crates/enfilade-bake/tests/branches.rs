@@ -1,4 +1,4 @@
-//! Branches of tubes through the Delaunay builder: one cell each, though nothing pinches them.
+//! Branches of tubes through the Delaunay builder, and forks through the watershed: one cell each, though nothing pinches them.
 
 use std::collections::BTreeSet;
 
@@ -249,22 +249,76 @@ fn arms_as_wide_as_their_stem_are_cells() {
     assert_eq!(n_different(&rooms), 1, "{rooms:?}");
 }
 
-#[test]
-fn arms_that_part_again_and_meet_again_are_cells() {
-    let tube = |ends: [[f64; 2]; 2]| Tube {
+/// A tube in the plane z = 0.
+fn flat_tube(ends: [[f64; 2]; 2]) -> Tube {
+    Tube {
         ends: ends.map(|p| DVec3::new(p[0], p[1], 0.0)),
         radius: 0.4,
-    };
-    // A stem, two arms, and two more at the end of each.
-    let tree = [
-        tube([[-4.0, 0.0], [0.0, 0.0]]),
-        tube([[0.0, 0.0], [3.0, 3.0]]),
-        tube([[0.0, 0.0], [3.0, -3.0]]),
-        tube([[3.0, 3.0], [3.0, 6.5]]),
-        tube([[3.0, 3.0], [6.5, 3.0]]),
-        tube([[3.0, -3.0], [3.0, -6.5]]),
-        tube([[3.0, -3.0], [6.5, -3.0]]),
-    ];
+    }
+}
+
+/// A stem, two arms, and two more at the end of each.
+fn tree() -> [Tube; 7] {
+    [
+        flat_tube([[-4.0, 0.0], [0.0, 0.0]]),
+        flat_tube([[0.0, 0.0], [3.0, 3.0]]),
+        flat_tube([[0.0, 0.0], [3.0, -3.0]]),
+        flat_tube([[3.0, 3.0], [3.0, 6.5]]),
+        flat_tube([[3.0, 3.0], [6.5, 3.0]]),
+        flat_tube([[3.0, -3.0], [3.0, -6.5]]),
+        flat_tube([[3.0, -3.0], [6.5, -3.0]]),
+    ]
+}
+
+/// Returns the cell of each point, by the watershed.
+fn cells_at(g: &Generated, points: &[DVec3]) -> Vec<u32> {
+    let context = BakeContext::new(&Silent, None);
+    let config = BakeConfig::of(Method::Watershed);
+    let world = bake(&g.scene, &config, &context).unwrap().world;
+    let cell = |&p: &DVec3| world.graph.locator.locate(p).unwrap().0;
+    points.iter().map(cell).collect()
+}
+
+// Covers V10: the rule for forks is one for all builders.
+#[test]
+fn arms_of_forks_are_cells_by_the_watershed() {
+    let middle = |t: &Tube| (t.ends[0] + t.ends[1]) * 0.5;
+    let twice = |tubes_of: &[Tube]| times(tubes(tubes_of, 0.12), 2.0);
+    // Nobody stands in these tubes, except that the stem of the second is as high as a room: low branches are no voids.
+    let mut high = tree();
+    high[0].radius = 0.53;
+    for (tubes_of, what) in [(tree(), "tree"), (high, "with a high stem")] {
+        let points: Vec<DVec3> = tubes_of.iter().map(|t| middle(t) * 2.0).collect();
+        let cells = cells_at(&twice(&tubes_of), &points);
+        assert_eq!(n_different(&cells), 7, "{what}: {cells:?}");
+    }
+    // A bend is not a fork, and neither is a junction with an arm less than two diameters long.
+    let mut bend = star(&[0.0, 90.0], 5.0, 0.5);
+    bend.extend(star(&[220.0], 1.9, 0.5));
+    let tips: Vec<DVec3> = bend.iter().map(|t| t.ends[1] * 2.0).collect();
+    let cells = cells_at(&twice(&bend), &tips);
+    assert_eq!(n_different(&cells), 1, "{cells:?}");
+    // A ring with a spur: three arms leave the fork, but two of them are one.
+    let (ring, spur) = ring_with_spur();
+    let mut points: Vec<DVec3> = ring.iter().map(|t| middle(t) * 2.0).collect();
+    points.push(DVec3::X * 14.0);
+    let cells = cells_at(&twice(&[&ring[..], &[spur]].concat()), &points);
+    assert_eq!(n_different(&cells), 2, "{cells:?}");
+    assert_eq!(n_different(&cells[..12]), 1, "{cells:?}");
+}
+
+fn ring_with_spur() -> (Vec<Tube>, Tube) {
+    let ring = (0..12).map(|i| {
+        let at = |i: i32| (f64::from(i) * 30.0).to_radians().sin_cos();
+        let (p, q) = (at(i), at(i + 1));
+        flat_tube([[3.5 * p.0, 3.5 * p.1], [3.5 * q.0, 3.5 * q.1]])
+    });
+    (ring.collect(), flat_tube([[3.5, 0.0], [8.0, 0.0]]))
+}
+
+#[test]
+fn arms_that_part_again_and_meet_again_are_cells() {
+    let tree = tree();
     let middle = |t: &Tube| (t.ends[0] + t.ends[1]) * 0.5;
     let mut points: Vec<DVec3> = tree.iter().map(middle).collect();
     points.extend(tree[3..].iter().map(|t| t.ends[1]));
@@ -272,15 +326,8 @@ fn arms_that_part_again_and_meet_again_are_cells() {
     assert_eq!(n_different(&rooms), 7, "{rooms:?}");
     assert_eq!(rooms[3..7], rooms[7..]);
     // A ring with a spur: three arms leave the fork, but two of them are one.
-    let ring: Vec<Tube> = (0..12)
-        .map(|i| {
-            let at = |i: i32| (f64::from(i) * 30.0).to_radians().sin_cos();
-            let (p, q) = (at(i), at(i + 1));
-            tube([[3.5 * p.0, 3.5 * p.1], [3.5 * q.0, 3.5 * q.1]])
-        })
-        .collect();
-    let mut all = ring.clone();
-    all.push(tube([[3.5, 0.0], [8.0, 0.0]]));
+    let (ring, spur) = ring_with_spur();
+    let all = [&ring[..], &[spur]].concat();
     let mut points: Vec<DVec3> = ring.iter().map(middle).collect();
     points.push(DVec3::X * 7.0);
     let rooms = rooms_at(&tubes(&all, 0.12), 1.0, &points);
@@ -338,6 +385,8 @@ fn corridors_that_cross_are_one_room() {
     let rooms = rooms_at(&g, 1.0, &points.map(|[x, z]| DVec3::new(x, y, z)));
     assert_eq!(n_different(&rooms), 1, "{rooms:?}");
     assert_ne!(rooms[0], 0);
+    let cells = cells_at(&g, &points.map(|[x, z]| DVec3::new(x, y, z)));
+    assert_eq!(n_different(&cells), 1, "{cells:?}");
 }
 
 /// Opens tubes at some ends: removes everything beyond.

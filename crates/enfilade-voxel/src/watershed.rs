@@ -24,8 +24,10 @@
 //! | crests and peaks | `crests` |
 //! | ascents and contacts, by slabs | `slabs` |
 //! | shallow basins joined, labels | `join` |
+//! | the widest places, in blocks | `blocks` |
 
 mod basins;
+mod blocks;
 mod crests;
 mod join;
 mod levels;
@@ -42,6 +44,7 @@ use levels::{Levels, Outdoors};
 use shape::Shape;
 
 pub use basins::{Basin, Saddle, Watershed};
+pub use blocks::WidestOfBlocks;
 
 /// Options of [`watershed`].
 #[derive(Clone, Debug, Default)]

@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 use enfilade_geom::{Aabb, Allowance, DVec3};
 use rayon::prelude::*;
 
-use super::branches::Walls;
 use super::cells::OUTDOOR_CELL;
 use super::labels::{BranchMouth, Branches};
 use super::space::Space;
 use crate::rooms::{Limb, LimbRule, Plan, THICKER};
+use crate::tubes::Walls;
 
 /// Cells of a plan across the narrowest opening.
 const ACROSS: f64 = 6.0;

@@ -3,7 +3,7 @@
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Allowance, Bvh, Triangle};
 
-use super::branches::{Walls, find_branches};
+use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
 use super::decimate::{Decimation, decimate, default_stop};
 use super::limbs::RoomSpace;
@@ -13,6 +13,7 @@ use super::standing::count_rooms;
 use crate::budget::n_structural;
 use crate::config::{Choices, Weight};
 use crate::structure::{Structure, in_own_order};
+use crate::tubes::Walls;
 use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
 
 /// The state of decimation, for a user to inspect and overrule.

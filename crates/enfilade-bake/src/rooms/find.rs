@@ -8,6 +8,7 @@ use enfilade_geom::{Allowance, DVec3};
 use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
 use super::candidates::fit_candidates;
+use super::forks::split_forks;
 use super::hollow::{Matter, find_matter};
 use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
@@ -17,6 +18,7 @@ use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
 use crate::proposal::Proposal;
 use crate::structure::{Frame, Structure};
+use crate::tubes::Walls;
 use crate::voxel::{Grid, Labels};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
@@ -40,6 +42,7 @@ pub(crate) fn propose(
         resolution,
         ..
     } = air;
+    let field = solid.field(allowance);
     basins.refill(&solid.occupied);
     basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
@@ -65,6 +68,19 @@ pub(crate) fn propose(
         allowance,
     );
     join_low(&grid, &basins.labels, &mut regions, allowance);
+    let walls = Walls {
+        triangles: &structure.triangles,
+        bvh: &structure.bvh,
+    };
+    let tubes = split_forks(
+        &grid,
+        &mut basins.labels,
+        &mut regions,
+        &mut basins.peaks,
+        field,
+        (&walls, config.merge.min_radius),
+        allowance,
+    );
     context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;
@@ -110,6 +126,7 @@ pub(crate) fn propose(
         candidates,
         voids,
         counts,
+        tubes,
         notes,
         settings: config.voxel_settings(),
         resolution,

@@ -115,10 +115,10 @@ pub(crate) fn split_limbs(
     }
 }
 
-type Contacts = BTreeMap<(u32, u32), Vec<u64>>;
+pub(super) type Contacts = BTreeMap<(u32, u32), Vec<u64>>;
 
 /// Returns the faces between regions, given those between basins.
-fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
+pub(super) fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
     let mut contacts = Contacts::new();
     for (&(a, b), faces) in by_basin {
         let [a, b] = [a, b].map(|l| regions.region_of_basin[l as usize]);

@@ -11,6 +11,8 @@ mod basins;
 mod candidates;
 mod find;
 mod flooded;
+mod fork_pieces;
+mod forks;
 mod fronts;
 mod hollow;
 mod judge;
@@ -26,6 +28,7 @@ mod sections;
 mod slabs;
 mod voids;
 mod votes;
+mod voxel_balls;
 
 pub(crate) use air::{FLOODED, Plot, measure, plots, prepare};
 pub(crate) use basins::Basins;

@@ -21,6 +21,7 @@ pub(crate) struct WrittenRooms {
     candidates: Vec<(Vec<[f64; 3]>, f64)>,
     votes: Vec<([f64; 3], WrittenLabel, f32)>,
     voids: Vec<([f64; 3], u32)>,
+    tubes: [f64; 2],
     counts: Vec<(String, f64)>,
     notes: Vec<String>,
     settings: BTreeMap<String, String>,
@@ -55,6 +56,7 @@ impl KeptPiece for Proposal {
             candidates: self.candidates.iter().map(candidate).collect(),
             votes: self.votes.iter().map(vote).collect(),
             voids: self.voids.iter().map(|v| (v.0.to_array(), v.1)).collect(),
+            tubes: self.tubes,
             counts: self.counts.iter().map(count).collect(),
             notes: self.notes.clone(),
             settings: self.settings.clone(),
@@ -85,6 +87,7 @@ impl KeptPiece for Proposal {
         Some(Self {
             candidates: written.candidates.into_iter().map(candidate).collect(),
             voids: voids.map(|(p, r)| (DVec3::from_array(p), r)).collect(),
+            tubes: written.tubes,
             counts: written
                 .counts
                 .into_iter()

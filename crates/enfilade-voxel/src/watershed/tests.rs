@@ -465,3 +465,26 @@ fn renumbering_changes_nothing() {
     );
     assert_eq!((w.basins.len(), w.saddles.len()), (20_000, 19_999));
 }
+
+#[test]
+fn the_widest_place_of_each_block_is_that_of_its_voxels() {
+    let dims = [7, 5, 9];
+    let blocked = BitVolume::from_fn(dims, |v| v % 11 == 0);
+    let allowance = Allowance::default();
+    let squared = distance_squared(&blocked, &allowance);
+    let field = DistanceField::of(&blocked, &BitVolume::new(dims), &allowance);
+    let mut widest = field.widest_of_blocks();
+    for edge in [2, 4] {
+        assert_eq!(widest.dims, dims.map(|n| n.div_ceil(edge)));
+        let mut most = vec![0.0_f64; widest.dims.iter().product()];
+        for (v, &d) in squared.iter().enumerate() {
+            let at = [v % 7, v / 7 % 5, v / 35].map(|c| c / edge);
+            let of = &mut most[at[0] + widest.dims[0] * (at[1] + widest.dims[1] * at[2])];
+            *of = of.max(f64::from(level(d)) / 64.0);
+        }
+        for (block, most) in most.into_iter().enumerate() {
+            assert_eq!(widest.distance(block), most, "{block}");
+        }
+        widest = widest.coarser();
+    }
+}

@@ -6,7 +6,8 @@ use enfilade_geom::DVec3;
 
 use super::super::space::connected;
 use super::regions::{NONE, TubeRegions};
-use super::rule::{DEEP, LimbFacts, MouthFacts, NARROWS, n_main_mouths};
+use super::rule::{LimbFacts, MouthFacts, n_main_mouths};
+use crate::tubes::{DEEP, NARROWS};
 
 /// A way out of a region within its room.
 pub(super) struct Mouth {

@@ -16,19 +16,17 @@
 //!
 //! Every other limb is merged across its largest opening. Pockets between rough walls and the balls of a room count as
 //! branches, too; they are smaller than a ball, and decimation treats them as the spikes that they are. Where a trunk
-//! divides into arms as wide as itself, no ball distinguishes them; `forks` does.
+//! divides into arms as wide as itself, no ball distinguishes them; `separate` does, at the forks of [`crate::tubes`].
 //!
 //! | file | contents |
 //! | --- | --- |
 //! | `regions` | connected sets of parts, and the width of the balls that connect them |
 //! | `measure` | the facts of a limb |
-//! | `rule` | the kind of a limb or an arm with such facts: all bounds, and nothing else |
+//! | `rule` | the kind of a limb with such facts: all bounds, and nothing else |
 //! | `flare` | the start of a limb within its mouth |
-//! | `forks`, `arms`, `separate` | meetings of tubes of one width, and their separation |
+//! | `separate` | the separation of tubes of one width where they meet |
 
-mod arms;
 mod flare;
-mod forks;
 mod measure;
 mod regions;
 mod rule;
@@ -40,7 +38,7 @@ use enfilade_geom::Allowance;
 
 use super::labels::Branches;
 use super::space::Space;
-pub(super) use arms::Walls;
+use crate::tubes::Walls;
 use regions::{NONE, TubeRegions};
 use rule::{LimbKind, classify};
 

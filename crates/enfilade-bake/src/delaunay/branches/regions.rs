@@ -12,7 +12,7 @@ use super::super::balls::circumsphere;
 use super::super::cells::OUTDOOR_CELL;
 use super::super::labels::{BranchMouth, Branches};
 use super::super::space::Space;
-use super::rule::NARROWS;
+use crate::tubes::NARROWS;
 
 /// Marks the absence of a region.
 pub(super) const NONE: u32 = u32::MAX;

@@ -4,18 +4,45 @@ use std::cmp::Reverse;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
-use enfilade_geom::Sets;
+use enfilade_geom::{Allowance, DVec3, Sets};
 
 use super::super::labels::BranchMouth;
-use super::arms::Walls;
-use super::forks::{Fork, reach};
-use super::regions::TubeRegions;
-use super::rule::{ARM_WEIGHS, Arm};
+use super::regions::{NONE, TubeRegions};
+use super::rule::ARM_WEIGHS;
+use crate::tubes::{Arm, Balls, Fork, Walls, find_forks, reach};
+
+impl Balls for TubeRegions<'_> {
+    fn n_parts(&self) -> usize {
+        self.owner.len()
+    }
+
+    fn radius(&self, t: u32) -> f64 {
+        Self::radius(self, t)
+    }
+
+    fn center(&self, t: u32) -> DVec3 {
+        self.centers[t as usize]
+    }
+
+    fn owner(&self, t: u32) -> u32 {
+        self.owner[t as usize]
+    }
+
+    fn ways(&self, t: u32) -> impl Iterator<Item = (u32, f64)> {
+        Self::ways(self, t).iter().map(|w| (w.0, self.passes(w.1)))
+    }
+
+    fn allowance(&self) -> &Allowance {
+        self.allowance
+    }
+}
 
 impl TubeRegions<'_> {
     /// Makes the arms of forks regions of their own.
     pub(super) fn separate_forks(&mut self, walls: &Walls<'_>) {
-        let forks = self.forks(walls);
+        let places = self.by_radius(0..self.owner.len() as u32);
+        let places = places.into_iter().filter(|&t| self.is_enclosed(t));
+        let forks = find_forks(self, places, walls);
         let mut closed = BTreeSet::new();
         for fork in &forks {
             self.close_mouths(fork, &mut closed);
@@ -24,6 +51,12 @@ impl TubeRegions<'_> {
         for region in touched {
             self.divide(region, &closed, &forks);
         }
+    }
+
+    /// Returns `true` if a part lies in a room, or in a branch of the outdoors.
+    fn is_enclosed(&self, t: u32) -> bool {
+        let owner = self.owner[t as usize];
+        owner != NONE && (self.regions[owner as usize].branch.is_some() || !self.is_outdoors(t))
     }
 
     /// Closes the mouths of a fork's arms, except the widest: floods arms and middle at once, and closes the links

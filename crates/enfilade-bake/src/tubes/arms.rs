@@ -8,70 +8,68 @@ use std::f64::consts::TAU;
 
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 
-use super::regions::TubeRegions;
+use super::forks::Balls;
 use super::rule::{Arm, ArmFacts, classify_arm};
 
 /// Rays about an axis: enough for a polygon of a dozen sides to count as round.
 const RAYS: usize = 32;
 
 /// The walls around a place, for normals.
-pub(in super::super) struct Walls<'a> {
-    pub(in super::super) triangles: &'a [Triangle],
-    pub(in super::super) bvh: &'a Bvh,
+pub(crate) struct Walls<'a> {
+    pub(crate) triangles: &'a [Triangle],
+    pub(crate) bvh: &'a Bvh,
 }
 
 /// A piece of the space around a fork.
-pub(super) struct ArmPiece {
+pub(crate) struct ArmPiece {
     /// Parts, nearest to the middle of the fork first.
-    pub(super) parts: Vec<u32>,
+    pub(crate) parts: Vec<u32>,
     /// Mean radius of its balls. [Units: wu]
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
     /// The place where it begins. [Units: wu]
-    pub(super) mouth: DVec3,
-    pub(super) kind: Arm,
+    pub(crate) mouth: DVec3,
+    pub(crate) kind: Arm,
 }
 
-impl TubeRegions<'_> {
-    /// Measures an arm. `piece` contains its parts, nearest first, with their distances from the middle of the fork,
-    /// where a ball of radius `removed` is removed; `radius` is that of the ball in the middle.
-    pub(super) fn arm(
-        &self,
-        piece: &[(f64, u32)],
-        removed: f64,
-        radius: f64,
-        walls: &Walls<'_>,
-    ) -> ArmPiece {
-        // Mean center of the balls of a stretch, given by distances in radii from the start of the arm.
-        let stretch = |from: f64, to: f64| {
-            let at = |d: f64| piece.partition_point(|p| (p.0 - removed) / radius < d);
-            let from = at(from).min(piece.len() - 1);
-            let within = &piece[from..at(to).max(from + 1)];
-            let sum: DVec3 = within.iter().map(|p| self.centers[p.1 as usize]).sum();
-            sum / within.len() as f64
-        };
-        let [mouth, middle, far] = [0.0, 1.0, 2.0].map(|d| stretch(d, d + 1.0));
-        let depth = |p: &(f64, u32)| self.centers[p.1 as usize].distance(mouth) + self.radius(p.1);
-        let (enclosed, squareness) = squareness(middle, far - mouth, walls);
-        let facts = ArmFacts {
-            depth: piece.iter().map(depth).fold(0.0, f64::max),
-            radius,
-            enclosed,
-            squareness,
-        };
-        let sum: f64 = piece.iter().map(|p| self.radius(p.1)).sum();
-        ArmPiece {
-            parts: piece.iter().map(|p| p.1).collect(),
-            radius: sum / piece.len() as f64,
-            mouth,
-            kind: classify_arm(&facts),
-        }
+/// Measures an arm. `piece` contains its parts, nearest first, with their distances from the middle of the fork,
+/// where a ball of radius `removed` is removed; `radius` is that of the ball in the middle.
+pub(crate) fn measure_arm(
+    balls: &impl Balls,
+    piece: &[(f64, u32)],
+    removed: f64,
+    radius: f64,
+    walls: &Walls<'_>,
+) -> ArmPiece {
+    // Mean center of the balls of a stretch, given by distances in radii from the start of the arm.
+    let stretch = |from: f64, to: f64| {
+        let at = |d: f64| piece.partition_point(|p| (p.0 - removed) / radius < d);
+        let from = at(from).min(piece.len() - 1);
+        let within = &piece[from..at(to).max(from + 1)];
+        let sum: DVec3 = within.iter().map(|p| balls.center(p.1)).sum();
+        sum / within.len() as f64
+    };
+    let [mouth, middle, far] = [0.0, 1.0, 2.0].map(|d| stretch(d, d + 1.0));
+    let depth = |p: &(f64, u32)| balls.center(p.1).distance(mouth) + balls.radius(p.1);
+    let (enclosed, squareness) = squareness(middle, far - mouth, walls);
+    let facts = ArmFacts {
+        depth: piece.iter().map(depth).fold(0.0, f64::max),
+        radius,
+        enclosed,
+        squareness,
+    };
+    let sum: f64 = piece.iter().map(|p| balls.radius(p.1)).sum();
+    ArmPiece {
+        parts: piece.iter().map(|p| p.1).collect(),
+        radius: sum / piece.len() as f64,
+        mouth,
+        kind: classify_arm(&facts),
     }
 }
 
 impl Walls<'_> {
     /// Returns `true` if the walls around a point are those of a corridor, not of a tube. The axis is the level direction
     /// in which the nearest wall is farthest.
-    pub(in super::super) fn are_of_corridor(&self, origin: DVec3, radius: f64) -> bool {
+    pub(crate) fn are_of_corridor(&self, origin: DVec3, radius: f64) -> bool {
         let level = (0..RAYS).map(|i| {
             let (sin, cos) = (TAU * i as f64 / RAYS as f64).sin_cos();
             let direction = DVec3::new(cos, 0.0, sin);

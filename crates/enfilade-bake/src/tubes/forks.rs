@@ -9,24 +9,43 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::Sets;
+use enfilade_geom::{Allowance, DVec3, Sets};
 
-use super::arms::{ArmPiece, Walls};
-use super::regions::{NONE, TubeRegions};
+use super::arms::{ArmPiece, Walls, measure_arm};
 use super::rule::{Arm, DEEP, Meeting, NARROWS, REMOVED, STRIDE, WIDEST, is_fork, meeting};
 
+/// Parts of the air, each with a ball: tetrahedra or voxels.
+pub(crate) trait Balls {
+    /// Returns the number of parts.
+    fn n_parts(&self) -> usize;
+
+    /// Returns the radius of the ball of a part. [Units: wu]
+    fn radius(&self, t: u32) -> f64;
+
+    /// Returns the center of the ball of a part. [Units: wu]
+    fn center(&self, t: u32) -> DVec3;
+
+    /// Returns what a part belongs to: a fork lies within one of these.
+    fn owner(&self, t: u32) -> u32;
+
+    /// Returns the neighbors of a part, each with the radius of the widest ball that passes. [Units: wu]
+    fn ways(&self, t: u32) -> impl Iterator<Item = (u32, f64)>;
+
+    fn allowance(&self) -> &Allowance;
+}
+
 /// A place where tubes meet.
-pub(super) struct Fork {
+pub(crate) struct Fork {
     /// The part that contains the ball in its middle.
-    pub(super) part: u32,
+    pub(crate) part: u32,
     /// Radius of that ball. [Units: wu]
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
     /// Radius of the removed ball. [Units: wu]
-    pub(super) removed: f64,
+    pub(crate) removed: f64,
     /// Parts in the removed ball.
-    pub(super) middle: Vec<u32>,
+    pub(crate) middle: Vec<u32>,
     /// Arms, widest first.
-    pub(super) arms: Vec<ArmPiece>,
+    pub(crate) arms: Vec<ArmPiece>,
     /// Least distance between the mouths of two arms. [Units: radii]
     spread: f64,
 }
@@ -75,63 +94,67 @@ struct Surroundings {
 }
 
 /// Returns the distance from the middle of a fork within which its arms are examined. [Units: wu]
-pub(super) fn reach(removed: f64, radius: f64) -> f64 {
+pub(crate) fn reach(removed: f64, radius: f64) -> f64 {
     removed + 2.0 * DEEP * radius
 }
 
-impl TubeRegions<'_> {
-    /// Returns all forks; the balls removed for any two of them are disjoint.
-    pub(super) fn forks(&self, walls: &Walls<'_>) -> Vec<Fork> {
-        let n = self.owner.len();
-        let mut search = Search {
-            was_tested: vec![false; n],
-            places: Places::new(n),
+/// Returns all forks with their middle at one of some parts, given widest first; the balls removed for any two of them are
+/// disjoint.
+pub(crate) fn find_forks(
+    balls: &impl Balls,
+    middles: impl Iterator<Item = u32>,
+    walls: &Walls<'_>,
+) -> Vec<Fork> {
+    let n = balls.n_parts();
+    let mut search = Search {
+        was_tested: vec![false; n],
+        places: Places::new(n),
+    };
+    let mut found: Vec<Fork> = Vec::new();
+    for c in middles {
+        if !search.was_tested[c as usize] {
+            found.extend(balls.fork_at(c, walls, &mut search));
+        }
+    }
+    disjoint(balls, found)
+}
+
+/// Returns the best of some forks.
+fn disjoint(balls: &impl Balls, mut found: Vec<Fork>) -> Vec<Fork> {
+    // The best first: a ball beside the middle of a crossing may leave two of its arms in one piece.
+    found.sort_by(|a, b| {
+        (b.arms.len().cmp(&a.arms.len()))
+            .then((a.removed / a.radius).total_cmp(&(b.removed / b.radius)))
+            .then(b.spread.total_cmp(&a.spread))
+            .then(a.part.cmp(&b.part))
+    });
+    let mut forks: Vec<Fork> = Vec::new();
+    for fork in found {
+        let is_near = |other: &Fork| {
+            let [p, q] = [fork.part, other.part].map(|t| balls.center(t));
+            p.distance(q) < fork.removed + other.removed
         };
-        let mut found: Vec<Fork> = Vec::new();
-        for c in self.by_radius(0..n as u32) {
-            if self.is_enclosed(c) && !search.was_tested[c as usize] {
-                found.extend(self.fork_at(c, walls, &mut search));
-            }
+        let may_go_on = balls.allowance().spend(1 + forks.len() as u64 / 16);
+        if may_go_on && !forks.iter().any(is_near) {
+            forks.push(fork);
         }
-        // The best first: a ball beside the middle of a crossing may leave two of its arms in one piece.
-        found.sort_by(|a, b| {
-            (b.arms.len().cmp(&a.arms.len()))
-                .then((a.removed / a.radius).total_cmp(&(b.removed / b.radius)))
-                .then(b.spread.total_cmp(&a.spread))
-                .then(a.part.cmp(&b.part))
-        });
-        let mut forks: Vec<Fork> = Vec::new();
-        for fork in found {
-            let is_near = |other: &Fork| {
-                let [p, q] = [fork.part, other.part].map(|t| self.centers[t as usize]);
-                p.distance(q) < fork.removed + other.removed
-            };
-            let may_go_on = self.allowance.spend(1 + forks.len() as u64 / 16);
-            if may_go_on && !forks.iter().any(is_near) {
-                forks.push(fork);
-            }
-        }
-        forks
     }
+    forks
+}
 
-    /// Returns `true` if a part lies in a room, or in a branch of the outdoors.
-    fn is_enclosed(&self, t: u32) -> bool {
-        let owner = self.owner[t as usize];
-        owner != NONE && (self.regions[owner as usize].branch.is_some() || !self.is_outdoors(t))
-    }
-
+/// The search, for all that has balls.
+trait ForkSearch: Balls + Sized {
     /// Returns the neighbors of a part that a ball [`NARROWS`] times narrower than `radius` reaches.
     fn wide_ways(&self, t: u32, radius: f64) -> impl Iterator<Item = u32> {
-        let ways = self.ways(t).iter();
-        ways.filter(move |w| self.passes(w.1) * NARROWS >= radius)
-            .map(|w| w.0)
+        let ways = self.ways(t);
+        ways.filter(move |w| w.1 * NARROWS >= radius).map(|w| w.0)
     }
 
     /// Returns the parts that a ball [`NARROWS`] times narrower than that of part `c` reaches. `None` if `c` cannot be
     /// the middle of a fork: if a wider ball is beside it, or a much wider one nearer than the arms are long.
     fn surroundings(&self, c: u32, search: &mut Search) -> Option<Surroundings> {
-        let (radius, region) = (self.radius(c), self.owner[c as usize]);
-        let center = self.centers[c as usize];
+        let (radius, region) = (self.radius(c), self.owner(c));
+        let center = self.center(c);
         let [least, .., most] = REMOVED.map(|k| (k + 2.0 * DEEP) * radius);
         let Search { was_tested, places } = search;
         let mut wide = f64::INFINITY;
@@ -141,7 +164,7 @@ impl TubeRegions<'_> {
         let mut next = 0;
         while let Some(&(distance, t)) = parts.get(next) {
             next += 1;
-            if !self.allowance.spend(2) {
+            if !self.allowance().spend(2) {
                 return None;
             }
             if distance < STRIDE * radius {
@@ -157,8 +180,8 @@ impl TubeRegions<'_> {
                 wide = wide.min(distance);
             }
             for other in self.wide_ways(t, radius) {
-                if self.owner[other as usize] == region && places.get(other).is_none() {
-                    let distance = self.centers[other as usize].distance(center);
+                if self.owner(other) == region && places.get(other).is_none() {
+                    let distance = self.center(other).distance(center);
                     if distance <= most {
                         places.set(other, parts.len());
                         parts.push((distance, other));
@@ -179,7 +202,7 @@ impl TubeRegions<'_> {
             if around.wide < reach {
                 return None;
             }
-            self.allowance.spend(around.parts.len() as u64);
+            self.allowance().spend(around.parts.len() as u64);
             let parts = &around.parts[..around.parts.partition_point(|a| a.0 <= reach)];
             let (middle, outer) = parts.split_at(parts.partition_point(|a| a.0 <= removed));
             let mut pieces = self.pieces(outer, radius, &mut search.places);
@@ -250,7 +273,9 @@ impl TubeRegions<'_> {
         walls: &Walls<'_>,
     ) -> Option<Fork> {
         let radius = self.radius(c);
-        let arms = pieces.iter().map(|p| self.arm(p, removed, radius, walls));
+        let arms = pieces
+            .iter()
+            .map(|p| measure_arm(self, p, removed, radius, walls));
         let mut arms: Vec<ArmPiece> = arms.filter(|a| a.kind != Arm::Stub).collect();
         arms.sort_by(|a, b| {
             b.radius
@@ -277,3 +302,5 @@ impl TubeRegions<'_> {
         })
     }
 }
+
+impl<B: Balls> ForkSearch for B {}

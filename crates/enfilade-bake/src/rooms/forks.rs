@@ -1,0 +1,241 @@
+//! Forks of tubes: each arm is a room, though nothing is narrower at its mouth.
+//!
+//! At the fork of an airway, of a vessel or of a burrow, balls of the tubes pass from arm to arm, so that no opening parts them.
+//! The rule of [`crate::tubes`] finds the forks among balls of air in blocks of voxels. There, a ball is taken out of the
+//! region, so large that walls part what it leaves: the arms, each a region of its own, except that the widest keeps the ball.
+//!
+//! Cost: another distance transform; the search is linear in the blocks along tubes.
+
+use std::collections::BTreeMap;
+
+use enfilade_geom::{Allowance, DVec3};
+
+use super::flooded::contact_faces;
+use super::fork_pieces::ForkPieces;
+use super::limbs::contacts_of;
+use super::regions::Regions;
+use super::voxel_balls::BlockBalls;
+use crate::structure::OUTDOORS;
+use crate::tubes::{Arm, Balls, Fork, REMOVED, Walls, find_forks};
+use crate::voxel::{DistanceField, Grid, Labels};
+
+/// Radius of the widest tubes that are looked for in blocks of one size: wider ones are, in blocks twice as large. [Units: blocks]
+const BLOCKS: f64 = 5.0;
+
+/// A fork in the space of the grid.
+pub(super) struct ForkPlace {
+    /// [Units: wu]
+    pub(super) center: DVec3,
+    /// Radius of the ball in the middle, and of that which is taken out. [Units: wu]
+    radius: f64,
+    pub(super) removed: f64,
+    /// Arms, widest first.
+    pub(super) arms: Vec<ForkArm>,
+}
+
+/// What leaves a fork.
+pub(super) struct ForkArm {
+    pub(super) kind: Arm,
+    /// [Units: wu]
+    pub(super) radius: f64,
+    /// Centers of its balls, nearest to the fork first. [Units: wu]
+    points: Vec<DVec3>,
+}
+
+impl ForkPlace {
+    /// Returns the first ball of an arm that is farther than `removed` from the middle.
+    pub(super) fn seed(&self, grid: &Grid, arm: &ForkArm, removed: f64) -> Option<[usize; 3]> {
+        let is_out = |p: &&DVec3| p.distance(self.center) > removed + 2.0 * grid.voxel;
+        grid.voxel_at(*arm.points.iter().find(is_out)?)
+    }
+
+    /// Widens the ball to take out until nothing but it connects the arms nearby: they begin where a wall parts them.
+    fn widen(&mut self, grid: &Grid, is_in: &dyn Fn([usize; 3]) -> bool) {
+        let from = self.removed;
+        for removed in REMOVED
+            .map(|k| k * self.radius)
+            .into_iter()
+            .filter(|&r| r >= from)
+        {
+            let seeds: Vec<_> = self
+                .arms
+                .iter()
+                .map(|a| self.seed(grid, a, removed))
+                .collect();
+            let shell = [removed, removed + self.radius];
+            let are_apart = seeds.iter().enumerate().all(|(i, seed)| {
+                let reached = seed.map(|s| flood_shell(grid, is_in, self.center, shell, s));
+                let reached = reached.unwrap_or_default();
+                let meets =
+                    |other: &Option<[usize; 3]>| other.is_some_and(|o| reached.contains(&o));
+                !seeds[..i].iter().any(meets)
+            });
+            if are_apart {
+                self.removed = removed;
+                return;
+            }
+        }
+    }
+}
+
+/// Splits the arms of forks off, in the labels of a flooded volume; returns the volume of the regions that had forks, and of all
+/// rooms, zero if none had. Radii count from `least` on. [Units: wu]
+pub(super) fn split_forks(
+    grid: &Grid,
+    labels: &mut Labels,
+    regions: &mut Regions,
+    peaks: &mut Vec<f32>,
+    field: DistanceField,
+    (walls, least): (&Walls<'_>, f64),
+    allowance: &Allowance,
+) -> [f64; 2] {
+    let places = find_places(grid, labels, regions, field, (walls, least), allowance);
+    let mut by_region: BTreeMap<u32, Vec<ForkPlace>> = BTreeMap::new();
+    for place in places {
+        let at = grid.voxel_at(place.center);
+        let region = at.map_or(0, |at| regions.region_of_basin[labels.at(at) as usize]);
+        if region > OUTDOORS {
+            by_region.entry(region).or_default().push(place);
+        }
+    }
+    let mut n_in_tubes = 0;
+    for (region, mut places) in by_region {
+        let is_in = |at: [usize; 3]| regions.region_of_basin[labels.at(at) as usize] == region;
+        places.iter_mut().for_each(|p| p.widen(grid, &is_in));
+        let pieces = ForkPieces::of(grid, labels, regions, region, &places);
+        let (n_voxels, rooms) = pieces.rooms(grid, &places);
+        if !rooms.is_empty() {
+            n_in_tubes += n_voxels;
+        }
+        for (radius, voxels) in rooms {
+            let basin = peaks.len() as u32;
+            for (at, to) in voxels {
+                for x in at[0]..to {
+                    labels.set([x, at[1], at[2]], basin);
+                }
+            }
+            peaks.push((radius / grid.voxel) as f32);
+            regions.region_of_basin.push(basin);
+        }
+    }
+    if n_in_tubes == 0 {
+        return [0.0; 2];
+    }
+    regions.contacts = contacts_of(regions, &contact_faces(labels));
+    let mut n_in_rooms = 0;
+    labels.for_runs(0..labels.len(), |run, label| {
+        if regions.region_of_basin[label as usize] > OUTDOORS {
+            n_in_rooms += run.len();
+        }
+    });
+    [n_in_tubes, n_in_rooms].map(|n| n as f64 * grid.voxel.powi(3))
+}
+
+/// Returns all forks; the balls to take out are disjoint.
+fn find_places(
+    grid: &Grid,
+    labels: &Labels,
+    regions: &Regions,
+    field: DistanceField,
+    (walls, least): (&Walls<'_>, f64),
+    allowance: &Allowance,
+) -> Vec<ForkPlace> {
+    let mut found: Vec<ForkPlace> = Vec::new();
+    if allowance.is_over() {
+        return found;
+    }
+    let mut widest = field.widest_of_blocks();
+    drop(field);
+    let mut edge = 2;
+    let mut least = least / grid.voxel;
+    while widest.dims.iter().any(|&n| n > 1) {
+        let most = BLOCKS * edge as f64;
+        let rooms = (labels, regions);
+        let balls = BlockBalls::of(grid, &widest, edge, [least, most], rooms, allowance);
+        let middles = balls.middles([least, most].map(|r| r * grid.voxel));
+        for fork in find_forks(&balls, middles.into_iter(), walls) {
+            let place = place_of(&balls, &fork);
+            let is_near =
+                |p: &ForkPlace| p.center.distance(place.center) < p.removed + place.removed;
+            if !found.iter().any(is_near) {
+                found.push(place);
+            }
+        }
+        widest = widest.coarser();
+        edge *= 2;
+        least = most;
+    }
+    found
+}
+
+fn place_of(balls: &BlockBalls<'_>, fork: &Fork) -> ForkPlace {
+    let center = balls.center(fork.part);
+    let arms = fork.arms.iter().map(|arm| ForkArm {
+        kind: arm.kind,
+        radius: arm.radius,
+        points: arm.parts.iter().map(|&t| balls.center(t)).collect(),
+    });
+    ForkPlace {
+        center,
+        radius: fork.radius,
+        removed: fork.removed,
+        arms: arms.collect(),
+    }
+}
+
+/// Returns the voxels of a region that a ball reaches from its center.
+pub(super) fn ball(
+    grid: &Grid,
+    is_in: &dyn Fn([usize; 3]) -> bool,
+    place: &ForkPlace,
+) -> Vec<[usize; 3]> {
+    let start = grid.voxel_at(place.center);
+    let flood = |s| flood_shell(grid, is_in, place.center, [-1.0, place.removed], s);
+    start.map_or_else(Vec::new, flood)
+}
+
+/// Returns the voxels of a region, farther than the first and not farther than the second distance from a center, that
+/// connect to `start`. [Units: wu]
+fn flood_shell(
+    grid: &Grid,
+    is_in: &dyn Fn([usize; 3]) -> bool,
+    center: DVec3,
+    shell: [f64; 2],
+    start: [usize; 3],
+) -> Vec<[usize; 3]> {
+    let center = grid.to_voxel(center);
+    let [near, far] = shell.map(|d| d / grid.voxel);
+    let reach = far.ceil() as usize + 1;
+    let low = center
+        .to_array()
+        .map(|c| (c as usize).saturating_sub(reach));
+    let side = 2 * reach + 2;
+    let mut was_met = vec![false; side.pow(3)];
+    let mut found = Vec::new();
+    let mut add = |at: [usize; 3], found: &mut Vec<[usize; 3]>| {
+        let distance = DVec3::from_array(at.map(|c| c as f64 + 0.5)).distance(center);
+        if distance > near && distance <= far && is_in(at) {
+            let [x, y, z] = [0, 1, 2].map(|k| at[k] - low[k]);
+            if !std::mem::replace(&mut was_met[x + side * (y + side * z)], true) {
+                found.push(at);
+            }
+        }
+    };
+    add(start, &mut found);
+    let mut next = 0;
+    while let Some(&at) = found.get(next) {
+        next += 1;
+        for k in 0..3 {
+            let mut to = at;
+            to[k] += 1;
+            if to[k] < grid.dims[k] {
+                add(to, &mut found);
+            }
+            if at[k] > 0 {
+                to[k] = at[k] - 1;
+                add(to, &mut found);
+            }
+        }
+    }
+    found
+}
