@@ -30,7 +30,7 @@ pub struct Scan {
 /// How a scan becomes a field. [Units: those of the scan]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanOptions {
-    /// Edge of the voxels; larger if there would be more than [`SourceLimits::max_voxels`].
+    /// Edge of the voxels; larger if there would be more than [`SourceLimits::max_voxels`], or than 10,000 for each point.
     pub step: f64,
     /// Points farther from all stations than this along an axis are left out; ways to them end there.
     pub reach: f64,
@@ -42,6 +42,9 @@ pub struct ScanOptions {
 pub(crate) const REACH: f64 = 2.0;
 /// Voxels around the points, so that planes end before the sides. [Units: voxels]
 const MARGIN: f64 = 4.0;
+/// Most voxels for each point, so that a single damaged point does not make a small file the work of a large one: a hundred
+/// times those of a room with a point every decimeter.
+const VOXELS_OF_POINT: u64 = 10_000;
 
 impl Scan {
     /// Returns the box of points and stations that matters.
@@ -58,7 +61,9 @@ impl Scan {
     #[must_use]
     pub fn step(&self, options: &ScanOptions, limits: &SourceLimits) -> f64 {
         let size = self.bounds(options).size() + 2.0 * MARGIN * options.step;
-        let least = (size.element_product() / limits.max_voxels as f64).cbrt();
+        let of_points = VOXELS_OF_POINT.saturating_mul(self.points.len().max(1) as u64);
+        let most = limits.max_voxels.min(of_points);
+        let least = (size.element_product() / most as f64).cbrt();
         options.step.max(least)
     }
 

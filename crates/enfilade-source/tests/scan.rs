@@ -190,3 +190,21 @@ fn distant_points_make_the_voxels_no_smaller_than_the_limit_allows() {
     assert!(scan.step(&OPTIONS, &limits) > 0.1);
     scan.surface(&OPTIONS, &limits).unwrap();
 }
+
+#[test]
+fn a_damaged_point_does_not_make_a_small_scan_large() {
+    let mut scan = Scan {
+        points: (0..200)
+            .map(|i| DVec3::new(f64::from(i % 5), f64::from(i % 7), f64::from(i % 3)) * 0.1)
+            .collect(),
+        station_of: vec![0; 200],
+        stations: vec![DVec3::ZERO],
+    };
+    let limits = SourceLimits::default();
+    assert_eq!(scan.step(&OPTIONS, &limits), 0.05);
+    scan.points[0] = DVec3::splat(1e30);
+    scan.points[1] = DVec3::splat(-1e30);
+    let n = (scan.bounds(&OPTIONS).size() / scan.step(&OPTIONS, &limits)).element_product();
+    assert!(n <= 200.0 * 10_000.0, "{n}");
+    assert_eq!(scan.bounds(&OPTIONS).size(), DVec3::splat(24.0));
+}
