@@ -8,7 +8,7 @@ use enfilade_geom::{Allowance, DVec3};
 use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
 use super::candidates::fit_candidates;
-use super::forks::split_forks;
+use super::forks::{is_curved, split_forks};
 use super::hollow::{Matter, find_matter};
 use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
@@ -42,7 +42,8 @@ pub(crate) fn propose(
         resolution,
         ..
     } = air;
-    let field = solid.field(allowance);
+    let framed = structure.frame.triangles_to_grid(&structure.triangles);
+    let field = is_curved(&framed).then(|| solid.field(allowance));
     basins.refill(&solid.occupied);
     basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
@@ -69,18 +70,21 @@ pub(crate) fn propose(
     );
     join_low(&grid, &basins.labels, &mut regions, allowance);
     let walls = Walls {
-        triangles: &structure.triangles,
+        triangles: &framed,
         bvh: &structure.bvh,
     };
-    let tubes = split_forks(
-        &grid,
-        &mut basins.labels,
-        &mut regions,
-        &mut basins.peaks,
-        field,
-        (&walls, config.merge.min_radius),
-        allowance,
-    );
+    let tubes = field.map_or([0.0; 2], |field| {
+        split_forks(
+            &grid,
+            &mut basins.labels,
+            &mut regions,
+            &mut basins.peaks,
+            field,
+            (&walls, config.merge.min_radius),
+            allowance,
+        )
+    });
+    drop(framed);
     context.check()?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;

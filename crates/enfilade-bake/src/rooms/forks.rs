@@ -4,11 +4,12 @@
 //! The rule of [`crate::tubes`] finds the forks among balls of air in blocks of voxels. There, a ball is taken out of the
 //! region, so large that walls part what it leaves: the arms, each a region of its own, except that the widest keeps the ball.
 //!
-//! Cost: another distance transform; the search is linear in the blocks along tubes.
+//! Cost: nothing where most walls are flat and along the axes, else another distance transform; the search is linear in the blocks along
+//! tubes.
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Allowance, DVec3};
+use enfilade_geom::{Allowance, DVec3, Triangle, triangle_area_normal};
 
 use super::flooded::contact_faces;
 use super::fork_pieces::ForkPieces;
@@ -21,6 +22,25 @@ use crate::voxel::{DistanceField, Grid, Labels};
 
 /// Radius of the widest tubes that are looked for in blocks of one size: wider ones are, in blocks twice as large. [Units: blocks]
 const BLOCKS: f64 = 5.0;
+
+/// Least sine of the angle between the normal of a curved wall and the nearest axis: 15°. Two thirds of a round tube are curved,
+/// wherever it leads.
+const CURVED: f64 = 0.26;
+
+/// Returns `true` if most of a scene is curved or oblique, given triangles in the axes of the grid, so that there may be tubes. Most
+/// of a building is flat and along the axes, even of one with vaults, and the search would take a quarter of its time.
+pub(super) fn is_curved(triangles: &[Triangle]) -> bool {
+    let (mut curved, mut all) = (0.0, 0.0);
+    for t in triangles {
+        let normal = triangle_area_normal(t);
+        let (along, area) = (normal.abs().max_element(), normal.length());
+        all += area;
+        if area * area - along * along > (CURVED * area).powi(2) {
+            curved += area;
+        }
+    }
+    2.0 * curved > all
+}
 
 /// A fork in the space of the grid.
 pub(super) struct ForkPlace {
