@@ -284,7 +284,7 @@ fn cells_at(g: &Generated, points: &[DVec3]) -> Vec<u32> {
 fn arms_of_forks_are_cells_by_the_watershed() {
     let middle = |t: &Tube| (t.ends[0] + t.ends[1]) * 0.5;
     let twice = |tubes_of: &[Tube]| times(tubes(tubes_of, 0.12), 2.0);
-    // Nobody stands in these tubes, except that the stem of the second is as high as a room: low branches are no voids.
+    // Nobody stands in these tubes, except that the stem of the second is as high as a room: low branches are not voids.
     let mut high = tree();
     high[0].radius = 0.53;
     for (tubes_of, what) in [(tree(), "tree"), (high, "with a high stem")] {

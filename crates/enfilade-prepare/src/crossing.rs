@@ -132,7 +132,7 @@ mod tests {
         let sheet = |k: usize| {
             let x = k as f64;
             let p = |dx: f64, y: f64, z: f64| DVec3::new(x + dx, y, z);
-            if k % 2 == 0 {
+            if k.is_multiple_of(2) {
                 [p(0.0, 0.0, 0.0), p(1.5, 0.0, 0.0), p(0.0, 1.0, 0.0)]
             } else {
                 [p(0.0, 0.3, -1.0), p(0.0, 0.3, 1.0), p(0.1, 0.5, 1.0)]

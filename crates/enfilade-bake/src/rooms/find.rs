@@ -3,7 +3,9 @@
 //!
 //! A builder begins with [`prepare`](super::prepare), divides the air into [`Basins`] in its own way, and ends with [`propose`].
 
-use enfilade_geom::{Allowance, DVec3};
+use std::borrow::Cow;
+
+use enfilade_geom::{Allowance, DVec3, Triangle};
 
 use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
@@ -19,7 +21,7 @@ use super::votes::{Ballots, inside_of};
 use crate::proposal::Proposal;
 use crate::structure::{Frame, Structure};
 use crate::tubes::Walls;
-use crate::voxel::{Grid, Labels};
+use crate::voxel::{DistanceField, Grid, Labels, SparseVolume};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// Proposes the rooms that the given parts of the air make.
@@ -42,8 +44,7 @@ pub(crate) fn propose(
         resolution,
         ..
     } = air;
-    let framed = structure.frame.triangles_to_grid(&structure.triangles);
-    let field = is_curved(&framed).then(|| solid.field(allowance));
+    let field = is_curved(&framed(structure)).then(|| solid.field(allowance));
     basins.refill(&solid.occupied);
     basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
@@ -57,35 +58,14 @@ pub(crate) fn propose(
     drop(occupied);
 
     context.begin(Stage::Rooms)?;
-    let mut regions = basins.merge(&grid, &shut, &slabs, config, allowance);
-    context.check()?;
-    split_limbs(
+    let (regions, tubes) = rooms_of(
+        structure,
         &grid,
-        &mut basins.labels,
-        &mut regions,
-        &mut basins.peaks,
-        &shut,
-        (&config.merge, LimbRule::ROOMS),
-        allowance,
-    );
-    join_low(&grid, &basins.labels, &mut regions, allowance);
-    let walls = Walls {
-        triangles: &framed,
-        bvh: &structure.bvh,
-    };
-    let tubes = field.map_or([0.0; 2], |field| {
-        split_forks(
-            &grid,
-            &mut basins.labels,
-            &mut regions,
-            &mut basins.peaks,
-            field,
-            (&walls, config.merge.min_radius),
-            allowance,
-        )
-    });
-    drop(framed);
-    context.check()?;
+        &mut basins,
+        (&shut, &slabs, field),
+        config,
+        context,
+    )?;
     drop(shut);
     let Basins { labels, peaks, .. } = basins;
     let matter = find_matter(
@@ -139,6 +119,56 @@ pub(crate) fn propose(
             ballots.count(&grid, frame),
         )
     })
+}
+
+/// Returns all structural triangles in the axes of the grid.
+fn framed<'a>(structure: &'a Structure<'_>) -> Cow<'a, [Triangle]> {
+    structure.frame.triangles_to_grid(&structure.triangles)
+}
+
+/// Makes rooms of basins; returns them with the volumes of tubes and of all rooms, see [`split_forks`]. Forks are looked for
+/// where a `field` is given.
+///
+/// # Errors
+/// If the caller cancels.
+fn rooms_of(
+    structure: &Structure<'_>,
+    grid: &Grid,
+    basins: &mut Basins,
+    (shut, slabs, field): (&SparseVolume, &[f64], Option<DistanceField>),
+    config: &BakeConfig,
+    context: &BakeContext<'_>,
+) -> Result<(Regions, [f64; 2]), BakeError> {
+    let allowance = context.allowance();
+    let mut regions = basins.merge(grid, shut, slabs, config, allowance);
+    context.check()?;
+    split_limbs(
+        grid,
+        &mut basins.labels,
+        &mut regions,
+        &mut basins.peaks,
+        shut,
+        (&config.merge, LimbRule::ROOMS),
+        allowance,
+    );
+    join_low(grid, &basins.labels, &mut regions, allowance);
+    let tubes = field.map_or([0.0; 2], |field| {
+        let walls = Walls {
+            triangles: &framed(structure),
+            bvh: &structure.bvh,
+        };
+        split_forks(
+            grid,
+            &mut basins.labels,
+            &mut regions,
+            &mut basins.peaks,
+            field,
+            (&walls, config.merge.min_radius),
+            allowance,
+        )
+    });
+    context.check()?;
+    Ok((regions, tubes))
 }
 
 /// Returns points of air that no opening connects to its region: inside stairs, and in shallow voids.

@@ -1,11 +1,11 @@
-//! What is left of a region without the balls of its forks.
+//! The rest of a region without the balls of its forks.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use enfilade_geom::Sets;
 
-use super::forks::{ForkPlace, ball};
+use super::fork_place::{ForkPlace, ball};
 use super::regions::Regions;
 use crate::tubes::Arm;
 use crate::voxel::{Grid, Labels};
@@ -13,7 +13,7 @@ use crate::voxel::{Grid, Labels};
 /// A run of voxels of one row: first voxel, and the end along x.
 pub(super) type VoxelRun = ([usize; 3], usize);
 
-/// What is left of a region without the balls of its forks.
+/// The rest of a region without the balls of its forks.
 pub(super) struct ForkPieces {
     /// Runs, ascending by row, and the first of each row.
     runs: Vec<VoxelRun>,
@@ -131,7 +131,7 @@ impl ForkPieces {
                 of.push(self.sets.find(run));
             }
             apart.retain(|piece| !own.contains(piece));
-            // What touches the ball stays with it, except for the other arms.
+            // A piece that touches the ball stays with it, except for the other arms.
             let beside: Vec<u32> = self.balls[k]
                 .iter()
                 .flat_map(|&at| self.beside(at))

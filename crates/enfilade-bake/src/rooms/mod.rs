@@ -12,6 +12,7 @@ mod candidates;
 mod find;
 mod flooded;
 mod fork_pieces;
+mod fork_place;
 mod forks;
 mod fronts;
 mod hollow;

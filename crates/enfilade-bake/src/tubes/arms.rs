@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use enfilade_geom::{Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 
-use super::forks::Balls;
+use super::balls::Balls;
 use super::rule::{Arm, ArmFacts, classify_arm};
 
 /// Rays about an axis: enough for a polygon of a dozen sides to count as round.
