@@ -336,7 +336,7 @@ fn each_triangle_of_a_large_tree_is_in_it_once() {
     let bvh = Bvh::build(&triangles);
     let mut found = Vec::new();
     bvh.for_each_in_box(&Aabb::of_points(triangles.as_flattened()), |t| {
-        found.push(t)
+        found.push(t);
     });
     found.sort_unstable();
     assert!(found.iter().copied().eq(0..30_000));
