@@ -263,13 +263,14 @@ const TIER: f64 = 0.85;
 /// least a storey high in feet. Only if no unit was given and the format does not have one that all its writers know.
 ///
 /// A house in feet is a plausible hall, so nothing but its stairs and doors shows it. Stairs that fit in meters speak
-/// against it.
+/// against it. Surfaces made of other sources, such as scans, are one object with all its stairs, and do not tell.
 pub(crate) fn feet_hint(
     scene: &Scene,
     report: &ImportReport,
     options: &ImportOptions,
 ) -> Option<String> {
-    let is_known = options.unit.is_some() || report.files.iter().any(|f| f.format == MAP);
+    let tells_nothing = |f: &FileReport| f.format == MAP || f.surface.is_some();
+    let is_known = options.unit.is_some() || report.files.iter().any(tells_nothing);
     if is_known || report.unit_doubt.is_some() {
         return None;
     }
@@ -356,6 +357,7 @@ pub(crate) fn up_doubt(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::SurfaceReport;
     use enfilade_geom::DMat4;
     use enfilade_testkit::{TowerParams, furnished_house, mixed, office_tower};
 
@@ -380,7 +382,24 @@ mod tests {
         let text = hint(&scene, None).unwrap();
         assert!(text.contains("--unit ft"), "{text}");
         assert_eq!(hint(&scene, Some(1.0)), None, "who says meters means them");
-        assert_eq!(hint(&scaled(scene, FOOT), None), None);
+        assert_eq!(hint(&scaled(scene.clone(), FOOT), None), None);
+        // As if it were the surface of a scan.
+        let surface = SurfaceReport {
+            step: None,
+            distance: 0.0,
+            n_samples: 0,
+            enlarged: None,
+            text: String::new(),
+        };
+        let file = FileReport {
+            surface: Some(surface),
+            ..FileReport::default()
+        };
+        let report = ImportReport {
+            files: vec![file],
+            ..ImportReport::default()
+        };
+        assert_eq!(feet_hint(&scene, &report, &ImportOptions::default()), None);
     }
 
     #[test]
