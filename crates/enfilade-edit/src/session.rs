@@ -214,15 +214,20 @@ impl EditSession {
 
     /// Makes an operation, and writes it to the journal. What was undone cannot be redone after that.
     ///
-    /// Pieces take time by what is beside them; a change by hand takes that of the world of its instance, or of a finished world.
+    /// Pieces take time by what is beside them; a change by hand takes that of the world of its instance, or of a finished world; one that is
+    /// in no instance, that of [`EditSession::world`].
     ///
     /// # Errors
     ///
     /// Why it is refused: nothing changes then. That the journal cannot be written: then it is not made either.
     pub fn apply(&mut self, operation: EditOperation) -> Result<(), EditError> {
         if let EditOperation::Make(edit) = &operation {
-            self.placed(edit)?;
+            let kind = self.placed(edit)?;
             let host = edit.host;
+            if host.is_none() && self.base.is_none() {
+                // Open air knows nothing of the matter of pieces, which may be there.
+                kind.make(&mut World::clone(&self.world()?.world))?;
+            }
             let before = kinds_of(&self.edits, host);
             let base = own_base(&self.around, &self.level, host);
             let base = base.ok_or(HandEditError::HostGone)?;

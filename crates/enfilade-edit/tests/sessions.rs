@@ -198,6 +198,11 @@ fn changes_by_hand_that_cannot_be_made_are_refused_with_place_and_reason() {
             HandEditKind::Lamp(DVec3::new(0.0, -0.1, 0.0)),
             "a lamp needs air",
         ),
+        // In the slab, but in no cell of the piece.
+        (
+            HandEditKind::Crate(corner(0.0, -0.4), 0.0),
+            "a crate needs air",
+        ),
         (HandEditKind::Lamp(DVec3::NAN), "finite"),
         (
             HandEditKind::Portal(vec![corner(0.0, 1.0), corner(1.0, 1.0), corner(0.0, 2.0)]),
