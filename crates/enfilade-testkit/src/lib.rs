@@ -77,4 +77,4 @@ pub use town::{Town, town, village};
 pub use traced::{Chain, Traced, TracedCamera, painted};
 pub use transform::{reordered, rotated, scaled, shuffled, transformed};
 pub use truth::{Convex, Opening, OpeningKind, Room, Side, Truth};
-pub use tubes::{Tube, tubes};
+pub use tubes::{Tube, surface_of, tubes};

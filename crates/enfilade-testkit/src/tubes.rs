@@ -36,9 +36,17 @@ pub fn tubes(tubes: &[Tube], grid: f64) -> Generated {
         let distance = |t: &Tube| distance_to_segment(p, t.ends[0], t.ends[1]) - t.radius;
         tubes.iter().map(distance).fold(f64::INFINITY, f64::min)
     };
-    let mut site = Site::new("tubes");
+    surface_of("tubes", field, bounds.expanded(2.0 * grid), grid)
+}
+
+/// The surface of any field, negative in the air, which the faces face.
+///
+/// `bounds` contains the air with a margin of one `grid`, the size of the triangles. The truth is empty. [Units: wu]
+#[must_use]
+pub fn surface_of(name: &str, field: impl Fn(DVec3) -> f64, bounds: Aabb, grid: f64) -> Generated {
+    let mut site = Site::new(name);
     let material = site.material("wall", [0.62, 0.25, 0.22]);
-    let net = surface_net(field, bounds.expanded(2.0 * grid), grid, material);
+    let net = surface_net(field, bounds, grid, material);
     let mesh = site.add_mesh(Mesh {
         name: "walls".into(),
         primitives: vec![net],

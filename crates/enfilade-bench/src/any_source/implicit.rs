@@ -45,7 +45,7 @@ fn scene(name: &str) -> anyhow::Result<([usize; 2], String)> {
 }
 
 /// Three rooms with two doorways, a door to the outdoors, and two windows.
-const HOUSE: &str = r#"{"enfilade":"implicit","matter":{"difference":[
+pub(super) const HOUSE: &str = r#"{"enfilade":"implicit","matter":{"difference":[
     {"box":{"min":[0,-0.3,0],"max":[10,3.1,8]}},
     {"box":{"min":[0.3,0,0.3],"max":[4.9,2.6,7.7]}},
     {"box":{"min":[5.1,0,0.3],"max":[9.7,2.6,3.9]}},
@@ -57,7 +57,7 @@ const HOUSE: &str = r#"{"enfilade":"implicit","matter":{"difference":[
     {"box":{"min":[2,0.9,7.6],"max":[3.2,2.1,8.1]}}]}}"#;
 
 /// A cave that was not made of rooms: it has those of its surface in finer steps.
-const GYROID: &str = r#"{"enfilade":"implicit","box":[[0,0,0],[8,8,8]],"outside":"matter","step":0.15,
+pub(super) const GYROID: &str = r#"{"enfilade":"implicit","box":[[0,0,0],[8,8,8]],"outside":"matter","step":0.15,
     "matter":{"gyroid":{"period":8}}}"#;
 
 /// Rooms and openings found.
@@ -69,7 +69,7 @@ fn counts(text: &str) -> anyhow::Result<[usize; 2]> {
     ])
 }
 
-fn read(text: &str) -> anyhow::Result<Imported> {
+pub(super) fn read(text: &str) -> anyhow::Result<Imported> {
     Ok(decode_implicit(text.as_bytes(), &ImportOptions::default())?)
 }
 

@@ -3,9 +3,11 @@
 //! To add rows, add a file for their family beside this one and lines in [`ROWS`].
 
 mod implicit;
+mod implicit_twins;
 mod land;
 mod parametric;
 mod scan;
+mod twins;
 mod volume;
 
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
@@ -17,6 +19,8 @@ use crate::rows::{Measure, Row};
 
 /// Implicit scenes with as many rooms and openings as they were made with.
 const SHAPES: &[&str] = &["balls", "cavern", "house", "gyroid"];
+/// Implicit scenes, each with a twin of triangles.
+const TWINS: &[&str] = &["balls", "cavern", "house", "gyroid", "knot", "beads"];
 /// Scenes of patches, each with a twin of triangles.
 const PATCHES: &[&str] = &["patch-house", "patch-vault", "patch-tube"];
 const AORTA: &[&str] = &["aorta"];
@@ -58,6 +62,16 @@ pub(crate) const ROWS: &[Row] = &[
     made("volume: branches missed", AIRWAYS, volume::missed),
     made("implicit: cells", SHAPES, implicit::cells),
     made("implicit: portals", SHAPES, implicit::portals),
+    made(
+        "implicit: beside triangles",
+        TWINS,
+        implicit_twins::differences,
+    ),
+    made(
+        "implicit: exponent of the time in the surface",
+        &["balls", "knot"],
+        implicit_twins::time,
+    ),
     made("implicit: samples by volume", &["balls"], implicit::samples),
     made("parametric: cells", PATCHES, parametric::cells),
     made("parametric: portals", PATCHES, parametric::portals),

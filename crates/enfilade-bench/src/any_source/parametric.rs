@@ -7,11 +7,8 @@ use enfilade::cpg::World;
 use enfilade::geom::DMat4;
 use enfilade::import::{ArrayMesh, ImportOptions, decode_patches, import_arrays};
 
-use super::baked;
+use super::{baked, twins};
 use crate::rows::Figure;
-
-/// Largest difference of the volumes of a cell: what a centimeter makes of the smallest room here.
-const MOST_VOLUME: f64 = 0.02;
 
 /// Patches in JSON, and the same surfaces as triangles.
 #[derive(Default)]
@@ -262,35 +259,11 @@ fn worlds(name: &str) -> anyhow::Result<[World; 2]> {
 /// Cells of patches and of triangles that differ in number, and those whose volumes do.
 pub(super) fn cells(name: &str) -> anyhow::Result<Figure> {
     let [patches, triangles] = worlds(name)?;
-    let volumes = |world: &World| {
-        let mut all: Vec<f64> = world
-            .graph
-            .indoor_cells()
-            .map(|(_, c)| f64::from(c.volume))
-            .collect();
-        all.sort_by(f64::total_cmp);
-        all
-    };
-    let [a, b] = [&patches, &triangles].map(volumes);
-    let differs = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() > MOST_VOLUME;
-    let n = a.iter().zip(&b).filter(|p| differs(*p)).count();
-    Ok(Figure {
-        value: (a.len().abs_diff(b.len()) + n) as f64,
-        most: 0.0,
-        note: format!(
-            "{} cells, {} of triangles; volumes {a:.1?} and {b:.1?}",
-            a.len(),
-            b.len()
-        ),
-    })
+    Ok(twins::cells(&patches, &triangles))
 }
 
 /// Portals of patches more or fewer than those of triangles.
 pub(super) fn portals(name: &str) -> anyhow::Result<Figure> {
-    let [a, b] = worlds(name)?.map(|w| w.graph.portals.len());
-    Ok(Figure {
-        value: a.abs_diff(b) as f64,
-        most: 0.0,
-        note: format!("{a} portals, {b} of triangles"),
-    })
+    let [patches, triangles] = worlds(name)?;
+    Ok(twins::portals(&patches, &triangles))
 }

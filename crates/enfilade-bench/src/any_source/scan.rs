@@ -28,6 +28,8 @@ const NOISE: f64 = 0.005;
 /// Squares of rays, of which a share is lost: black, shiny or wet surfaces.
 const HOLE: usize = 12;
 const LOST: f64 = 0.03;
+/// Variable with a folder in which scans, their worlds and truths are kept.
+const KEPT: &str = "ENFILADE_SCANS";
 /// Boxes of clutter in each room.
 const CLUTTER: usize = 3;
 
@@ -150,8 +152,11 @@ impl Building {
         boxes
     }
 
-    /// Returns the truth of the rooms with a station, without points in boxes.
-    fn truth_of(&self, stations: &[DVec3], boxes: &[Aabb]) -> Value {
+    /// Returns the truth of the rooms with a station, and the share of their points that it leaves out: those in boxes, and
+    /// those that the triangles hide from all stations. What is unknown is not air to a scan.
+    fn truth_of(&self, stations: &[DVec3], boxes: &[Aabb]) -> (Value, f64) {
+        let bvh = Bvh::build(&self.triangles);
+        let is_hidden = |from: &DVec3, p: DVec3| bvh.any_hit(*from, p, |_| false);
         let is_seen = |(id, points): &(String, Vec<DVec3>)| {
             points
                 .iter()
@@ -161,20 +166,26 @@ impl Building {
         let seen: BTreeSet<String> = self.places.iter().filter_map(is_seen).collect();
         let mut rooms: Vec<Value> = list(&self.truth["rooms"]).to_vec();
         rooms.retain(|r| seen.contains(&text(&r["id"])));
+        let [mut n_points, mut n_left] = [0, 0];
         for room in &mut rooms {
-            let is_in_air = |p: &&Value| {
+            let is_in_known_air = |p: &&Value| {
                 let p = vec3(p).map_or(DVec3::ZERO, DVec3::from_array);
                 !boxes.iter().any(|b| b.expanded(0.1).contains(p))
+                    && !stations.iter().all(|s| is_hidden(s, p))
             };
-            let points = list(&room["sample_points"]).iter().filter(is_in_air);
-            room["sample_points"] = points.cloned().collect();
+            let points = list(&room["sample_points"]);
+            n_points += points.len();
+            let known: Vec<Value> = points.iter().filter(is_in_known_air).cloned().collect();
+            n_left += known.len();
+            room["sample_points"] = known.into();
         }
         let is_known = |id: &Value| id == "outside" || seen.contains(&text(id));
         let openings = list(&self.truth["openings"]).iter();
         let openings: Vec<&Value> = openings
             .filter(|o| list(&o["rooms"]).iter().all(is_known))
             .collect();
-        json!({"rooms": rooms, "openings": openings})
+        let unknown = 1.0 - n_left as f64 / n_points.max(1) as f64;
+        (json!({"rooms": rooms, "openings": openings}), unknown)
     }
 }
 
@@ -250,15 +261,28 @@ fn scored(name: &str, n_stations: Stations) -> anyhow::Result<Score> {
     let boxes = building.clutter(&stations, &mut rng);
     let file = ply(&building.triangles, &stations, &mut rng);
     let world = baked(&decode_ply(&file, &ImportOptions::default())?.scene)?;
-    let scratch = std::env::temp_dir().join(format!("enfilade-scan-{}", std::process::id()));
+    let kept = std::env::var_os(KEPT).map(|f| Path::new(&f).join(format!("{name}-{n_stations:?}")));
+    let scratch = kept.clone().unwrap_or_else(|| {
+        std::env::temp_dir().join(format!("enfilade-scan-{}", std::process::id()))
+    });
     std::fs::create_dir_all(&scratch)?;
     let scored = (|| {
         let (truth, glb) = (scratch.join("truth.json"), scratch.join("world.glb"));
-        std::fs::write(truth, building.truth_of(&stations, &boxes).to_string())?;
+        let (known, unknown) = building.truth_of(&stations, &boxes);
+        std::fs::write(truth, known.to_string())?;
         std::fs::write(&glb, encode_glb(&world)?)?;
-        score_world(&scratch, &glb, &inspect(&glb)?)
+        let mut score = score_world(&scratch, &glb, &inspect(&glb)?)?;
+        let text = format!(
+            "{:.0} % of the points hidden or in clutter",
+            100.0 * unknown
+        );
+        score.failed.insert(0, text);
+        anyhow::Ok(score)
     })();
-    std::fs::remove_dir_all(&scratch)?;
+    match kept {
+        Some(folder) => std::fs::write(folder.join("scan.ply"), file)?,
+        None => std::fs::remove_dir_all(&scratch)?,
+    }
     scored
 }
 
