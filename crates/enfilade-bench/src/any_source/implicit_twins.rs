@@ -22,8 +22,6 @@ const TIMES: usize = 3;
 
 /// Distance between the ends of two tubes that meet in a neck: less than their width. [Units: wu]
 const NECK: f64 = 1.2;
-/// Half as much as a share of the knot, which is about 120 m long.
-const SHORT: f64 = 0.005;
 
 /// A part of the air: the points within a radius of the line through some points.
 struct Part {
@@ -93,17 +91,7 @@ fn parts(name: &str) -> anyhow::Result<Vec<Part>> {
                 .chain(ways.into_iter().flat_map(|[a, b]| way(at(a), at(b))))
                 .collect()
         }
-        "knot" => vec![knot(0.0, 1.0)],
-        "beads" => {
-            let bead = |k: usize| {
-                let at = k as f64 / 5.0;
-                [
-                    Part::ball(knot_at(at), 2.4),
-                    knot(at - 0.1 + SHORT, at + 0.1 - SHORT),
-                ]
-            };
-            (0..5).flat_map(bead).collect()
-        }
+        "knot" => vec![knot()],
         _ => bail!("no scene {name}"),
     })
 }
@@ -115,11 +103,9 @@ fn knot_at(t: f64) -> DVec3 {
     DVec3::new(r * cos, 4.0 * (3.0 * TAU * t).sin(), r * sin)
 }
 
-/// A tube along a part of the knot.
-fn knot(from: f64, to: f64) -> Part {
-    let n = ((to - from) * 180.0).ceil();
-    let at = |k: i32| knot_at(from + (to - from) * f64::from(k) / n);
-    Part::tube((0..=n as i32).map(at).collect(), 1.0)
+fn knot() -> Part {
+    let points = (0..=180).map(|k| knot_at(f64::from(k) / 180.0)).collect();
+    Part::tube(points, 1.0)
 }
 
 /// Boxes of the house: matter, and what is cut from it.

@@ -20,7 +20,7 @@ use crate::rows::{Measure, Row};
 /// Implicit scenes with as many rooms and openings as they were made with.
 const SHAPES: &[&str] = &["balls", "cavern", "house", "gyroid"];
 /// Implicit scenes, each with a twin of triangles.
-const TWINS: &[&str] = &["balls", "cavern", "house", "gyroid", "knot", "beads"];
+const TWINS: &[&str] = &["balls", "cavern", "house", "gyroid", "knot"];
 /// Scenes of patches, each with a twin of triangles.
 const PATCHES: &[&str] = &["patch-house", "patch-vault", "patch-tube"];
 const AORTA: &[&str] = &["aorta"];
