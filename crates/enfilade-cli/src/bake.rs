@@ -33,7 +33,7 @@ use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
 use crate::walk::{self, Walks, WorldFile};
-use enfilade_cli::input::{import_scene, is_stream};
+use enfilade_cli::input::{import_scene, is_stream, names_of};
 use enfilade_cli::memory::held_memory;
 use enfilade_report::{Verdict, is_empty, why_empty};
 
@@ -65,6 +65,7 @@ pub(crate) struct Bake {
 }
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
+    args.options.begin(&args.inputs)?;
     run_with(args, None)
 }
 
@@ -136,7 +137,9 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     };
     let own = args.checkpoint.clone().map(PieceFolder::at);
     let pieces = kept.or(own.as_ref());
-    let mut baked = bake_scene(scene, config, options.threads, pieces)?;
+    let name = || names_of(&args.inputs);
+    let baked = bake_scene(scene, config, options.threads, pieces);
+    let mut baked = baked.with_context(name)?;
     if let Some(path) = &leak_path {
         baked.world.leak_path = path.points();
     } else if baked.n_indoors() == 0 {
@@ -153,7 +156,8 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
                 path.write(&mut path.says())?;
             }
             bail!(
-                "no room was found, and nothing was written: {why}; --allow-empty writes the world all the same"
+                "{}: no room was found, and nothing was written: {why}; --allow-empty writes the world all the same",
+                name()
             );
         }
         writeln!(Warned, "no room was found: {why}")?;

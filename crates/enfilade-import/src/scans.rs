@@ -9,6 +9,7 @@ use enfilade_source::{Scan, ScanOptions};
 
 use crate::ImportError;
 use crate::builder::Builder;
+use crate::caught::caught;
 use crate::sources::{Told, add, limits};
 
 /// Edge of the voxels of a scan: walls are at least two of them thick. [Units: wu]
@@ -51,6 +52,7 @@ fn e57_scan(bytes: &[u8], builder: &mut Builder<'_>) -> Result<Scan, ImportError
             .pointcloud_simple(cloud)
             .map_err(|e| damaged(builder, &place, &e))?;
         for point in all {
+            builder.spend(&place, 4)?;
             let point = point.map_err(|e| damaged(builder, &place, &e))?;
             // A direction alone met nothing: the sky, or a surface as black as it.
             if let CartesianCoordinate::Valid { x, y, z } = point.cartesian {
@@ -79,8 +81,8 @@ fn guarded<T>(
     builder: &mut Builder<'_>,
     read: impl FnOnce(&mut Builder<'_>) -> Result<T, ImportError>,
 ) -> Result<T, ImportError> {
-    let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| read(builder)));
-    read.unwrap_or_else(|_| Err(builder.malformed("file", "is damaged; export it anew")))
+    let read = caught(|| read(builder));
+    read.unwrap_or_else(|| Err(builder.malformed("file", "is damaged; export it anew")))
 }
 
 /// Points read at a time.
@@ -125,6 +127,8 @@ fn las_points(
     builder.charge_vertices("points", n)?;
     let (mut points, mut sources) = (Vec::new(), Vec::new());
     while (points.len() as u64) < n {
+        // Each point takes about half a microsecond to unpack.
+        builder.spend("points", 5 * BATCH)?;
         let batch = reader
             .read_points(BATCH)
             .map_err(|e| damaged(builder, &e))?;
@@ -194,7 +198,7 @@ fn add_scan(scan: &Scan, builder: &mut Builder<'_>) -> Result<(), ImportError> {
     let limits = limits(builder);
     let step = scan.step(&options, &limits);
     let surface = scan.surface(&options, &limits);
-    let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
+    let surface = surface.map_err(|e| builder.failed(e))?;
     let text = format!(
         "a scan of {} points, stations: {}; what no station saw is matter",
         scan.points.len(),

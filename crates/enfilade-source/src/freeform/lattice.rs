@@ -17,7 +17,7 @@ impl Lattice2 {
     pub(super) fn new(
         patch: &FreeformSurface,
         tolerance: f64,
-        budget: &mut Budget,
+        budget: &mut Budget<'_>,
     ) -> Result<Self, SourceError> {
         let spans = [0, 1].map(|a| patch.bases[a].spans(patch.range[a]));
         let n_spans = (spans[0].len() * spans[1].len()) as f64;
@@ -35,12 +35,18 @@ impl Lattice2 {
             }
         }
         let [m, n_lines] = [0, 1].map(|a| n[a].iter().sum::<f64>());
-        budget.take(patch, 2.0 * m * n_lines, patch.cost())?;
+        let n_parts = (spans[0].len() + spans[1].len()) as f64;
+        budget.take(patch, 2.0 * m * n_lines, patch.cost() + n_parts / 8.0)?;
         let steps = [0, 1].map(|a| {
             let n = n[a].iter().map(|n| *n as usize);
             spans[a].iter().copied().zip(n).collect()
         });
         Ok(Self { steps })
+    }
+
+    /// Returns the work of a value at a place: the patch's, and a search among the parts.
+    pub(super) fn cost(&self, patch: &FreeformSurface) -> f64 {
+        patch.cost() + (self.steps[0].len() + self.steps[1].len()) as f64 / 8.0
     }
 
     /// Returns the number of steps along each axis.
