@@ -29,6 +29,7 @@ mod files;
 mod foreign;
 mod gltf;
 mod ifc;
+mod las_head;
 mod map;
 mod marks;
 mod mesh;

@@ -49,7 +49,8 @@ pub(super) fn parse(
             &other
         }
     };
-    for _ in 0..head.n_lines_skipped {
+    // No file has more lines than bytes, whatever its head says.
+    for _ in 0..head.n_lines_skipped.min(data.len()) {
         let end = data.iter().position(|&b| b == b'\n');
         data = end.map_or(&[], |end| &data[end + 1..]);
     }
