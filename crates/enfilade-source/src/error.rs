@@ -109,5 +109,5 @@ impl SourceLimits {
 
 /// The error of a loop that ended with its allowance.
 fn ended() -> SourceError {
-    SourceError::new("limits", "the allowance is over; allow more, or give less")
+    SourceError::new("source", "the allowance is over; allow more, or give less")
 }

@@ -2,7 +2,7 @@
 
 use enfilade_geom::DVec3;
 
-use super::patch::{Budget, FreeformSurface};
+use super::patch::{Budget, FreeformSurface, TERMS, TOO_MUCH};
 use super::spline::SplineSpan;
 use crate::SourceError;
 
@@ -23,9 +23,14 @@ impl Lattice2 {
         let n_spans = (spans[0].len() * spans[1].len()) as f64;
         // The values that a second fundamental form takes.
         budget.take(patch, n_spans, 36.0 * patch.cost() * patch.cost())?;
+        // The same again for each part as it is done, for those who look at the clock.
+        let of_each = 36.0 * patch.cost() * patch.cost() / TERMS;
         let mut n = [vec![1.0; spans[0].len()], vec![1.0; spans[1].len()]];
         for (j, &v) in spans[1].iter().enumerate() {
             for (i, &u) in spans[0].iter().enumerate() {
+                if !budget.purse.spend(of_each as u64) {
+                    return Err(patch.error(TOO_MUCH));
+                }
                 let [along, across, twist] = curvature(patch, [u, v]);
                 // A right triangle with steps a and b along the axes is a²/8 (along + twist) +
                 // b²/8 (across + twist) off; half of the error from each.

@@ -29,7 +29,7 @@ pub(super) struct Budget<'l> {
 }
 
 /// Terms of a sum for a value in a unit of work.
-const TERMS: f64 = 16.0;
+pub(super) const TERMS: f64 = 16.0;
 
 impl Budget<'_> {
     /// Takes work, in terms of sums for values; returns `false` if there is not as much left.
