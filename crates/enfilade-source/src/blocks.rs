@@ -137,7 +137,7 @@ fn expected(
         };
         let to = [size, root(lattice)];
         descend(field, lattice, [0; 3], to, spent, &mut count)?;
-        if n >= ENOUGH {
+        if n >= ENOUGH || size / 2 == BLOCK {
             break;
         }
         size /= 2;

@@ -52,7 +52,8 @@ pub(super) fn not_refused(family: &str) -> anyhow::Result<Figure> {
                     End::Baked => _ = n_baked.fetch_add(1, Ordering::Relaxed),
                     End::Refused => {}
                     End::Wrong(why) => {
-                        eprintln!("bad input: {}, case {i}, {}: {why}", family, case.name);
+                        let name = &case.name;
+                        eprintln!("bad input: {family}, case {i}, {name}: {why}");
                         let mut wrong = wrong.lock().unwrap_or_else(|e| e.into_inner());
                         wrong.push(case.name.clone());
                     }
