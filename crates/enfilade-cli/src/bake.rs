@@ -27,6 +27,7 @@ use serde::Serialize;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
+use crate::limits::watch_bake;
 use crate::output::{Outputs, Written, write_whole};
 use crate::pieces::PieceFolder;
 use crate::progress::{BakeBar, StageBar};
@@ -65,8 +66,13 @@ pub(crate) struct Bake {
 }
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
-    args.options.begin(&args.inputs)?;
+    begin(&args.options, &args.inputs)?;
     run_with(args, None)
+}
+
+/// Starts enforcing the limits of a bake of `scene`, also where nothing looks at them.
+pub(crate) fn begin(options: &settings::BakeOptions, scene: &[PathBuf]) -> anyhow::Result<()> {
+    watch_bake(&names_of(scene), options.max_time, options.max_memory)
 }
 
 /// A scene that is ready to be baked.

@@ -14,7 +14,7 @@ use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 
 use crate::bake::delaunay::choices_text;
-use crate::bake::{Summary, print_summary, settings};
+use crate::bake::{Summary, begin, print_summary, settings};
 use crate::formats::Format;
 use crate::output::{Outputs, Written, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json, write_lines};
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     let began = Some(Instant::now());
     // At the steps, people take the time that they need; each bake has its own limit.
     if !args.steps {
-        args.options.begin(&args.inputs)?;
+        begin(&args.options, &args.inputs)?;
     }
     let mut outputs = Outputs::reading(args.options.inputs(&args.inputs))?;
     // Choices that are read are extended, and may be saved to the same file.

@@ -11,7 +11,7 @@ use enfilade::cpg::CellId;
 use enfilade::cpg::wire::encode_glb;
 use serde::Serialize;
 
-use crate::bake::{Summary, found, print_summary, settings};
+use crate::bake::{Summary, begin, found, print_summary, settings};
 use crate::formats::Format;
 use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
@@ -45,7 +45,7 @@ pub(crate) struct Rebake {
 pub(crate) fn run(args: &Rebake) -> anyhow::Result<()> {
     let began = Instant::now();
     let options = &args.options;
-    options.begin(&args.source)?;
+    begin(options, &args.source)?;
     if let Some(option) = options.of_bakes_alone() {
         bail!("{option} is an option of bake; bake the new scene with it to see what is open");
     }

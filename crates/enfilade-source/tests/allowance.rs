@@ -162,11 +162,3 @@ fn of_compressed_samples_no_more_is_unpacked_than_the_head_tells() {
         assert_eq!(volume.values, [0.0; 8]);
     }
 }
-
-#[test]
-fn lines_are_skipped_only_while_there_are_some() {
-    let file = b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nline skip: 18446744073709551615\n\nabc\nabcdefgh";
-    let mut none = |_: &str| Err(String::new());
-    let error = Volume::parse(file, &mut none, &SourceLimits::default()).unwrap_err();
-    assert!(error.problem.contains("cut off"), "{error}");
-}

@@ -14,8 +14,7 @@ use enfilade_settings::{
     Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit, parse_weld,
 };
 
-use crate::limits::watch_bake;
-use enfilade_cli::input::{name_of, names_of, read_text};
+use enfilade_cli::input::{name_of, read_text};
 use enfilade_cli::memory::held_memory;
 
 /// Options for reading scenes, shared by the baked scene and the scene that a world is compared with.
@@ -137,7 +136,7 @@ pub(crate) struct BakeOptions {
     pub(crate) max_memory: Option<u64>,
     /// End without a world after this long; if not given, when the work is out of proportion to the triangles.
     #[arg(long, value_name = "SECONDS", value_parser = enfilade_cli::values::seconds)]
-    max_time: Option<Duration>,
+    pub(crate) max_time: Option<Duration>,
     /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -215,11 +214,6 @@ impl BakeOptions {
             (self.leak_path.is_some(), "--leak-path"),
         ];
         given.into_iter().find(|(is, _)| *is).map(|(_, name)| name)
-    }
-
-    /// Starts enforcing the limits also where nothing looks at them.
-    pub(crate) fn begin(&self, scene: &[PathBuf]) -> anyhow::Result<()> {
-        watch_bake(&names_of(scene), self.max_time, self.max_memory)
     }
 
     /// All files to read, including `scene`.

@@ -49,8 +49,7 @@ pub(super) fn parse(
             &other
         }
     };
-    // No file has more lines than bytes, whatever its head says.
-    for _ in 0..head.n_lines_skipped.min(data.len()) {
+    for _ in 0..head.n_lines_skipped {
         let end = data.iter().position(|&b| b == b'\n');
         data = end.map_or(&[], |end| &data[end + 1..]);
     }
