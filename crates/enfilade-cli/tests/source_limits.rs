@@ -42,8 +42,8 @@ impl Folder {
     }
 
     /// Runs a command, whose standard input stays open: must end by itself with exit code 1, print all of `words`, and write
-    /// nothing.
-    fn refused(&self, args: &[&str], words: &[&str]) {
+    /// nothing. Returns what it said.
+    fn refused(&self, args: &[&str], words: &[&str]) -> String {
         let n_files = || fs::read_dir(&self.0).unwrap().count();
         let before = n_files();
         let mut child = self.started(args);
@@ -68,6 +68,7 @@ impl Folder {
         }
         assert_eq!(said.matches("enfilade: ").count(), 1, "{args:?}: {said}");
         assert_eq!(n_files(), before, "{args:?} left something");
+        said
     }
 }
 
@@ -149,4 +150,19 @@ fn the_memory_of_reading_counts() {
         "300M",
     ];
     folder.refused(&args, &["zeros.nii.gz: ", "--max-memory"]);
+}
+
+/// A LAZ whose packed points have another size than its head tells: its reader, of another project, panics.
+#[test]
+fn a_reader_that_panics_on_a_damaged_file_is_quiet_about_it() {
+    let folder = Folder::new("panic");
+    let mut file = include_bytes!("../../../fuzz/seeds/las/room.laz").to_vec();
+    file[471] = 7;
+    fs::write(folder.0.join("case.laz"), file).unwrap();
+    let args = ["bake", "case.laz", "--station", "0,0,0", "-o", "out.glb"];
+    let said = folder.refused(&args, &["case.laz: file: ", "is damaged"]);
+    assert!(
+        !said.contains("panicked") && !said.contains("backtrace"),
+        "{said}"
+    );
 }

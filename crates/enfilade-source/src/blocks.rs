@@ -172,7 +172,6 @@ pub(crate) fn for_blocks(
 }
 
 /// Visits the blocks of some size that may have zeros, in one of another size.
-
 fn descend(
     field: &dyn Field,
     lattice: &Lattice,
