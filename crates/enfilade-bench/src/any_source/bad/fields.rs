@@ -16,6 +16,13 @@ fn scene(fields: &str) -> String {
 
 /// Steps, sizes and numbers out of all proportion, expressions without end, and text cut off.
 pub(super) fn implicit() -> Vec<Case> {
+    [sizes(), shapes(), endless(), texts()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn sizes() -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();
     let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     for step in [
@@ -37,6 +44,12 @@ pub(super) fn implicit() -> Vec<Case> {
             scene(&format!(r#""step":0.05,"air":{ball}"#)),
         );
     }
+    all
+}
+
+fn shapes() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     for (name, shape) in [
         (
             "a gyroid of nothing",
@@ -112,6 +125,12 @@ pub(super) fn implicit() -> Vec<Case> {
     ] {
         add(name.into(), scene(&format!(r#""air":{shape}"#)));
     }
+    all
+}
+
+fn endless() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     for depth in [65, 120, 1000, 200_000] {
         let text = format!("{}{BALL}{}", r#"{"not":"#.repeat(depth), "}".repeat(depth));
         add(format!("{depth} deep"), scene(&format!(r#""air":{text}"#)));
@@ -147,6 +166,12 @@ pub(super) fn implicit() -> Vec<Case> {
         "a tube of 90,000 points".into(),
         scene(&format!(r#""air":{tube}"#)),
     );
+    all
+}
+
+fn texts() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     add(
         "air and matter".into(),
         scene(&format!(r#""air":{BALL},"matter":{BALL}"#)),
@@ -241,28 +266,44 @@ fn floats(n: usize, value: impl FnMut(usize) -> f32) -> Vec<u8> {
     (0..n).map(value).flat_map(f32::to_le_bytes).collect()
 }
 
+/// Options of all volumes, and the number of samples of most along each edge.
+const LEVEL: [&str; 4] = ["--level", "0", "--air", "above"];
+const N: usize = 20;
+
+fn nrrd(head: &str, samples: &[u8]) -> Vec<u8> {
+    let head = format!("NRRD0004\ntype: float\ndimension: 3\n{head}\n\n");
+    [head.as_bytes(), samples].concat()
+}
+
 /// Volumes cut off, of wrong sizes, without values, with more samples than there are, and of noise.
 pub(super) fn volumes() -> Vec<Case> {
-    let level = ["--level", "0", "--air", "above"];
+    [cut_off(), niftis(), values(), nrrds(), raws()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn cut_off() -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();
-    let n = 20_usize;
-    let samples = ball(n);
+    let samples = ball(N);
     let good = Nifti::of([20; 3], F32).bytes(&samples);
     let zip = zipped(&good);
-    let nrrd = |head: &str, samples: &[u8]| {
-        let head = format!("NRRD0004\ntype: float\ndimension: 3\n{head}\n\n");
-        [head.as_bytes(), samples].concat()
-    };
     let sized = nrrd("sizes: 20 20 20\nencoding: raw\nendian: little", &samples);
     for (ending, whole) in [("nii", &good), ("nii.gz", &zip), ("nrrd", &sized)] {
         for cut in cuts(whole.len()) {
             all.push(
-                Case::new(format!("{ending} cut after {cut}"), ending, &whole[..cut]).with(&level),
+                Case::new(format!("{ending} cut after {cut}"), ending, &whole[..cut]).with(&LEVEL),
             );
         }
     }
+    all
+}
+
+fn niftis() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let samples = ball(N);
     let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&level));
+        all.push(Case::new(name, ending, bytes).with(&LEVEL));
     };
     for size in [
         [0; 3],
@@ -326,7 +367,15 @@ pub(super) fn volumes() -> Vec<Case> {
             head.bytes(&samples),
         );
     }
-    let cube = n * n * n;
+    all
+}
+
+fn values() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
+        all.push(Case::new(name, ending, bytes).with(&LEVEL));
+    };
+    let cube = N * N * N;
     for (name, values) in [
         ("all NaN", floats(cube, |_| f32::NAN)),
         (
@@ -373,6 +422,15 @@ pub(super) fn volumes() -> Vec<Case> {
         "nii.gz",
         bomb.finish().unwrap_or_default(),
     );
+    all
+}
+
+fn nrrds() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let samples = ball(N);
+    let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
+        all.push(Case::new(name, ending, bytes).with(&LEVEL));
+    };
     for head in [
         "sizes: 1000 1000 1000\nencoding: raw\nendian: little",
         "sizes: 1000000 1000000 1000000\nencoding: raw\nendian: little",
@@ -395,9 +453,15 @@ pub(super) fn volumes() -> Vec<Case> {
             nrrd(head, &samples),
         );
     }
+    all
+}
+
+fn raws() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let samples = ball(N);
     let mut raw = |name: &str, fields: &str| {
         let head = format!(r#"{{"enfilade":"volume","file":"case.raw",{fields}}}"#);
-        let case = Case::new(format!("raw: {name}"), "json", head).with(&level);
+        let case = Case::new(format!("raw: {name}"), "json", head).with(&LEVEL);
         all.push(case.beside("case.raw", samples.clone()));
     };
     for size in [

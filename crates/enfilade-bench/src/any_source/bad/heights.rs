@@ -75,16 +75,30 @@ fn tiff([w, h]: [u32; 2], samples: &[f32], other: &[[u32; 4]]) -> Vec<u8> {
 }
 
 pub(super) fn cases() -> Vec<Case> {
+    [pngs(), tiffs(), cut_off()].into_iter().flatten().collect()
+}
+
+fn field(n: usize, of: impl Fn(usize) -> f32) -> Vec<f32> {
+    (0..n).map(of).collect()
+}
+
+/// Rows of a PNG of 8 bits.
+fn rows(w: usize, h: usize) -> Vec<u8> {
+    (0..h)
+        .flat_map(|z| std::iter::once(0).chain((0..w).map(move |x| (x * z) as u8)))
+        .collect()
+}
+
+/// Rows of heights of 20 by 20 samples.
+fn slope() -> Vec<f32> {
+    field(400, |i| (i % 20) as f32)
+}
+
+fn pngs() -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();
     let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
         all.push(Case::new(name, ending, bytes).with(&OPTIONS));
     };
-    let rows = |w: usize, h: usize| -> Vec<u8> {
-        (0..h)
-            .flat_map(|z| std::iter::once(0).chain((0..w).map(move |x| (x * z) as u8)))
-            .collect()
-    };
-    let good = png([20, 20], 8, 0, &rows(20, 20));
     for size in [
         [0, 0],
         [0, 20],
@@ -137,9 +151,15 @@ pub(super) fn cases() -> Vec<Case> {
         "png",
         png([2049, 2049], 8, 0, &noise),
     );
-    let field = |n: usize, of: &dyn Fn(usize) -> f32| (0..n).map(of).collect::<Vec<f32>>();
-    let slope = field(400, &|i| (i % 20) as f32);
-    let whole = tiff([20, 20], &slope, &[]);
+    all
+}
+
+fn tiffs() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
+        all.push(Case::new(name, ending, bytes).with(&OPTIONS));
+    };
+    let slope = slope();
     for size in [
         [0, 0],
         [0, 20],
@@ -187,14 +207,14 @@ pub(super) fn cases() -> Vec<Case> {
         );
     }
     for (name, samples) in [
-        ("all NaN", field(400, &|_| f32::NAN)),
+        ("all NaN", field(400, |_| f32::NAN)),
         (
             "every second NaN",
-            field(400, &|i| if i % 2 == 0 { f32::NAN } else { 1.0 }),
+            field(400, |i| if i % 2 == 0 { f32::NAN } else { 1.0 }),
         ),
         (
             "infinite",
-            field(400, &|i| {
+            field(400, |i| {
                 if i % 2 == 0 {
                     f32::INFINITY
                 } else {
@@ -204,15 +224,25 @@ pub(super) fn cases() -> Vec<Case> {
         ),
         (
             "of all heights",
-            field(400, &|i| if i % 2 == 0 { f32::MAX } else { f32::MIN }),
+            field(400, |i| if i % 2 == 0 { f32::MAX } else { f32::MIN }),
         ),
         (
             "of great heights",
-            field(400, &|i| if i % 2 == 0 { 9e5 } else { -9e5 }),
+            field(400, |i| if i % 2 == 0 { 9e5 } else { -9e5 }),
         ),
     ] {
         add(format!("tiff {name}"), "tif", tiff([20, 20], &samples, &[]));
     }
+    all
+}
+
+fn cut_off() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
+        all.push(Case::new(name, ending, bytes).with(&OPTIONS));
+    };
+    let good = png([20, 20], 8, 0, &rows(20, 20));
+    let whole = tiff([20, 20], &slope(), &[]);
     for (ending, whole) in [("png", &good), ("tif", &whole)] {
         for cut in cuts(whole.len()).into_iter().filter(|&c| c >= 12) {
             add(

@@ -11,6 +11,13 @@ fn patch(fields: &str) -> String {
 }
 
 pub(super) fn cases() -> Vec<Case> {
+    [numbers(), many(), loops(), objs()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn numbers() -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();
     let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     for degrees in [
@@ -72,6 +79,12 @@ pub(super) fn cases() -> Vec<Case> {
             patch(&format!(r#""degrees":[2,1],"points":{points}"#)),
         );
     }
+    all
+}
+
+fn many() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     let mut rng = Rng::new(5);
     for n in [40, 250] {
         let mut row = || {
@@ -91,6 +104,12 @@ pub(super) fn cases() -> Vec<Case> {
         let fields = format!(r#""degrees":[3,3],"points":[{}]"#, rows.join(","));
         add(format!("{n} × {n} points at random"), patch(&fields));
     }
+    all
+}
+
+fn loops() -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
     let bow = |by: f64| format!("[[0.2,0.2],[{by},0.8],[0.8,0.2],[0.2,{by}],[0.2,0.2]]");
     for (name, loops) in [
         ("crossing", format!(r#"[[{{"points":{}}}]]"#, bow(0.8))),
@@ -134,7 +153,6 @@ pub(super) fn cases() -> Vec<Case> {
     for cut in cuts(whole.len()).into_iter().filter(|&c| c > 24) {
         add(format!("cut after {cut}"), whole[..cut].into());
     }
-    all.extend(objs());
     all
 }
 
