@@ -84,9 +84,9 @@ pub enum ImportError {
     Ended {
         /// The file.
         path: PathBuf,
-        /// What was being read.
+        /// Element that was being read.
         place: String,
-        /// What was over.
+        /// Reason for the end.
         end: End,
     },
     /// No triangle was found in any file.

@@ -1,4 +1,4 @@
-//! What the head of a LAS file promises, compared with the file before it is read.
+//! Promises of the head of a LAS file, compared with the file before it is read.
 //!
 //! The readers of LAS and LAZ allocate what a file announces, and a process that gets less memory than it asks for is aborted. So
 //! the lengths that they believe are checked here: those of extended records, of points, and of the table of compressed chunks.

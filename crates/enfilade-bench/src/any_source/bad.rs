@@ -7,6 +7,7 @@ mod cases;
 mod damaged;
 mod fields;
 mod heights;
+mod pages;
 mod patches;
 mod scans;
 
@@ -22,7 +23,7 @@ use enfilade::cpg::wire::decode_glb;
 
 use crate::process::{binary, target_dir};
 use crate::rows::Figure;
-use cases::Case;
+use cases::BadSource;
 
 /// The limits of each run, and when it has to be over by the promise of `--max-time`: half as much again and a second; and a
 /// second for the start on a busy machine.
@@ -33,7 +34,7 @@ const AT_ONCE: usize = 2;
 
 /// Cases that neither bake nor are refused as they should.
 pub(super) fn not_refused(family: &str) -> anyhow::Result<Figure> {
-    let cases = cases::of_family(family).with_context(|| format!("no bad input '{family}'"))?;
+    let cases = of_family(family).with_context(|| format!("no bad input '{family}'"))?;
     let folder = target_dir().join("any-source").join(family);
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
@@ -81,6 +82,19 @@ pub(super) fn not_refused(family: &str) -> anyhow::Result<Figure> {
     })
 }
 
+/// Returns the cases of a family.
+fn of_family(family: &str) -> Option<Vec<BadSource>> {
+    Some(match family {
+        "implicit" => fields::implicit(),
+        "volumes" => fields::volumes(),
+        "patches" => patches::cases(),
+        "heights" => heights::cases(),
+        "scans" => scans::cases(),
+        "damaged-scans" => damaged::cases(),
+        _ => return None,
+    })
+}
+
 /// How a run ended.
 #[derive(Debug, PartialEq)]
 enum End {
@@ -89,7 +103,7 @@ enum End {
     Wrong(String),
 }
 
-fn run(case: &Case, folder: &Path) -> anyhow::Result<End> {
+fn run(case: &BadSource, folder: &Path) -> anyhow::Result<End> {
     fs::create_dir_all(folder)?;
     for (name, bytes) in &case.files {
         fs::write(folder.join(name), bytes)?;
@@ -125,7 +139,7 @@ fn run(case: &Case, folder: &Path) -> anyhow::Result<End> {
         .filter(|name| name != "said" && name != "out.glb" && !files.clone().any(|f| f == name))
         .collect();
     let end = judged(status, &text, world.as_deref(), &left, &case.files[0].0);
-    // What went wrong is kept.
+    // A case that went wrong is kept.
     if !matches!(end, End::Wrong(_)) {
         fs::remove_dir_all(folder)?;
     }
@@ -191,7 +205,7 @@ mod tests {
     #[test]
     fn there_are_cases_of_all_families_and_hundreds_of_damaged_scans() {
         for family in super::super::BAD {
-            let cases = cases::of_family(family).expect("a family");
+            let cases = of_family(family).expect("a family");
             let least = if *family == "damaged-scans" { 300 } else { 20 };
             assert!(cases.len() >= least, "{family}: {}", cases.len());
             assert!(cases.iter().all(|c| !c.files.is_empty()));

@@ -1,15 +1,13 @@
-//! Cases by their family.
-
-use super::{damaged, fields, heights, patches, scans};
+//! A case, and where to cut files off.
 
 /// Files, the first of which is baked, and options.
-pub(super) struct Case {
+pub(super) struct BadSource {
     pub(super) name: String,
     pub(super) files: Vec<(String, Vec<u8>)>,
     pub(super) options: Vec<String>,
 }
 
-impl Case {
+impl BadSource {
     /// A case of one file without options. The name of the file ends with `ending`.
     pub(super) fn new(name: impl Into<String>, ending: &str, bytes: impl Into<Vec<u8>>) -> Self {
         Self {
@@ -28,19 +26,6 @@ impl Case {
         self.files.push((name.into(), bytes));
         self
     }
-}
-
-/// Returns the cases of a family.
-pub(super) fn of_family(family: &str) -> Option<Vec<Case>> {
-    Some(match family {
-        "implicit" => fields::implicit(),
-        "volumes" => fields::volumes(),
-        "patches" => patches::cases(),
-        "heights" => heights::cases(),
-        "scans" => scans::cases(),
-        "damaged-scans" => damaged::cases(),
-        _ => return None,
-    })
 }
 
 /// Returns lengths at which a file of `n` bytes is cut off: in its head, and evenly.

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::cases::{Case, cuts};
+use super::cases::{BadSource, cuts};
 use enfilade_testkit::Rng;
 
 const BALL: &str = r#"{"ball":{"at":[0,2,0],"radius":3}}"#;
@@ -15,16 +15,16 @@ fn scene(fields: &str) -> String {
 }
 
 /// Steps, sizes and numbers out of all proportion, expressions without end, and text cut off.
-pub(super) fn implicit() -> Vec<Case> {
+pub(super) fn implicit() -> Vec<BadSource> {
     [sizes(), shapes(), endless(), texts()]
         .into_iter()
         .flatten()
         .collect()
 }
 
-fn sizes() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn sizes() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     for step in [
         "0.0002", "1e-9", "1e-300", "0", "-1", "1e300", "1e999", "null", "\"a\"",
     ] {
@@ -47,9 +47,9 @@ fn sizes() -> Vec<Case> {
     all
 }
 
-fn shapes() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn shapes() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     for (name, shape) in [
         (
             "a gyroid of nothing",
@@ -128,9 +128,9 @@ fn shapes() -> Vec<Case> {
     all
 }
 
-fn endless() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn endless() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     for depth in [65, 120, 1000, 200_000] {
         let text = format!("{}{BALL}{}", r#"{"not":"#.repeat(depth), "}".repeat(depth));
         add(format!("{depth} deep"), scene(&format!(r#""air":{text}"#)));
@@ -169,9 +169,9 @@ fn endless() -> Vec<Case> {
     all
 }
 
-fn texts() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn texts() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     add(
         "air and matter".into(),
         scene(&format!(r#""air":{BALL},"matter":{BALL}"#)),
@@ -193,7 +193,7 @@ fn texts() -> Vec<Case> {
     all
 }
 
-/// What a header of NIfTI-1 says.
+/// Contents of a header of NIfTI-1.
 struct Nifti {
     dims: [i16; 8],
     kind: i16,
@@ -276,15 +276,15 @@ fn nrrd(head: &str, samples: &[u8]) -> Vec<u8> {
 }
 
 /// Volumes cut off, of wrong sizes, without values, with more samples than there are, and of noise.
-pub(super) fn volumes() -> Vec<Case> {
+pub(super) fn volumes() -> Vec<BadSource> {
     [cut_off(), niftis(), values(), nrrds(), raws()]
         .into_iter()
         .flatten()
         .collect()
 }
 
-fn cut_off() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn cut_off() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let samples = ball(N);
     let good = Nifti::of([20; 3], F32).bytes(&samples);
     let zip = zipped(&good);
@@ -292,18 +292,19 @@ fn cut_off() -> Vec<Case> {
     for (ending, whole) in [("nii", &good), ("nii.gz", &zip), ("nrrd", &sized)] {
         for cut in cuts(whole.len()) {
             all.push(
-                Case::new(format!("{ending} cut after {cut}"), ending, &whole[..cut]).with(&LEVEL),
+                BadSource::new(format!("{ending} cut after {cut}"), ending, &whole[..cut])
+                    .with(&LEVEL),
             );
         }
     }
     all
 }
 
-fn niftis() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn niftis() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let samples = ball(N);
     let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&LEVEL));
+        all.push(BadSource::new(name, ending, bytes).with(&LEVEL));
     };
     for size in [
         [0; 3],
@@ -370,10 +371,10 @@ fn niftis() -> Vec<Case> {
     all
 }
 
-fn values() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn values() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&LEVEL));
+        all.push(BadSource::new(name, ending, bytes).with(&LEVEL));
     };
     let cube = N * N * N;
     for (name, values) in [
@@ -425,11 +426,11 @@ fn values() -> Vec<Case> {
     all
 }
 
-fn nrrds() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn nrrds() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let samples = ball(N);
     let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&LEVEL));
+        all.push(BadSource::new(name, ending, bytes).with(&LEVEL));
     };
     for head in [
         "sizes: 1000 1000 1000\nencoding: raw\nendian: little",
@@ -456,12 +457,12 @@ fn nrrds() -> Vec<Case> {
     all
 }
 
-fn raws() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn raws() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let samples = ball(N);
     let mut raw = |name: &str, fields: &str| {
         let head = format!(r#"{{"enfilade":"volume","file":"case.raw",{fields}}}"#);
-        let case = Case::new(format!("raw: {name}"), "json", head).with(&LEVEL);
+        let case = BadSource::new(format!("raw: {name}"), "json", head).with(&LEVEL);
         all.push(case.beside("case.raw", samples.clone()));
     };
     for size in [

@@ -6,7 +6,7 @@ use enfilade_testkit::Rng;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::cases::{Case, cuts};
+use super::cases::{BadSource, cuts};
 
 const OPTIONS: [&str; 4] = ["--cell", "1", "--heights", "0,10"];
 
@@ -74,7 +74,7 @@ fn tiff([w, h]: [u32; 2], samples: &[f32], other: &[[u32; 4]]) -> Vec<u8> {
     file
 }
 
-pub(super) fn cases() -> Vec<Case> {
+pub(super) fn cases() -> Vec<BadSource> {
     [pngs(), tiffs(), cut_off()].into_iter().flatten().collect()
 }
 
@@ -94,10 +94,10 @@ fn slope() -> Vec<f32> {
     field(400, |i| (i % 20) as f32)
 }
 
-fn pngs() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn pngs() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&OPTIONS));
+        all.push(BadSource::new(name, ending, bytes).with(&OPTIONS));
     };
     for size in [
         [0, 0],
@@ -154,10 +154,10 @@ fn pngs() -> Vec<Case> {
     all
 }
 
-fn tiffs() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn tiffs() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&OPTIONS));
+        all.push(BadSource::new(name, ending, bytes).with(&OPTIONS));
     };
     let slope = slope();
     for size in [
@@ -236,10 +236,10 @@ fn tiffs() -> Vec<Case> {
     all
 }
 
-fn cut_off() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
+fn cut_off() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
-        all.push(Case::new(name, ending, bytes).with(&OPTIONS));
+        all.push(BadSource::new(name, ending, bytes).with(&OPTIONS));
     };
     let good = png([20, 20], 8, 0, &rows(20, 20));
     let whole = tiff([20, 20], &slope(), &[]);
@@ -252,6 +252,6 @@ fn cut_off() -> Vec<Case> {
             );
         }
     }
-    all.push(Case::new("png without options", "png", good));
+    all.push(BadSource::new("png without options", "png", good));
     all
 }

@@ -2,7 +2,7 @@
 
 use enfilade_testkit::Rng;
 
-use super::cases::{Case, cuts};
+use super::cases::{BadSource, cuts};
 
 const POINTS: &str = "[[[0,0,0],[2,3,0],[4,0,0]],[[0,0,6],[2,3,6],[4,0,6]]]";
 
@@ -10,16 +10,16 @@ fn patch(fields: &str) -> String {
     format!(r#"{{"enfilade":"patches","patches":[{{{fields}}}]}}"#)
 }
 
-pub(super) fn cases() -> Vec<Case> {
+pub(super) fn cases() -> Vec<BadSource> {
     [numbers(), many(), loops(), objs()]
         .into_iter()
         .flatten()
         .collect()
 }
 
-fn numbers() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn numbers() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     for degrees in [
         "[0,0]",
         "[2]",
@@ -82,9 +82,9 @@ fn numbers() -> Vec<Case> {
     all
 }
 
-fn many() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn many() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     let mut rng = Rng::new(5);
     for n in [40, 250] {
         let mut row = || {
@@ -107,9 +107,9 @@ fn many() -> Vec<Case> {
     all
 }
 
-fn loops() -> Vec<Case> {
-    let mut all: Vec<Case> = Vec::new();
-    let mut add = |name: String, text: String| all.push(Case::new(name, "json", text));
+fn loops() -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
+    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
     let bow = |by: f64| format!("[[0.2,0.2],[{by},0.8],[0.8,0.2],[0.2,{by}],[0.2,0.2]]");
     for (name, loops) in [
         ("crossing", format!(r#"[[{{"points":{}}}]]"#, bow(0.8))),
@@ -157,7 +157,7 @@ fn loops() -> Vec<Case> {
 }
 
 /// Surfaces in OBJ.
-fn objs() -> Vec<Case> {
+fn objs() -> Vec<BadSource> {
     let vertices: String = (0..3)
         .flat_map(|j| (0..3).map(move |i| format!("v {i} {} {j}\n", i % 2)))
         .collect();
@@ -210,6 +210,6 @@ fn objs() -> Vec<Case> {
         ),
     ]
     .into_iter()
-    .map(|(name, text)| Case::new(format!("obj: {name}"), "obj", text))
+    .map(|(name, text)| BadSource::new(format!("obj: {name}"), "obj", text))
     .collect()
 }

@@ -5,8 +5,8 @@ use std::io::Cursor;
 use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use enfilade_testkit::Rng;
 
-use super::cases::Case;
-use super::damaged::unpaged;
+use super::cases::BadSource;
+use super::pages::unpaged;
 
 /// Points on the walls of a room of 4 by 3 by 2.5 m around the origin, z up.
 fn room(n: usize) -> Vec<[f64; 3]> {
@@ -76,21 +76,23 @@ pub(super) fn e57(points: &[[f64; 3]]) -> anyhow::Result<Vec<u8>> {
 pub(super) const STATION: [&str; 2] = ["--station", "0,0,0"];
 pub(super) const ORIGIN: &str = "comment station 0 0 0\n";
 
+/// Points told of that are not there.
+const HUGE: usize = 1_000_000_000;
+
 /// Few points: a bake of the whole takes a second.
 pub(super) fn small() -> Vec<[f64; 3]> {
     room(1500)
 }
 
 /// Points that are not there, are not numbers, lie all at one place or far away, or were seen from nowhere.
-pub(super) fn cases() -> Vec<Case> {
+pub(super) fn cases() -> Vec<BadSource> {
     let points = small();
     let n = points.len();
-    let mut all: Vec<Case> = Vec::new();
+    let mut all: Vec<BadSource> = Vec::new();
     let mut add =
-        |name: &str, bytes: Vec<u8>| all.push(Case::new(format!("ply {name}"), "ply", bytes));
-    let huge = 1_000_000_000;
-    add("of 1e9 points", ply(&points, huge, ORIGIN));
-    let text = ply(&points, huge, ORIGIN);
+        |name: &str, bytes: Vec<u8>| all.push(BadSource::new(format!("ply {name}"), "ply", bytes));
+    add("of 1e9 points", ply(&points, HUGE, ORIGIN));
+    let text = ply(&points, HUGE, ORIGIN);
     let text = String::from_utf8_lossy(&text).replace("binary_little_endian", "ascii");
     add("of 1e9 points as text", text.into_bytes());
     add("of 2^64 points", ply(&points, usize::MAX, ORIGIN));
@@ -156,18 +158,25 @@ pub(super) fn cases() -> Vec<Case> {
         .map(|_| [0; 3].map(|_| rng.range(-12.0, 12.0)))
         .collect();
     add("of noise", ply(&cloud, cloud.len(), ORIGIN));
+    all.extend(heads(n));
+    all
+}
+
+/// Heads of LAS, LAZ and E57 that tell of points that are not there.
+fn heads(n: usize) -> Vec<BadSource> {
+    let mut all: Vec<BadSource> = Vec::new();
     let Ok([plain, packed, pages]) = files() else {
-        return all;
+        return Vec::new();
     };
     for (ending, whole) in [("las", &plain), ("laz", &packed)] {
         let mut many = whole.clone();
-        many[107..111].copy_from_slice(&(huge as u32).to_le_bytes());
-        many[247..255].copy_from_slice(&(huge as u64).to_le_bytes());
-        all.push(Case::new(format!("{ending} of 1e9 points"), ending, many).with(&STATION));
+        many[107..111].copy_from_slice(&(HUGE as u32).to_le_bytes());
+        many[247..255].copy_from_slice(&(HUGE as u64).to_le_bytes());
+        all.push(BadSource::new(format!("{ending} of 1e9 points"), ending, many).with(&STATION));
         let mut some = whole.clone();
         some[247..255].copy_from_slice(&50_000_000_u64.to_le_bytes());
-        all.push(Case::new(format!("{ending} of 5e7 points"), ending, some).with(&STATION));
-        all.push(Case::new(
+        all.push(BadSource::new(format!("{ending} of 5e7 points"), ending, some).with(&STATION));
+        all.push(BadSource::new(
             format!("{ending} without a station"),
             ending,
             whole.clone(),
@@ -175,9 +184,13 @@ pub(super) fn cases() -> Vec<Case> {
     }
     // Points that the compressed vector does not have.
     for n_told in ["1000000000", "18446744073709551615", "50000000", "-1"] {
-        let told = format!("recordCount=\"{}\"", points.len());
+        let told = format!("recordCount=\"{}\"", n);
         let bytes = unpaged(&pages).with_text(&told, &format!("recordCount=\"{n_told}\""));
-        all.push(Case::new(format!("e57 of {n_told} points"), "e57", bytes));
+        all.push(BadSource::new(
+            format!("e57 of {n_told} points"),
+            "e57",
+            bytes,
+        ));
     }
     all
 }
