@@ -15,8 +15,12 @@ RUSTFLAGS="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
 -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1"
 export RUSTFLAGS
+bins=
+for target in $targets; do
+    bins="$bins --bin $target"
+done
 # shellcheck disable=SC2086
-cargo build $build --bins
+cargo build $build $bins
 for target in $targets; do
     mkdir -p "corpus/$target" "artifacts/$target"
     "target/coverage/$host/release/$target" "corpus/$target" -artifact_prefix="artifacts/$target/" \

@@ -14,6 +14,9 @@ extern crate self as enfilade_cli;
 #[path = "../../crates/enfilade-cli/src/input.rs"]
 pub mod input;
 #[doc(hidden)]
+#[path = "../../crates/enfilade-cli/src/memory.rs"]
+pub mod memory;
+#[doc(hidden)]
 #[path = "../../crates/enfilade-cli/src/values.rs"]
 pub mod values;
 

@@ -27,13 +27,14 @@ use serde::Serialize;
 
 use crate::formats::Format;
 use crate::inspect::{write_holes, write_seals};
+use crate::limits::watch_bake;
 use crate::output::{Outputs, Written, write_whole};
 use crate::pieces::PieceFolder;
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, is_watched, print_json, write_lines};
 use crate::specials::described;
 use crate::walk::{self, Walks, WorldFile};
-use enfilade_cli::input::{import_scene, is_stream};
+use enfilade_cli::input::{import_scene, is_stream, names_of};
 use enfilade_cli::memory::held_memory;
 use enfilade_report::{Verdict, is_empty, why_empty};
 
@@ -65,7 +66,13 @@ pub(crate) struct Bake {
 }
 
 pub(crate) fn run(args: &Bake) -> anyhow::Result<()> {
+    begin(&args.options, &args.inputs)?;
     run_with(args, None)
+}
+
+/// Starts enforcing the limits of a bake of `scene`, also where nothing looks at them.
+pub(crate) fn begin(options: &settings::BakeOptions, scene: &[PathBuf]) -> anyhow::Result<()> {
+    watch_bake(&names_of(scene), options.max_time, options.max_memory)
 }
 
 /// A scene that is ready to be baked.
@@ -136,7 +143,9 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     };
     let own = args.checkpoint.clone().map(PieceFolder::at);
     let pieces = kept.or(own.as_ref());
-    let mut baked = bake_scene(scene, config, options.threads, pieces)?;
+    let name = || names_of(&args.inputs);
+    let baked = bake_scene(scene, config, options.threads, pieces);
+    let mut baked = baked.with_context(name)?;
     if let Some(path) = &leak_path {
         baked.world.leak_path = path.points();
     } else if baked.n_indoors() == 0 {
@@ -153,7 +162,8 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
                 path.write(&mut path.says())?;
             }
             bail!(
-                "no room was found, and nothing was written: {why}; --allow-empty writes the world all the same"
+                "{}: no room was found, and nothing was written: {why}; --allow-empty writes the world all the same",
+                name()
             );
         }
         writeln!(Warned, "no room was found: {why}")?;

@@ -5,6 +5,7 @@
 
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::{Context, bail};
 use enfilade::bake::delaunay::{JOINED, Session, Step};
@@ -13,11 +14,11 @@ use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 
 use crate::bake::delaunay::choices_text;
-use crate::bake::{Summary, print_summary, settings};
+use crate::bake::{Summary, begin, print_summary, settings};
 use crate::formats::Format;
 use crate::output::{Outputs, Written, refuse_stream, write_whole};
 use crate::screen::{Warned, print_json, write_lines};
-use enfilade_cli::input::{import_scene, is_stream};
+use enfilade_cli::input::{import_scene, is_stream, names_of};
 use enfilade_cli::memory::held_memory;
 
 /// Shows how the Delaunay builder removes portals, one by one, and lets you overrule it.
@@ -48,6 +49,11 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     if args.steps && args.options.inputs(&args.inputs).any(|p| is_stream(p)) {
         bail!("--steps reads commands from standard input; give files to read, not '-'");
     }
+    let began = Some(Instant::now());
+    // At the steps, people take the time that they need; each bake has its own limit.
+    if !args.steps {
+        begin(&args.options, &args.inputs)?;
+    }
     let mut outputs = Outputs::reading(args.options.inputs(&args.inputs))?;
     // Choices that are read are extended, and may be saved to the same file.
     let mut choices = Outputs::reading(args.inputs.iter().chain(&args.options.detail))?;
@@ -62,10 +68,12 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     outputs.read(&imported.report.references)?;
     choices.read(&imported.report.references)?;
     let scene = &imported.scene;
-    let config = settings.bake.config_for(scene);
+    let mut config = settings.bake.config_for(scene);
+    config.budget.began = began.filter(|_| !args.steps);
     config.costs.cost.check(&scene.materials)?;
     let context = BakeContext::new(&Silent, None).measured_by(held_memory);
-    let session = Session::begin(scene, &config, &context)?;
+    let session = Session::begin(scene, &config, &context);
+    let session = session.with_context(|| names_of(&args.inputs))?;
     let n = session.decimation.steps.len();
     if let Some(at) = args.at.filter(|&at| at > n) {
         bail!("--at {at} is past the last step; there are {n}");

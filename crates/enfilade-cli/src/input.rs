@@ -5,6 +5,7 @@ use std::io::{self, Read, StdinLock};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use enfilade::geom::shown;
 use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
 use enfilade::stream::{PackedFiles, PackedPlace};
 
@@ -21,6 +22,16 @@ pub fn name_of(path: &Path) -> String {
         "standard input".into()
     } else {
         path.display().to_string()
+    }
+}
+
+/// The names of the files of a scene in messages: of many, the first.
+#[must_use]
+pub fn names_of(scene: &[PathBuf]) -> String {
+    match scene {
+        [] => "the scene".into(),
+        [one] => shown(name_of(one)).to_string(),
+        [one, others @ ..] => format!("{} and {} more", shown(name_of(one)), others.len()),
     }
 }
 

@@ -11,7 +11,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::geom::Allowance;
+use enfilade::geom::{Allowance, PROGRAM};
 
 use crate::output::WRITING;
 use crate::screen::Warned;
@@ -73,8 +73,34 @@ fn late(time: Duration) -> String {
     )
 }
 
+/// Ends the process of a bake of `scene` once it exceeds a limit by more than its own looks at clock and memory let it.
+pub(crate) fn watch_bake(
+    scene: &str,
+    max_time: Option<Duration>,
+    max_memory: Option<u64>,
+) -> anyhow::Result<()> {
+    // A bake may hold its memory beside that of the program; a tenth for what is taken between two looks.
+    let hard = max_memory.map(|bytes| bytes.saturating_add(PROGRAM));
+    let hard = hard.map(|bytes| bytes.saturating_add(bytes / 10));
+    // Where the memory of a process is unknown, that of a bake is estimated alone.
+    watch_over(
+        format!("{scene}: "),
+        max_time,
+        hard.filter(|_| memory().is_some()),
+    )
+}
+
 /// Ends the process once it exceeds a limit.
 pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyhow::Result<()> {
+    watch_over(String::new(), max_time, max_memory)
+}
+
+/// Works as [`watch`]; messages begin with `subject`.
+fn watch_over(
+    subject: String,
+    max_time: Option<Duration>,
+    max_memory: Option<u64>,
+) -> anyhow::Result<()> {
     if max_memory.is_some() && memory().is_none() {
         bail!("--max-memory: this system does not report the memory of a process");
     }
@@ -85,7 +111,7 @@ pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyh
     let hard = max_time.map(with_grace);
     let look = move || loop {
         if hard.is_some_and(|t| start.elapsed() >= t) {
-            end(&late(max_time.unwrap_or_default()));
+            end(&format!("{subject}{}", late(max_time.unwrap_or_default())));
         }
         if let Some((taken, most)) = memory()
             .zip(max_memory)
@@ -93,7 +119,7 @@ pub(crate) fn watch(max_time: Option<Duration>, max_memory: Option<u64>) -> anyh
         {
             let [taken, most] = [taken, most].map(|b| b as f64 / f64::from(1 << 20));
             end(&format!(
-                "uses {taken:.0} MiB, and {most:.0} MiB were allowed (--max-memory); raise the limit or reduce the work"
+                "{subject}uses {taken:.0} MiB, and {most:.0} MiB were allowed (--max-memory); raise the limit or reduce the work"
             ));
         }
         // Without a bound on memory, there is nothing to check before the time is up.

@@ -53,6 +53,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use enfilade::geom::{is_hidden, shown};
+use enfilade::import::is_panic_caught;
 use screen::{Warned, be_quiet, is_broken_pipe};
 
 /// Finds the rooms and doorways of a 3D scene and computes what is visible from where.
@@ -139,7 +140,18 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     }
 }
 
+/// Keeps quiet about panics of other people's readers that become errors naming a damaged file; all others are reported.
+fn silence_caught_panics() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !is_panic_caught() {
+            usual(panic);
+        }
+    }));
+}
+
 fn main() -> ExitCode {
+    silence_caught_panics();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => wrong_usage(&error),

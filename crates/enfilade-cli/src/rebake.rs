@@ -11,12 +11,12 @@ use enfilade::cpg::CellId;
 use enfilade::cpg::wire::encode_glb;
 use serde::Serialize;
 
-use crate::bake::{Summary, found, print_summary, settings};
+use crate::bake::{Summary, begin, found, print_summary, settings};
 use crate::formats::Format;
 use crate::output::{Outputs, Written, write_whole};
 use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, print_json, write_lines};
-use enfilade_cli::input::import_scene;
+use enfilade_cli::input::{import_scene, names_of};
 use enfilade_cli::memory::held_memory;
 use enfilade_cli::world::read_world;
 
@@ -45,6 +45,7 @@ pub(crate) struct Rebake {
 pub(crate) fn run(args: &Rebake) -> anyhow::Result<()> {
     let began = Instant::now();
     let options = &args.options;
+    begin(options, &args.source)?;
     if let Some(option) = options.of_bakes_alone() {
         bail!("{option} is an option of bake; bake the new scene with it to see what is open");
     }
@@ -69,7 +70,8 @@ pub(crate) fn run(args: &Rebake) -> anyhow::Result<()> {
         .num_threads(options.threads.map_or(0, usize::from))
         .build()?;
     let context = BakeContext::new(&bar, None).measured_by(held_memory);
-    let mut rebaked = pool.install(|| rebake(&old, scene, &config, &context))?;
+    let rebaked = pool.install(|| rebake(&old, scene, &config, &context));
+    let mut rebaked = rebaked.with_context(|| names_of(&args.source))?;
     drop(bar);
     let told = &mut rebaked.world.graph.provenance.settings;
     told.extend(found::settings_of(&imported.report, settings.import.repair));

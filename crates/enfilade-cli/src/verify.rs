@@ -14,7 +14,7 @@ use enfilade_verify::{
     other_scene, verify_evidence, verify_views, verify_world_with_progress,
 };
 
-use crate::bake::settings::{SceneOptions, bound_converter};
+use crate::bake::settings::{SceneOptions, bound};
 use crate::exact::{Asked, verify_pictures};
 use crate::limits::Limits;
 use crate::output::{Outputs, make_folder};
@@ -254,7 +254,7 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
 
 fn read_source(args: &Verify, outputs: &mut Outputs) -> anyhow::Result<Scene> {
     let mut options = args.scene.resolve()?;
-    bound_converter(
+    bound(
         &mut options,
         args.limits.max_time(),
         args.limits.max_memory(),

@@ -83,6 +83,12 @@ impl Allowance {
         self
     }
 
+    /// Returns `true` if it ends at some time, however much work is left.
+    #[must_use]
+    pub fn is_timed(&self) -> bool {
+        self.until.is_some()
+    }
+
     /// Adds work: the task turned out larger, by an amount that is bounded elsewhere.
     pub fn grant(&self, work: u64) {
         let most = self.most().saturating_add(work);

@@ -11,6 +11,7 @@ use enfilade_geom::scene::{
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
 use enfilade_prepare::{GridSteps, RoleFacts, RoleVerdict, weld_quantized};
+use enfilade_source::SourceError;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -132,6 +133,36 @@ impl<'a> Builder<'a> {
         Ok(bytes)
     }
 
+    /// Returns the error of a source: that of the allowance if this is why it ended.
+    pub(crate) fn failed(&self, e: SourceError) -> ImportError {
+        self.ended(&e.place)
+            .unwrap_or_else(|| self.malformed(e.place, e.problem))
+    }
+
+    /// Returns the error of the allowance, if it is over; looks at clock and memory.
+    fn ended(&self, place: &str) -> Option<ImportError> {
+        let end = self.options.allowance.as_ref()?.end()?;
+        Some(ImportError::Ended {
+            path: self.path.clone(),
+            place: place.into(),
+            end,
+        })
+    }
+
+    /// Spends work of the allowance, in units of about 100 ns.
+    pub(crate) fn spend(&self, place: &str, work: u64) -> Result<(), ImportError> {
+        let allowance = self.options.allowance.as_deref();
+        match allowance.is_none_or(|a| a.spend(work)) {
+            true => Ok(()),
+            false => self.go_on(place),
+        }
+    }
+
+    /// Checks that the allowance is not over, before or after what does not spend from it.
+    pub(crate) fn go_on(&self, place: &str) -> Result<(), ImportError> {
+        self.ended(place).map_or(Ok(()), Err)
+    }
+
     pub(crate) fn limits(&self) -> &'a Limits {
         &self.options.limits
     }
@@ -205,7 +236,7 @@ impl<'a> Builder<'a> {
         if self.n_vertices > limit {
             return Err(self.too_much(place, "vertices", self.n_vertices, limit));
         }
-        Ok(())
+        self.spend(place, n)
     }
 
     /// Adds to the bytes read, of this file or one that it refers to.
@@ -409,7 +440,7 @@ impl<'a> Builder<'a> {
             RoleVerdict::Keep(role, reason) => (role, reason),
         };
         let limits = self.limits();
-        let n_placed = placement.transforms.len() as u64;
+        self.spend(placement.place, n_placed)?;
         let n_placed_triangles = n_placed.saturating_mul(n_triangles as u64);
         self.n_triangles = self.n_triangles.saturating_add(n_placed_triangles);
         if self.n_triangles > limits.max_triangles {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use enfilade_geom::shown;
+use enfilade_geom::{End, shown};
 
 /// The reason why an import stopped. The text names the problem, the place and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -79,6 +79,16 @@ pub enum ImportError {
         /// Bytes allowed.
         limit: u64,
     },
+    /// The allowance of the options was over before a file was read.
+    #[error("{}: {}: {}", shown(path.display()), shown(place), words_of(*end))]
+    Ended {
+        /// The file.
+        path: PathBuf,
+        /// Element that was being read.
+        place: String,
+        /// Reason for the end.
+        end: End,
+    },
     /// No triangle was found in any file.
     #[error("no triangles in {}; {}", shown(paths), shown(advice))]
     NoTriangles {
@@ -108,6 +118,22 @@ pub enum ImportError {
     /// An option is invalid.
     #[error(transparent)]
     BadOption(#[from] enfilade_prepare::BadOption),
+}
+
+/// Returns the reason for an end, and the remedy.
+fn words_of(end: End) -> &'static str {
+    match end {
+        End::Work => {
+            "reading takes more work than allowed; allow more, or give less or coarser input"
+        }
+        End::Time => {
+            "the time was up before it was read (--max-time); allow more, or give less or coarser input"
+        }
+        End::Memory => {
+            "reading takes more memory than allowed (--max-memory); allow more, or give less or coarser input"
+        }
+        End::Cancelled => "cancelled",
+    }
 }
 
 /// Formats a length short enough for one line, however wrong it is.

@@ -21,6 +21,7 @@
 
 mod arrays;
 mod builder;
+mod caught;
 mod error;
 mod export;
 mod extent;
@@ -28,6 +29,7 @@ mod files;
 mod foreign;
 mod gltf;
 mod ifc;
+mod las_head;
 mod map;
 mod marks;
 mod mesh;
@@ -62,6 +64,7 @@ pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
 pub use report::{FileReport, ImportReport, Note, SurfaceReport, UpDoubt, cleaning_report};
 
 use builder::Builder;
+pub use caught::is_panic_caught;
 use enfilade_geom::scene::Scene;
 pub use enfilade_source::AirSide;
 pub use enfilade_source::HeightOptions;
@@ -369,6 +372,7 @@ fn decode(
 }
 
 fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, ImportError> {
+    builder.go_on("scene")?;
     let (mut scene, mut report) = builder.finish();
     if scene.objects.is_empty() {
         let advice = match report.notes.first() {

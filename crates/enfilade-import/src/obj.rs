@@ -126,6 +126,7 @@ impl ObjReader<'_, '_> {
         let (word, rest) = line
             .split_once(|c: char| c.is_whitespace())
             .map_or((line, ""), |(word, rest)| (word, rest.trim()));
+        self.builder.spend("lines", 2)?;
         match word {
             "v" => {
                 let numbers = self.numbers::<7>(rest, number, 3)?;
@@ -227,7 +228,7 @@ impl ObjReader<'_, '_> {
         let unit = soup::unit(self.builder);
         let limits = sources::limits(self.builder);
         let mesh = tessellate(&self.patches, tolerance / unit, &limits)
-            .map_err(|e| self.builder.malformed(e.place, e.problem))?;
+            .map_err(|e| self.builder.failed(e))?;
         // Triangles are as many as it takes, whatever the length of the file.
         let n: usize = mesh.triangles.iter().map(Vec::len).sum();
         self.builder.add_read_bytes((n * 36) as u64);

@@ -1,9 +1,10 @@
 //! Options of the import.
 
-use enfilade_geom::{DMat4, DVec3};
+use enfilade_geom::{Allowance, DMat4, DVec3};
 use enfilade_prepare::{BadOption, RepairOptions, RoleRules};
 use enfilade_source::{AirSide, HeightOptions};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The input's up axis.
@@ -74,6 +75,9 @@ pub struct ImportOptions {
     pub stations: Vec<DVec3>,
     /// Repairs of structural triangles; `None` repairs nothing.
     pub repair: Option<RepairOptions>,
+    /// Time and memory, shared with whoever goes on with the scene; `None` limits neither, so that work out of proportion to a source
+    /// is refused beforehand.
+    pub allowance: Option<Arc<Allowance>>,
 }
 
 /// Settings of volumes of samples.

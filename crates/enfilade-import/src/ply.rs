@@ -352,6 +352,7 @@ fn read_property(
         Err(builder.malformed(place(), format!("{name}: {problem}")))
     };
     let cut = "no number; is the file cut off?";
+    builder.spend("body", 1)?;
     let n = match property.length {
         None => 1,
         Some(length) => match source.next(length) {
@@ -360,7 +361,11 @@ fn read_property(
             Some(n) => return bad(&format!("a list of {n}")),
         },
     };
-    for _ in 0..n {
+    for k in 0..n {
+        // Lists of four or fewer are paid already.
+        if k % 4 == 3 {
+            builder.spend("body", 1)?;
+        }
         match source.next(property.kind) {
             None => return bad(cut),
             Some(value) => take(value),

@@ -9,6 +9,8 @@ use enfilade_source::{Scan, ScanOptions};
 
 use crate::ImportError;
 use crate::builder::Builder;
+use crate::caught::caught;
+use crate::las_head;
 use crate::sources::{Told, add, limits};
 
 /// Edge of the voxels of a scan: walls are at least two of them thick. [Units: wu]
@@ -51,6 +53,7 @@ fn e57_scan(bytes: &[u8], builder: &mut Builder<'_>) -> Result<Scan, ImportError
             .pointcloud_simple(cloud)
             .map_err(|e| damaged(builder, &place, &e))?;
         for point in all {
+            builder.spend(&place, 4)?;
             let point = point.map_err(|e| damaged(builder, &place, &e))?;
             // A direction alone met nothing: the sky, or a surface as black as it.
             if let CartesianCoordinate::Valid { x, y, z } = point.cartesian {
@@ -79,12 +82,13 @@ fn guarded<T>(
     builder: &mut Builder<'_>,
     read: impl FnOnce(&mut Builder<'_>) -> Result<T, ImportError>,
 ) -> Result<T, ImportError> {
-    let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| read(builder)));
-    read.unwrap_or_else(|_| Err(builder.malformed("file", "is damaged; export it anew")))
+    let read = caught(|| read(builder));
+    read.unwrap_or_else(|| Err(builder.malformed("file", "is damaged; export it anew")))
 }
 
-/// Points read at a time.
+/// Points read at a time, and the bytes that they take at most.
 const BATCH: u64 = 1 << 16;
+const BATCH_BYTES: u64 = 16 << 20;
 
 /// Reads a cloud of points in LAS or LAZ. The third axis is up; the options give the places of the scanner.
 pub(crate) fn read_las(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
@@ -118,15 +122,21 @@ fn las_points(
     let damaged = |builder: &Builder<'_>, e: &las::Error| {
         builder.malformed("file", format!("{e}; is it cut off?"))
     };
+    if let Some(problem) = las_head::problem(bytes) {
+        return Err(builder.malformed("file", problem));
+    }
     // The reader needs bytes of its own.
     let mut reader =
         las::Reader::new(Cursor::new(bytes.to_vec())).map_err(|e| damaged(builder, &e))?;
     let n = reader.header().number_of_points();
     builder.charge_vertices("points", n)?;
+    let n_batch = BATCH.min(BATCH_BYTES / las_head::point_length(bytes));
     let (mut points, mut sources) = (Vec::new(), Vec::new());
     while (points.len() as u64) < n {
+        // Each point takes about half a microsecond to unpack.
+        builder.spend("points", 5 * n_batch)?;
         let batch = reader
-            .read_points(BATCH)
+            .read_points(n_batch)
             .map_err(|e| damaged(builder, &e))?;
         if batch.is_empty() {
             let problem = format!("ends after {} of {n} points; is it cut off?", points.len());
@@ -194,7 +204,7 @@ fn add_scan(scan: &Scan, builder: &mut Builder<'_>) -> Result<(), ImportError> {
     let limits = limits(builder);
     let step = scan.step(&options, &limits);
     let surface = scan.surface(&options, &limits);
-    let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
+    let surface = surface.map_err(|e| builder.failed(e))?;
     let text = format!(
         "a scan of {} points, stations: {}; what no station saw is matter",
         scan.points.len(),

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use enfilade_geom::scene::{Mesh, Primitive, Role};
 use enfilade_geom::{DMat4, DVec3};
 use enfilade_source::{
-    AirSide, FreeformScene, HeightMap, ImplicitScene, Level, SourceError, SourceLimits, Surface,
-    Volume, VolumeSummary, tessellate,
+    AirSide, FreeformScene, HeightMap, ImplicitScene, Level, SourceLimits, Surface, Volume,
+    VolumeSummary, tessellate,
 };
 
 use crate::builder::{Builder, Placement};
@@ -17,9 +17,8 @@ use crate::{ImportError, ImportReport, SurfaceReport, Up, soup};
 pub(crate) fn read_implicit(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     builder.set_format("implicit");
     let limits = limits(builder);
-    let bad = |builder: &Builder<'_>, e: SourceError| builder.malformed(e.place, e.problem);
-    let scene = ImplicitScene::parse(bytes, &limits).map_err(|e| bad(builder, e))?;
-    let surface = scene.surface(&limits).map_err(|e| bad(builder, e))?;
+    let scene = ImplicitScene::parse(bytes, &limits).map_err(|e| builder.failed(e))?;
+    let surface = scene.surface(&limits).map_err(|e| builder.failed(e))?;
     let unit = match builder.options.unit {
         Some(_) => 1.0,
         None => scene.unit.unwrap_or(1.0),
@@ -45,8 +44,7 @@ pub(crate) fn told_of_patches(n: usize) -> String {
 pub(crate) fn read_patches(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     builder.set_format("patches");
     let limits = limits(builder);
-    let bad = |builder: &Builder<'_>, e: SourceError| builder.malformed(e.place, e.problem);
-    let scene = FreeformScene::parse(bytes, &limits).map_err(|e| bad(builder, e))?;
+    let scene = FreeformScene::parse(bytes, &limits).map_err(|e| builder.failed(e))?;
     let unit = match builder.options.unit {
         Some(_) => 1.0,
         None => scene.unit.unwrap_or(1.0),
@@ -58,7 +56,7 @@ pub(crate) fn read_patches(bytes: &[u8], builder: &mut Builder<'_>) -> Result<()
         surfaces.push(patch.surface);
     }
     let mesh = tessellate(&surfaces, patch_tolerance(builder) / meters, &limits);
-    let mesh = mesh.map_err(|e| bad(builder, e))?;
+    let mesh = mesh.map_err(|e| builder.failed(e))?;
     let n: usize = mesh.triangles.iter().map(Vec::len).sum();
     builder.add_read_bytes((n * 36) as u64);
     let mut positions: Vec<[f64; 3]> = mesh.positions.iter().map(DVec3::to_array).collect();
@@ -134,7 +132,7 @@ pub(crate) fn read_volume(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(),
         builder.note(place, text);
     }
     let surface = volume.surface(level, &limits);
-    let surface = surface.map_err(|e| builder.malformed(e.place, e.problem))?;
+    let surface = surface.map_err(|e| builder.failed(e))?;
     let side = match level.air {
         AirSide::Below => "below",
         AirSide::Above => "above",
@@ -185,7 +183,7 @@ fn parse_volume(
         Ok(read)
     };
     let volume = Volume::parse(bytes, &mut beside, limits);
-    volume.map_err(|e| builder.malformed(e.place, e.problem))
+    volume.map_err(|e| builder.failed(e))
 }
 
 /// Returns what to multiply lengths of a volume with, beside the unit of the options, and the enlargement in it.
@@ -227,12 +225,11 @@ fn level(found: &VolumeSummary, builder: &Builder<'_>) -> Result<Level, ImportEr
 pub(crate) fn read_heights(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     builder.set_format(HeightMap::format(bytes));
     let limits = limits(builder);
-    let bad = |builder: &Builder<'_>, e: SourceError| builder.malformed(e.place, e.problem);
-    let map = HeightMap::parse(bytes, &limits).map_err(|e| bad(builder, e))?;
+    let map = HeightMap::parse(bytes, &limits).map_err(|e| builder.failed(e))?;
     let options = builder.options.heights.clone();
     let surface = map.surface(&options, &limits);
-    let surface = surface.map_err(|e| bad(builder, e))?;
-    let cell = map.cell(&options).map_err(|e| bad(builder, e))?;
+    let surface = surface.map_err(|e| builder.failed(e))?;
+    let cell = map.cell(&options).map_err(|e| builder.failed(e))?;
     let n = map.samples.iter().filter(|s| s.is_nan()).count();
     let mut text = format!("{} × {} heights", map.dims[0], map.dims[1]);
     if n > 0 {
@@ -277,6 +274,7 @@ pub(crate) fn limits(builder: &Builder<'_>) -> SourceLimits {
         max_voxels: usual.max_voxels.min(most.max_file_bytes / 16),
         max_samples: usual.max_samples.min(most.max_file_bytes / 4),
         max_nodes: usual.max_nodes.min(most.max_objects),
+        allowance: builder.options.allowance.clone(),
         ..usual
     }
 }

@@ -295,10 +295,42 @@ fn las_and_laz_are_scans_if_the_stations_of_their_sources_are_given() {
     many[107..111].copy_from_slice(&1_000_000_000_u32.to_le_bytes());
     many[247..255].copy_from_slice(&1_000_000_000_u64.to_le_bytes());
     let error = said(&many, &both);
+    assert!(error.contains("promises 1000000000"), "{error}");
+    let mut many = laz.clone();
+    many[107..111].copy_from_slice(&1_000_000_000_u32.to_le_bytes());
+    many[247..255].copy_from_slice(&1_000_000_000_u64.to_le_bytes());
+    let error = said(&many, &both);
     assert!(
         error.contains("vertices") && error.contains("1000000000"),
         "{error}"
     );
+}
+
+#[test]
+fn lengths_in_a_las_are_not_believed_beyond_its_end() {
+    let options = ImportOptions {
+        stations: vec![DVec3::ZERO],
+        ..ImportOptions::default()
+    };
+    let said = |bytes: &[u8]| decode_las(bytes, &options).unwrap_err().to_string();
+    // An extended record of 2^46 bytes, for which no process gets memory.
+    let mut las = rooms_las(false, 100);
+    let start = (las.len() as u64).to_le_bytes();
+    las.extend([0; 60]);
+    let at = las.len() - 40;
+    las[at..at + 8].copy_from_slice(&(1_u64 << 46).to_le_bytes());
+    las[235..243].copy_from_slice(&start);
+    las[243..247].copy_from_slice(&1_u32.to_le_bytes());
+    assert!(said(&las).contains("extended record 0"), "{}", said(&las));
+    // As many chunks as a number can tell, of 16 bytes each in memory.
+    let mut laz = rooms_las(true, 100);
+    let to_points = u32::from_le_bytes(laz[96..100].try_into().unwrap()) as usize;
+    let table = u64::from_le_bytes(laz[to_points..to_points + 8].try_into().unwrap()) as usize;
+    laz[table + 4..table + 8].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(said(&laz).contains("4294967295 chunks"), "{}", said(&laz));
+    for whole in [rooms_las(false, 40_000), rooms_las(true, 40_000)] {
+        assert!(decode_las(&whole, &options).is_ok());
+    }
 }
 
 #[test]

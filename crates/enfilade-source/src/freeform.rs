@@ -82,6 +82,7 @@ fn mesh_of(
     let mut budget = Budget {
         n_triangles: limits.max_triangles,
         work: limits.max_work,
+        purse: limits.purse(),
     };
     let mut lattices = Vec::with_capacity(patches.len());
     let mut sides = Sides::new(tolerance);
@@ -99,7 +100,12 @@ fn mesh_of(
             false => loops::polylines(patch, lattice, &outline, tolerance, &mut budget)?,
         };
         let filled = fill::fill(patch, lattice, &polylines, &mut budget)?;
-        mesh.add(patch, lattice, &filled, &mut weld);
+        // A vertex, and the middles of a triangle and its edges.
+        let n_values = (filled.vertices.len() + 4 * filled.triangles.len()) as f64;
+        if !budget.spend(n_values * lattice.cost(patch)) {
+            return Err(patch.error(patch::TOO_MUCH));
+        }
+        mesh.add(patch, lattice, &filled, &mut weld, limits)?;
     }
     Ok(mesh)
 }
@@ -112,8 +118,11 @@ impl FreeformMesh {
         lattice: &Lattice2,
         filled: &fill::Filled,
         weld: &mut Weld,
-    ) {
+        limits: &SourceLimits,
+    ) -> Result<(), SourceError> {
+        let cost = lattice.cost(patch) as u64 / 4 + 1;
         let index: Vec<u32> = (filled.vertices.iter())
+            .take_while(limits.purse().each(cost))
             .map(|v| {
                 let p = v
                     .position
@@ -124,12 +133,14 @@ impl FreeformMesh {
                 }
             })
             .collect();
+        limits.go_on()?;
         let mut triangles = Vec::with_capacity(filled.triangles.len());
         for t in &filled.triangles {
             let [a, b, c] = t.map(|v| index[v as usize]);
             if a == b || b == c || c == a {
                 continue;
             }
+            limits.spend(cost)?;
             triangles.push([a, b, c]);
             // The middles of the triangle and of its edges.
             for weights in [
@@ -154,5 +165,6 @@ impl FreeformMesh {
         }
         self.n_samples += (filled.vertices.len() + 4 * filled.triangles.len()) as u64;
         self.triangles.push(triangles);
+        Ok(())
     }
 }

@@ -115,7 +115,9 @@ impl HeightMap {
         let heights: Vec<f32> = self.samples.iter().map(|&s| height(s)).collect();
         let off = OFF * cell[0].min(cell[1]);
         let most = usize::try_from(limits.max_triangles).unwrap_or(usize::MAX);
-        let land = triangulate(self.dims, &heights, off as f32, most).ok_or_else(|| {
+        let land = triangulate(self.dims, &heights, off as f32, most, limits.purse());
+        limits.go_on()?;
+        let land = land.ok_or_else(|| {
             let problem = format!("its surface has more than {most} triangles; give a coarser map");
             error("surface", problem)
         })?;

@@ -101,13 +101,16 @@ impl Scan {
             step,
             size,
         };
-        let found = planes::of_scan(self, &grid);
-        let free = carve::carve(self, &grid);
+        let purse = limits.purse();
+        let found = planes::of_scan(self, &grid, purse);
+        let free = carve::carve(self, &grid, purse);
+        limits.go_on()?;
         let reach = (REACH * step) as f32;
         let start = |is_free: &bool| if *is_free { reach } else { -reach };
         let mut values: Vec<f32> = free.iter().map(start).collect();
-        let is_measured = planes::blend(&found, &grid, &free, &mut values);
-        frontier::smooth(&grid, &is_measured, &mut values);
+        let is_measured = planes::blend(&found, &grid, &free, &mut values, purse);
+        frontier::smooth(&grid, &is_measured, &mut values, purse);
+        limits.go_on()?;
         Ok(Volume {
             size,
             values,

@@ -8,18 +8,19 @@
 mod collapse;
 mod quadric;
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, Purse};
 
 use collapse::Mesh;
 
 /// Collapses edges while every vertex of the input stays within `tolerance` of the result, and returns the largest distance
-/// that one has. The surface stays closed and keeps its pieces and holes.
+/// that one has. The surface stays closed and keeps its pieces and holes. It stays as it is where the purse is empty.
 pub(crate) fn simplify(
     positions: &mut Vec<DVec3>,
     triangles: &mut Vec<[u32; 3]>,
     tolerance: f64,
+    purse: Purse<'_>,
 ) -> f64 {
-    let mut mesh = Mesh::new(positions, triangles, tolerance);
+    let mut mesh = Mesh::new(positions, triangles, tolerance, purse);
     mesh.collapse_all();
     let (kept, left, distance) = mesh.finish();
     (*positions, *triangles) = (kept, left);

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use enfilade_geom::{Aabb, DMat4, DVec3, Sets};
 
-use crate::blocks::{BLOCK, Lattice, Spent, for_blocks};
+use crate::blocks::{BLOCK, Lattice, Spent, for_blocks, forecast};
 use crate::patches::{EDGES, NONE, Pieces};
 use crate::qef::nearest_to_planes;
 use crate::simplify::simplify;
@@ -83,6 +83,8 @@ pub fn extract(
     limits: &SourceLimits,
 ) -> Result<Surface, SourceError> {
     let mut spent = Spent::new(limits);
+    let unit = unit(&options.placement);
+    forecast(field, &options.lattice, unit, &mut spent)?;
     let mut net = Net::new(options);
     for_blocks(
         field,
@@ -90,7 +92,7 @@ pub fn extract(
         &mut spent,
         &mut |field, from, spent| net.add_block(field, from, spent),
     )?;
-    net.add_faces()?;
+    net.add_faces(limits)?;
     if net.quads.is_empty() {
         let problem = "there is none: all is matter or all is air";
         return Err(SourceError::new("surface", problem));
@@ -103,7 +105,8 @@ pub fn extract(
             &mut surface.triangles,
             &surface.positions,
             options.least_piece,
-        );
+            limits,
+        )?;
         if surface.triangles.is_empty() {
             let problem = "all pieces are as small as noise; check the level";
             return Err(SourceError::new("surface", problem));
@@ -116,9 +119,17 @@ pub fn extract(
             &mut surface.positions,
             &mut surface.triangles,
             options.tolerance,
+            limits.purse(),
         );
+        limits.go_on()?;
     }
     Ok(surface)
+}
+
+/// Returns the length of the shortest axis of a placement.
+fn unit(placement: &DMat4) -> f64 {
+    let lengths = DVec3::AXES.map(|a| placement.transform_vector3(a).length());
+    lengths.into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// A cell with surface in it.
@@ -228,7 +239,8 @@ impl<'o> Net<'o> {
             }
             self.vertices.push(vertex);
         }
-        if self.vertices.len() as u64 > self.max_triangles {
+        // A closed surface has two triangles for each vertex.
+        if self.vertices.len() as u64 * 2 > self.max_triangles {
             let most = self.max_triangles;
             let problem = format!("has more than {most} triangles; give a coarser step");
             return Err(SourceError::new("surface", problem));
@@ -239,8 +251,9 @@ impl<'o> Net<'o> {
     }
 
     /// Adds a quadrangle around each edge of the lattice that the surface crosses.
-    fn add_faces(&mut self) -> Result<(), SourceError> {
+    fn add_faces(&mut self, limits: &SourceLimits) -> Result<(), SourceError> {
         for cell in &self.cells {
+            limits.spend(4)?;
             for axis in 0..3 {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 let is_in = cell.matter & 1 == 1;
@@ -362,14 +375,21 @@ impl<'o> Net<'o> {
 }
 
 /// Drops pieces whose box is smaller than `least` along all axes, and returns how many.
-fn drop_small(triangles: &mut Vec<[u32; 3]>, positions: &[DVec3], least: f64) -> u64 {
+fn drop_small(
+    triangles: &mut Vec<[u32; 3]>,
+    positions: &[DVec3],
+    least: f64,
+    limits: &SourceLimits,
+) -> Result<u64, SourceError> {
     let mut pieces = Sets::new(positions.len());
     for [a, b, c] in &*triangles {
+        limits.spend(1)?;
         pieces.join(*a, *b);
         pieces.join(*a, *c);
     }
     let mut boxes: HashMap<u32, Aabb> = HashMap::new();
     for [a, b, c] in &*triangles {
+        limits.spend(1)?;
         let bounds = boxes.entry(pieces.find(*a)).or_insert(Aabb::EMPTY);
         *bounds = [a, b, c]
             .iter()
@@ -377,7 +397,7 @@ fn drop_small(triangles: &mut Vec<[u32; 3]>, positions: &[DVec3], least: f64) ->
     }
     let is_small = |b: &Aabb| b.size().max_element() < least;
     triangles.retain(|t| !boxes.get(&pieces.find(t[0])).is_some_and(is_small));
-    boxes.values().filter(|b| is_small(b)).count() as u64
+    Ok(boxes.values().filter(|b| is_small(b)).count() as u64)
 }
 
 /// Returns the place where a field changes its sign between two points.

@@ -10,7 +10,7 @@ mod nrrd;
 mod raw;
 mod samples;
 
-use enfilade_geom::{Aabb, DMat4, DVec3};
+use enfilade_geom::{Aabb, DMat4, DVec3, Purse};
 
 pub use gunzip::{gunzip, is_gzip};
 pub use samples::SampleKind;
@@ -188,7 +188,8 @@ impl Volume {
         least_piece: f64,
         limits: &SourceLimits,
     ) -> Result<Surface, SourceError> {
-        let field = VolumeField::new(self, level, ends);
+        let field = VolumeField::new(self, level, ends, limits.purse());
+        limits.go_on()?;
         let step = self.least_step();
         let options = ExtractOptions {
             lattice: Lattice {
@@ -275,7 +276,8 @@ struct VolumeField<'v> {
 }
 
 impl<'v> VolumeField<'v> {
-    fn new(volume: &'v Volume, level: Level, ends: Ends) -> Self {
+    /// Meaningless if the purse is empty.
+    fn new(volume: &'v Volume, level: Level, ends: Ends, purse: Purse<'_>) -> Self {
         let sign = match level.air {
             AirSide::Above => 1.0,
             AirSide::Below => -1.0,
@@ -290,7 +292,7 @@ impl<'v> VolumeField<'v> {
             missing: -reach[0].max(reach[1]).max(f64::MIN_POSITIVE),
             bounds: Vec::new(),
         };
-        field.bounds.push(field.first_bounds());
+        field.bounds.push(field.first_bounds(purse));
         while let Some((edge, n, of)) = field
             .bounds
             .last()
@@ -302,11 +304,13 @@ impl<'v> VolumeField<'v> {
         field
     }
 
-    fn first_bounds(&self) -> (usize, [usize; 3], Vec<[f32; 2]>) {
+    fn first_bounds(&self, purse: Purse<'_>) -> (usize, [usize; 3], Vec<[f32; 2]>) {
         // From one sample before the first to one after the last.
         let n = self.volume.size.map(|n| (n + 2).div_ceil(BLOCK));
         let mut all = vec![[f32::INFINITY, f32::NEG_INFINITY]; n[0] * n[1] * n[2]];
-        for (i, bounds) in all.iter_mut().enumerate() {
+        // A block has nine samples along each edge.
+        let blocks = all.iter_mut().enumerate().take_while(purse.each(30));
+        for (i, bounds) in blocks {
             let block = [i % n[0], i / n[0] % n[1], i / (n[0] * n[1])];
             let from = block.map(|b| (b * BLOCK) as i64 - 1);
             for z in 0..=BLOCK as i64 {

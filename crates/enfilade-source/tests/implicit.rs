@@ -1,6 +1,9 @@
 //! Implicit scenes: bounds of boxes, work by surface, errors with their places. Covers S3.
 
-use enfilade_geom::{Aabb, DVec3};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use enfilade_geom::{Aabb, Allowance, DVec3};
 use enfilade_source::{ExtractOptions, Field, ImplicitScene, SourceLimits, extract};
 
 fn parse(text: &str) -> ImplicitScene {
@@ -196,6 +199,14 @@ fn endless_work_ends_early() {
         ..SourceLimits::default()
     };
     let text = r#"{"enfilade":"implicit","step":0.001,"box":[[0,0,0],[10,10,10]],"matter":{"gyroid":{"period":0.01}}}"#;
+    // Beforehand, and where time is limited as it goes on.
     let error = parse(text).surface(&limits).unwrap_err();
+    assert!(error.problem.contains("a step of"), "{error}");
+    let until = Instant::now() + Duration::from_secs(1000);
+    let timed = SourceLimits {
+        allowance: Some(Arc::new(Allowance::new(u64::MAX, Some(until)))),
+        ..limits
+    };
+    let error = parse(text).surface(&timed).unwrap_err();
     assert!(error.problem.contains("coarser step"), "{error}");
 }

@@ -2,6 +2,7 @@
 //!
 //! To add rows, add a file for their family beside this one and lines in [`ROWS`].
 
+mod bad;
 mod implicit;
 mod implicit_twins;
 mod land;
@@ -35,6 +36,16 @@ const CITIES: &[&str] = &["city-1", "city-2"];
 /// Buildings that are scanned.
 const HOUSE: &[&str] = &["fzk-haus"];
 const BUILDINGS: &[&str] = &["fzk-haus", "institute"];
+
+/// Families of bad input.
+const BAD: &[&str] = &[
+    "implicit",
+    "volumes",
+    "patches",
+    "heights",
+    "scans",
+    "damaged-scans",
+];
 
 const fn named(
     name: &'static str,
@@ -104,6 +115,7 @@ pub(crate) const ROWS: &[Row] = &[
     made("land: seconds", LANDS, land::seconds),
     made("land: broken promises", LANDS, land::broken),
     made("land: visible share", CITIES, land::seen),
+    made("bad input", BAD, bad::not_refused),
 ];
 
 /// Bakes with default settings.

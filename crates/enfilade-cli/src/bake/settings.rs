@@ -3,17 +3,19 @@
 //! Every value is checked where it is read, so that an error message names its place.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use enfilade::bake::{Method, Outdoors};
-use enfilade::geom::DVec3;
+use enfilade::geom::{Allowance, DVec3};
 use enfilade::import::{AirSide, HeightOptions, IfcConverter, ImportOptions, VolumeOptions};
 use enfilade_settings::{
     Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit, parse_weld,
 };
 
 use enfilade_cli::input::{name_of, read_text};
+use enfilade_cli::memory::held_memory;
 
 /// Options for reading scenes, shared by the baked scene and the scene that a world is compared with.
 #[derive(clap::Args)]
@@ -134,7 +136,7 @@ pub(crate) struct BakeOptions {
     pub(crate) max_memory: Option<u64>,
     /// End without a world after this long; if not given, when the work is out of proportion to the triangles.
     #[arg(long, value_name = "SECONDS", value_parser = enfilade_cli::values::seconds)]
-    max_time: Option<Duration>,
+    pub(crate) max_time: Option<Duration>,
     /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
@@ -224,8 +226,8 @@ impl BakeOptions {
     }
 }
 
-/// Holds the converter of IFC, a separate process, to the limits of the command.
-pub(crate) fn bound_converter(
+/// Holds the import, and the converter of IFC, a separate process, to the limits of the command. Time counts from now on.
+pub(crate) fn bound(
     options: &mut ImportOptions,
     max_time: Option<Duration>,
     max_memory: Option<u64>,
@@ -234,13 +236,20 @@ pub(crate) fn bound_converter(
         ifc.max_time = max_time.unwrap_or(ifc.max_time);
         ifc.max_memory = max_memory;
     }
+    // A time too long for the clock is not a bound.
+    let until = max_time.and_then(|t| Instant::now().checked_add(t));
+    let allowance = Allowance::new(u64::MAX, until);
+    options.allowance = Some(Arc::new(match max_memory {
+        Some(bytes) => allowance.holding(bytes, held_memory),
+        None => allowance,
+    }));
 }
 
 /// Resolves command line and settings file.
 pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     let mut settings = options.scene.settings()?;
     let mut import = options.scene.import_options(&settings);
-    bound_converter(&mut import, options.max_time, options.max_memory);
+    bound(&mut import, options.max_time, options.max_memory);
     settings.voxel = options.voxel.or(settings.voxel);
     settings.min_opening = options.min_opening.or(settings.min_opening);
     settings.smallest_hole = options.smallest_hole.or(settings.smallest_hole);

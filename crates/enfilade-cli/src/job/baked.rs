@@ -38,7 +38,9 @@ impl BakedJob {
     ) -> anyhow::Result<Self> {
         let mut words: Vec<OsString> = options.iter().map(OsString::from).collect();
         words.push(path.into());
-        let readied = bake::readied(&parsed(&words, Path::new("-"), max_memory)?)?;
+        let options = parsed(&words, Path::new("-"), max_memory)?;
+        bake::begin(&options.options, &[path.to_owned()])?;
+        let readied = bake::readied(&options)?;
         if let Some(file) = readied.references.first() {
             bail!(
                 "{} refers to {}: a job takes scenes in one file, such as a GLB",

@@ -8,7 +8,7 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation
 
 use super::lattice::Lattice2;
 use super::loops::Polyline;
-use super::patch::{Budget, FreeformSurface};
+use super::patch::{Budget, FreeformSurface, TOO_MUCH};
 use crate::SourceError;
 
 /// Crossings of the lattice closer to a limit than this are left out: they would make thin triangles. [Units: steps]
@@ -42,19 +42,31 @@ impl HasPosition for Site {
     }
 }
 
+/// Terms of a sum that take as long as a vertex of a triangulation.
+const OF_VERTEX: f64 = 160.0;
+
 /// A triangulation as it grows.
-struct Filling<'p> {
+struct Filling<'p, 'l> {
     patch: &'p FreeformSurface,
     mesh: ConstrainedDelaunayTriangulation<Site>,
     vertices: Vec<FilledVertex>,
+    budget: &'p mut Budget<'l>,
 }
 
-impl Filling<'_> {
+impl Filling<'_, '_> {
+    fn spend(&mut self, work: f64) -> Result<(), SourceError> {
+        match self.budget.spend(work) {
+            true => Ok(()),
+            false => Err(self.patch.error(TOO_MUCH)),
+        }
+    }
+
     fn insert(
         &mut self,
         at: [f64; 2],
         position: Option<DVec3>,
     ) -> Result<FixedVertexHandle, SourceError> {
+        self.spend(OF_VERTEX)?;
         // The least numbers are beyond the exact predicates.
         let at = at.map(|c| if c.abs() < 1e-12 { 0.0 } else { c });
         let index = self.vertices.len() as u32;
@@ -79,14 +91,15 @@ pub(super) fn fill(
     patch: &FreeformSurface,
     lattice: &Lattice2,
     polylines: &[Polyline],
-    budget: &mut Budget,
+    budget: &mut Budget<'_>,
 ) -> Result<Filled, SourceError> {
     let n: usize = polylines.iter().map(|line| line.0.len()).sum();
-    budget.take(patch, n as f64, patch.cost())?;
+    budget.take(patch, n as f64, lattice.cost(patch))?;
     let mut filling = Filling {
         patch,
         mesh: ConstrainedDelaunayTriangulation::new(),
         vertices: Vec::new(),
+        budget,
     };
     for line in polylines {
         let handles: Vec<_> = (line.0.iter())
@@ -108,23 +121,27 @@ pub(super) fn fill(
     let region = Region::new(polylines, lattice.size()[1]);
     let creases = lattice.creases(patch);
     add_crossings(&mut filling, polylines, &region, lattice.size(), &creases)?;
-    add_creases(&mut filling, &creases);
-    let triangles = filling.mesh.inner_faces().filter_map(|face| {
-        let corners = face.vertices();
+    add_creases(&mut filling, &creases)?;
+    let mut triangles = Vec::new();
+    for face in filling.mesh.inner_faces() {
         let middle = face.center();
-        region
-            .contains([middle.x, middle.y])
-            .then(|| corners.map(|v| v.data().index))
-    });
+        let middle = [middle.x, middle.y];
+        if !filling.budget.spend(1.0 + region.n_edges(middle[1])) {
+            return Err(patch.error(TOO_MUCH));
+        }
+        if region.contains(middle) {
+            triangles.push(face.vertices().map(|v| v.data().index));
+        }
+    }
     Ok(Filled {
-        triangles: triangles.collect(),
+        triangles,
         vertices: filling.vertices,
     })
 }
 
 /// Adds the crossings of lines in the region, away from its limits.
 fn add_crossings(
-    filling: &mut Filling<'_>,
+    filling: &mut Filling<'_, '_>,
     polylines: &[Polyline],
     region: &Region,
     [m, n]: [usize; 2],
@@ -135,6 +152,8 @@ fn add_crossings(
     for [a, b] in polylines.iter().flat_map(Polyline::edges) {
         let [a, b] = [a, b].map(|v| DVec2::from_array(v.at));
         let (min, max) = (a.min(b) - NEAR, a.max(b) + NEAR);
+        let around = max - min + 1.0;
+        filling.spend(around.x * around.y)?;
         for j in min.y.ceil().max(0.0) as usize..=max.y.floor().max(0.0) as usize {
             for i in min.x.ceil().max(0.0) as usize..=max.x.floor().max(0.0) as usize {
                 let p = DVec2::new(i as f64, j as f64).extend(0.0);
@@ -146,6 +165,7 @@ fn add_crossings(
         }
     }
     for j in 0..=n {
+        filling.spend(region.n_edges(j as f64))?;
         let crossed = region.crossed(j as f64);
         for pair in crossed.chunks_exact(2) {
             for i in pair[0].ceil() as usize..=(pair[1].floor() as usize).min(m) {
@@ -159,9 +179,10 @@ fn add_crossings(
 }
 
 /// Adds edges along creases.
-fn add_creases(filling: &mut Filling<'_>, creases: &[Vec<f64>; 2]) {
+fn add_creases(filling: &mut Filling<'_, '_>, creases: &[Vec<f64>; 2]) -> Result<(), SourceError> {
     for (axis, lines) in creases.iter().enumerate() {
         for line in lines {
+            filling.spend(filling.mesh.num_vertices() as f64)?;
             let mut on: Vec<(f64, FixedVertexHandle)> = filling
                 .mesh
                 .vertices()
@@ -178,6 +199,7 @@ fn add_creases(filling: &mut Filling<'_>, creases: &[Vec<f64>; 2]) {
             }
         }
     }
+    Ok(())
 }
 
 /// Region that an odd number of loops surrounds: their edges by the row of the lattice.
@@ -198,9 +220,18 @@ impl Region {
         Self { rows }
     }
 
+    fn row(&self, y: f64) -> &[[[f64; 2]; 2]] {
+        &self.rows[(y as usize).min(self.rows.len() - 1)]
+    }
+
+    /// Returns the number of edges that a look at a line along the first axis takes.
+    fn n_edges(&self, y: f64) -> f64 {
+        self.row(y).len() as f64
+    }
+
     /// Returns where a line along the first axis crosses loops, in ascending order.
     fn crossed(&self, y: f64) -> Vec<f64> {
-        let edges = self.rows[(y as usize).min(self.rows.len() - 1)].iter();
+        let edges = self.row(y).iter();
         let crossing = edges.filter(|[a, b]| a[1] <= y && y < b[1]);
         let mut all: Vec<f64> = crossing
             .map(|[a, b]| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))

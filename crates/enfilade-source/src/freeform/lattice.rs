@@ -2,7 +2,7 @@
 
 use enfilade_geom::DVec3;
 
-use super::patch::{Budget, FreeformSurface};
+use super::patch::{Budget, FreeformSurface, TERMS, TOO_MUCH};
 use super::spline::SplineSpan;
 use crate::SourceError;
 
@@ -17,15 +17,20 @@ impl Lattice2 {
     pub(super) fn new(
         patch: &FreeformSurface,
         tolerance: f64,
-        budget: &mut Budget,
+        budget: &mut Budget<'_>,
     ) -> Result<Self, SourceError> {
         let spans = [0, 1].map(|a| patch.bases[a].spans(patch.range[a]));
         let n_spans = (spans[0].len() * spans[1].len()) as f64;
         // The values that a second fundamental form takes.
         budget.take(patch, n_spans, 36.0 * patch.cost() * patch.cost())?;
+        // The same again for each part as it is done, for those who look at the clock.
+        let of_each = 36.0 * patch.cost() * patch.cost() / TERMS;
         let mut n = [vec![1.0; spans[0].len()], vec![1.0; spans[1].len()]];
         for (j, &v) in spans[1].iter().enumerate() {
             for (i, &u) in spans[0].iter().enumerate() {
+                if !budget.purse.spend(of_each as u64) {
+                    return Err(patch.error(TOO_MUCH));
+                }
                 let [along, across, twist] = curvature(patch, [u, v]);
                 // A right triangle with steps a and b along the axes is a²/8 (along + twist) +
                 // b²/8 (across + twist) off; half of the error from each.
@@ -35,12 +40,18 @@ impl Lattice2 {
             }
         }
         let [m, n_lines] = [0, 1].map(|a| n[a].iter().sum::<f64>());
-        budget.take(patch, 2.0 * m * n_lines, patch.cost())?;
+        let n_parts = (spans[0].len() + spans[1].len()) as f64;
+        budget.take(patch, 2.0 * m * n_lines, patch.cost() + n_parts / 8.0)?;
         let steps = [0, 1].map(|a| {
             let n = n[a].iter().map(|n| *n as usize);
             spans[a].iter().copied().zip(n).collect()
         });
         Ok(Self { steps })
+    }
+
+    /// Returns the work of a value at a place: the patch's, and a search among the parts.
+    pub(super) fn cost(&self, patch: &FreeformSurface) -> f64 {
+        patch.cost() + (self.steps[0].len() + self.steps[1].len()) as f64 / 8.0
     }
 
     /// Returns the number of steps along each axis.

@@ -4,7 +4,7 @@ use enfilade_geom::{DVec2, DVec3, closest_point_on_segment};
 
 use super::curves::TrimCurve;
 use super::lattice::Lattice2;
-use super::patch::{Budget, FreeformSurface};
+use super::patch::{Budget, FreeformSurface, TOO_MUCH};
 use super::sides::LimitVertex;
 use crate::SourceError;
 
@@ -37,7 +37,7 @@ pub(super) fn polylines(
     lattice: &Lattice2,
     outline: &[Vec<LimitVertex>; 4],
     tolerance: f64,
-    budget: &mut Budget,
+    budget: &mut Budget<'_>,
 ) -> Result<Vec<Polyline>, SourceError> {
     let creases = lattice.creases(patch);
     let mut all = Vec::with_capacity(patch.loops.len());
@@ -48,13 +48,22 @@ pub(super) fn polylines(
             lattice,
             tolerance: tolerance * SHARE,
             points: Vec::new(),
+            budget,
+            cost: 8.0 * lattice.cost(patch),
         };
         for curve in curves {
             curve.check().map_err(bad)?;
             tracer.add(curve).map_err(bad)?;
-            budget.take(patch, tracer.points.len() as f64, 8.0 * patch.cost())?;
         }
-        let points = with_sides(tracer.points, lattice, outline);
+        let points = tracer.points;
+        budget.take(patch, points.len() as f64, 0.0)?;
+        // Each part is compared with the sides and with all creases.
+        let n_lines: usize =
+            outline.iter().map(Vec::len).sum::<usize>() + creases[0].len() + creases[1].len();
+        if !budget.spend(points.len() as f64 * n_lines as f64 / 16.0) {
+            return Err(patch.error(TOO_MUCH));
+        }
+        let points = with_sides(points, lattice, outline);
         let line = Polyline(points).at_creases(patch, lattice, &creases);
         if line.0.len() < 3 {
             return Err(bad("has no area; remove it, or check its curves".into()));
@@ -65,14 +74,17 @@ pub(super) fn polylines(
 }
 
 /// Points of a loop as they are found.
-struct Tracer<'p> {
+struct Tracer<'p, 'l> {
     patch: &'p FreeformSurface,
     lattice: &'p Lattice2,
     tolerance: f64,
     points: Vec<LimitVertex>,
+    budget: &'p mut Budget<'l>,
+    /// Work of each part of a curve.
+    cost: f64,
 }
 
-impl Tracer<'_> {
+impl Tracer<'_, '_> {
     fn add(&mut self, curve: &TrimCurve) -> Result<(), String> {
         let mut ends: Vec<f64> = Vec::new();
         let spans = curve.curve.basis.spans(curve.ascending());
@@ -102,6 +114,9 @@ impl Tracer<'_> {
         [a, b]: [DVec2; 2],
         n_halvings: u32,
     ) -> Result<(), String> {
+        if !self.budget.spend(self.cost) {
+            return Err(TOO_MUCH.into());
+        }
         let mut is_close = a.distance(b) <= 1.0;
         let [p, q] = [self.point(a), self.point(b)];
         for share in [0.25, 0.5, 0.75] {

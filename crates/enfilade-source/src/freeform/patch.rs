@@ -1,6 +1,6 @@
 //! A patch: its points, the limits of its parameters, and what is wrong with it.
 
-use enfilade_geom::{DVec3, DVec4};
+use enfilade_geom::{DVec3, DVec4, Purse};
 
 use super::curves::{self, FreeformCurve, TrimCurve};
 use super::spline::SplineBasis;
@@ -22,12 +22,23 @@ pub struct FreeformSurface {
 }
 
 /// The triangles and the work that are left.
-pub(super) struct Budget {
+pub(super) struct Budget<'l> {
     pub(super) n_triangles: u64,
     pub(super) work: u64,
+    pub(super) purse: Purse<'l>,
 }
 
-impl Budget {
+/// Terms of a sum for a value in a unit of work.
+pub(super) const TERMS: f64 = 16.0;
+
+impl Budget<'_> {
+    /// Takes work, in terms of sums for values; returns `false` if there is not as much left.
+    pub(super) fn spend(&mut self, work: f64) -> bool {
+        let is_enough = work <= self.work as f64 && self.purse.spend((work / TERMS) as u64 + 1);
+        self.work = self.work.saturating_sub(work as u64);
+        is_enough
+    }
+
     /// Takes triangles, and evaluations of a cost each.
     pub(super) fn take(
         &mut self,
@@ -35,13 +46,12 @@ impl Budget {
         n_triangles: f64,
         cost: f64,
     ) -> Result<(), SourceError> {
-        let work = n_triangles * cost;
-        if n_triangles > self.n_triangles as f64 || work > self.work as f64 {
-            let problem = "needs more triangles than are allowed; give a larger --patch-tolerance, or check its unit";
-            return Err(patch.error(problem));
+        // Also if a number is not one.
+        let is_enough = n_triangles <= self.n_triangles as f64 && self.spend(n_triangles * cost);
+        if !is_enough {
+            return Err(patch.error(TOO_MUCH));
         }
         self.n_triangles -= n_triangles as u64;
-        self.work -= work as u64;
         Ok(())
     }
 }
@@ -148,6 +158,10 @@ impl FreeformSurface {
         Ok(())
     }
 }
+
+/// The problem with a patch that exceeds the budget.
+pub(super) const TOO_MUCH: &str =
+    "needs more triangles than are allowed; give a larger --patch-tolerance, or check its unit";
 
 /// Largest coordinate: beyond, numbers are no longer exact to a thousandth.
 const MAX_LENGTH: f64 = 1e9;

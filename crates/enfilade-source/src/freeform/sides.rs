@@ -75,7 +75,7 @@ impl Sides {
         &mut self,
         patch: &FreeformSurface,
         lattice: &Lattice2,
-        budget: &mut Budget,
+        budget: &mut Budget<'_>,
     ) -> Result<(), SourceError> {
         for axis in 0..2 {
             for end in 0..2 {

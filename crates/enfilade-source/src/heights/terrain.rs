@@ -7,6 +7,8 @@
 //!
 //! Cost: linear in the samples of the next larger square of a power of two.
 
+use enfilade_geom::Purse;
+
 /// Triangles over a lattice.
 pub(super) struct Land {
     /// Column and row of each vertex.
@@ -18,12 +20,13 @@ pub(super) struct Land {
 /// Triangle by its two ends of the longest edge and the third vertex, in columns and rows.
 type Corners = [[usize; 2]; 3];
 
-/// Makes triangles that pass within `off` of each height; `None` if there are more than `most`. NaN stands for a missing one.
+/// Makes triangles that pass within `off` of each height; `None` if there are more than `most`, or the purse is empty. NaN stands for a missing one.
 pub(super) fn triangulate(
     dims: [usize; 2],
     heights: &[f32],
     off: f32,
     most: usize,
+    purse: Purse<'_>,
 ) -> Option<Land> {
     let side = (dims[0].max(dims[1]) - 1).next_power_of_two();
     let mut mesh = RightTriangles {
@@ -37,6 +40,7 @@ pub(super) fn triangulate(
             triangles: Vec::new(),
         },
         most,
+        purse,
     };
     let halves = [
         [[0, 0], [side, side], [side, 0]],
@@ -58,6 +62,7 @@ struct RightTriangles<'a> {
     number: Vec<u32>,
     land: Land,
     most: usize,
+    purse: Purse<'a>,
 }
 
 fn middle([a, b, _]: &Corners) -> [usize; 2] {
@@ -98,7 +103,7 @@ impl RightTriangles<'_> {
         let side = self.size - 1;
         let n = 2 * side * side - 2;
         let n_parents = n.saturating_sub(side * side); // none in a single square
-        for i in (0..n).rev() {
+        for i in (0..n).rev().take_while(self.purse.each(2)) {
             let corners = numbered(i + 2, side);
             let at = self.index(middle(&corners));
             let mut error = self.errors[at].max(self.own_error(&corners));
@@ -130,6 +135,9 @@ impl RightTriangles<'_> {
         // One is replaced by two, and a path to the smallest is short.
         let mut stack = vec![corners];
         while let Some(corners) = stack.pop() {
+            if !self.purse.spend(1) {
+                return false;
+            }
             if !is_smallest(&corners) && self.errors[self.index(middle(&corners))] > off {
                 stack.extend(halves(&corners));
             } else if corners.iter().all(|&p| !self.height(p).is_nan()) {
@@ -208,7 +216,7 @@ mod tests {
                 }
             };
             let heights: Vec<f32> = (0..n).map(height).collect();
-            let land = triangulate(dims, &heights, 0.1, usize::MAX).unwrap();
+            let land = triangulate(dims, &heights, 0.1, usize::MAX, Purse::endless()).unwrap();
             for i in 0..n {
                 let p = [i % dims[0], i / dims[0]].map(|v| v as f64);
                 let found = at(&land, &heights, dims[0], p).unwrap();
@@ -228,12 +236,19 @@ mod tests {
                 .sum();
             assert_eq!(area, 2 * ((dims[0] - 1) * (dims[1] - 1)) as i64, "{dims:?}");
         }
-        let flat = triangulate([257, 257], &vec![1.0; 257 * 257], 0.1, usize::MAX).unwrap();
+        let flat = triangulate(
+            [257, 257],
+            &vec![1.0; 257 * 257],
+            0.1,
+            usize::MAX,
+            Purse::endless(),
+        )
+        .unwrap();
         assert_eq!(flat.triangles.len(), 2);
         assert!(
-            triangulate([20, 20], &[f32::NAN; 400], 0.1, 10)
+            triangulate([20, 20], &[f32::NAN; 400], 0.1, 10, Purse::endless())
                 .is_some_and(|l| l.triangles.is_empty())
         );
-        assert!(triangulate([20, 20], &[1.0; 400], 0.1, 1).is_none());
+        assert!(triangulate([20, 20], &[1.0; 400], 0.1, 1, Purse::endless()).is_none());
     }
 }

@@ -1,6 +1,6 @@
 //! The air that the stations saw.
 
-use enfilade_geom::{Aabb, DVec3};
+use enfilade_geom::{Aabb, DVec3, Purse};
 use rayon::prelude::*;
 
 use super::cells::ScanGrid;
@@ -30,9 +30,9 @@ impl Station {
 /// Marks the vertices that lie between a station and what it saw, except near that.
 ///
 /// Each vertex looks for itself up in the views of the stations, so that nothing is left between two ways: time goes by vertices times the
-/// stations within reach.
-pub(super) fn carve(scan: &Scan, grid: &ScanGrid) -> Vec<bool> {
-    let stations = stations_of(scan);
+/// stations within reach. Meaningless once the purse is empty.
+pub(super) fn carve(scan: &Scan, grid: &ScanGrid, purse: Purse<'_>) -> Vec<bool> {
+    let stations = stations_of(scan, purse);
     let least = (REACH - 0.5) * grid.step;
     let [nx, ny, _] = grid.size;
     let row_of = |row: usize| {
@@ -43,6 +43,10 @@ pub(super) fn carve(scan: &Scan, grid: &ScanGrid) -> Vec<bool> {
             let run = Aabb::of_points(&[at(from), at(to - 1)]);
             let is_near = |s: &&Station| s.at.distance(s.at.clamp(run.min, run.max)) < s.reach;
             let mut near: Vec<&Station> = stations.iter().filter(is_near).collect();
+            // A look into a view takes as long as twenty distances.
+            if !purse.spend(((stations.len() + 20 * near.len()) / 16 + 1) as u64) {
+                break;
+            }
             for (x, free) in (from..to).zip(&mut free[from..to]) {
                 let seen_by = near.iter().position(|s| s.sees(at(x), least));
                 *free = seen_by.is_some();
@@ -58,14 +62,14 @@ pub(super) fn carve(scan: &Scan, grid: &ScanGrid) -> Vec<bool> {
     rows.concat()
 }
 
-fn stations_of(scan: &Scan) -> Vec<Station> {
+fn stations_of(scan: &Scan, purse: Purse<'_>) -> Vec<Station> {
     let mut ways: Vec<Vec<DVec3>> = vec![Vec::new(); scan.stations.len()];
     for (p, &s) in scan.points.iter().zip(&scan.station_of) {
         ways[usize::from(s)].push(*p - scan.stations[usize::from(s)]);
     }
     let of = |(&at, ways): (&DVec3, Vec<DVec3>)| {
         let mut view = Panorama::of(&ways);
-        view.close_gaps();
+        view.close_gaps(purse);
         let reach = view.reach();
         Station { at, view, reach }
     };

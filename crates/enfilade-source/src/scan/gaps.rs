@@ -4,6 +4,8 @@
 //! was seen ends the room. The inverse of the distance of a plane is the product of its normal with the direction, which on the
 //! unit sphere solves Δf = -2f; so that is what is solved in the gap, with the rim as given.
 
+use enfilade_geom::Purse;
+
 use super::view::Panorama;
 
 /// Largest gap that its rim may close: a cone of half a right angle around its middle. Larger ones are the sky. [Units: steradian]
@@ -47,17 +49,17 @@ impl Panorama {
     }
 
     /// Gives distances to all gaps that their rims may close.
-    pub(super) fn close_gaps(&mut self) {
+    pub(super) fn close_gaps(&mut self, purse: Purse<'_>) {
         let gaps = self.gaps();
-        self.close(&gaps);
+        self.close(&gaps, purse);
     }
 
-    /// Gives values to gaps.
-    fn close(&mut self, gaps: &[usize]) {
+    /// Gives values to gaps, until the purse is empty.
+    fn close(&mut self, gaps: &[usize], purse: Purse<'_>) {
         let [w, h] = self.size;
         // The first guess grows from the rim.
         let mut left: Vec<usize> = gaps.to_vec();
-        while !left.is_empty() {
+        while !left.is_empty() && purse.spend(left.len() as u64) {
             let mean = |p: &usize| {
                 let seen = self.neighbors(*p).map(|q| self.inverse[q]);
                 let n = seen.iter().filter(|f| **f > 0.0).count();
@@ -77,6 +79,9 @@ impl Panorama {
         }
         let step = std::f64::consts::PI / h as f64;
         for sweep in 0..SWEEPS {
+            if !purse.spend(gaps.len() as u64) {
+                return;
+            }
             // To and fro, so that values spread both ways.
             for k in 0..gaps.len() {
                 let p = gaps[if sweep % 2 == 0 {

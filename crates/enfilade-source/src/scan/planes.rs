@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use enfilade_geom::{DMat3, DVec3};
+use enfilade_geom::{DMat3, DVec3, Purse, Tab};
 
 use super::cells::ScanGrid;
 use super::{REACH, Scan};
@@ -41,10 +41,14 @@ pub(super) struct PointPlane {
     normal: DVec3,
 }
 
-/// Returns a plane for each voxel with enough points.
-pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
+/// Returns a plane for each voxel with enough points, until the purse is empty.
+pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid, purse: Purse<'_>) -> Vec<PointPlane> {
+    let mut tab = Tab::from(purse);
     let mut sums: HashMap<usize, Sums> = HashMap::new();
     for (p, s) in scan.points.iter().zip(&scan.station_of) {
+        if !tab.spend(2) {
+            return Vec::new();
+        }
         let Some(at) = grid.voxel(*p) else {
             continue;
         };
@@ -59,6 +63,9 @@ pub(super) fn of_scan(scan: &Scan, grid: &ScanGrid) -> Vec<PointPlane> {
     let mut voxels: Vec<usize> = sums.keys().copied().collect();
     voxels.sort_unstable();
     for voxel in voxels {
+        if !tab.spend(20) {
+            break;
+        }
         let own = &sums[&voxel];
         let at = grid.at(voxel);
         let (mut n, mut p, mut pp, mut up) = (0.0, DVec3::ZERO, DMat3::ZERO, DVec3::ZERO);
@@ -113,16 +120,17 @@ const BLOCK: usize = 8;
 /// Sums of weighted distances, and of weights, of the vertices in a block.
 type BlockSums = Box<[[f32; 2]; BLOCK * BLOCK * BLOCK]>;
 
-/// Replaces the values near planes by the distance from them; returns the vertices that got one.
+/// Replaces the values near planes by the distance from them, until the purse is empty; returns the vertices that got one.
 pub(super) fn blend(
     planes: &[PointPlane],
     grid: &ScanGrid,
     free: &[bool],
     values: &mut [f32],
+    purse: Purse<'_>,
 ) -> Vec<bool> {
     let mut is_measured = vec![false; values.len()];
     let mut blocks: HashMap<[usize; 3], BlockSums> = HashMap::new();
-    for plane in planes {
+    for plane in planes.iter().take_while(purse.each(10)) {
         let near = |a: usize, by: f64| {
             let at = grid.scaled(plane.at).to_array()[a] + by;
             (at.max(0.0) as usize).min(grid.size[a] - 1)

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use enfilade_geom::{DVec3, closest_point_on_triangle};
+use enfilade_geom::{DVec3, Purse, Tab, closest_point_on_triangle};
 
 use super::quadric::Quadric;
 
@@ -19,7 +19,11 @@ const LEAST_HEIGHT: f64 = 0.01;
 /// A collapse that may be made: cost, ends of the edge, and how often each had changed.
 type Wish = Reverse<(u64, [u32; 2], [u32; 2])>;
 
-pub(super) struct Mesh {
+/// Work of a vertex or a wish, in the units of an allowance; and the distances of vertices from triangles in one such unit.
+const WORK: u64 = 10;
+const DISTANCES: usize = 4;
+
+pub(super) struct Mesh<'p> {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     is_alive: Vec<bool>,
@@ -35,10 +39,16 @@ pub(super) struct Mesh {
     carried: Vec<Vec<u32>>,
     heap: BinaryHeap<Wish>,
     tolerance: f64,
+    tab: Tab<'p>,
 }
 
-impl Mesh {
-    pub(super) fn new(positions: &[DVec3], triangles: &[[u32; 3]], tolerance: f64) -> Self {
+impl<'p> Mesh<'p> {
+    pub(super) fn new(
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+        tolerance: f64,
+        purse: Purse<'p>,
+    ) -> Self {
         let n = positions.len();
         let mut mesh = Self {
             positions: positions.to_vec(),
@@ -52,6 +62,7 @@ impl Mesh {
             carried: vec![Vec::new(); triangles.len()],
             heap: BinaryHeap::new(),
             tolerance,
+            tab: purse.into(),
         };
         for (t, corners) in (0..).zip(triangles) {
             let quadric = Quadric::of_triangle(corners.map(|i| positions[i as usize]));
@@ -61,6 +72,9 @@ impl Mesh {
             }
         }
         for v in 0..n as u32 {
+            if !mesh.tab.spend(WORK) {
+                return mesh;
+            }
             if let Some(&first) = mesh.fans[v as usize].first() {
                 mesh.carried[first as usize].push(v);
             }
@@ -69,6 +83,9 @@ impl Mesh {
             mesh.is_fixed[v as usize] = is_fixed;
         }
         for v in 0..n as u32 {
+            if !mesh.tab.spend(WORK) {
+                return mesh;
+            }
             mesh.wish_around(v, |v, w| v < w);
         }
         mesh
@@ -161,6 +178,9 @@ impl Mesh {
 
     pub(super) fn collapse_all(&mut self) {
         while let Some(Reverse((_, edge, versions))) = self.heap.pop() {
+            if !self.tab.spend(1) {
+                return;
+            }
             if edge.map(|i| self.versions[i as usize]) == versions {
                 self.try_collapse(edge);
             }
@@ -216,6 +236,12 @@ impl Mesh {
                 return false;
             }
             moved.push(after);
+        }
+        let of_each = stay.iter().chain(gone);
+        let n_carried: usize = of_each.map(|&t| self.carried[t as usize].len()).sum();
+        let n_distances = n_carried * moved.len();
+        if !self.tab.spend(WORK + (n_distances / DISTANCES) as u64) {
+            return false;
         }
         let near = self.tolerance * self.tolerance;
         let mut assigned: Vec<Vec<u32>> = vec![Vec::new(); stay.len()];

@@ -2,6 +2,7 @@
 
 use enfilade_geom::{DMat3, DMat4, DQuat, DVec3, DVec4};
 
+use super::gunzip::gunzip_within;
 use super::samples::{SampleKind, Stored, read};
 use super::{Beside, Volume, gunzip, is_gzip};
 use crate::{SourceError, SourceLimits};
@@ -72,14 +73,13 @@ pub(super) fn parse(
     limits: &SourceLimits,
 ) -> Result<Volume, SourceError> {
     let bad = |place: &str, problem: String| SourceError::new(place, problem);
+    let file = bytes;
     let plain;
-    let bytes = if is_gzip(bytes) {
-        // A sample has at most eight bytes.
-        let most = limits.max_samples.saturating_mul(8).saturating_add(1 << 20);
-        plain = gunzip(bytes, most).ok_or_else(|| bad("file", "is no gzip".into()))?;
+    let bytes = if is_gzip(file) {
+        plain = gunzip(file, HEAD_2 as u64).ok_or_else(|| bad("file", "is no gzip".into()))?;
         &plain
     } else {
-        bytes
+        file
     };
     let Some(size) = bytes.first_chunk::<4>() else {
         return Err(bad("header", "the file is cut off".into()));
@@ -121,7 +121,7 @@ pub(super) fn parse(
     let n_after = offset.clamp(0.0, 1e15) as usize;
     let values = if is_apart {
         let other = beside(".img").map_err(|e| bad("samples", e))?;
-        read(other.get(n_after..).unwrap_or_default(), n, stored)?
+        read(other.get(n_after..).unwrap_or_default(), n, stored, limits)?
     } else {
         if n_after < n_head {
             return Err(bad(
@@ -129,7 +129,16 @@ pub(super) fn parse(
                 format!("{offset} lies within the header"),
             ));
         }
-        read(bytes.get(n_after..).unwrap_or_default(), n, stored)?
+        let unpacked;
+        let bytes = if is_gzip(file) {
+            // No more than the header promises.
+            let most = (n_after as u64).saturating_add((n * stored.kind.size()) as u64);
+            unpacked = gunzip_within(file, most, limits)?.unwrap_or_default();
+            &unpacked
+        } else {
+            file
+        };
+        read(bytes.get(n_after..).unwrap_or_default(), n, stored, limits)?
     };
     Ok(Volume {
         size,

@@ -2,8 +2,9 @@
 
 use enfilade_geom::{DMat3, DMat4, DVec3};
 
+use super::gunzip::gunzip_within;
 use super::samples::{SampleKind, Stored, read};
-use super::{Beside, Volume, gunzip};
+use super::{Beside, Volume};
 use crate::{SourceError, SourceLimits};
 
 /// Longest head. [Units: bytes]
@@ -64,13 +65,24 @@ pub(super) fn parse(
     };
     let n_bytes = n as u64 * kind.size() as u64;
     let values = match head.encoding.as_str() {
-        "raw" => read(data.get(head.n_skipped..).unwrap_or_default(), n, stored)?,
+        "raw" => read(
+            data.get(head.n_skipped..).unwrap_or_default(),
+            n,
+            stored,
+            limits,
+        )?,
         "gzip" | "gz" => {
-            let plain = gunzip(data, n_bytes + head.n_skipped as u64);
+            let most = n_bytes.saturating_add(head.n_skipped as u64);
+            let plain = gunzip_within(data, most, limits)?;
             let plain = plain.ok_or_else(|| bad("samples", "are damaged: not gzip"))?;
-            read(plain.get(head.n_skipped..).unwrap_or_default(), n, stored)?
+            read(
+                plain.get(head.n_skipped..).unwrap_or_default(),
+                n,
+                stored,
+                limits,
+            )?
         }
-        "ascii" | "text" | "txt" => text_values(data, n)?,
+        "ascii" | "text" | "txt" => text_values(data, n, limits)?,
         other => {
             let problem = format!("'{}'; save it as raw or gzip", crate::shortened(other));
             return Err(bad("encoding", problem));
@@ -266,12 +278,13 @@ fn placement(head: &NrrdHead, axes: [usize; 3]) -> Result<DMat4, SourceError> {
     super::checked(DMat4::from_translation(head.origin * signs) * DMat4::from_mat3(matrix))
 }
 
-fn text_values(data: &[u8], n: usize) -> Result<Vec<f32>, SourceError> {
+fn text_values(data: &[u8], n: usize, limits: &SourceLimits) -> Result<Vec<f32>, SourceError> {
     let words = data
         .split(|b| b.is_ascii_whitespace() || *b == b',')
         .filter(|w| !w.is_empty());
     let mut values = Vec::new();
     for (i, word) in words.take(n).enumerate() {
+        limits.spend(1)?;
         let value = std::str::from_utf8(word)
             .ok()
             .and_then(|w| w.parse::<f32>().ok());

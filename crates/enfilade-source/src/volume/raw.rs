@@ -88,7 +88,7 @@ pub(super) fn parse(
     };
     Ok(Volume {
         size,
-        values: read(data.get(skip..).unwrap_or_default(), n, stored)?,
+        values: read(data.get(skip..).unwrap_or_default(), n, stored, limits)?,
         placement: super::checked(matrix)?,
         unit,
         is_z_up,

@@ -1,6 +1,6 @@
 //! Samples of all types as single precision numbers.
 
-use crate::SourceError;
+use crate::{SourceError, SourceLimits};
 
 /// Type of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,8 +85,16 @@ pub(super) struct Stored {
     pub(super) scale: [f64; 2],
 }
 
+/// Samples between two looks at the limits.
+const PART: usize = 1 << 16;
+
 /// Reads `n` samples. Infinite values become the largest number.
-pub(super) fn read(bytes: &[u8], n: usize, stored: Stored) -> Result<Vec<f32>, SourceError> {
+pub(super) fn read(
+    bytes: &[u8],
+    n: usize,
+    stored: Stored,
+    limits: &SourceLimits,
+) -> Result<Vec<f32>, SourceError> {
     let size = stored.kind.size();
     if bytes.len() / size < n {
         let problem = format!(
@@ -106,5 +114,10 @@ pub(super) fn read(bytes: &[u8], n: usize, stored: Stored) -> Result<Vec<f32>, S
         // Keeps NaN.
         v.clamp(f32::MIN, f32::MAX)
     };
-    Ok(bytes.chunks_exact(size).take(n).map(value).collect())
+    let mut values = Vec::with_capacity(n);
+    for part in bytes[..n * size].chunks(size * PART) {
+        limits.spend(PART as u64 / 16)?;
+        values.extend(part.chunks_exact(size).map(value));
+    }
+    Ok(values)
 }
