@@ -20,6 +20,8 @@
 //!
 //! Ties are broken by the ids of cells, which depend on coordinates only. `O(n log n)`.
 
+mod remaining;
+
 use std::cmp::Ordering;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -29,6 +31,9 @@ use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::cells::{CellPortal, Cells};
 use crate::config::{Choices, Weight};
+
+pub use remaining::RemainingPortal;
+pub(super) use remaining::remaining;
 
 /// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
 /// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
@@ -66,8 +71,13 @@ impl Choices {
     /// Greatest distance of a choice from a portal's center. [Units: radii of the ball that passes]
     pub const REACH: f64 = 1.0;
 
-    /// Returns the choice for each portal that has one. `undecided` are the portals removed without choices.
-    fn by_portal(&self, cells: &Cells, undecided: &[(u32, u32)]) -> BTreeMap<(u32, u32), Choice> {
+    /// Returns the portal that each choice is about, with its place. `undecided` are the portals removed without
+    /// choices.
+    fn resolved(
+        &self,
+        cells: &Cells,
+        undecided: &[(u32, u32)],
+    ) -> Vec<((u32, u32), Choice, DVec3)> {
         let portal = |p: &DVec3| {
             let off = |pair: &(u32, u32)| cells.portals[pair].center.distance(*p);
             let is_at = |pair: &&(u32, u32)| off(pair) == 0.0;
@@ -78,24 +88,20 @@ impl Choices {
                 nearest.filter(is_near).copied()
             })
         };
-        let join = self
-            .join
-            .iter()
-            .filter_map(portal)
-            .map(|p| (p, Choice::Join));
-        let keep = self
-            .keep
-            .iter()
-            .filter_map(portal)
-            .map(|p| (p, Choice::Keep));
-        join.chain(keep).collect()
+        let join = self.join.iter().map(|p| (p, Choice::Join));
+        // Of two choices about the same portal, the later entry holds.
+        let all = join.chain(self.keep.iter().map(|p| (p, Choice::Keep)));
+        all.filter_map(|(p, choice)| Some((portal(p)?, choice, *p)))
+            .collect()
     }
 }
 
 /// Decision of the user on one portal.
-#[derive(Clone, Copy, PartialEq)]
-enum Choice {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// It stays, whatever its weight.
     Keep,
+    /// The rooms on both sides become one.
     Join,
 }
 
@@ -151,16 +157,27 @@ pub fn decimate(
         stop,
         min_radius,
     };
+    decided(cells, rules, choices, allowance).0
+}
+
+/// Returns the record of a decimation, and the portals that its choices are about.
+fn decided(
+    cells: &Cells,
+    rules: Rules,
+    choices: &Choices,
+    allowance: &Allowance,
+) -> (Decimation, Vec<((u32, u32), Choice, DVec3)>) {
     let (undecided, portals) = Merging::new(cells, rules, &BTreeMap::new()).run(allowance);
     if *choices == Choices::default() {
-        return undecided;
+        return (undecided, Vec::new());
     }
     // No user means a crevice in a doorway.
     let steps = undecided.steps.iter().zip(portals);
     let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
-    Merging::new(cells, rules, &choices.by_portal(cells, &portals))
-        .run(allowance)
-        .0
+    let resolved = choices.resolved(cells, &portals);
+    let by_portal = resolved.iter().map(|r| (r.0, r.1)).collect();
+    let merging = Merging::new(cells, rules, &by_portal);
+    (merging.run(allowance).0, resolved)
 }
 
 /// Rules that select the next portal, and that stop.
@@ -213,6 +230,11 @@ impl Rules {
             Weight::Aspect => aspect,
             _ => aspect / largest.sqrt(),
         }
+    }
+
+    /// Returns `true` if the weight of a portal is that of a branch at its mouth.
+    fn is_mouth(&self, portal: &Live, weight: f64) -> bool {
+        self.weight == Weight::ScaleFree && portal.mouth > 0.0 && weight == portal.mouth
     }
 
     /// Returns `true` if the portals of a cell must be weighed again after it changes from `before` to `after`.
@@ -361,17 +383,7 @@ impl<'a> Merging<'a> {
 
     /// Merges until no portal is left. Also returns, for each step, the initial portal that it removed.
     fn run(mut self, allowance: &Allowance) -> (Decimation, Vec<(u32, u32)>) {
-        while let Some(candidate) = self.queue.pop() {
-            if self.is_stale(&candidate) {
-                continue;
-            }
-            if self.stop_at.is_none() && candidate.weight > self.rules.stop {
-                if self.take_up_joins() {
-                    self.queue.push(candidate);
-                    continue;
-                }
-                self.stop_at = Some(self.steps.len());
-            }
+        while let Some(candidate) = self.next_candidate() {
             if !allowance.spend(WORK_A_STEP + WORK_A_PAIR * self.n_pairs(candidate.pair)) {
                 break;
             }
@@ -383,6 +395,24 @@ impl<'a> Merging<'a> {
             steps: self.steps,
         };
         (decimation, self.removed)
+    }
+
+    /// Takes the next portal to remove from the queue, and notes whether the decimation stops before it.
+    fn next_candidate(&mut self) -> Option<QueuedPortal> {
+        while let Some(candidate) = self.queue.pop() {
+            if self.is_stale(&candidate) {
+                continue;
+            }
+            if self.stop_at.is_none() && candidate.weight > self.rules.stop {
+                if self.take_up_joins() {
+                    self.queue.push(candidate);
+                    continue;
+                }
+                self.stop_at = Some(self.steps.len());
+            }
+            return Some(candidate);
+        }
+        None
     }
 
     /// Returns the number of portals that a step may weigh again.
@@ -456,9 +486,7 @@ impl<'a> Merging<'a> {
             into: one.min(other),
             from: one.max(other),
             weight: candidate.weight,
-            is_mouth: self.rules.weight == Weight::ScaleFree
-                && portal.mouth > 0.0
-                && candidate.weight == portal.mouth,
+            is_mouth: self.rules.is_mouth(portal, candidate.weight),
             position: self.cells.portals[&portal.widest].center,
         });
         self.removed.push(portal.widest);

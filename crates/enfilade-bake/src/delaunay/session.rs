@@ -1,11 +1,11 @@
 //! The state of decimation, which a bake runs through at once and a user step by step.
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Allowance, Bvh, Triangle};
+use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
-use super::decimate::{Decimation, decimate, default_stop};
+use super::decimate::{Decimation, RemainingPortal, decimate, default_stop, remaining};
 use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
@@ -120,6 +120,29 @@ impl Session {
             &self.bvh,
             config.merge.min_radius,
         )
+    }
+
+    /// Returns the portals left after the first `n_steps` of the decimation by `config`, with their weights at that
+    /// step. Takes milliseconds.
+    #[must_use]
+    pub fn remaining(&self, n_steps: usize, config: &BakeConfig) -> Vec<RemainingPortal> {
+        let own = &config.delaunay;
+        let stop = own.stop.unwrap_or_else(|| default_stop(own.weight));
+        let least = config.merge.min_radius;
+        remaining(
+            &self.cells,
+            (own.weight, stop, least),
+            &own.choices,
+            n_steps,
+        )
+    }
+
+    /// Returns the openings of a portal as convex polygons, without cracks, in which no portal is placed. [Units: wu]
+    #[must_use]
+    pub fn openings(&self, portal: &RemainingPortal) -> Vec<Vec<DVec3>> {
+        let links = portal.links.iter().map(|&l| &self.space.links[l as usize]);
+        let wide = links.filter(|link| !self.space.is_crack(link));
+        wide.map(|link| self.space.outline(link).to_vec()).collect()
     }
 
     /// Decimates again, after other choices or with another weight or stop. Takes milliseconds.
