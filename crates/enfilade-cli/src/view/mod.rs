@@ -10,6 +10,7 @@ mod mode;
 mod open;
 mod panel;
 mod pointed;
+mod reviewing;
 mod steering;
 mod strider;
 mod titles;
@@ -26,6 +27,7 @@ use winit::event_loop::{ControlFlow, EventLoop};
 use self::app::App;
 pub(crate) use self::args::View;
 use self::editing::begin;
+pub(crate) use self::reviewing::{ReviewOptions, open_review};
 use crate::formats::Format;
 use crate::living::{Lived, LivingFile};
 use crate::output::{Outputs, refuse_stream};
@@ -73,8 +75,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         None => (None, read(args)?),
     };
     let events = events.map_or_else(open_events, Ok)?;
-    events.set_control_flow(ControlFlow::Poll);
-    let mut app = App {
+    let app = App {
         args,
         world: Arc::clone(lived.space.world(PartId::ROOT)),
         packed,
@@ -82,9 +83,17 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         lived: Some(lived),
         outputs,
         editor,
+        reviewer: None,
+        baking: None,
         open: None,
         failed: None,
     };
+    run_app(events, app)
+}
+
+/// Runs the program in the window until it is closed.
+fn run_app(events: EventLoop<()>, mut app: App<'_>) -> anyhow::Result<()> {
+    events.set_control_flow(ControlFlow::Poll);
     events.run_app(&mut app)?;
     match app.failed {
         Some(why) => Err(why),

@@ -12,6 +12,7 @@ use winit::window::Window;
 use super::editing::{EDIT_HELP, EditShown, Strip};
 use super::map::{Map, MapShown};
 use super::mode::Mode;
+use super::reviewing::{REVIEW_HELP, ReviewShown, draw_review};
 use super::titles::Titles;
 use crate::living::Blip;
 
@@ -55,6 +56,8 @@ pub(super) struct Shown {
     pub(super) times: VecDeque<f32>,
     /// The editor, while editing is on.
     pub(super) edit: Option<EditShown>,
+    /// The review, if a decimation is reviewed.
+    pub(super) review: Option<ReviewShown>,
 }
 
 impl Shown {
@@ -282,10 +285,14 @@ fn paint(ui: &egui::Ui, map: &mut Map, strip: &mut Option<Strip>, shown: &Shown)
     if let (Some(strip), Some(edit)) = (strip.as_mut(), &shown.edit) {
         strip.draw(painter, edit);
     }
+    if let Some(review) = &shown.review {
+        draw_review(painter, screen, review);
+    }
     if shown.help {
-        let text = match strip {
-            Some(_) => format!("{EDIT_HELP}\n\n{HELP}"),
-            None => HELP.to_owned(),
+        let text = match (strip, &shown.review) {
+            (Some(_), _) => format!("{EDIT_HELP}\n\n{HELP}"),
+            (None, Some(_)) => format!("{REVIEW_HELP}\n\n{HELP}"),
+            (None, None) => HELP.to_owned(),
         };
         write(screen.center(), Align2::CENTER_CENTER, text);
     }
