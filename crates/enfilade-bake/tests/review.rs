@@ -42,7 +42,7 @@ fn the_portals_shown_are_all_openings_between_rooms_and_the_next_is_the_next_ste
         let n = review.steps().len();
         let stop = review.stop();
         let mut n_next = 0;
-        for at in (0..n).step_by(7).chain(stop.saturating_sub(3)..=n) {
+        for at in (0..n).step_by(1 + n / 12).chain(stop.saturating_sub(3)..=n) {
             review.go_to(at);
             let portals = review.portals();
             let shown: BTreeMap<[u32; 2], BTreeSet<u32>> = portals

@@ -4,7 +4,6 @@
 //! decimation and overrules it: with commands from standard input, one per line, so that a script can do the same
 //! (`walk`), or in a window (`view/reviewing`).
 
-mod reviewed;
 mod walk;
 
 use std::io::{self, BufRead, Write};
@@ -14,11 +13,11 @@ use anyhow::{Context, bail};
 use enfilade::bake::delaunay::{Review, Session};
 use enfilade::bake::{BakeContext, Method, Silent};
 
-pub(crate) use self::reviewed::{Reviewed, weight_words};
 use self::walk::Walk;
 use crate::bake::settings;
 use crate::formats::Format;
 use crate::output::Outputs;
+use crate::reviewed::Reviewed;
 use crate::screen::Warned;
 #[cfg(feature = "view")]
 use crate::view::{ReviewOptions, open_review};

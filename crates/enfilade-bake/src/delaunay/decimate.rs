@@ -33,7 +33,7 @@ use super::cells::{CellPortal, Cells};
 use crate::config::{Choices, Weight};
 
 pub use remaining::RemainingPortal;
-pub(super) use remaining::remaining;
+pub(super) use remaining::{Resolved, remaining};
 
 /// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
 /// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
@@ -73,11 +73,7 @@ impl Choices {
 
     /// Returns the portal that each choice is about, with its place. `undecided` are the portals removed without
     /// choices.
-    fn resolved(
-        &self,
-        cells: &Cells,
-        undecided: &[(u32, u32)],
-    ) -> Vec<((u32, u32), Choice, DVec3)> {
+    fn resolved(&self, cells: &Cells, undecided: &[(u32, u32)]) -> Vec<Resolved> {
         let portal = |p: &DVec3| {
             let off = |pair: &(u32, u32)| cells.portals[pair].center.distance(*p);
             let is_at = |pair: &&(u32, u32)| off(pair) == 0.0;
@@ -91,8 +87,14 @@ impl Choices {
         let join = self.join.iter().map(|p| (p, Choice::Join));
         // Of two choices about the same portal, the later entry holds.
         let all = join.chain(self.keep.iter().map(|p| (p, Choice::Keep)));
-        all.filter_map(|(p, choice)| Some((portal(p)?, choice, *p)))
-            .collect()
+        let resolved = |(p, choice): (&DVec3, Choice)| {
+            Some(Resolved {
+                pair: portal(p)?,
+                choice,
+                at: *p,
+            })
+        };
+        all.filter_map(resolved).collect()
     }
 }
 
@@ -161,12 +163,12 @@ pub fn decimate(
 }
 
 /// Returns the record of a decimation, and the portals that its choices are about.
-fn decided(
+pub(super) fn decided(
     cells: &Cells,
     rules: Rules,
     choices: &Choices,
     allowance: &Allowance,
-) -> (Decimation, Vec<((u32, u32), Choice, DVec3)>) {
+) -> (Decimation, Vec<Resolved>) {
     let (undecided, portals) = Merging::new(cells, rules, &BTreeMap::new()).run(allowance);
     if *choices == Choices::default() {
         return (undecided, Vec::new());
@@ -175,18 +177,22 @@ fn decided(
     let steps = undecided.steps.iter().zip(portals);
     let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
     let resolved = choices.resolved(cells, &portals);
-    let by_portal = resolved.iter().map(|r| (r.0, r.1)).collect();
-    let merging = Merging::new(cells, rules, &by_portal);
+    let merging = Merging::new(cells, rules, &by_portal(&resolved));
     (merging.run(allowance).0, resolved)
+}
+
+/// Returns the choice that holds for each portal.
+fn by_portal(resolved: &[Resolved]) -> BTreeMap<(u32, u32), Choice> {
+    resolved.iter().map(|r| (r.pair, r.choice)).collect()
 }
 
 /// Rules that select the next portal, and that stop.
 #[derive(Clone, Copy)]
-struct Rules {
-    weight: Weight,
-    stop: f64,
+pub(super) struct Rules {
+    pub(super) weight: Weight,
+    pub(super) stop: f64,
     /// [Units: wu]
-    min_radius: f64,
+    pub(super) min_radius: f64,
 }
 
 /// A cell during the merging.

@@ -5,7 +5,9 @@ use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
-use super::decimate::{Decimation, RemainingPortal, decimate, default_stop, remaining};
+use super::decimate::{
+    Decimation, RemainingPortal, Resolved, Rules, decided, decimate, default_stop, remaining,
+};
 use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
@@ -24,6 +26,8 @@ pub struct Session {
     pub cells: Cells,
     /// The steps.
     pub decimation: Decimation,
+    /// The choices of that decimation, and the portals that they are about.
+    resolved: Vec<Resolved>,
     /// Structural triangles that bound rooms: all but stairs.
     pub(super) walls: Vec<Triangle>,
     /// BVH of the walls.
@@ -96,6 +100,7 @@ impl Session {
                 steps: Vec::new(),
                 stop: 0,
             },
+            resolved: Vec::new(),
             walls,
             bvh,
             closures,
@@ -122,19 +127,12 @@ impl Session {
         )
     }
 
-    /// Returns the portals left after the first `n_steps` of the decimation by `config`, with their weights at that
-    /// step. Takes milliseconds.
+    /// Returns the portals left after the first `n_steps`, with their weights at that step. `config` is that of the last
+    /// decimation. Takes milliseconds.
     #[must_use]
     pub fn remaining(&self, n_steps: usize, config: &BakeConfig) -> Vec<RemainingPortal> {
-        let own = &config.delaunay;
-        let stop = own.stop.unwrap_or_else(|| default_stop(own.weight));
-        let least = config.merge.min_radius;
-        remaining(
-            &self.cells,
-            (own.weight, stop, least),
-            &own.choices,
-            n_steps,
-        )
+        let record = (&self.decimation, &self.resolved[..]);
+        remaining(&self.cells, rules_of(config), record, n_steps)
     }
 
     /// Returns the openings of a portal as convex polygons, without cracks, in which no portal is placed. [Units: wu]
@@ -151,17 +149,18 @@ impl Session {
     }
 
     fn decimate_within(&mut self, config: &BakeConfig, allowance: &Allowance) {
-        let own = &config.delaunay;
-        let stop = own.stop.unwrap_or_else(|| default_stop(own.weight));
-        let least = config.merge.min_radius;
-        self.decimation = decimate(
-            &self.cells,
-            own.weight,
-            stop,
-            least,
-            &own.choices,
-            allowance,
-        );
+        let choices = &config.delaunay.choices;
+        (self.decimation, self.resolved) =
+            decided(&self.cells, rules_of(config), choices, allowance);
+    }
+}
+
+fn rules_of(config: &BakeConfig) -> Rules {
+    let own = &config.delaunay;
+    Rules {
+        weight: own.weight,
+        stop: own.stop.unwrap_or_else(|| default_stop(own.weight)),
+        min_radius: config.merge.min_radius,
     }
 }
 

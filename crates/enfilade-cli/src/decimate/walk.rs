@@ -5,9 +5,9 @@ use std::path::Path;
 
 use enfilade::bake::delaunay::{Choice, Decision};
 
-use super::reviewed::{Reviewed, in_walk, weight_words};
 use crate::bake::print_summary;
 use crate::formats::Format;
+use crate::reviewed::{Reviewed, in_walk, weight_words};
 use crate::screen::{At, write_lines};
 
 const HELP: &str = "\

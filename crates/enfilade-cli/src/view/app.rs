@@ -22,12 +22,12 @@ use winit::window::WindowId;
 
 use super::args::View;
 use super::bare::BareWindow;
-use super::editing::{EditKey, Editor, Strip, edit_key, edit_ray};
+use super::editing::{EditKey, Editor, Strip, edit_key};
 use super::mode::Mode;
 use super::open::Open;
 use super::panel::{Panel, Shown};
 use super::pointed::{FAR, Pointed};
-use super::reviewing::{Reviewer, review_camera, review_key};
+use super::reviewing::{Reviewer, review_key};
 use super::strider::start_in;
 use super::titles::Titles;
 use super::walker::Walker;
@@ -72,6 +72,9 @@ impl ApplicationHandler for App<'_> {
                 }
                 if let Some(notes) = self.editor.as_mut().and_then(Editor::take_notes) {
                     open.say(notes);
+                }
+                if let Some(reviewer) = &self.reviewer {
+                    open.say(reviewer.step_words());
                 }
                 self.open = Some(open);
             }
@@ -250,7 +253,7 @@ impl App<'_> {
     }
 
     /// The first camera.
-    fn start(&mut self, studio: &mut Studio, space: &Space) -> anyhow::Result<Camera> {
+    fn start(&self, studio: &mut Studio, space: &Space) -> anyhow::Result<Camera> {
         if let Some(eye) = self.args.eye {
             return Ok(Camera {
                 eye,
@@ -258,8 +261,7 @@ impl App<'_> {
                 fov_y: FOV,
             });
         }
-        let review = self.reviewer.as_mut();
-        if let Some(camera) = review.and_then(|it| review_camera(it, space)) {
+        if let Some(camera) = self.review_camera(space) {
             return Ok(camera);
         }
         if self.packed.is_some() {
@@ -378,7 +380,13 @@ impl App<'_> {
             KeyCode::F12 => {
                 // The walk goes on even if a picture fails.
                 let asked_of_it = (self.args.screenshot.as_path(), &self.args.adapter);
-                if let Err(why) = open.shot(asked_of_it, &self.world, &mut self.outputs) {
+                let review = self.reviewer.as_mut();
+                let marks = review.map_or_else(Vec::new, Reviewer::lend_marks);
+                let made = open.shot(asked_of_it, (&self.world, &marks), &mut self.outputs);
+                if let Some(reviewer) = &mut self.reviewer {
+                    reviewer.take_marks(marks);
+                }
+                if let Err(why) = made {
                     open.warn(format!("no picture: {why:#}"));
                 }
             }
@@ -486,18 +494,10 @@ impl App<'_> {
         if let Some(recorded) = &mut open.recorded {
             recorded.push(outside);
         }
-        let mut marks = Vec::new();
-        if let Some(editor) = &mut self.editor {
-            editor.look(&edit_ray(open));
-            marks = editor.marks();
-            open.shown.edit = editor.shown();
-            if let Err(why) = editor.tick() {
-                open.warn(why.to_string());
-            }
-        }
+        let mut marks = self.look_at_edits();
         if self.reviewer.is_some() {
             marks = self.look_at_review()?;
-        } else {
+        } else if let Some(open) = &mut self.open {
             open.shown.ahead = if open.streamed.is_some() {
                 open.titles.here(&open.lived.space, &outside)
             } else {

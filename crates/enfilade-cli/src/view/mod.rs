@@ -5,12 +5,16 @@ mod args;
 mod bare;
 mod doors;
 mod editing;
+mod edits;
+mod events;
 mod map;
 mod mode;
 mod open;
 mod panel;
 mod pointed;
+mod review_window;
 mod reviewing;
+mod reviews;
 mod steering;
 mod strider;
 mod titles;
@@ -22,12 +26,12 @@ use std::sync::Arc;
 use anyhow::Context;
 use enfilade::world::{PartId, Space};
 use enfilade_render::FOV;
-use winit::event_loop::{ControlFlow, EventLoop};
 
 use self::app::App;
 pub(crate) use self::args::View;
 use self::editing::begin;
-pub(crate) use self::reviewing::{ReviewOptions, open_review};
+use self::events::{open_events, run_app};
+pub(crate) use self::review_window::{ReviewOptions, open_review};
 use crate::formats::Format;
 use crate::living::{Lived, LivingFile};
 use crate::output::{Outputs, refuse_stream};
@@ -89,20 +93,6 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         failed: None,
     };
     run_app(events, app)
-}
-
-/// Runs the program in the window until it is closed.
-fn run_app(events: EventLoop<()>, mut app: App<'_>) -> anyhow::Result<()> {
-    events.set_control_flow(ControlFlow::Poll);
-    events.run_app(&mut app)?;
-    match app.failed {
-        Some(why) => Err(why),
-        None => Ok(()),
-    }
-}
-
-fn open_events() -> anyhow::Result<EventLoop<()>> {
-    EventLoop::new().context("no window can be opened here; `enfilade render` draws without one")
 }
 
 /// Reads the world, and what lives in it; of a packed one only the head, if that is enough.

@@ -441,11 +441,11 @@ impl Open {
         Ok(())
     }
 
-    /// Writes a picture of the world as shown now, without the panel.
+    /// Writes a picture of the world as shown now, without the panel; `marks` are drawn into a world in one piece.
     pub(super) fn shot(
         &mut self,
         (screenshot, adapter): (&Path, &AdapterChoice),
-        world: &World,
+        (world, marks): (&World, &[Mark]),
         outputs: &mut Outputs,
     ) -> anyhow::Result<()> {
         self.n_shots += 1;
@@ -491,7 +491,7 @@ impl Open {
                 })?;
                 studio.paint_portal_textures(self.texture_paint());
             }
-            studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?
+            studio.picture(&camera, self.mode.culling(), self.style(), marks, size)?
         };
         let png = picture.to_png()?;
         outputs.write("--screenshot", Format::Picture, &to)?;

@@ -5,10 +5,19 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Allowance, DVec3};
+use enfilade_geom::DVec3;
 
-use super::{Choice, Choices, Merging, Rules, Weight, decided};
+use super::{Choice, Decimation, Merging, Rules, by_portal};
 use crate::delaunay::cells::Cells;
+
+/// A choice, and the portal between initial cells that it is about.
+pub(in crate::delaunay) struct Resolved {
+    /// The initial cells, lesser id first.
+    pub(super) pair: (u32, u32),
+    pub(super) choice: Choice,
+    /// Its place, as in [`Choices`](super::Choices). [Units: wu]
+    pub(super) at: DVec3,
+}
 
 /// A portal that is left after some steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,11 +29,11 @@ pub struct RemainingPortal {
     pub weight: f64,
     /// The weight is that of a branch at its mouth, not that of a pinch.
     pub is_mouth: bool,
-    /// Center of the widest of the portals that it was merged from, for [`Choices`]. [Units: wu]
+    /// Center of the widest of the portals that it was merged from, for [`Choices`](super::Choices). [Units: wu]
     pub position: DVec3,
     /// Decision of the user on it.
     pub choice: Option<Choice>,
-    /// Places of all decisions on it, as in [`Choices`]. [Units: wu]
+    /// Places of all decisions on it, as in [`Choices`](super::Choices). [Units: wu]
     pub decided_at: Vec<DVec3>,
     /// The next step removes it.
     pub is_next: bool,
@@ -32,22 +41,15 @@ pub struct RemainingPortal {
     pub links: Vec<u32>,
 }
 
-/// Returns the portals left after the first `n_steps` of the decimation that [`decimate`](super::decimate) records, in
-/// the order of their cells.
-pub(crate) fn remaining(
+/// Returns the portals left after the first `n_steps` of a record, in the order of their cells. `resolved` are the choices
+/// of that record.
+pub(in crate::delaunay) fn remaining(
     cells: &Cells,
-    (weight, stop, min_radius): (Weight, f64, f64),
-    choices: &Choices,
+    rules: Rules,
+    (record, resolved): (&Decimation, &[Resolved]),
     n_steps: usize,
 ) -> Vec<RemainingPortal> {
-    let rules = Rules {
-        weight,
-        stop,
-        min_radius,
-    };
-    let (record, resolved) = decided(cells, rules, choices, &Allowance::default());
-    let by_portal = resolved.iter().map(|r| (r.0, r.1)).collect();
-    let mut merging = Merging::new(cells, rules, &by_portal);
+    let mut merging = Merging::new(cells, rules, &by_portal(resolved));
     let mut next = merging.next_candidate();
     while merging.steps.len() < n_steps
         && let Some(candidate) = next
@@ -68,8 +70,9 @@ pub(crate) fn remaining(
             .extend(&portal.links);
     }
     let mut decided_at: BTreeMap<[u32; 2], Vec<DVec3>> = BTreeMap::new();
-    for (pair, _, at) in resolved {
-        decided_at.entry(pair_of(pair)).or_default().push(at);
+    for choice in resolved {
+        let all = decided_at.entry(pair_of(choice.pair)).or_default();
+        all.push(choice.at);
     }
     let next = next.map(|candidate| candidate.pair);
     let left = merging.portals.iter().map(|(&pair, live)| {

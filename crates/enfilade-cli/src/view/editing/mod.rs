@@ -1,6 +1,5 @@
 //! Editing in the window: pieces of a kit, and changes by hand.
 
-mod acting;
 mod aim;
 mod begin;
 mod editor;
@@ -11,8 +10,8 @@ mod strip;
 mod there;
 mod tool;
 
-pub(super) use acting::edit_ray;
+pub(super) use aim::EditRay;
 pub(super) use begin::begin;
-pub(super) use editor::{EditKey, Editor};
+pub(super) use editor::{EditKey, Editor, Outcome};
 pub(super) use keys::{EDIT_HELP, edit_key};
 pub(super) use strip::{EditShown, Strip};

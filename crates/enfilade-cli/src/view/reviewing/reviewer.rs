@@ -12,7 +12,7 @@ use enfilade_render::Mark;
 use super::legend::{LegendLine, ReviewShown};
 use super::scale::{PortalClass, WeightScale};
 use super::sheets::Sheets;
-use crate::decimate::{Reviewed, weight_words};
+use crate::reviewed::{Reviewed, weight_words};
 use crate::screen::At;
 
 /// Greatest distance of a portal at the crosshair. [Units: wu]
@@ -46,7 +46,7 @@ pub(crate) enum ReviewKey {
 }
 
 /// Consequence of a key.
-pub(super) enum Outcome {
+pub(crate) enum ReviewOutcome {
     Said(String),
     Refused(String),
     /// The eye goes before a place, to look at it along one of two directions.
@@ -76,7 +76,7 @@ pub(crate) struct Reviewer<'a> {
 }
 
 impl<'a> Reviewer<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         reviewed: Reviewed<'a>,
         (save, output): (PathBuf, Option<PathBuf>),
         scene: Arc<World>,
@@ -108,9 +108,15 @@ impl<'a> Reviewer<'a> {
     }
 
     /// Finds the portal at the crosshair; `wall` is the distance of the first surface there.
-    pub(super) fn look(&mut self, eye: DVec3, toward: DVec3, wall: Option<f64>) {
+    pub(crate) fn look(&mut self, eye: DVec3, toward: DVec3, wall: Option<f64>) {
         let most = wall.map_or(REACH, |t| (t + BEHIND).min(REACH));
         self.aimed = self.sheets.at(eye, toward, most);
+    }
+
+    /// Returns the place of the portal of the next step, and its normal.
+    pub(crate) fn next_place(&self) -> Option<[DVec3; 2]> {
+        let (portal, normal) = self.sheets.next()?;
+        Some([portal.position, normal])
     }
 
     /// Lends the marks of the portals to a frame.
@@ -218,7 +224,7 @@ impl<'a> Reviewer<'a> {
     }
 
     /// Does what a key means.
-    pub(super) fn press(&mut self, key: ReviewKey) -> Outcome {
+    pub(crate) fn press(&mut self, key: ReviewKey) -> ReviewOutcome {
         match key {
             ReviewKey::Step(by) => self.timed(|it| {
                 it.reviewed.review.go_by(by);
@@ -241,29 +247,29 @@ impl<'a> Reviewer<'a> {
                 let words = |d| format!("made again: {}", decision_words(d));
                 Some(made.map_or_else(|| "nothing to redo".into(), words))
             }),
-            ReviewKey::Visit => match self.sheets.next() {
-                Some((portal, normal)) => Outcome::Visit(portal.position, normal),
-                None => Outcome::Said("no portal is left".into()),
+            ReviewKey::Visit => match self.next_place() {
+                Some([position, normal]) => ReviewOutcome::Visit(position, normal),
+                None => ReviewOutcome::Said("no portal is left".into()),
             },
             ReviewKey::Save => {
                 let path = self.save.clone();
                 match self.reviewed.save("--save", &path) {
                     Ok(()) => {
                         let name = path.display();
-                        Outcome::Said(format!(
+                        ReviewOutcome::Said(format!(
                             "wrote {name}; `enfilade bake --method delaunay --choices {name}` applies it"
                         ))
                     }
-                    Err(why) => Outcome::Refused(format!("not saved: {why:#}")),
+                    Err(why) => ReviewOutcome::Refused(format!("not saved: {why:#}")),
                 }
             }
             ReviewKey::Bake => match &self.output {
-                Some(path) => Outcome::Bake(format!(
+                Some(path) => ReviewOutcome::Bake(format!(
                     "baking the rooms of step {} to {}",
                     self.reviewed.review.at(),
                     path.display()
                 )),
-                None => Outcome::Refused(
+                None => ReviewOutcome::Refused(
                     "there is no file to bake to; give -o OUT.glb to `enfilade decimate`".into(),
                 ),
             },
@@ -274,31 +280,36 @@ impl<'a> Reviewer<'a> {
                         let world = Arc::clone(world);
                         self.shown = other;
                         let words = ["the scene", "the rooms baked last"][other];
-                        Outcome::Show(world, words.into())
+                        ReviewOutcome::Show(world, words.into())
                     }
-                    None => Outcome::Said("no rooms are baked; F3 bakes them".into()),
+                    None => ReviewOutcome::Said("no rooms are baked; F3 bakes them".into()),
                 }
             }
         }
     }
 
     /// Takes a step, and brings all that is shown to it; tells the step, and what else there is to tell.
-    fn timed(&mut self, act: impl FnOnce(&mut Self) -> Option<String>) -> Outcome {
+    fn timed(&mut self, act: impl FnOnce(&mut Self) -> Option<String>) -> ReviewOutcome {
         let begin = Instant::now();
         let words = act(self);
         self.renew();
         self.times.push(begin.elapsed());
         let words = words.map_or_else(String::new, |w| w + "; ");
-        let review = &self.reviewed.review;
-        Outcome::Said(format!(
-            "{words}step {} of {}, {} cells left indoors",
-            review.at(),
-            review.steps().len(),
-            self.n_cells[0]
-        ))
+        ReviewOutcome::Said(words + &self.step_words())
     }
 
-    fn decide(&mut self, choice: Choice, is_there: bool) -> Outcome {
+    /// Returns a line about the step.
+    pub(crate) fn step_words(&self) -> String {
+        let review = &self.reviewed.review;
+        let n = review.steps().len();
+        format!(
+            "step {} of {n}, {} cells left indoors",
+            review.at(),
+            self.n_cells[0]
+        )
+    }
+
+    fn decide(&mut self, choice: Choice, is_there: bool) -> ReviewOutcome {
         let mut portals = self.sheets.portals().iter();
         let portal = if is_there {
             self.aimed.map(|k| &self.sheets.portals()[k])
@@ -307,10 +318,10 @@ impl<'a> Reviewer<'a> {
         };
         let Some(portal) = portal.cloned() else {
             let words = ["no portal is left to decide about", "no portal there"];
-            return Outcome::Refused(words[usize::from(is_there)].into());
+            return ReviewOutcome::Refused(words[usize::from(is_there)].into());
         };
         if portal.choice == Some(choice) {
-            return Outcome::Refused("that is decided already".into());
+            return ReviewOutcome::Refused("that is decided already".into());
         }
         self.timed(|it| {
             let made = it.reviewed.review.decide(&portal, choice);
@@ -319,7 +330,7 @@ impl<'a> Reviewer<'a> {
     }
 
     /// Bakes the rooms of the step, which are shown from now on.
-    pub(super) fn bake(&mut self) -> anyhow::Result<(Arc<World>, String)> {
+    pub(crate) fn bake(&mut self) -> anyhow::Result<(Arc<World>, String)> {
         let Some(path) = &self.output else {
             anyhow::bail!("there is no file to bake to");
         };

@@ -7,7 +7,7 @@ use enfilade::geom::scene::{Primitive, Scene};
 use enfilade::geom::{Aabb, DMat3, DVec3};
 
 /// Makes the world of a scene: all of its triangles, details included, in one cell without walls.
-pub(super) fn scene_world(scene: &Scene) -> World {
+pub(crate) fn scene_world(scene: &Scene) -> World {
     let mut merged: BTreeMap<(Option<u32>, [usize; 3]), Primitive> = BTreeMap::new();
     let mut bounds = Aabb::EMPTY;
     for object in &scene.objects {

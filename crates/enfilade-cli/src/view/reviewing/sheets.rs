@@ -15,7 +15,7 @@ const AIMED: [f32; 4] = [1.0, 0.75, 0.0, 1.0];
 const CROSS: f64 = 0.12;
 
 /// The openings of a portal.
-struct Sheet {
+struct PortalSheet {
     /// Indices of its links, by which it is known again.
     links: Vec<u32>,
     /// Convex polygons. [Units: wu]
@@ -25,7 +25,7 @@ struct Sheet {
     bounds: Aabb,
 }
 
-impl Sheet {
+impl PortalSheet {
     fn new(session: &Session, portal: &RemainingPortal) -> Self {
         let openings = session.openings(portal);
         let points = openings.iter().flatten();
@@ -81,7 +81,7 @@ fn passes(polygon: &[DVec3], eye: DVec3, toward: DVec3) -> Option<f64> {
 #[derive(Default)]
 pub(super) struct Sheets {
     portals: Vec<RemainingPortal>,
-    sheets: Vec<Sheet>,
+    sheets: Vec<PortalSheet>,
     marks: Vec<Mark>,
     /// Number of the marks, which are lent at times.
     n_marks: usize,
@@ -98,7 +98,7 @@ impl Sheets {
     ) -> usize {
         // No opening is part of two portals.
         let old = std::mem::take(&mut self.sheets).into_iter();
-        let mut old: BTreeMap<Option<u32>, Sheet> = old
+        let mut old: BTreeMap<Option<u32>, PortalSheet> = old
             .map(|sheet| (sheet.links.first().copied(), sheet))
             .collect();
         let mut n_made = 0;
@@ -108,7 +108,7 @@ impl Sheets {
                 .filter(|sheet| sheet.links == portal.links)
                 .unwrap_or_else(|| {
                     n_made += 1;
-                    Sheet::new(session, portal)
+                    PortalSheet::new(session, portal)
                 })
         });
         self.sheets = sheets.collect();
@@ -168,7 +168,12 @@ fn single(p: DVec3) -> [f32; 3] {
     p.as_vec3().to_array()
 }
 
-fn add_sheet(marks: &mut Vec<Mark>, portal: &RemainingPortal, sheet: &Sheet, class: PortalClass) {
+fn add_sheet(
+    marks: &mut Vec<Mark>,
+    portal: &RemainingPortal,
+    sheet: &PortalSheet,
+    class: PortalClass,
+) {
     let [r, g, b] = class.linear();
     for polygon in &sheet.openings {
         marks.push(Mark {
@@ -201,7 +206,13 @@ fn line(ends: [DVec3; 2], color: [f32; 4], width: f32, on_top: bool) -> Mark {
     }
 }
 
-fn add_border(marks: &mut Vec<Mark>, sheet: &Sheet, color: [f32; 4], width: f32, on_top: bool) {
+fn add_border(
+    marks: &mut Vec<Mark>,
+    sheet: &PortalSheet,
+    color: [f32; 4],
+    width: f32,
+    on_top: bool,
+) {
     let lines = sheet.border.iter();
     marks.extend(lines.map(|ends| line(*ends, color, width, on_top)));
 }

@@ -8,15 +8,14 @@ use enfilade::world::Space;
 use enfilade_render::AdapterChoice;
 use winit::event_loop::EventLoop;
 
-use super::reviewer::Reviewer;
-use super::scene::scene_world;
-use crate::decimate::Reviewed;
+use super::app::App;
+use super::args::View;
+use super::events::{open_events, run_app};
+use super::reviewing::{Reviewer, scene_world};
 use crate::formats::Format;
 use crate::living::{Lived, LivingFile};
 use crate::output::{Outputs, refuse_stream};
-use crate::view::app::App;
-use crate::view::args::View;
-use crate::view::{open_events, run_app};
+use crate::reviewed::Reviewed;
 use enfilade_cli::values::{point, size};
 
 const WINDOW: &str = "Window";

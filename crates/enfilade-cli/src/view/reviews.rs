@@ -6,10 +6,10 @@ use enfilade::geom::DVec3;
 use enfilade::world::{PartId, Space};
 use enfilade_render::{Camera, FOV, Mark};
 
-use super::reviewer::{Outcome, ReviewKey, Reviewer};
-use crate::view::app::App;
-use crate::view::open::Open;
-use crate::view::pointed::{FAR, Pointed};
+use super::app::App;
+use super::open::Open;
+use super::pointed::{FAR, Pointed};
+use super::reviewing::{ReviewKey, ReviewOutcome, Reviewer};
 
 /// Distance of the eye from the portal that it goes before, where there is room. [Units: wu]
 const BEFORE: f64 = 2.5;
@@ -18,24 +18,24 @@ const AWAY: f64 = 0.8;
 
 impl App<'_> {
     /// Lets the reviewer have a key; returns `false` if nothing is reviewed.
-    pub(crate) fn review(&mut self, key: ReviewKey) -> anyhow::Result<bool> {
+    pub(super) fn review(&mut self, key: ReviewKey) -> anyhow::Result<bool> {
         let (Some(reviewer), Some(open)) = (&mut self.reviewer, &mut self.open) else {
             return Ok(false);
         };
         match reviewer.press(key) {
-            Outcome::Said(words) => open.say(words),
-            Outcome::Refused(why) => open.warn(why),
-            Outcome::Visit(position, normal) => {
+            ReviewOutcome::Said(words) => open.say(words),
+            ReviewOutcome::Refused(why) => open.warn(why),
+            ReviewOutcome::Visit(position, normal) => {
                 let [eye, toward] = before(&open.lived.space, position, normal);
                 open.go(eye, toward);
             }
-            Outcome::Show(world, words) => {
+            ReviewOutcome::Show(world, words) => {
                 self.world = world;
                 open.show_world(&self.world)?;
                 open.has_asked_for_light = reviewer.shows_scene();
                 open.say(words);
             }
-            Outcome::Bake(words) => {
+            ReviewOutcome::Bake(words) => {
                 open.say(words);
                 // The next frame shows these words, and the one after it bakes.
                 self.baking = Some(2);
@@ -45,7 +45,7 @@ impl App<'_> {
     }
 
     /// Looks at the portals of a review, and lends their marks to the frame.
-    pub(crate) fn look_at_review(&mut self) -> anyhow::Result<Vec<Mark>> {
+    pub(super) fn look_at_review(&mut self) -> anyhow::Result<Vec<Mark>> {
         let (Some(reviewer), Some(open)) = (&mut self.reviewer, &mut self.open) else {
             return Ok(Vec::new());
         };
@@ -64,6 +64,17 @@ impl App<'_> {
         look(reviewer, open);
         open.shown.review = Some(reviewer.shown());
         Ok(reviewer.lend_marks())
+    }
+
+    /// Returns the camera with which a review begins: before the portal of the next step.
+    pub(super) fn review_camera(&self, space: &Space) -> Option<Camera> {
+        let [position, normal] = self.reviewer.as_ref()?.next_place()?;
+        let [eye, toward] = before(space, position, normal);
+        Some(Camera {
+            eye: eye.as_vec3().to_array(),
+            toward: toward.as_vec3().to_array(),
+            fov_y: FOV,
+        })
     }
 }
 
@@ -95,19 +106,6 @@ fn before(space: &Space, position: DVec3, normal: DVec3) -> [DVec3; 2] {
         (-normal, back)
     };
     [position + side * way, -side]
-}
-
-/// Returns the camera with which a review begins: before the portal of the next step.
-pub(crate) fn review_camera(reviewer: &mut Reviewer<'_>, space: &Space) -> Option<Camera> {
-    let Outcome::Visit(position, normal) = reviewer.press(ReviewKey::Visit) else {
-        return None;
-    };
-    let [eye, toward] = before(space, position, normal);
-    Some(Camera {
-        eye: eye.as_vec3().to_array(),
-        toward: toward.as_vec3().to_array(),
-        fov_y: FOV,
-    })
 }
 
 #[cfg(test)]

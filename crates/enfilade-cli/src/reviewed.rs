@@ -58,7 +58,7 @@ struct Baked {
 }
 
 /// Refuses standard output, which the replies of a walk go to.
-pub(super) fn in_walk(option: &str, path: &Path) -> anyhow::Result<()> {
+pub(crate) fn in_walk(option: &str, path: &Path) -> anyhow::Result<()> {
     refuse_stream(option, path, "a file beside the replies")
 }
 
@@ -74,7 +74,7 @@ pub(crate) struct Reviewed<'a> {
 }
 
 impl<'a> Reviewed<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         scene: &'a Scene,
         review: Review,
         outputs: Outputs,
@@ -121,7 +121,7 @@ impl<'a> Reviewed<'a> {
         Ok((baked, written))
     }
 
-    pub(super) fn print_json(&self, out: impl Write, output: Option<&Path>) -> anyhow::Result<()> {
+    pub(crate) fn print_json(&self, out: impl Write, output: Option<&Path>) -> anyhow::Result<()> {
         let review = &self.review;
         let [cells_indoors, others] = review.count_rooms();
         let steps = review.steps().iter().map(|s| StepReport {

@@ -7,19 +7,31 @@ use enfilade::cpg::PortalId;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::DVec3;
 use enfilade::world::PartId;
-use enfilade_render::portal_looked_at;
+use enfilade_render::{Mark, portal_looked_at};
 
-use super::aim::EditRay;
-use super::editor::{EditKey, Outcome};
+use super::app::App;
+use super::editing::{EditKey, EditRay, Outcome};
+use super::open::Open;
+use super::pointed::{FAR, Pointed};
 use crate::formats::Format;
 use crate::output::write_whole;
-use crate::view::app::App;
-use crate::view::open::Open;
-use crate::view::pointed::{FAR, Pointed};
 
 impl App<'_> {
+    /// Finds what the pointer means for the editor; returns the marks that show it.
+    pub(super) fn look_at_edits(&mut self) -> Vec<Mark> {
+        let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
+            return Vec::new();
+        };
+        editor.look(&edit_ray(open));
+        open.shown.edit = editor.shown();
+        if let Err(why) = editor.tick() {
+            open.warn(why.to_string());
+        }
+        editor.marks()
+    }
+
     /// Lets the editor have a key; returns `false` if it means nothing to it.
-    pub(crate) fn edit(&mut self, key: EditKey) -> anyhow::Result<bool> {
+    pub(super) fn edit(&mut self, key: EditKey) -> anyhow::Result<bool> {
         let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
             return Ok(false);
         };
@@ -48,7 +60,7 @@ impl App<'_> {
     }
 
     /// Writes the world as edited.
-    pub(crate) fn save(&mut self) {
+    pub(super) fn save(&mut self) {
         let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
             return;
         };
@@ -75,7 +87,7 @@ impl App<'_> {
 }
 
 /// Returns the ray through the pointer, for the editor.
-pub(crate) fn edit_ray(open: &Open) -> EditRay<'_> {
+fn edit_ray(open: &Open) -> EditRay<'_> {
     let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
     let (ray, space) = (open.pointer(), &open.lived.space);
     let length = vector(ray.toward).length().max(1e-9);
