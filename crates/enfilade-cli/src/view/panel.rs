@@ -272,7 +272,8 @@ fn paint(ui: &egui::Ui, map: &mut Map, strip: &mut Option<Strip>, shown: &Shown)
         screen.right_bottom() - Vec2::splat(290.0),
         Vec2::splat(280.0),
     );
-    if let Some(camera) = shown.camera {
+    let has_map = !shown.review.as_ref().is_some_and(|it| it.is_without_map);
+    if let Some(camera) = shown.camera.filter(|_| has_map) {
         let shown = MapShown {
             camera,
             cells: &shown.cells,

@@ -1,7 +1,5 @@
 //! Keys and frames of a review in the window.
 
-use std::sync::Arc;
-
 use enfilade::geom::DVec3;
 use enfilade::world::{PartId, Space};
 use enfilade_render::{Camera, FOV, Mark};

@@ -4,6 +4,8 @@ use egui::{Color32, Painter, Pos2, Rect, Vec2};
 
 /// State of a review that the panel shows.
 pub(crate) struct ReviewShown {
+    /// `true` if the scene is shown, which has no rooms to draw a map of.
+    pub(crate) is_without_map: bool,
     pub(super) lines: Vec<String>,
     pub(super) legend: Vec<LegendLine>,
 }

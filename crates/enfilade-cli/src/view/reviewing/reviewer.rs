@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use enfilade::bake::delaunay::{Choice, Decision};
+use enfilade::bake::delaunay::{Choice, Decision, OUTDOOR_CELL};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade_render::Mark;
@@ -137,14 +137,17 @@ impl<'a> Reviewer<'a> {
     /// Returns the words about the portal at the crosshair.
     pub(crate) fn aimed_words(&self) -> Option<String> {
         let portal = &self.sheets.portals()[self.aimed?];
-        let [a, b] = portal.cells;
+        let [a, b] = portal.cells.map(|cell| match cell {
+            OUTDOOR_CELL => "the outdoors".to_owned(),
+            cell => format!("cell {cell}"),
+        });
         let weight = match portal.choice {
             Some(Choice::Keep) => "kept by decision".into(),
             Some(Choice::Join) => "joined by decision".into(),
             None => weight_words(portal.weight, portal.is_mouth),
         };
         let next = if portal.is_next { ", next" } else { "" };
-        Some(format!("cells {a} and {b}: {weight}{next}"))
+        Some(format!("{a} and {b}: {weight}{next}"))
     }
 
     /// Returns what is to be told at the end.
@@ -203,6 +206,7 @@ impl<'a> Reviewer<'a> {
             words: self.scale.words(class),
         });
         ReviewShown {
+            is_without_map: self.shows_scene(),
             lines,
             legend: legend.collect(),
         }

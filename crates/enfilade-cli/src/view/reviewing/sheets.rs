@@ -178,7 +178,7 @@ fn add_sheet(
     for polygon in &sheet.openings {
         marks.push(Mark {
             shape: MarkShape::Area(polygon.iter().map(|p| single(*p)).collect()),
-            color: [r, g, b, 0.55],
+            color: [r, g, b, 0.4],
             width: 0.0,
             on_top: false,
         });
