@@ -11,7 +11,7 @@ use super::decimate::{
 use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
-use super::standing::count_rooms;
+use super::standing::{CellSpace, KnownBacks, LargestParts, count_rooms};
 use crate::budget::n_structural;
 use crate::config::{Choices, Weight};
 use crate::structure::{Structure, in_own_order};
@@ -32,6 +32,9 @@ pub struct Session {
     pub(super) walls: Vec<Triangle>,
     /// BVH of the walls.
     pub(super) bvh: Bvh,
+    /// For [`CellSpace`].
+    largest: LargestParts,
+    known_backs: KnownBacks,
     pub(super) closures: Vec<Triangle>,
     pub(super) stairs: Bvh,
     /// The smallest hole. [Units: wu]
@@ -93,6 +96,8 @@ impl Session {
             context.allowance(),
         );
         let mut session = Self {
+            largest: LargestParts::of(&space, &cells),
+            known_backs: KnownBacks::default(),
             space,
             cells,
             decimation: Decimation {
@@ -115,16 +120,22 @@ impl Session {
     /// [`bake_session`](crate::bake_session) makes of them, and the number of other cells: crevices, and interiors of
     /// walls, which are dropped.
     ///
-    /// `O(n log n)` in the parts of the space; a fraction of a second.
+    /// `O(n log n)` in the initial cells, and rays from the rooms that no count before had: milliseconds, and a fraction of a
+    /// second for the first.
     #[must_use]
     pub fn count_rooms(&self, n_steps: usize, config: &BakeConfig) -> [usize; 2] {
-        count_rooms(
-            &self.space,
-            &self.cells,
-            &self.decimation.after(n_steps),
-            &self.bvh,
-            config.merge.min_radius,
-        )
+        let room_of_cell = self.decimation.after(n_steps);
+        let least = config.merge.min_radius;
+        count_rooms(&self.air(), &room_of_cell, least, &self.known_backs)
+    }
+
+    pub(super) fn air(&self) -> CellSpace<'_> {
+        CellSpace {
+            space: &self.space,
+            cells: &self.cells,
+            bvh: &self.bvh,
+            largest: &self.largest,
+        }
     }
 
     /// Returns the portals left after the first `n_steps`, with their weights at that step. `config` is that of the last
