@@ -33,7 +33,7 @@ use super::cells::{CellPortal, Cells};
 use crate::config::{Choices, Weight};
 
 pub use remaining::RemainingPortal;
-pub(super) use remaining::{Resolved, remaining};
+pub(super) use remaining::{Resolved, begun_before, remaining};
 
 /// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
 /// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
@@ -252,6 +252,7 @@ impl Rules {
 }
 
 /// A portal in the queue. It is stale if the portal now has another version.
+#[derive(Clone)]
 struct QueuedPortal {
     weight: f64,
     pair: (u32, u32),
@@ -292,8 +293,9 @@ struct Live {
     mouth: f64,
     /// Sum of area vectors, from the lesser to the greater slot. [Units: wu²]
     vector: DVec3,
-    /// The widest of its initial portals.
+    /// The widest of its initial portals, and the center of that. [Units: wu]
     widest: (u32, u32),
+    center: DVec3,
     /// The user wants it to stay; two cells with such a portal among theirs never merge.
     stays: bool,
     /// The user wants it to go.
@@ -308,6 +310,7 @@ impl Live {
             mouth: portal.mouth,
             vector: portal.vector,
             widest: pair,
+            center: portal.center,
             stays: choice == Some(Choice::Keep),
             goes: choice == Some(Choice::Join),
             version: 0,
@@ -317,7 +320,8 @@ impl Live {
     /// Absorbs another portal between the same two cells.
     fn absorb(&mut self, other: &Self) {
         if (other.radius, other.mouth) > (self.radius, self.mouth) {
-            (self.radius, self.mouth, self.widest) = (other.radius, other.mouth, other.widest);
+            (self.radius, self.mouth) = (other.radius, other.mouth);
+            (self.widest, self.center) = (other.widest, other.center);
         }
         self.vector += other.vector;
         self.stays |= other.stays;
@@ -334,8 +338,8 @@ fn pair_of(a: u32, b: u32) -> (u32, u32) {
 ///
 /// A merged cell takes the slot of the one that had more neighbors, so that a hall that absorbs thousands of crevices
 /// is not moved each time.
-struct Merging<'a> {
-    cells: &'a Cells,
+#[derive(Clone)]
+pub(super) struct Merging {
     rules: Rules,
     /// The cell in each slot.
     bodies: Vec<Body>,
@@ -353,8 +357,8 @@ struct Merging<'a> {
     has_joins: bool,
 }
 
-impl<'a> Merging<'a> {
-    fn new(cells: &'a Cells, rules: Rules, choices: &BTreeMap<(u32, u32), Choice>) -> Self {
+impl Merging {
+    fn new(cells: &Cells, rules: Rules, choices: &BTreeMap<(u32, u32), Choice>) -> Self {
         let n = cells.radii.len();
         let body = |c: usize| Body {
             radius: cells.radii[c],
@@ -370,7 +374,6 @@ impl<'a> Merging<'a> {
             portals.insert((a, b), Live::new((a, b), portal, choice));
         }
         let mut merging = Self {
-            cells,
             rules,
             bodies: (0..n).map(body).collect(),
             neighbors,
@@ -493,7 +496,7 @@ impl<'a> Merging<'a> {
             from: one.max(other),
             weight: candidate.weight,
             is_mouth: self.rules.is_mouth(portal, candidate.weight),
-            position: self.cells.portals[&portal.widest].center,
+            position: portal.center,
         });
         self.removed.push(portal.widest);
         self.ids[into as usize] = one.min(other);

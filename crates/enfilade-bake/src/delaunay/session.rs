@@ -1,12 +1,15 @@
 //! The state of decimation, which a bake runs through at once and a user step by step.
 
+use std::sync::Mutex;
+
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
 use super::decimate::{
-    Decimation, RemainingPortal, Resolved, Rules, decided, decimate, default_stop, remaining,
+    Decimation, Merging, RemainingPortal, Resolved, Rules, begun_before, decided, decimate,
+    default_stop, remaining,
 };
 use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
@@ -28,6 +31,8 @@ pub struct Session {
     pub decimation: Decimation,
     /// The choices of that decimation, and the portals that they are about.
     resolved: Vec<Resolved>,
+    /// The same decimation in progress, a little before the step of which the portals were asked for last.
+    begun: Mutex<Option<Merging>>,
     /// Structural triangles that bound rooms: all but stairs.
     pub(super) walls: Vec<Triangle>,
     /// BVH of the walls.
@@ -106,6 +111,7 @@ impl Session {
                 stop: 0,
             },
             resolved: Vec::new(),
+            begun: Mutex::new(None),
             walls,
             bvh,
             closures,
@@ -142,8 +148,16 @@ impl Session {
     /// decimation. Takes milliseconds.
     #[must_use]
     pub fn remaining(&self, n_steps: usize, config: &BakeConfig) -> Vec<RemainingPortal> {
+        // A poisoned lock only costs the time to begin anew.
+        let mut begun = self.begun.lock().ok();
+        let earlier = begun.as_mut().and_then(|begun| begun.take());
+        let to_cells = (&self.cells, rules_of(config));
+        let merging = begun_before(earlier, to_cells, &self.resolved, n_steps);
+        if let Some(begun) = &mut begun {
+            **begun = Some(merging.clone());
+        }
         let record = (&self.decimation, &self.resolved[..]);
-        remaining(&self.cells, rules_of(config), record, n_steps)
+        remaining(&self.cells, merging, record, n_steps)
     }
 
     /// Returns the openings of a portal as convex polygons, without cracks, in which no portal is placed. [Units: wu]
@@ -163,6 +177,7 @@ impl Session {
         let choices = &config.delaunay.choices;
         (self.decimation, self.resolved) =
             decided(&self.cells, rules_of(config), choices, allowance);
+        self.begun = Mutex::new(None);
     }
 }
 

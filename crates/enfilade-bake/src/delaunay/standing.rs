@@ -85,21 +85,28 @@ impl LargestParts {
     }
 
     /// Returns the largest parts of each group of cells.
-    fn of_groups(
-        &self,
-        space: &Space,
-        group_of_cell: impl Fn(usize) -> u32,
-    ) -> BTreeMap<u32, Vec<u32>> {
-        let mut groups: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for (c, parts) in self.0.iter().enumerate() {
-            groups.entry(group_of_cell(c)).or_default().extend(parts);
+    fn of_groups(&self, space: &Space, group_of_cell: &[u32]) -> BTreeMap<u32, Vec<u32>> {
+        let mut groups: Vec<Vec<u32>> = vec![Vec::new(); self.0.len()];
+        for (parts, &group) in self.0.iter().zip(group_of_cell) {
+            let all = &mut groups[group as usize];
+            all.extend(parts);
+            // The largest of all are among the largest of some.
+            if all.len() > MANY * POINTS {
+                keep_largest(space, all);
+            }
         }
-        for parts in groups.values_mut() {
-            keep_largest(space, parts);
-        }
-        groups
+        let is_group: BTreeSet<u32> = group_of_cell.iter().copied().collect();
+        let largest = is_group.into_iter().map(|group| {
+            let mut parts = std::mem::take(&mut groups[group as usize]);
+            keep_largest(space, &mut parts);
+            (group, parts)
+        });
+        largest.collect()
     }
 }
+
+/// Parts that are sorted at once, in units of those that are kept.
+const MANY: usize = 32;
 
 fn keep_largest(space: &Space, parts: &mut Vec<u32>) {
     parts.sort_by(|&a, &b| {
@@ -148,7 +155,7 @@ fn void_joined(
     known: Option<&KnownBacks>,
     allowance: &Allowance,
 ) -> Vec<u32> {
-    let members = air.largest.of_groups(air.space, |c| room_of_cell[c]);
+    let members = air.largest.of_groups(air.space, room_of_cell);
     let void: BTreeSet<u32> = members
         .into_par_iter()
         .filter_map(|(room, parts)| {
@@ -180,11 +187,11 @@ fn hollow_rooms(
         sets.join(a, b);
     }
     let group_of = sets.into_least();
-    let group_at = |c: usize| group_of[room_of_cell[c] as usize];
-    let mut members = air.largest.of_groups(air.space, group_at);
+    let group_of_cell: Vec<u32> = room_of_cell.iter().map(|r| group_of[*r as usize]).collect();
+    let mut members = air.largest.of_groups(air.space, &group_of_cell);
     let mut radius: BTreeMap<u32, f64> = BTreeMap::new();
-    for (c, own) in air.cells.radii.iter().enumerate() {
-        let r = radius.entry(group_at(c)).or_insert(0.0);
+    for (group, own) in group_of_cell.iter().zip(&air.cells.radii) {
+        let r = radius.entry(*group).or_insert(0.0);
         *r = r.max(*own);
     }
     let share = |parts: Vec<u32>| share_of_backs(air, parts, known, allowance);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::DVec3;
 
-use super::{Choice, Decimation, Merging, Rules, by_portal};
+use super::{Choice, Decimation, Merging, QueuedPortal, Rules, by_portal};
 use crate::delaunay::cells::Cells;
 
 /// A choice, and the portal between initial cells that it is about.
@@ -41,22 +41,49 @@ pub struct RemainingPortal {
     pub links: Vec<u32>,
 }
 
-/// Returns the portals left after the first `n_steps` of a record, in the order of their cells. `resolved` are the choices
-/// of that record.
+/// Steps between the decimation in progress that is kept and the step that was asked for.
+const LAG: usize = 100;
+
+/// Returns a decimation in progress that is at most some steps before `n_steps`: that of an earlier request, if it is, or goes on
+/// from it. `resolved` are the choices.
+pub(in crate::delaunay) fn begun_before(
+    begun: Option<Merging>,
+    (cells, rules): (&Cells, Rules),
+    resolved: &[Resolved],
+    n_steps: usize,
+) -> Merging {
+    let is_before = |merging: &Merging| merging.steps.len() <= n_steps;
+    let begun = begun.filter(is_before);
+    let mut merging = begun.unwrap_or_else(|| Merging::new(cells, rules, &by_portal(resolved)));
+    if merging.steps.len() + 2 * LAG < n_steps {
+        merging.advance(n_steps - LAG);
+    }
+    merging
+}
+
+impl Merging {
+    /// Goes on until `n_steps` are taken, or no portal is left; returns the next portal.
+    fn advance(&mut self, n_steps: usize) -> Option<QueuedPortal> {
+        while self.steps.len() < n_steps {
+            let candidate = self.next_candidate()?;
+            self.remove(&candidate);
+        }
+        let next = self.next_candidate();
+        // It is still to be taken by whoever goes on.
+        self.queue.extend(next.clone());
+        next
+    }
+}
+
+/// Returns the portals left after the first `n_steps` of a record, in the order of their cells. `merging` is the same
+/// decimation, not further than that, and `resolved` its choices.
 pub(in crate::delaunay) fn remaining(
     cells: &Cells,
-    rules: Rules,
+    mut merging: Merging,
     (record, resolved): (&Decimation, &[Resolved]),
     n_steps: usize,
 ) -> Vec<RemainingPortal> {
-    let mut merging = Merging::new(cells, rules, &by_portal(resolved));
-    let mut next = merging.next_candidate();
-    while merging.steps.len() < n_steps
-        && let Some(candidate) = next
-    {
-        merging.remove(&candidate);
-        next = merging.next_candidate();
-    }
+    let next = merging.advance(n_steps);
     let room_of_cell = record.after(n_steps);
     let pair_of = |(a, b): (u32, u32)| {
         let [a, b] = [a, b].map(|c| room_of_cell[c as usize]);
@@ -64,10 +91,10 @@ pub(in crate::delaunay) fn remaining(
     };
     let mut links: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
     for (&pair, portal) in &cells.portals {
-        links
-            .entry(pair_of(pair))
-            .or_default()
-            .extend(&portal.links);
+        let pair = pair_of(pair);
+        if pair[0] != pair[1] {
+            links.entry(pair).or_default().extend(&portal.links);
+        }
     }
     let mut decided_at: BTreeMap<[u32; 2], Vec<DVec3>> = BTreeMap::new();
     for choice in resolved {
@@ -84,8 +111,8 @@ pub(in crate::delaunay) fn remaining(
         RemainingPortal {
             cells: ids,
             weight,
-            is_mouth: rules.is_mouth(live, weight),
-            position: cells.portals[&live.widest].center,
+            is_mouth: merging.rules.is_mouth(live, weight),
+            position: live.center,
             choice: match (live.stays, live.goes) {
                 (true, _) => Some(Choice::Keep),
                 (false, true) => Some(Choice::Join),

@@ -115,8 +115,7 @@ impl<'a> Reviewer<'a> {
 
     /// Returns the place of the portal of the next step, and its normal.
     pub(crate) fn next_place(&self) -> Option<[DVec3; 2]> {
-        let (portal, normal) = self.sheets.next()?;
-        Some([portal.position, normal])
+        self.sheets.next()
     }
 
     /// Lends the marks of the portals to a frame.

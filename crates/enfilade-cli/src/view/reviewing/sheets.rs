@@ -13,6 +13,8 @@ const NEXT: [f32; 4] = [1.0, 1.0, 1.0, 1.0];
 const AIMED: [f32; 4] = [1.0, 0.75, 0.0, 1.0];
 /// Half the size of the cross at the portal of the next step. [Units: wu]
 const CROSS: f64 = 0.12;
+/// Openings this close to the place of a portal tell its normal there. [Units: wu]
+const AROUND: f64 = 1.5;
 
 /// The openings of a portal.
 struct PortalSheet {
@@ -23,13 +25,18 @@ struct PortalSheet {
     /// Edges of one opening only. [Units: wu]
     border: Vec<[DVec3; 2]>,
     bounds: Aabb,
+    /// Middle of the largest opening: the middle of all may be in a wall, as between two windows. [Units: wu]
+    place: Option<DVec3>,
 }
 
 impl PortalSheet {
     fn new(session: &Session, portal: &RemainingPortal) -> Self {
         let openings = session.openings(portal);
         let points = openings.iter().flatten();
+        let area = |p: &&Vec<DVec3>| area_normal(p).length();
+        let largest = openings.iter().max_by(|a, b| area(a).total_cmp(&area(b)));
         Self {
+            place: largest.map(|p| middle(p)),
             links: portal.links.clone(),
             border: border(&openings),
             bounds: points.fold(Aabb::EMPTY, |b, p| b.including(*p)),
@@ -45,6 +52,18 @@ impl PortalSheet {
         let hits = openings.filter_map(|polygon| passes(polygon, eye, toward));
         hits.filter(|t| *t <= most).min_by(f64::total_cmp)
     }
+}
+
+fn middle(polygon: &[DVec3]) -> DVec3 {
+    polygon.iter().sum::<DVec3>() / polygon.len() as f64
+}
+
+/// Returns twice the area of a polygon, along its normal.
+fn area_normal(polygon: &[DVec3]) -> DVec3 {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    edges
+        .map(|(a, b)| (*a - polygon[0]).cross(*b - polygon[0]))
+        .sum()
 }
 
 /// Returns the edges that only one of some polygons has.
@@ -65,9 +84,7 @@ fn border(openings: &[Vec<DVec3>]) -> Vec<[DVec3; 2]> {
 /// Returns the distance at which a ray passes a convex polygon.
 fn passes(polygon: &[DVec3], eye: DVec3, toward: DVec3) -> Option<f64> {
     let edges = || polygon.iter().zip(polygon.iter().cycle().skip(1));
-    let normal: DVec3 = edges()
-        .map(|(a, b)| (*a - polygon[0]).cross(*b - polygon[0]))
-        .sum();
+    let normal = area_normal(polygon);
     let t = normal.dot(polygon[0] - eye) / normal.dot(toward);
     if !(t > 0.0 && t.is_finite()) {
         return None;
@@ -125,20 +142,16 @@ impl Sheets {
         &self.portals
     }
 
-    /// Returns the portal of the next step, with its sheet's normal.
-    pub(super) fn next(&self) -> Option<(&RemainingPortal, DVec3)> {
+    /// Returns the place of the portal of the next step, and its normal there.
+    pub(super) fn next(&self) -> Option<[DVec3; 2]> {
         let k = self.portals.iter().position(|p| p.is_next)?;
-        let openings = &self.sheets[k].openings;
-        let area = |polygon: &Vec<DVec3>| -> DVec3 {
-            let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
-            edges
-                .map(|(a, b)| (*a - polygon[0]).cross(*b - polygon[0]))
-                .sum()
-        };
+        let at = self.sheets[k].place.unwrap_or(self.portals[k].position);
+        let openings = self.sheets[k].openings.iter();
+        let near = openings.filter(|polygon| middle(polygon).distance(at) < AROUND);
         // Openings face either way.
         let turned = |sum: DVec3, n: DVec3| if sum.dot(n) < 0.0 { sum - n } else { sum + n };
-        let normal = openings.iter().map(area).fold(DVec3::ZERO, turned);
-        Some((&self.portals[k], normal.normalize_or(DVec3::X)))
+        let normal = near.map(|p| area_normal(p)).fold(DVec3::ZERO, turned);
+        Some([at, normal.normalize_or(DVec3::X)])
     }
 
     /// Returns the first portal that a ray passes within a distance.
@@ -187,11 +200,9 @@ fn add_sheet(
     if portal.is_next {
         add_border(marks, sheet, NEXT, 4.0, true);
         // A portal of cracks alone has no sheet.
+        let at = sheet.place.unwrap_or(portal.position);
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-            let ends = [
-                portal.position - axis * CROSS,
-                portal.position + axis * CROSS,
-            ];
+            let ends = [at - axis * CROSS, at + axis * CROSS];
             marks.push(line(ends, NEXT, 2.5, true));
         }
     }
@@ -244,18 +255,14 @@ mod tests {
         assert!(!g.truth.openings.is_empty());
         for opening in &g.truth.openings {
             let k = sheets.sheets.iter().position(|sheet| {
-                let near = |p: &Vec<DVec3>| {
-                    let middle = p.iter().sum::<DVec3>() / p.len() as f64;
-                    middle.distance(opening.center) < 1.5
-                };
+                let near = |p: &Vec<DVec3>| middle(p).distance(opening.center) < 1.5;
                 !sheet.openings.is_empty() && sheet.openings.iter().all(near)
             });
             let k = k.unwrap_or_else(|| panic!("no sheet in {}", opening.name));
             let sheet = &sheets.sheets[k];
             assert!(sheet.border.len() > 3);
-            let middle = sheet.openings[0].iter().sum::<DVec3>() / sheet.openings[0].len() as f64;
-            let edges = |p: &[DVec3]| (p[1] - p[0]).cross(p[2] - p[0]).normalize();
-            let normal = edges(&sheet.openings[0]);
+            let middle = middle(&sheet.openings[0]);
+            let normal = area_normal(&sheet.openings[0]).normalize();
             for side in [normal, -normal] {
                 let eye = middle + side * 0.2;
                 assert_eq!(sheets.at(eye, -side, 0.3), Some(k));
@@ -271,13 +278,7 @@ mod tests {
             sheets.give_back(marks);
             (n, aimed)
         };
-        let (k, next) = sheets
-            .portals()
-            .iter()
-            .enumerate()
-            .find(|(_, p)| p.is_next)
-            .unwrap();
-        let position = next.position;
+        let k = sheets.portals().iter().position(|p| p.is_next).unwrap();
         let n_border = sheets.sheets[k].border.len();
         let n_aimed = sheets.sheets[0].border.len();
         assert_eq!(white(&mut sheets), (n_border + 3, n_aimed));
@@ -286,7 +287,8 @@ mod tests {
             (n_border + 3, n_aimed),
             "marks that were lent come back"
         );
-        assert_eq!(sheets.next().unwrap().0.position, position);
+        let [at, normal] = sheets.next().unwrap();
+        assert_eq!(sheets.at(at + normal * 0.2, -normal, 0.3), Some(k));
 
         let before = sheets.portals().len();
         review.go_by(1);
