@@ -41,7 +41,7 @@ fn the_portals_shown_are_all_openings_between_rooms_and_the_next_is_the_next_ste
         let mut review = review(&g);
         let n = review.steps().len();
         let stop = review.stop();
-        let mut n_next = 0;
+        let (mut n_next, mut seen) = (0, Vec::new());
         for at in (0..n).step_by(1 + n / 12).chain(stop.saturating_sub(3)..=n) {
             review.go_to(at);
             let portals = review.portals();
@@ -65,8 +65,14 @@ fn the_portals_shown_are_all_openings_between_rooms_and_the_next_is_the_next_ste
                     assert!(portals.iter().all(|p| p.weight >= shown.weight));
                 }
             }
+            seen.push((at, portals));
         }
         assert!(n_next > 4);
+        // The same from any side, although what is near the step before is not found anew.
+        for (at, portals) in seen.into_iter().rev() {
+            review.go_to(at);
+            assert_eq!(review.portals(), portals, "step {at}");
+        }
     }
 }
 
