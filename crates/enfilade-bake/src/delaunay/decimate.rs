@@ -85,7 +85,7 @@ impl Choices {
             })
         };
         let join = self.join.iter().map(|p| (p, Choice::Join));
-        // Of two choices about the same portal, the later entry holds.
+        // The later of two choices about the same portal holds.
         let all = join.chain(self.keep.iter().map(|p| (p, Choice::Keep)));
         let resolved = |(p, choice): (&DVec3, Choice)| {
             Some(Resolved {

@@ -12,7 +12,7 @@ use crate::config::Choices;
 /// A decision about a portal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision {
-    /// What was decided.
+    /// The choice.
     pub choice: Choice,
     /// Place of the portal. [Units: wu]
     pub position: DVec3,

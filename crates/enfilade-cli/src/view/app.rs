@@ -377,22 +377,25 @@ impl App<'_> {
                     }
                 }
             }
-            KeyCode::F12 => {
-                // The walk goes on even if a picture fails.
-                let asked_of_it = (self.args.screenshot.as_path(), &self.args.adapter);
-                let review = self.reviewer.as_mut();
-                let marks = review.map_or_else(Vec::new, Reviewer::lend_marks);
-                let made = open.shot(asked_of_it, (&self.world, &marks), &mut self.outputs);
-                if let Some(reviewer) = &mut self.reviewer {
-                    reviewer.take_marks(marks);
-                }
-                if let Err(why) = made {
-                    open.warn(format!("no picture: {why:#}"));
-                }
-            }
+            KeyCode::F12 => self.take_picture(),
             _ => {}
         }
         Ok(())
+    }
+
+    /// Writes a picture. The walk goes on even if that fails.
+    fn take_picture(&mut self) {
+        let Some(open) = &mut self.open else { return };
+        let asked = (self.args.screenshot.as_path(), &self.args.adapter);
+        let review = self.reviewer.as_mut();
+        let marks = review.map_or_else(Vec::new, Reviewer::lend_marks);
+        let made = open.shot(asked, (&self.world, &marks), &mut self.outputs);
+        if let Some(reviewer) = &mut self.reviewer {
+            reviewer.take_marks(marks);
+        }
+        if let Err(why) = made {
+            open.warn(format!("no picture: {why:#}"));
+        }
     }
 
     /// Takes another tool while editing; otherwise zooms the map.
