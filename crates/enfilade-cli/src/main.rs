@@ -35,6 +35,7 @@ mod pvs;
 mod rebake;
 mod render;
 mod report;
+mod reviewed;
 mod screen;
 mod see;
 mod serve;

@@ -20,6 +20,8 @@
 //!
 //! Ties are broken by the ids of cells, which depend on coordinates only. `O(n log n)`.
 
+mod remaining;
+
 use std::cmp::Ordering;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
@@ -29,6 +31,9 @@ use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::cells::{CellPortal, Cells};
 use crate::config::{Choices, Weight};
+
+pub use remaining::RemainingPortal;
+pub(super) use remaining::{Resolved, begun_before, remaining};
 
 /// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
 /// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
@@ -66,8 +71,9 @@ impl Choices {
     /// Greatest distance of a choice from a portal's center. [Units: radii of the ball that passes]
     pub const REACH: f64 = 1.0;
 
-    /// Returns the choice for each portal that has one. `undecided` are the portals removed without choices.
-    fn by_portal(&self, cells: &Cells, undecided: &[(u32, u32)]) -> BTreeMap<(u32, u32), Choice> {
+    /// Returns the portal that each choice is about, with its place. `undecided` are the portals removed without
+    /// choices.
+    fn resolved(&self, cells: &Cells, undecided: &[(u32, u32)]) -> Vec<Resolved> {
         let portal = |p: &DVec3| {
             let off = |pair: &(u32, u32)| cells.portals[pair].center.distance(*p);
             let is_at = |pair: &&(u32, u32)| off(pair) == 0.0;
@@ -78,24 +84,26 @@ impl Choices {
                 nearest.filter(is_near).copied()
             })
         };
-        let join = self
-            .join
-            .iter()
-            .filter_map(portal)
-            .map(|p| (p, Choice::Join));
-        let keep = self
-            .keep
-            .iter()
-            .filter_map(portal)
-            .map(|p| (p, Choice::Keep));
-        join.chain(keep).collect()
+        let join = self.join.iter().map(|p| (p, Choice::Join));
+        // The later of two choices about the same portal holds.
+        let all = join.chain(self.keep.iter().map(|p| (p, Choice::Keep)));
+        let resolved = |(p, choice): (&DVec3, Choice)| {
+            Some(Resolved {
+                pair: portal(p)?,
+                choice,
+                at: *p,
+            })
+        };
+        all.filter_map(resolved).collect()
     }
 }
 
 /// Decision of the user on one portal.
-#[derive(Clone, Copy, PartialEq)]
-enum Choice {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// It stays, whatever its weight.
     Keep,
+    /// The rooms on both sides become one.
     Join,
 }
 
@@ -151,25 +159,40 @@ pub fn decimate(
         stop,
         min_radius,
     };
+    decided(cells, rules, choices, allowance).0
+}
+
+/// Returns the record of a decimation, and the portals that its choices are about.
+pub(super) fn decided(
+    cells: &Cells,
+    rules: Rules,
+    choices: &Choices,
+    allowance: &Allowance,
+) -> (Decimation, Vec<Resolved>) {
     let (undecided, portals) = Merging::new(cells, rules, &BTreeMap::new()).run(allowance);
     if *choices == Choices::default() {
-        return undecided;
+        return (undecided, Vec::new());
     }
     // No user means a crevice in a doorway.
     let steps = undecided.steps.iter().zip(portals);
     let portals: Vec<(u32, u32)> = steps.filter(|s| s.0.weight > 0.0).map(|s| s.1).collect();
-    Merging::new(cells, rules, &choices.by_portal(cells, &portals))
-        .run(allowance)
-        .0
+    let resolved = choices.resolved(cells, &portals);
+    let merging = Merging::new(cells, rules, &by_portal(&resolved));
+    (merging.run(allowance).0, resolved)
+}
+
+/// Returns the choice that holds for each portal.
+fn by_portal(resolved: &[Resolved]) -> BTreeMap<(u32, u32), Choice> {
+    resolved.iter().map(|r| (r.pair, r.choice)).collect()
 }
 
 /// Rules that select the next portal, and that stop.
 #[derive(Clone, Copy)]
-struct Rules {
-    weight: Weight,
-    stop: f64,
+pub(super) struct Rules {
+    pub(super) weight: Weight,
+    pub(super) stop: f64,
     /// [Units: wu]
-    min_radius: f64,
+    pub(super) min_radius: f64,
 }
 
 /// A cell during the merging.
@@ -215,6 +238,11 @@ impl Rules {
         }
     }
 
+    /// Returns `true` if the weight of a portal is that of a branch at its mouth.
+    fn is_mouth(&self, portal: &Live, weight: f64) -> bool {
+        self.weight == Weight::ScaleFree && portal.mouth > 0.0 && weight == portal.mouth
+    }
+
     /// Returns `true` if the portals of a cell must be weighed again after it changes from `before` to `after`.
     fn weighs_anew(&self, before: &Body, after: &Body) -> bool {
         before.radius != after.radius
@@ -224,6 +252,7 @@ impl Rules {
 }
 
 /// A portal in the queue. It is stale if the portal now has another version.
+#[derive(Clone)]
 struct QueuedPortal {
     weight: f64,
     pair: (u32, u32),
@@ -264,8 +293,9 @@ struct Live {
     mouth: f64,
     /// Sum of area vectors, from the lesser to the greater slot. [Units: wu²]
     vector: DVec3,
-    /// The widest of its initial portals.
+    /// The widest of its initial portals, and the center of that. [Units: wu]
     widest: (u32, u32),
+    center: DVec3,
     /// The user wants it to stay; two cells with such a portal among theirs never merge.
     stays: bool,
     /// The user wants it to go.
@@ -280,6 +310,7 @@ impl Live {
             mouth: portal.mouth,
             vector: portal.vector,
             widest: pair,
+            center: portal.center,
             stays: choice == Some(Choice::Keep),
             goes: choice == Some(Choice::Join),
             version: 0,
@@ -289,7 +320,8 @@ impl Live {
     /// Absorbs another portal between the same two cells.
     fn absorb(&mut self, other: &Self) {
         if (other.radius, other.mouth) > (self.radius, self.mouth) {
-            (self.radius, self.mouth, self.widest) = (other.radius, other.mouth, other.widest);
+            (self.radius, self.mouth) = (other.radius, other.mouth);
+            (self.widest, self.center) = (other.widest, other.center);
         }
         self.vector += other.vector;
         self.stays |= other.stays;
@@ -306,8 +338,8 @@ fn pair_of(a: u32, b: u32) -> (u32, u32) {
 ///
 /// A merged cell takes the slot of the one that had more neighbors, so that a hall that absorbs thousands of crevices
 /// is not moved each time.
-struct Merging<'a> {
-    cells: &'a Cells,
+#[derive(Clone)]
+pub(super) struct Merging {
     rules: Rules,
     /// The cell in each slot.
     bodies: Vec<Body>,
@@ -325,8 +357,8 @@ struct Merging<'a> {
     has_joins: bool,
 }
 
-impl<'a> Merging<'a> {
-    fn new(cells: &'a Cells, rules: Rules, choices: &BTreeMap<(u32, u32), Choice>) -> Self {
+impl Merging {
+    fn new(cells: &Cells, rules: Rules, choices: &BTreeMap<(u32, u32), Choice>) -> Self {
         let n = cells.radii.len();
         let body = |c: usize| Body {
             radius: cells.radii[c],
@@ -342,7 +374,6 @@ impl<'a> Merging<'a> {
             portals.insert((a, b), Live::new((a, b), portal, choice));
         }
         let mut merging = Self {
-            cells,
             rules,
             bodies: (0..n).map(body).collect(),
             neighbors,
@@ -361,17 +392,7 @@ impl<'a> Merging<'a> {
 
     /// Merges until no portal is left. Also returns, for each step, the initial portal that it removed.
     fn run(mut self, allowance: &Allowance) -> (Decimation, Vec<(u32, u32)>) {
-        while let Some(candidate) = self.queue.pop() {
-            if self.is_stale(&candidate) {
-                continue;
-            }
-            if self.stop_at.is_none() && candidate.weight > self.rules.stop {
-                if self.take_up_joins() {
-                    self.queue.push(candidate);
-                    continue;
-                }
-                self.stop_at = Some(self.steps.len());
-            }
+        while let Some(candidate) = self.next_candidate() {
             if !allowance.spend(WORK_A_STEP + WORK_A_PAIR * self.n_pairs(candidate.pair)) {
                 break;
             }
@@ -383,6 +404,24 @@ impl<'a> Merging<'a> {
             steps: self.steps,
         };
         (decimation, self.removed)
+    }
+
+    /// Takes the next portal to remove from the queue, and notes whether the decimation stops before it.
+    fn next_candidate(&mut self) -> Option<QueuedPortal> {
+        while let Some(candidate) = self.queue.pop() {
+            if self.is_stale(&candidate) {
+                continue;
+            }
+            if self.stop_at.is_none() && candidate.weight > self.rules.stop {
+                if self.take_up_joins() {
+                    self.queue.push(candidate);
+                    continue;
+                }
+                self.stop_at = Some(self.steps.len());
+            }
+            return Some(candidate);
+        }
+        None
     }
 
     /// Returns the number of portals that a step may weigh again.
@@ -456,10 +495,8 @@ impl<'a> Merging<'a> {
             into: one.min(other),
             from: one.max(other),
             weight: candidate.weight,
-            is_mouth: self.rules.weight == Weight::ScaleFree
-                && portal.mouth > 0.0
-                && candidate.weight == portal.mouth,
-            position: self.cells.portals[&portal.widest].center,
+            is_mouth: self.rules.is_mouth(portal, candidate.weight),
+            position: portal.center,
         });
         self.removed.push(portal.widest);
         self.ids[into as usize] = one.min(other);

@@ -12,7 +12,8 @@
 //! | merging of parts of the air between which nothing narrows | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches`; `labels`: the result | ours, after Matheron 1975 |
 //! | corridors that leave a room without a pinch | `limbs`, by the rule of `rooms` | ours |
-//! | portals removed one by one | `decimate` | §4.1.4, §4.2.3, §4.3 |
+//! | portals removed one by one | `decimate`; `decimate/remaining`: those left after a step | §4.1.4, §4.2.3, §4.3 |
+//! | overruling by a person | `review` | §4.2.3 |
 //! | remaining rooms, and matter | `standing` | ours |
 //! | candidates and votes | `rooms` | ours |
 //!
@@ -32,6 +33,7 @@ mod order;
 mod predicate;
 mod propose;
 mod refine;
+mod review;
 mod rooms;
 mod session;
 mod space;
@@ -46,9 +48,10 @@ mod tests;
 pub use crate::config::{Choices, DelaunayConfig, Weight};
 pub use crate::error::DelaunayError;
 pub use cells::{CellPortal, Cells, OUTDOOR_CELL, flow_together};
-pub use decimate::{Decimation, JOINED, Step, decimate, default_stop};
+pub use decimate::{Choice, Decimation, JOINED, RemainingPortal, Step, decimate, default_stop};
 pub use insert::tetrahedralize;
 pub(crate) use propose::{propose, propose_of};
+pub use review::{Decision, Review};
 pub use session::Session;
 pub use space::{LEAST_BALL, Link, Space, divide};
 pub use tetrahedra::{Delaunay, INFINITE, Tetrahedron};

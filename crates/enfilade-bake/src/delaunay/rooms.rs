@@ -64,7 +64,7 @@ pub(super) fn find_rooms(
         room_of_cell,
         patches,
         hollow,
-    } = Standing::of(space, cells, room_of_cell, bvh, min_radius, allowance);
+    } = Standing::of(&session.air(), room_of_cell, min_radius, allowance);
     let room_at = |t: u32| room_of_cell[cells.cell_of_part[t as usize] as usize];
     let leaves = Bvh::build(closures);
     let found: Vec<(Vec<DVec3>, Option<Candidate>)> = patches

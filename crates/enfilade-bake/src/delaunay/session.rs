@@ -1,15 +1,20 @@
 //! The state of decimation, which a bake runs through at once and a user step by step.
 
+use std::sync::Mutex;
+
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Allowance, Bvh, Triangle};
+use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
-use super::decimate::{Decimation, decimate, default_stop};
+use super::decimate::{
+    Decimation, Merging, RemainingPortal, Resolved, Rules, begun_before, decided, decimate,
+    default_stop, remaining,
+};
 use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
-use super::standing::count_rooms;
+use super::standing::{CellSpace, KnownBacks, LargestParts, count_rooms};
 use crate::budget::n_structural;
 use crate::config::{Choices, Weight};
 use crate::structure::{Structure, in_own_order};
@@ -24,10 +29,17 @@ pub struct Session {
     pub cells: Cells,
     /// The steps.
     pub decimation: Decimation,
+    /// The choices of that decimation, and the portals that they are about.
+    resolved: Vec<Resolved>,
+    /// The same decimation in progress, a little before the step of which the portals were asked for last.
+    begun: Mutex<Option<Merging>>,
     /// Structural triangles that bound rooms: all but stairs.
     pub(super) walls: Vec<Triangle>,
     /// BVH of the walls.
     pub(super) bvh: Bvh,
+    /// For [`CellSpace`].
+    largest: LargestParts,
+    known_backs: KnownBacks,
     pub(super) closures: Vec<Triangle>,
     pub(super) stairs: Bvh,
     /// The smallest hole. [Units: wu]
@@ -89,6 +101,8 @@ impl Session {
             context.allowance(),
         );
         let mut session = Self {
+            largest: LargestParts::of(&space, &cells),
+            known_backs: KnownBacks::default(),
             space,
             cells,
             decimation: Decimation {
@@ -96,6 +110,8 @@ impl Session {
                 steps: Vec::new(),
                 stop: 0,
             },
+            resolved: Vec::new(),
+            begun: Mutex::new(None),
             walls,
             bvh,
             closures,
@@ -110,16 +126,46 @@ impl Session {
     /// [`bake_session`](crate::bake_session) makes of them, and the number of other cells: crevices, and interiors of
     /// walls, which are dropped.
     ///
-    /// `O(n log n)` in the parts of the space; a fraction of a second.
+    /// `O(n log n)` in the initial cells, and rays from the rooms that no count before had: milliseconds, and a fraction of a
+    /// second for the first.
     #[must_use]
     pub fn count_rooms(&self, n_steps: usize, config: &BakeConfig) -> [usize; 2] {
-        count_rooms(
-            &self.space,
-            &self.cells,
-            &self.decimation.after(n_steps),
-            &self.bvh,
-            config.merge.min_radius,
-        )
+        let room_of_cell = self.decimation.after(n_steps);
+        let least = config.merge.min_radius;
+        count_rooms(&self.air(), &room_of_cell, least, &self.known_backs)
+    }
+
+    pub(super) fn air(&self) -> CellSpace<'_> {
+        CellSpace {
+            space: &self.space,
+            cells: &self.cells,
+            bvh: &self.bvh,
+            largest: &self.largest,
+        }
+    }
+
+    /// Returns the portals left after the first `n_steps`, with their weights at that step. `config` is that of the last
+    /// decimation. Takes milliseconds.
+    #[must_use]
+    pub fn remaining(&self, n_steps: usize, config: &BakeConfig) -> Vec<RemainingPortal> {
+        // A poisoned lock only costs the time to begin anew.
+        let mut begun = self.begun.lock().ok();
+        let earlier = begun.as_mut().and_then(|begun| begun.take());
+        let to_cells = (&self.cells, rules_of(config));
+        let merging = begun_before(earlier, to_cells, &self.resolved, n_steps);
+        if let Some(begun) = &mut begun {
+            **begun = Some(merging.clone());
+        }
+        let record = (&self.decimation, &self.resolved[..]);
+        remaining(&self.cells, merging, record, n_steps)
+    }
+
+    /// Returns the openings of a portal as convex polygons, without cracks, in which no portal is placed. [Units: wu]
+    #[must_use]
+    pub fn openings(&self, portal: &RemainingPortal) -> Vec<Vec<DVec3>> {
+        let links = portal.links.iter().map(|&l| &self.space.links[l as usize]);
+        let wide = links.filter(|link| !self.space.is_crack(link));
+        wide.map(|link| self.space.outline(link).to_vec()).collect()
     }
 
     /// Decimates again, after other choices or with another weight or stop. Takes milliseconds.
@@ -128,17 +174,19 @@ impl Session {
     }
 
     fn decimate_within(&mut self, config: &BakeConfig, allowance: &Allowance) {
-        let own = &config.delaunay;
-        let stop = own.stop.unwrap_or_else(|| default_stop(own.weight));
-        let least = config.merge.min_radius;
-        self.decimation = decimate(
-            &self.cells,
-            own.weight,
-            stop,
-            least,
-            &own.choices,
-            allowance,
-        );
+        let choices = &config.delaunay.choices;
+        (self.decimation, self.resolved) =
+            decided(&self.cells, rules_of(config), choices, allowance);
+        self.begun = Mutex::new(None);
+    }
+}
+
+fn rules_of(config: &BakeConfig) -> Rules {
+    let own = &config.delaunay;
+    Rules {
+        weight: own.weight,
+        stop: own.stop.unwrap_or_else(|| default_stop(own.weight)),
+        min_radius: config.merge.min_radius,
     }
 }
 

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
-use enfilade::cpg::wire::encode_glb;
-use enfilade::cpg::{PortalId, World};
+use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::runtime::Target;
 use enfilade::world::{PartId, Pose, Space};
@@ -23,11 +22,12 @@ use winit::window::WindowId;
 
 use super::args::View;
 use super::bare::BareWindow;
-use super::editing::{EditKey, EditRay, Editor, Outcome, Strip, edit_key};
+use super::editing::{EditKey, Editor, Strip, edit_key};
 use super::mode::Mode;
 use super::open::Open;
 use super::panel::{Panel, Shown};
 use super::pointed::{FAR, Pointed};
+use super::reviewing::{Reviewer, review_key};
 use super::strider::start_in;
 use super::titles::Titles;
 use super::walker::Walker;
@@ -53,6 +53,9 @@ pub(super) struct App<'a> {
     pub(super) outputs: Outputs,
     /// The editor, if the world is edited.
     pub(super) editor: Option<Editor>,
+    /// The reviewer, if a decimation is reviewed, and the number of frames until it bakes.
+    pub(super) reviewer: Option<Reviewer<'a>>,
+    pub(super) baking: Option<u32>,
     pub(super) open: Option<Open>,
     pub(super) failed: Option<anyhow::Error>,
 }
@@ -69,6 +72,9 @@ impl ApplicationHandler for App<'_> {
                 }
                 if let Some(notes) = self.editor.as_mut().and_then(Editor::take_notes) {
                     open.say(notes);
+                }
+                if let Some(reviewer) = &self.reviewer {
+                    open.say(reviewer.step_words());
                 }
                 self.open = Some(open);
             }
@@ -192,13 +198,13 @@ impl App<'_> {
         let [x, y, z] = start.toward;
         let shown = Shown {
             // The software adapter draws the plain picture several times as fast.
-            plain: studio.gpu.is_software() || self.editor.is_some(),
+            plain: studio.gpu.is_software() || self.editor.is_some() || self.reviewer.is_some(),
             spares: studio.sparing != Sparing::default(),
             zoom: 1.0,
             ..Shown::default()
         };
         let mut walker = Walker::new(start.eye, streamed.is_some());
-        walker.flies = self.editor.is_some();
+        walker.flies = self.editor.is_some() || self.reviewer.is_some();
         walker.rides = self.args.living.is_some();
         let titles = self.editor.as_ref().map(Editor::titles);
         Ok(Open {
@@ -235,8 +241,8 @@ impl App<'_> {
             },
             is_captured: false,
             wants_mouse: false,
-            // Daylight needs the whole world.
-            has_asked_for_light: streamed.is_some(),
+            // Daylight needs the whole world, in rooms.
+            has_asked_for_light: streamed.is_some() || self.reviewer.is_some(),
             streamed,
             turning: Vec::new(),
             recorded: None,
@@ -254,6 +260,9 @@ impl App<'_> {
                 toward: [1.0, 0.0, 0.0],
                 fov_y: FOV,
             });
+        }
+        if let Some(camera) = self.review_camera(space) {
+            return Ok(camera);
         }
         if self.packed.is_some() {
             return Ok(start_in(&self.world, &studio.sight));
@@ -297,6 +306,17 @@ impl App<'_> {
         }
         if let Some(key) = edit_key(key)
             && self.edit(key)?
+        {
+            return Ok(());
+        }
+        let Some(open) = &mut self.open else {
+            return Ok(());
+        };
+        let is_there = [KeyCode::ShiftLeft, KeyCode::ShiftRight]
+            .iter()
+            .any(|k| open.keys.contains(k));
+        if let Some(key) = review_key(key, is_there)
+            && self.review(key)?
         {
             return Ok(());
         }
@@ -357,16 +377,25 @@ impl App<'_> {
                     }
                 }
             }
-            KeyCode::F12 => {
-                // The walk goes on even if a picture fails.
-                let asked_of_it = (self.args.screenshot.as_path(), &self.args.adapter);
-                if let Err(why) = open.shot(asked_of_it, &self.world, &mut self.outputs) {
-                    open.warn(format!("no picture: {why:#}"));
-                }
-            }
+            KeyCode::F12 => self.take_picture(),
             _ => {}
         }
         Ok(())
+    }
+
+    /// Writes a picture. The walk goes on even if that fails.
+    fn take_picture(&mut self) {
+        let Some(open) = &mut self.open else { return };
+        let asked = (self.args.screenshot.as_path(), &self.args.adapter);
+        let review = self.reviewer.as_mut();
+        let marks = review.map_or_else(Vec::new, Reviewer::lend_marks);
+        let made = open.shot(asked, (&self.world, &marks), &mut self.outputs);
+        if let Some(reviewer) = &mut self.reviewer {
+            reviewer.take_marks(marks);
+        }
+        if let Err(why) = made {
+            open.warn(format!("no picture: {why:#}"));
+        }
     }
 
     /// Takes another tool while editing; otherwise zooms the map.
@@ -400,65 +429,12 @@ impl App<'_> {
     /// Closes the window; tells what is not saved.
     fn leave(&mut self, events: &ActiveEventLoop) {
         let words = self.editor.as_ref().and_then(Editor::farewell);
-        if let (Some(words), Some(open)) = (words, &mut self.open) {
-            open.say(words);
+        let reviewed = self.reviewer.as_ref().map(Reviewer::farewell);
+        let words = words.into_iter().chain(reviewed.into_iter().flatten());
+        if let Some(open) = &mut self.open {
+            words.for_each(|words| open.say(words));
         }
         events.exit();
-    }
-
-    /// Lets the editor have a key; returns `false` if it means nothing to it.
-    fn edit(&mut self, key: EditKey) -> anyhow::Result<bool> {
-        let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
-            return Ok(false);
-        };
-        match editor.press(key, &edit_ray(open)) {
-            Outcome::Quiet(is_taken) => return Ok(is_taken),
-            Outcome::Said(words) => open.say(words),
-            Outcome::Refused(why) => open.warn(why),
-            Outcome::Go { eye, toward, words } => {
-                open.go(eye, toward);
-                open.say(words);
-            }
-            Outcome::Edited(words) => {
-                if open.is_in_parts {
-                    open.follow_edit(editor)?;
-                } else {
-                    self.world = Arc::new(editor.world()?.world.clone());
-                    open.show_world(&self.world)?;
-                }
-                open.say(words);
-            }
-        }
-        if let Some(notes) = editor.take_notes() {
-            open.say(notes);
-        }
-        Ok(true)
-    }
-
-    /// Writes the world as edited.
-    fn save(&mut self) {
-        let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
-            return;
-        };
-        let path = editor.save().to_owned();
-        let world = editor.world().map_err(anyhow::Error::from);
-        let bytes = world.and_then(|edited| {
-            let bytes = encode_glb(&edited.world);
-            let bytes = bytes.context("the world breaks an invariant (a bug)")?;
-            Ok((bytes, edited.world.graph.rooms().count()))
-        });
-        let written = bytes.and_then(|(bytes, n)| {
-            self.outputs.write("--save", Format::World, &path)?;
-            write_whole(&path, &bytes)?;
-            Ok(n)
-        });
-        match written {
-            Ok(n) => {
-                editor.saved();
-                open.say(format!("wrote {}, {n} rooms", path.display()));
-            }
-            Err(why) => open.warn(format!("not saved: {why:#}")),
-        }
     }
 
     /// Opens or closes the portal at the pointer.
@@ -521,22 +497,25 @@ impl App<'_> {
         if let Some(recorded) = &mut open.recorded {
             recorded.push(outside);
         }
-        let mut marks = Vec::new();
-        if let Some(editor) = &mut self.editor {
-            editor.look(&edit_ray(open));
-            marks = editor.marks();
-            open.shown.edit = editor.shown();
-            if let Err(why) = editor.tick() {
-                open.warn(why.to_string());
-            }
+        let mut marks = self.look_at_edits();
+        if self.reviewer.is_some() {
+            marks = self.look_at_review()?;
+        } else if let Some(open) = &mut self.open {
+            open.shown.ahead = if open.streamed.is_some() {
+                open.titles.here(&open.lived.space, &outside)
+            } else {
+                let pointed = Pointed::at(&open.lived.space, &outside, FAR);
+                open.titles.ahead(&open.lived.space, &pointed.ray)
+            };
         }
-        open.shown.ahead = if open.streamed.is_some() {
-            open.titles.here(&open.lived.space, &outside)
-        } else {
-            let pointed = Pointed::at(&open.lived.space, &outside, FAR);
-            open.titles.ahead(&open.lived.space, &pointed.ray)
+        let Some(open) = &mut self.open else {
+            return Ok(());
         };
-        open.draw(&self.world, &camera, seconds, marks)
+        open.draw(&self.world, &camera, seconds, &mut marks)?;
+        if let Some(reviewer) = &mut self.reviewer {
+            reviewer.take_marks(marks);
+        }
+        Ok(())
     }
 
     /// The sparing of distant rooms that the options request.
@@ -547,26 +526,6 @@ impl App<'_> {
             lod: self.args.lod,
             ..Sparing::default()
         }
-    }
-}
-
-/// Returns the ray through the pointer, for the editor.
-fn edit_ray(open: &Open) -> EditRay<'_> {
-    let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
-    let (ray, space) = (open.pointer(), &open.lived.space);
-    let length = vector(ray.toward).length().max(1e-9);
-    let pointed = Pointed::at(space, &ray, FAR / length as f32);
-    let portal = portal_looked_at(space, &pointed.ray);
-    let center = |(part, portal, _): (PartId, PortalId, f32)| {
-        let own = space.world(part).graph[portal].center();
-        space.pose(part).point(vector(own))
-    };
-    EditRay {
-        eye: vector(pointed.ray.eye),
-        toward: vector(pointed.ray.toward).normalize_or(DVec3::X),
-        hit: pointed.hit.map(|h| [h.at, h.normal]),
-        portal: portal.map(center),
-        space,
     }
 }
 

@@ -5,11 +5,16 @@ mod args;
 mod bare;
 mod doors;
 mod editing;
+mod edits;
+mod events;
 mod map;
 mod mode;
 mod open;
 mod panel;
 mod pointed;
+mod review_window;
+mod reviewing;
+mod reviews;
 mod steering;
 mod strider;
 mod titles;
@@ -21,11 +26,12 @@ use std::sync::Arc;
 use anyhow::Context;
 use enfilade::world::{PartId, Space};
 use enfilade_render::FOV;
-use winit::event_loop::{ControlFlow, EventLoop};
 
 use self::app::App;
 pub(crate) use self::args::View;
 use self::editing::begin;
+use self::events::{open_events, run_app};
+pub(crate) use self::review_window::{ReviewOptions, open_review};
 use crate::formats::Format;
 use crate::living::{Lived, LivingFile};
 use crate::output::{Outputs, refuse_stream};
@@ -73,8 +79,7 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         None => (None, read(args)?),
     };
     let events = events.map_or_else(open_events, Ok)?;
-    events.set_control_flow(ControlFlow::Poll);
-    let mut app = App {
+    let app = App {
         args,
         world: Arc::clone(lived.space.world(PartId::ROOT)),
         packed,
@@ -82,18 +87,12 @@ pub(crate) fn run(args: &View) -> anyhow::Result<()> {
         lived: Some(lived),
         outputs,
         editor,
+        reviewer: None,
+        baking: None,
         open: None,
         failed: None,
     };
-    events.run_app(&mut app)?;
-    match app.failed {
-        Some(why) => Err(why),
-        None => Ok(()),
-    }
-}
-
-fn open_events() -> anyhow::Result<EventLoop<()>> {
-    EventLoop::new().context("no window can be opened here; `enfilade render` draws without one")
+    run_app(events, app)
 }
 
 /// Reads the world, and what lives in it; of a packed one only the head, if that is enough.

@@ -263,7 +263,7 @@ impl Open {
         world: &World,
         camera: &Camera,
         seconds: f64,
-        mut marks: Vec<Mark>,
+        marks: &mut Vec<Mark>,
     ) -> anyhow::Result<()> {
         use wgpu::CurrentSurfaceTexture as Got;
         let size = [self.config.width, self.config.height];
@@ -293,7 +293,7 @@ impl Open {
         self.begin_textures();
         self.scan(world);
         if self.is_living {
-            return self.draw_living((camera, &view), target, (seconds, &marks));
+            return self.draw_living((camera, &view), target, (seconds, marks));
         }
         let list = if self.mode == Mode::Queries {
             let (list, counts) = self.studio.list_by_queries(world, camera, size)?;
@@ -314,7 +314,7 @@ impl Open {
             projection: camera.projection(aspect)?,
             list: &list,
             style,
-            marks: &marks,
+            marks,
         };
         self.studio.draw(&frame, &output, size)?;
         let seen = self
@@ -441,11 +441,11 @@ impl Open {
         Ok(())
     }
 
-    /// Writes a picture of the world as shown now, without the panel.
+    /// Writes a picture of the world as shown now, without the panel; `marks` are drawn into a world in one piece.
     pub(super) fn shot(
         &mut self,
         (screenshot, adapter): (&Path, &AdapterChoice),
-        world: &World,
+        (world, marks): (&World, &[Mark]),
         outputs: &mut Outputs,
     ) -> anyhow::Result<()> {
         self.n_shots += 1;
@@ -491,7 +491,7 @@ impl Open {
                 })?;
                 studio.paint_portal_textures(self.texture_paint());
             }
-            studio.picture(&camera, self.mode.culling(), self.style(), &[], size)?
+            studio.picture(&camera, self.mode.culling(), self.style(), marks, size)?
         };
         let png = picture.to_png()?;
         outputs.write("--screenshot", Format::Picture, &to)?;

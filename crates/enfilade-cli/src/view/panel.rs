@@ -12,6 +12,7 @@ use winit::window::Window;
 use super::editing::{EDIT_HELP, EditShown, Strip};
 use super::map::{Map, MapShown};
 use super::mode::Mode;
+use super::reviewing::{REVIEW_HELP, ReviewShown, draw_review};
 use super::titles::Titles;
 use crate::living::Blip;
 
@@ -55,6 +56,8 @@ pub(super) struct Shown {
     pub(super) times: VecDeque<f32>,
     /// The editor, while editing is on.
     pub(super) edit: Option<EditShown>,
+    /// The review, if a decimation is reviewed.
+    pub(super) review: Option<ReviewShown>,
 }
 
 impl Shown {
@@ -269,7 +272,8 @@ fn paint(ui: &egui::Ui, map: &mut Map, strip: &mut Option<Strip>, shown: &Shown)
         screen.right_bottom() - Vec2::splat(290.0),
         Vec2::splat(280.0),
     );
-    if let Some(camera) = shown.camera {
+    let has_map = !shown.review.as_ref().is_some_and(|it| it.is_without_map);
+    if let Some(camera) = shown.camera.filter(|_| has_map) {
         let shown = MapShown {
             camera,
             cells: &shown.cells,
@@ -282,10 +286,14 @@ fn paint(ui: &egui::Ui, map: &mut Map, strip: &mut Option<Strip>, shown: &Shown)
     if let (Some(strip), Some(edit)) = (strip.as_mut(), &shown.edit) {
         strip.draw(painter, edit);
     }
+    if let Some(review) = &shown.review {
+        draw_review(painter, screen, review);
+    }
     if shown.help {
-        let text = match strip {
-            Some(_) => format!("{EDIT_HELP}\n\n{HELP}"),
-            None => HELP.to_owned(),
+        let text = match (strip, &shown.review) {
+            (Some(_), _) => format!("{EDIT_HELP}\n\n{HELP}"),
+            (None, Some(_)) => format!("{REVIEW_HELP}\n\n{HELP}"),
+            (None, None) => HELP.to_owned(),
         };
         write(screen.center(), Align2::CENTER_CENTER, text);
     }

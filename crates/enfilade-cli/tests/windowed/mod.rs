@@ -87,9 +87,14 @@ pub(crate) struct Viewer {
 impl Viewer {
     /// Opens `view` in a folder.
     pub(crate) fn open(display: &Display, dir: &Path, world: Option<&str>, args: &[&str]) -> Self {
+        let command: Vec<&str> = ["view"].into_iter().chain(world).collect();
+        Self::of(display, dir, &command, args)
+    }
+
+    /// Opens the window of a command in a folder.
+    pub(crate) fn of(display: &Display, dir: &Path, command: &[&str], args: &[&str]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_enfilade"))
-            .arg("view")
-            .args(world)
+            .args(command)
             .args(["--adapter", "software"])
             .args(args)
             .current_dir(dir)
