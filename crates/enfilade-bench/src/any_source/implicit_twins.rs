@@ -24,12 +24,12 @@ const TIMES: usize = 3;
 const NECK: f64 = 1.2;
 
 /// A part of the air: the points within a radius of the line through some points.
-struct Part {
+struct Hollow {
     points: Vec<DVec3>,
     radius: f64,
 }
 
-impl Part {
+impl Hollow {
     fn ball(at: DVec3, radius: f64) -> Self {
         let points = vec![at];
         Self { points, radius }
@@ -65,18 +65,18 @@ impl Part {
 }
 
 /// Balls and tubes of a scene.
-fn parts(name: &str) -> anyhow::Result<Vec<Part>> {
+fn parts(name: &str) -> anyhow::Result<Vec<Hollow>> {
     let flat = |x: f64, z: f64| DVec3::new(x, 0.0, z);
     // Two tubes whose round ends meet in a neck, since in a tube of one width a portal may be anywhere.
     let way = |a: DVec3, b: DVec3| {
         let short = (b - a).normalize() * NECK / 2.0;
         let middle = (a + b) / 2.0;
-        [[a, middle - short], [middle + short, b]].map(|ends| Part::tube(ends.to_vec(), 0.9))
+        [[a, middle - short], [middle + short, b]].map(|ends| Hollow::tube(ends.to_vec(), 0.9))
     };
     Ok(match name {
         "balls" => {
             let [a, b, c] = [flat(0.0, 0.0), flat(9.0, 1.0), flat(4.0, 9.0)];
-            let balls = [(a, 2.5), (b, 3.0), (c, 2.8)].map(|(at, r)| Part::ball(at, r));
+            let balls = [(a, 2.5), (b, 3.0), (c, 2.8)].map(|(at, r)| Hollow::ball(at, r));
             balls
                 .into_iter()
                 .chain(way(a, b))
@@ -85,7 +85,7 @@ fn parts(name: &str) -> anyhow::Result<Vec<Part>> {
         }
         "cavern" => {
             let at = |i: usize| flat((i % 3) as f64 * 9.0, (i / 3) as f64 * 9.0);
-            let balls = (0..6).map(|i| Part::ball(at(i), 2.8));
+            let balls = (0..6).map(|i| Hollow::ball(at(i), 2.8));
             let ways = [[0, 1], [1, 2], [3, 4], [4, 5], [0, 3], [1, 4], [2, 5]];
             balls
                 .chain(ways.into_iter().flat_map(|[a, b]| way(at(a), at(b))))
@@ -103,9 +103,9 @@ fn knot_at(t: f64) -> DVec3 {
     DVec3::new(r * cos, 4.0 * (3.0 * TAU * t).sin(), r * sin)
 }
 
-fn knot() -> Part {
+fn knot() -> Hollow {
     let points = (0..=180).map(|k| knot_at(f64::from(k) / 180.0)).collect();
-    Part::tube(points, 1.0)
+    Hollow::tube(points, 1.0)
 }
 
 /// Boxes of the house: matter, and what is cut from it.
@@ -139,7 +139,7 @@ fn gyroid_at(p: DVec3) -> f64 {
 }
 
 fn text(name: &str, step: Option<f64>) -> anyhow::Result<String> {
-    let parts: Vec<_> = parts(name)?.iter().map(Part::json).collect();
+    let parts: Vec<_> = parts(name)?.iter().map(Hollow::json).collect();
     let step = step.map_or(String::new(), |s| format!(r#""step":{s},"#));
     let parts = parts.join(",");
     Ok(format!(
@@ -163,7 +163,7 @@ fn worlds(name: &str) -> anyhow::Result<[World; 2]> {
         }
         _ => {
             let parts = parts(name)?;
-            let reach = |p: &Part| {
+            let reach = |p: &Hollow| {
                 let balls = p.points.iter().map(|&c| [c - p.radius, c + p.radius]);
                 balls.collect::<Vec<_>>()
             };
