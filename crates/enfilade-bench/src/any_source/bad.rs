@@ -14,7 +14,7 @@ mod scans;
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
@@ -55,7 +55,7 @@ pub(super) fn not_refused(family: &str) -> anyhow::Result<Figure> {
                     End::Wrong(why) => {
                         let name = &case.name;
                         eprintln!("bad input: {family}, case {i}, {name}: {why}");
-                        let mut wrong = wrong.lock().unwrap_or_else(|e| e.into_inner());
+                        let mut wrong = wrong.lock().unwrap_or_else(PoisonError::into_inner);
                         wrong.push(case.name.clone());
                     }
                 }
@@ -68,7 +68,7 @@ pub(super) fn not_refused(family: &str) -> anyhow::Result<Figure> {
         }
         Ok(())
     })?;
-    let wrong = wrong.into_inner().unwrap_or_else(|e| e.into_inner());
+    let wrong = wrong.into_inner().unwrap_or_else(PoisonError::into_inner);
     let note = format!(
         "of {} cases, {} of which are baked; {}",
         cases.len(),

@@ -184,7 +184,7 @@ fn heads(n: usize) -> Vec<BadSource> {
     }
     // Points that the compressed vector does not have.
     for n_told in ["1000000000", "18446744073709551615", "50000000", "-1"] {
-        let told = format!("recordCount=\"{}\"", n);
+        let told = format!("recordCount=\"{n}\"");
         let bytes = unpaged(&pages).with_text(&told, &format!("recordCount=\"{n_told}\""));
         all.push(BadSource::new(
             format!("e57 of {n_told} points"),
