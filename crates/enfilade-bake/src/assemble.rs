@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, Portal, PortalId, PortalKind,
-    Provenance, SourceRuns, Statistics, World,
+    Provenance, Reason, SourceRuns, Statistics, Why, World,
 };
 use enfilade_geom::scene::{Mesh, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, Allowance, DMat3, DVec3, Plane, Winding};
@@ -30,6 +30,8 @@ use crate::structure::{Candidate, SceneStructure, plates};
 pub(crate) struct Cut<'a> {
     pub(crate) structure: &'a SceneStructure<'a>,
     pub(crate) partition: Partition,
+    /// Why each cell is there.
+    pub(crate) whys: &'a [Vec<Why>],
     pub(crate) candidates: &'a [Candidate],
     /// Regions that are open land.
     pub(crate) land: Range<u32>,
@@ -46,6 +48,12 @@ impl Cut<'_> {
     fn is_land(&self, cell: u32) -> bool {
         let region = self.partition.label_of_cell[cell as usize].region();
         region.is_some_and(|r| self.land.contains(&r))
+    }
+
+    /// Returns why there are two cells at a portal.
+    fn why(&self, portal: &PartitionPortal) -> Why {
+        let candidate = portal.candidate.map(|c| &self.candidates[c as usize]);
+        candidate.map_or_else(|| Why::given(Reason::Gap), |c| c.why.clone())
     }
 
     /// Returns `true` for the outdoors and for open land.
@@ -84,6 +92,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
                 outdoor,
                 is_void,
                 is_land: !outdoor && !is_void && cut.is_land(i as u32),
+                why: cut.whys.get(i).cloned().unwrap_or_default(),
                 ..Cell::default()
             }
         })
@@ -96,6 +105,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         locator: partition.locator.clone(),
         provenance,
         statistics,
+        places: Vec::new(),
     };
     let seals = seals::batches(cut);
     let seen_from = |t: usize| partition.triangle_cells.both(t);
@@ -219,6 +229,7 @@ fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
     Some(Portal {
         cells: p.cells.map(CellId),
         kind: judged.kind,
+        why: vec![cut.why(p)],
         ..rounded_portal(&p.plane, &p.outline, &p.pieces, cut.outward)?
     })
 }
@@ -245,6 +256,7 @@ pub(crate) fn rounded_portal(
         area: pieces.iter().map(|piece| to_f64(piece).area()).sum::<f64>() as f32,
         pieces,
         fittings: Vec::new(),
+        why: Vec::new(),
     })
 }
 

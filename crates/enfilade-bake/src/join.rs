@@ -46,8 +46,9 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
     join(partition, sets);
 }
 
-/// Merges voids that open to each other: beams, ribs and ducts divide what is one space to whoever crawls there.
-pub(crate) fn join_voids(partition: &mut Partition) {
+/// Merges voids that open to each other: beams, ribs and ducts divide what is one space to whoever crawls there. Returns the old
+/// numbers of the cells that are left.
+pub(crate) fn join_voids(partition: &mut Partition) -> Vec<usize> {
     let mut sets = Sets::new(partition.label_of_cell.len());
     let is_void = |c: &u32| matches!(partition.label_of_cell[*c as usize], Label::Void(_));
     for p in partition
@@ -57,11 +58,11 @@ pub(crate) fn join_voids(partition: &mut Partition) {
     {
         sets.join(p.cells[0], p.cells[1]);
     }
-    join(partition, sets);
+    join(partition, sets)
 }
 
-/// Merges the cells of each set, and renumbers the rest.
-fn join(partition: &mut Partition, sets: Sets) {
+/// Merges the cells of each set, and renumbers the rest. Returns the old numbers of the cells that are left.
+fn join(partition: &mut Partition, sets: Sets) -> Vec<usize> {
     let n = partition.label_of_cell.len();
     let least = sets.into_least();
     // The largest cell of each set stands for all of it.
@@ -73,7 +74,7 @@ fn join(partition: &mut Partition, sets: Sets) {
         }
     }
     if stands_for.len() == n {
-        return;
+        return (0..n).collect();
     }
     let home = |c: usize| stands_for[&least[c]];
     let kept: Vec<usize> = (0..n).filter(|&c| home(c) == c as u32).collect();
@@ -90,6 +91,7 @@ fn join(partition: &mut Partition, sets: Sets) {
         }
     }
     renumber(partition, &number, &kept);
+    kept
 }
 
 /// Gives each cell its new `number`; `kept` are the cells that stay, in order. Portals within a cell vanish.

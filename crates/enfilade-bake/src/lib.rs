@@ -28,6 +28,7 @@ pub mod delaunay;
 pub mod edit;
 mod error;
 mod join;
+mod judge;
 mod land;
 mod layout;
 pub mod leak;

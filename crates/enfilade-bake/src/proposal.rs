@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use enfilade_cpg::Why;
 use enfilade_geom::{Aabb, DVec3};
 
 use crate::Resolution;
@@ -11,6 +12,14 @@ use crate::structure::{Candidate, OUTDOORS};
 
 /// Region of everything beyond the part of a scene that is baked, and of matter that its border cuts.
 pub(crate) const BEYOND: u32 = u32::MAX >> 1;
+
+/// A decision about a place that is not a cell, in scene coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct FoundPlace {
+    /// [Units: wu]
+    pub(crate) at: DVec3,
+    pub(crate) why: Why,
+}
 
 /// Rooms and openings that a builder found, in scene coordinates.
 pub(crate) struct Proposal {
@@ -22,6 +31,10 @@ pub(crate) struct Proposal {
     pub(crate) votes: Vec<Vote>,
     /// Points in shallow voids, each with its region, although no opening connects the two.
     pub(crate) voids: Vec<(DVec3, u32)>,
+    /// Close decisions about places that are not cells.
+    pub(crate) places: Vec<FoundPlace>,
+    /// Decisions about regions, ascending by region.
+    pub(crate) whys: Vec<(u32, Why)>,
     /// Regions that are open land: parts of the outdoors.
     pub(crate) land: Range<u32>,
     /// How votes become cells.
@@ -47,6 +60,8 @@ impl Proposal {
             candidates: Vec::new(),
             votes,
             voids: Vec::new(),
+            places: Vec::new(),
+            whys: Vec::new(),
             land: 0..0,
             label: LabelSettings::default(),
             joins_unparted: true,
@@ -87,6 +102,9 @@ impl Proposal {
             };
         }
         other.voids.iter_mut().for_each(|v| v.1 = moved(v.1));
+        other.whys.iter_mut().for_each(|w| w.0 = moved(w.0));
+        self.whys.append(&mut other.whys);
+        self.places.append(&mut other.places);
         self.bounds = self.bounds.union(other.bounds);
         self.candidates.append(&mut other.candidates);
         self.votes.append(&mut other.votes);

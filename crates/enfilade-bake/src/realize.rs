@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use enfilade_cpg::{Provenance, Statistics, World};
+use enfilade_cpg::{Place, Provenance, Reason, Statistics, Why, World};
 use enfilade_geom::scene::Role;
 use enfilade_geom::{Allowance, Triangle};
 
@@ -12,7 +12,7 @@ use crate::complex::{
     Complex, ComplexInput, Label, LeafCells, Partition, Vote, build_complex_within,
 };
 use crate::join::{join_enclosed, join_unparted, join_voids};
-use crate::proposal::{BEYOND, Proposal};
+use crate::proposal::{BEYOND, FoundPlace, Proposal};
 use crate::structure::Structure;
 use crate::void::mark_voids;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
@@ -56,7 +56,7 @@ pub(crate) fn realize(
     };
     let complex = build_complex_within(&input, context.allowance());
     context.begin(Stage::Partition)?;
-    let partition = part(&complex, &mut proposal, context.allowance());
+    let Divided { partition, whys } = part(&complex, &mut proposal, context.allowance());
     proposal.counts.push(("leaves", complex.n_leaves() as f64));
     proposal.votes = Vec::new();
     let outward = complex.opening_tolerance();
@@ -67,13 +67,15 @@ pub(crate) fn realize(
     let cut = Cut {
         structure: &structure,
         partition,
+        whys: &whys,
         candidates: &proposal.candidates,
         outward,
         land: proposal.land.clone(),
         closed_share: config.merge.closed_share,
         allowance: context.allowance(),
     };
-    let world = world_of(&cut, method, &proposal);
+    let mut world = world_of(&cut, method, &proposal);
+    world.graph.places = places_of(&proposal);
     context.check()?;
     context.end_stage();
     Ok(BakeOutput {
@@ -91,12 +93,28 @@ pub(crate) fn realize(
 /// voids of its region: a flight of closed boxes. [Units: wu³]
 const VOID_WEIGHT: f32 = 1.0;
 
+/// Returns the close decisions of a proposal, as a world has them.
+pub(crate) fn places_of(proposal: &Proposal) -> Vec<Place> {
+    let place = |place: &FoundPlace| Place {
+        at: place.at.as_vec3().to_array(),
+        why: place.why.clone(),
+    };
+    proposal.places.iter().map(place).collect()
+}
+
+/// Space divided among cells.
+pub(crate) struct Divided {
+    pub(crate) partition: Partition,
+    /// Why each cell is there.
+    pub(crate) whys: Vec<Vec<Why>>,
+}
+
 /// Divides the leaves of the complex among cells.
 pub(crate) fn part(
     complex: &Complex<'_>,
     proposal: &mut Proposal,
     allowance: &Allowance,
-) -> Partition {
+) -> Divided {
     let is_tree = proposal.is_tree();
     let Proposal {
         votes,
@@ -104,6 +122,7 @@ pub(crate) fn part(
         land,
         label,
         joins_unparted,
+        whys,
         ..
     } = proposal;
     let mut cells = complex.label(votes, label);
@@ -142,14 +161,32 @@ pub(crate) fn part(
     }
     let mut partition = complex.realize(cells);
     join_enclosed(&mut partition);
-    if !is_tree {
-        mark_voids(&mut partition, allowance);
-    }
+    let mut of_cell = if is_tree {
+        vec![Why::given(Reason::Unscaled); partition.label_of_cell.len()]
+    } else {
+        mark_voids(&mut partition, allowance)
+    };
     // Methods whose regions are never joined make the cells that they are asked for.
     if *joins_unparted {
-        join_voids(&mut partition);
+        let kept = join_voids(&mut partition);
+        of_cell = kept.into_iter().map(|c| of_cell[c].clone()).collect();
     }
-    partition
+    let whys = (0..).zip(of_cell).map(|(cell, why)| {
+        let region = partition.label_of_cell[cell as usize].region();
+        let is_land = region.is_some_and(|r| land.contains(&r));
+        if partition.outside == Some(cell) {
+            return vec![Why::given(Reason::Outside)];
+        } else if is_land {
+            return vec![Why::given(Reason::Land)];
+        }
+        let found = whys.binary_search_by_key(&region, |w| Some(w.0));
+        let closed = found.ok().map(|i| whys[i].1.clone());
+        std::iter::once(why).chain(closed).collect()
+    });
+    Divided {
+        whys: whys.collect(),
+        partition,
+    }
 }
 
 /// Returns the cells that open to a cell of another region.

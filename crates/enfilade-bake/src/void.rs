@@ -9,19 +9,16 @@
 //!
 //! Cost: up to `MAX_COLUMNS`² walks down the locator's tree for each cell.
 
-use enfilade_cpg::{CellId, Locator};
+use enfilade_cpg::{CellId, Locator, Reason, Why};
 use enfilade_geom::{Aabb, Allowance, DVec3, Sets};
 use rayon::prelude::*;
 
 use crate::complex::{Label, Partition, PartitionPortal};
+use crate::judge::SpaceFacts;
 
 /// Least height in which somebody stands: that of a low door. [Units: wu]
 pub(crate) const STANDING: f64 = 2.0;
-/// A space with a smaller share of its floor to stand on is a void: a pocket between beams makes no room of it.
-const LEAST_SHARE: f64 = 0.05;
-/// Least height of a doorway, to be entered bent over. [Units: wu]
-pub(crate) const DOORWAY: f64 = 1.2;
-/// … and least width. [Units: wu]
+/// Least width of a doorway. [Units: wu]
 pub(crate) const WIDTH: f64 = 0.4;
 /// Greatest step up or down at a doorway. [Units: wu]
 pub(crate) const STEP: f64 = 0.4;
@@ -35,39 +32,9 @@ const MAX_COLUMNS: f64 = 128.0;
 /// Cost of a column, in units of [`Allowance`].
 const WORK_A_COLUMN: u64 = 20;
 
-/// Measures of a space that tell what it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Facts {
-    /// Area of its floor. [Units: wu²]
-    floor: f64,
-    /// The part of it on which somebody can stand. [Units: wu²]
-    standing: f64,
-    /// Height of the highest doorway into it from a space that is not a void, 0 without any. [Units: wu]
-    doorway: f64,
-}
-
-impl Facts {
-    /// Returns the measures of two parts of a space together.
-    fn and(self, other: &Self) -> Self {
-        Self {
-            floor: self.floor + other.floor,
-            standing: self.standing + other.standing,
-            doorway: self.doorway.max(other.doorway),
-        }
-    }
-
-    fn is_low(&self) -> bool {
-        self.standing <= LEAST_SHARE * self.floor
-    }
-
-    fn is_void(&self) -> bool {
-        self.is_low() && self.doorway < DOORWAY
-    }
-}
-
-/// Labels the voids of a partition as such. Cells of one region that open to each other are one space, since slits and
+/// Labels the voids of a partition as such, and returns for each cell why it is a room or a void. Cells of one region that open to each other are one space, since slits and
 /// hatches divide what is one to a builder.
-pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) {
+pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) -> Vec<Why> {
     let n = partition.label_of_cell.len();
     let mut sets = Sets::new(n);
     for portal in &partition.portals {
@@ -82,13 +49,18 @@ pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) {
         let is_outside = partition.outside == Some(c as u32);
         (!is_outside).then(|| facts_of(&partition.locator, cell, bounds, allowance))
     });
-    let mut facts = vec![Some(Facts::default()); n];
+    let mut facts = vec![Some(SpaceFacts::default()); n];
     for (found, &space) in measured.collect::<Vec<_>>().into_iter().zip(&space_of) {
         let sum = facts[space as usize].take();
         facts[space as usize] = sum.zip(found).map(|(sum, found)| sum.and(&found));
     }
-    if facts.iter().flatten().all(Facts::is_low) {
-        return;
+    if facts.iter().flatten().all(SpaceFacts::is_low) {
+        let unscaled =
+            |f: &Option<SpaceFacts>| Why::given(f.map_or(Reason::Outside, |_| Reason::Unscaled));
+        return space_of
+            .iter()
+            .map(|&s| unscaled(&facts[s as usize]))
+            .collect();
     }
     let doorways = partition.portals.iter().filter_map(|p| {
         let (height, stands) = doorway_of(p, &partition.locator)?;
@@ -106,6 +78,11 @@ pub(crate) fn mark_voids(partition: &mut Partition, allowance: &Allowance) {
             *label = Label::Void(region);
         }
     }
+    let why = |&space: &u32| {
+        let facts = facts[space as usize];
+        facts.map_or(Why::given(Reason::Outside), |f| f.why())
+    };
+    space_of.iter().map(why).collect()
 }
 
 /// An upright opening that begins at a floor on both sides.
@@ -118,7 +95,7 @@ struct Doorway {
 }
 
 /// Enters the doorways between spaces in their facts, over any number of low rooms in a row. Outdoors has no facts.
-fn settle(facts: &mut [Option<Facts>], doorways: &[Doorway], allowance: &Allowance) {
+fn settle(facts: &mut [Option<SpaceFacts>], doorways: &[Doorway], allowance: &Allowance) {
     let mut is_settled = false;
     while !is_settled && allowance.spend(1 + doorways.len() as u64 / 16) {
         is_settled = true;
@@ -142,7 +119,7 @@ fn settle(facts: &mut [Option<Facts>], doorways: &[Doorway], allowance: &Allowan
 }
 
 /// Measures a cell, all but its doorways.
-fn facts_of(locator: &Locator, cell: CellId, bounds: &Aabb, allowance: &Allowance) -> Facts {
+fn facts_of(locator: &Locator, cell: CellId, bounds: &Aabb, allowance: &Allowance) -> SpaceFacts {
     let size = bounds.size();
     let spacing = SPACING.max(size.x.max(size.z) / MAX_COLUMNS);
     // A little more, since boxes are rounded.
@@ -169,7 +146,7 @@ fn facts_of(locator: &Locator, cell: CellId, bounds: &Aabb, allowance: &Allowanc
         }
     }
     let area = |n: usize| n as f64 * spacing * spacing;
-    Facts {
+    SpaceFacts {
         floor: area(heights.iter().filter(|h| **h > 0.0).count()),
         standing: area(stands.iter().filter(|s| **s).count()),
         doorway: 0.0,
@@ -241,36 +218,14 @@ fn doorway_of(portal: &PartitionPortal, locator: &Locator) -> Option<(f64, [bool
 mod tests {
     use super::*;
 
-    // Covers V9.
-    #[test]
-    fn a_void_has_nowhere_to_stand_and_no_doorway() {
-        let facts = |floor, standing, doorway| Facts {
-            floor,
-            standing,
-            doorway,
-        };
-        for (what, facts, is_void) in [
-            ("room", facts(20.0, 19.0, 2.1), false),
-            ("closed shaft", facts(4.0, 4.0, 0.0), false),
-            ("attic high at its ridge", facts(40.0, 5.0, 0.8), false),
-            ("cellar with a door", facts(20.0, 0.0, 1.6), false),
-            ("space above a ceiling", facts(200.0, 0.0, 0.0), true),
-            ("the same, with a pocket", facts(200.0, 2.0, 0.0), true),
-            ("crawl space with a hatch", facts(20.0, 0.0, 0.6), true),
-            ("hollow wall", facts(0.5, 0.0, 0.0), true),
-        ] {
-            assert_eq!(facts.is_void(), is_void, "{what}");
-        }
-    }
-
     #[test]
     fn a_doorway_makes_a_room_of_a_low_space_only_from_where_somebody_comes() {
-        let low = Facts {
+        let low = SpaceFacts {
             floor: 9.0,
             standing: 0.0,
             doorway: 0.0,
         };
-        let high = Facts {
+        let high = SpaceFacts {
             standing: 9.0,
             ..low
         };
@@ -287,7 +242,7 @@ mod tests {
             doorway([3, 4], 1.6),
             doorway([0, 5], 0.8),
         ];
-        let voids = |facts: [Option<Facts>; 6]| facts.map(|f| f.is_some_and(|f| f.is_void()));
+        let voids = |facts: [Option<SpaceFacts>; 6]| facts.map(|f| f.is_some_and(|f| f.is_void()));
         settle(&mut facts, &doorways, &Allowance::default());
         assert_eq!(voids(facts), [false, false, false, true, true, true]);
         // Nobody stands in the high room where it meets the low ones: it reaches over its neighbors.

@@ -68,6 +68,7 @@ fn read_portal_file(path: &Path) -> anyhow::Result<Subject> {
             outline,
             area: winding.area() as f32,
             fittings: Vec::new(),
+            why: Vec::new(),
         });
     }
     for (i, cell) in cells.iter_mut().enumerate() {

@@ -3,6 +3,7 @@
 mod doors;
 mod objects;
 mod specials;
+mod why;
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -37,6 +38,10 @@ pub(crate) struct Inspect {
     /// Instead, list the objects that this cell sees, given by name or id, with their triangles.
     #[arg(long, value_name = "CELL")]
     objects: Option<String>,
+    /// Instead, tell why this cell and its portals are there, or this portal (portal-5), or `all`: the decision of the bake, its reason, how close
+    /// it was, and the facts behind it. `all` begins with what is most in doubt.
+    #[arg(long, value_name = "CELL|portal-N|all", conflicts_with = "objects")]
+    why: Option<String>,
 }
 
 pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
@@ -45,6 +50,8 @@ pub(crate) fn run(args: &Inspect) -> anyhow::Result<()> {
     let mut out = printed_at_once();
     if let Some(cell) = &args.objects {
         objects::write(&mut out, &world, cell, args.json)?;
+    } else if let Some(what) = &args.why {
+        why::write(&mut out, &world.graph, what, args.json)?;
     } else if args.json {
         print_json(&mut out, &report(&world))?;
     } else {

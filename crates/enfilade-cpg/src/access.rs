@@ -175,6 +175,7 @@ mod tests {
             pieces: Vec::new(),
             area: 4.0,
             fittings: Vec::new(),
+            why: Vec::new(),
         };
         CellPortalGraph {
             cells: vec![

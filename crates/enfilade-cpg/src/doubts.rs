@@ -278,6 +278,7 @@ mod tests {
             outline,
             area: w * h,
             fittings: Vec::new(),
+            why: Vec::new(),
         });
         for cell in cells {
             world.graph.cells[cell as usize].portals.push(id);

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
-use crate::{CellId, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns, SpecialPortal};
+use crate::{
+    CellId, Fitting, Locator, PartNumbers, Place, PortalId, Pvs, SourceRuns, SpecialPortal, Why,
+};
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,6 +31,8 @@ pub struct Cell {
     /// `true` for an area of open land, from the ground to a sky limit: a street, a valley. It counts as no room. Never outdoors
     /// and never a void.
     pub is_land: bool,
+    /// Why it is a cell, and of this kind; empty where no bake decided it.
+    pub why: Vec<Why>,
 }
 
 impl Cell {
@@ -68,6 +72,8 @@ pub struct Portal {
     pub area: f32,
     /// The objects that stand in it: leaves of a door, frames, panes. Ascending by object, without duplicates.
     pub fittings: Vec<Fitting>,
+    /// Why there are two cells; empty where no bake decided it.
+    pub why: Vec<Why>,
 }
 
 /// Kind of a portal.
@@ -94,6 +100,9 @@ pub struct CellPortalGraph {
     pub specials: Vec<SpecialPortal>,
     /// Finds the cell of a point.
     pub locator: Locator,
+    /// Decisions of the bake about places that are neither a cell nor a portal: openings within a cell that nearly parted it,
+    /// and spaces that are not cells.
+    pub places: Vec<Place>,
     /// Origin of the graph.
     pub provenance: Provenance,
     /// Counts from the bake.

@@ -180,6 +180,7 @@ mod tests {
                     pieces: vec![outline.clone()],
                     outline,
                     fittings: Vec::new(),
+                    why: Vec::new(),
                 })
                 .collect(),
             ..CellPortalGraph::default()

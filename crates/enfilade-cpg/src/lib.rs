@@ -25,6 +25,7 @@ mod sources;
 mod special;
 mod special_access;
 mod validate;
+mod why;
 pub mod wire;
 
 pub use access::Exit;
@@ -46,3 +47,4 @@ pub use sight_graph::{SightGraph, SightGraphError, SightPortal};
 pub use sources::SourceRuns;
 pub use special::{MonitorCamera, Pass, SpecialId, SpecialPortal, SpecialShape, Way};
 pub use validate::{GraphError, MAX_REPORTED, SpecialProblem};
+pub use why::{Fact, Place, Reason, Why};

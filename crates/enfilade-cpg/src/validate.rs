@@ -16,7 +16,7 @@ mod special_error;
 
 use std::collections::HashMap;
 
-use crate::{CellPortalGraph, PartNumbers, PortalId, World};
+use crate::{CellPortalGraph, PartNumbers, PortalId, Why, World};
 use error::Findings;
 use extent::{check_boxes_around_geometry, check_cells_in_locator};
 use geometry::{check_cell_list, check_detail, check_mesh, check_primitive};
@@ -53,6 +53,7 @@ impl CellPortalGraph {
         check_specials(self, found);
         check_locator(&self.locator, self.cells.len(), found);
         check_outside(self, found);
+        check_decisions(self, found);
         check_cells_in_locator(self, found);
         for (name, &value) in &self.statistics.counts {
             if !value.is_finite() {
@@ -111,6 +112,29 @@ impl World {
             found.push(GraphError::Look { owner, problem });
         });
         found.into_result()
+    }
+}
+
+/// Checks that all numbers of decisions are finite.
+fn check_decisions(graph: &CellPortalGraph, found: &mut Findings) {
+    let is_finite = |why: &Why| {
+        let mut numbers = why.facts.values().chain(&why.limit);
+        numbers.all(|x| x.is_finite())
+    };
+    let mut check = |owner: &dyn Fn() -> String, is_right: bool| {
+        if !is_right && !found.is_full() {
+            found.push(GraphError::Decision { owner: owner() });
+        }
+    };
+    for (i, cell) in graph.cells.iter().enumerate() {
+        check(&|| format!("cell {i}"), cell.why.iter().all(is_finite));
+    }
+    for (i, portal) in graph.portals.iter().enumerate() {
+        check(&|| format!("portal {i}"), portal.why.iter().all(is_finite));
+    }
+    for (i, place) in graph.places.iter().enumerate() {
+        let is_right = is_finite(&place.why) && place.at.iter().all(|x| x.is_finite());
+        check(&|| format!("place {i}"), is_right);
     }
 }
 

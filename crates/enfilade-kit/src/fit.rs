@@ -166,6 +166,7 @@ mod tests {
             outline,
             area: w * h,
             fittings: Vec::new(),
+            why: Vec::new(),
         };
         Mouth::of_portal(&portal, DVec3::Z)
     }

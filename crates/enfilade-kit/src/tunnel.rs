@@ -122,6 +122,7 @@ mod tests {
             outline,
             area: 2.0,
             fittings: Vec::new(),
+            why: Vec::new(),
         };
         let solids = [
             [[-3.0, -0.2, 0.0], [0.0, 3.0, 0.3]],

@@ -100,6 +100,7 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
                     .collect(),
                 area: portal.area,
                 fittings,
+                why: Vec::new(),
             });
         }
     }
@@ -285,6 +286,7 @@ pub fn chamber(size: DVec3, [from, to]: [f64; 2], height: f64) -> World {
                 outline,
                 area: ((to - from) * height) as f32,
                 fittings: Vec::new(),
+                why: Vec::new(),
             }],
             locator: Locator {
                 bounds: Aabb::new(DVec3::ZERO, size),

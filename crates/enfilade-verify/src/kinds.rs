@@ -277,6 +277,7 @@ mod tests {
             pieces: vec![vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 2.0, 1.0]]],
             area: 2.0,
             fittings: Vec::new(),
+            why: Vec::new(),
         };
         let mut world = World {
             graph: CellPortalGraph {

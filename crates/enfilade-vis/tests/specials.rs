@@ -103,6 +103,7 @@ fn row_of_rooms(windows: &[[f32; 4]]) -> CellPortalGraph {
         pieces: vec![window(windows[i], i as f32)],
         area: 0.0,
         fittings: Vec::new(),
+        why: Vec::new(),
     };
     CellPortalGraph {
         cells: (0..n).map(cell).collect(),
@@ -280,6 +281,7 @@ fn a_mirror_shows_what_is_around_a_corner() {
             pieces: vec![outline],
             area: 0.0,
             fittings: Vec::new(),
+            why: Vec::new(),
         });
     }
     assert_eq!(row(&see(&graph).vis.cells, 1, 3), [0, 1]);

@@ -35,6 +35,7 @@ fn graph_by_chance(n: usize, n_links: usize, seed: u64) -> Space {
             outline,
             area: 0.5,
             fittings: Vec::new(),
+            why: Vec::new(),
         });
         for c in [a, b] {
             cells[c].portals.push(PortalId(i as u32));

@@ -77,6 +77,7 @@ fn doorway(i: u32) -> Portal {
         outline,
         area: 2.1,
         fittings: Vec::new(),
+        why: Vec::new(),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use enfilade_cpg::{Reason, Why};
 use enfilade_geom::scene::Scene;
 use enfilade_geom::{DVec3, Purse, Triangle, Winding};
 use rayon::prelude::*;
@@ -213,6 +214,7 @@ fn candidates_of(bsp: &Bsp<'_>, separators: &[Separator]) -> Vec<Candidate> {
             // A candidate must reach past the rim of its opening.
             winding: grown(&w, &plane, 4.0 * bsp.tolerance.plane),
             closed: 0.0,
+            why: Why::given(Reason::Plane),
         }));
     }
     out

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use enfilade_cpg::{Fact, Reason, Why};
 use enfilade_geom::{Allowance, Bvh, DVec3, Plane};
 use rayon::prelude::*;
 
@@ -75,7 +76,13 @@ pub(super) fn find_rooms(
             if !allowance.spend(WORK_A_CENTER * work as u64) || opening.area < MIN_AREA {
                 return (centers, None);
             }
-            let candidate = fit_candidate(&centers, STEP, &opening, walls, bvh, *hole, allowance);
+            let winding = fit_candidate(&centers, STEP, &opening, walls, bvh, *hole, allowance);
+            let facts = [(Fact::Area, opening.area), (Fact::Closed, opening.closed)];
+            let candidate = Candidate {
+                winding,
+                closed: opening.closed,
+                why: Why::given(Reason::Kept).with(&facts),
+            };
             (centers, Some(candidate))
         })
         .collect();

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::cells::{Cells, OUTDOOR_CELL};
 use super::space::{Space, connected};
-use crate::structure::{BACKS, POINTS, count_backs, is_crevice};
+use crate::judge::{BACKS, is_crevice};
+use crate::structure::{POINTS, count_backs};
 
 /// The rooms that decimation left, and the cells that are not rooms.
 pub(super) struct Standing {

@@ -13,7 +13,9 @@ mod splice;
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Cell, CellId, FittingPart, Portal, PortalId, SourceRuns, SpecialId, World};
+use enfilade_cpg::{
+    Cell, CellId, FittingPart, Portal, PortalId, Reason, SourceRuns, SpecialId, Why, World,
+};
 use enfilade_geom::{DVec3, Plane, Triangle, Winding};
 
 use crate::assemble::rounded_portal;
@@ -250,6 +252,7 @@ pub(crate) fn cut_cell(
         new_portals.extend(rounded.map(|portal| Portal {
             cells: p.cells.map(|side| parts.id(side)),
             kind: p.kind,
+            why: vec![Why::given(Reason::Asked)],
             ..portal
         }));
     }

@@ -17,6 +17,7 @@ mod lids;
 mod relief;
 mod rise;
 
+use enfilade_cpg::{Reason, Why};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use crate::complex::{Label, Vote};
@@ -306,6 +307,7 @@ impl Land {
             let winding = self.frame.winding_to_scene(&winding);
             bounds = bounds.union(winding.aabb());
             proposal.candidates.push(Candidate {
+                why: Why::given(Reason::Border),
                 winding,
                 closed: 0.0,
             });

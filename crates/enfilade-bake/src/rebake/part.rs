@@ -3,7 +3,7 @@
 //! The part is a box that cuts rooms. Where it does, its faces are candidate portals for the complex, so that what is beyond joins
 //! nothing; and air at its border that was outdoors is outdoors.
 
-use enfilade_cpg::{Locator, Portal, World};
+use enfilade_cpg::{Locator, Place, Portal, Reason, Why, World};
 use enfilade_geom::{Aabb, DVec3, Triangle, Winding};
 
 use super::block::Block;
@@ -12,7 +12,7 @@ use super::tree::cell_of;
 use crate::assemble::{Cut, SealPart, portals_of};
 use crate::complex::{ComplexInput, Label, Partition, TriangleCells, Vote, build_complex_within};
 use crate::proposal::{BEYOND, Proposal};
-use crate::realize::part;
+use crate::realize::{Divided, part, places_of};
 use crate::rooms::{self, VoxelRange};
 use crate::structure::{Candidate, OUTDOORS, Structure};
 use crate::voxel::{BitVolume, Grid};
@@ -28,6 +28,9 @@ pub(super) struct BakedPart {
     pub(super) volumes: Vec<f64>,
     pub(super) aabbs: Vec<Aabb>,
     pub(super) is_void: Vec<bool>,
+    pub(super) whys: Vec<Vec<Why>>,
+    /// Close decisions about places in the part that are not cells.
+    pub(super) places: Vec<Place>,
     /// Cells that are matter, or not in the part.
     pub(super) is_beyond: Vec<bool>,
     pub(super) portals: Vec<Portal>,
@@ -65,7 +68,11 @@ pub(super) fn bake_part(
     close_off(&mut proposal, ground, &grid);
     let is_near = |t: &u32| ground.boxes[*t as usize].overlaps(&grid.aabb());
     let numbers: Vec<u32> = (0..ground.boxes.len() as u32).filter(is_near).collect();
-    let (mut partition, outward) = cut_by(&mut proposal, ground, &numbers, &grid, context)?;
+    let (divided, outward) = cut_by(&mut proposal, ground, &numbers, &grid, context)?;
+    let Divided {
+        mut partition,
+        whys,
+    } = divided;
     // The cell at the border of the whole box is beyond the part.
     partition.outside = outdoors_of(&partition);
     context.begin(Stage::Geometry)?;
@@ -76,6 +83,7 @@ pub(super) fn bake_part(
     let cut = Cut {
         structure: &ground.scene,
         partition,
+        whys: &whys,
         candidates: &proposal.candidates,
         outward,
         closed_share: config.merge.closed_share,
@@ -113,6 +121,8 @@ pub(super) fn bake_part(
         volumes,
         aabbs,
         is_void,
+        places: places_of(&proposal),
+        whys,
         is_beyond,
         portals,
         triangle_cells,
@@ -131,6 +141,7 @@ fn close_off(proposal: &mut Proposal, ground: &Ground<'_>, grid: &Grid) {
         let reach = 0.2 * grid.voxel;
         let to = face.map(|p| frame.to_scene(p + (p - middle).normalize() * reach));
         proposal.candidates.push(Candidate {
+            why: Why::given(Reason::Gap),
             winding: Winding::new(to.to_vec()),
             closed: 0.0,
         });
@@ -154,7 +165,7 @@ fn cut_by(
     numbers: &[u32],
     grid: &Grid,
     context: &BakeContext<'_>,
-) -> Result<(Partition, f64), BakeError> {
+) -> Result<(Divided, f64), BakeError> {
     let triangles = numbers.iter().map(|&t| ground.scene.triangles[t as usize]);
     let triangles: Vec<Triangle> = triangles.collect();
     let candidates = proposal.candidates.iter();
@@ -176,8 +187,8 @@ fn cut_by(
     };
     let complex = build_complex_within(&input, context.allowance());
     context.begin(Stage::Partition)?;
-    let partition = part(&complex, proposal, context.allowance());
-    Ok((partition, complex.opening_tolerance()))
+    let divided = part(&complex, proposal, context.allowance());
+    Ok((divided, complex.opening_tolerance()))
 }
 
 /// Returns the air at the border of a part that was outdoors.

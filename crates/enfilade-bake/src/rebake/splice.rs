@@ -158,6 +158,7 @@ impl Joint<'_> {
             locator,
             provenance: old.graph.provenance.clone(),
             statistics: old.graph.statistics.clone(),
+            places: self.places(),
         };
         let seals = self.seals(&numbers);
         let eps = plane_tolerance(old.graph.locator.bounds.extent());
@@ -215,12 +216,24 @@ impl Joint<'_> {
             }
             let cell = &mut cells[id as usize];
             cell.is_void = is_void;
+            cell.why = self.part.whys[n as usize].clone();
             cell.volume = self.part.volumes[n as usize] as f32;
             let b = self.part.aabbs[n as usize];
             cell.aabb = [b.min, b.max].map(|p| p.as_vec3().to_array());
         }
         name_by_number(&mut cells);
         cells
+    }
+
+    /// Returns the close decisions: those of the part in the block, the old ones beyond it.
+    fn places(&self) -> Vec<enfilade_cpg::Place> {
+        let is_in = |place: &&enfilade_cpg::Place| {
+            let p = DVec3::from_array(place.at.map(f64::from));
+            self.block.contains([&p], 0.0)
+        };
+        let old = self.old.graph.places.iter().filter(|p| !is_in(p));
+        let new = self.part.places.iter().filter(is_in);
+        old.chain(new).cloned().collect()
     }
 
     /// Returns the portals, without fittings, and the cells of those that are new or gone.

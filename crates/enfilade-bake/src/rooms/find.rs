@@ -9,7 +9,8 @@ use enfilade_geom::{Allowance, DVec3, Triangle};
 
 use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
-use super::candidates::fit_candidates;
+use super::candidates::Openings;
+use super::flooded::Flooded;
 use super::forks::{is_curved, split_forks};
 use super::hollow::{Matter, find_matter};
 use super::limb_rule::LimbRule;
@@ -18,7 +19,7 @@ use super::low::join_low;
 use super::regions::Regions;
 use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
-use crate::proposal::Proposal;
+use crate::proposal::{FoundPlace, Proposal};
 use crate::structure::{Frame, Structure};
 use crate::tubes::Walls;
 use crate::voxel::{DistanceField, Grid, Labels, SparseVolume};
@@ -66,7 +67,6 @@ pub(crate) fn propose(
         config,
         context,
     )?;
-    drop(shut);
     let Basins { labels, peaks, .. } = basins;
     let matter = find_matter(
         &grid,
@@ -80,16 +80,24 @@ pub(crate) fn propose(
     notes.extend_from_slice(&matter.notes);
 
     context.begin(Stage::Candidates)?;
-    let mut candidates = fit_candidates(
-        &grid,
-        &labels,
-        &regions,
-        (&closures, &lids),
-        &structure.walls,
-        [config.merge.closed_share, structure.hole.gap()],
-        allowance,
-    );
-    drop((closures, lids));
+    let openings = Openings {
+        flooded: Flooded {
+            grid: &grid,
+            labels: &labels,
+            peaks: &peaks,
+            closures: Some(&shut),
+            slabs: &slabs,
+            allowance,
+        },
+        regions: &regions,
+        closures: &closures,
+        lids: &lids,
+        walls: &structure.walls,
+        hole: structure.hole.gap(),
+        settings: &config.merge,
+    };
+    let mut candidates = openings.candidates();
+    drop((closures, lids, shut));
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh, allowance);
     let not_air = (&matter.regions[..], &stairs);
     let ballots = Ballots::cast(&grid, &labels, &regions, not_air, share, allowance);
@@ -104,11 +112,18 @@ pub(crate) fn propose(
     }
     let voids = voids.into_iter().map(|(p, r)| (frame.to_scene(p), r));
     let voids = voids.collect();
+    let joins = regions.joins.iter().map(|join| FoundPlace {
+        at: frame.to_scene(join.at),
+        why: join.why(&config.merge),
+    });
+    let places = joins.chain(matter.places(frame)).collect();
     let found = [n_occupied, basins.n_basins, candidates.len()];
     let counts = counts_of(&grid, frame, found);
     Ok(Proposal {
         candidates,
         voids,
+        places,
+        whys: matter.whys,
         counts,
         tubes,
         notes,

@@ -81,6 +81,7 @@ pub(super) fn split_forks(
             }
             peaks.push((radius / grid.voxel) as f32);
             regions.region_of_basin.push(basin);
+            regions.limbs.insert(basin, None);
         }
     }
     if n_in_tubes == 0 {

@@ -23,21 +23,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use enfilade_cpg::{Fact, Reason, Why};
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets};
 use rayon::prelude::*;
 
 use crate::voxel::{Grid, Labels};
 
-use super::regions::Regions;
+use super::regions::{CloseJoin, Regions};
 use super::slabs::LAYERS;
-use crate::structure::{BACKS, OUTDOORS, POINTS, is_crevice, rays_from};
+use crate::judge::{EnclosedFacts, Facing, NARROW, why_open};
+use crate::proposal::FoundPlace;
+use crate::structure::{Frame, OUTDOORS, POINTS, rays_from};
 
-/// Least share of the rays from inside matter that leave it: all but those that slip through a crack or
-/// along an edge.
-const LEAVING: f64 = 0.9;
-/// Surfaces are trusted if known air sees at most this share of backs, and turned if it sees at
-/// most this share of fronts: half the share seen of randomly oriented surfaces.
-const ASTRAY: f64 = 0.25;
 /// Two surfaces nearer than this are the two faces of a wall. [Units: wu]
 const WALL: f64 = 0.5;
 /// … and nearer than this are one duplicated sheet. [Units: wu]
@@ -56,8 +53,27 @@ pub(crate) struct Matter {
     pub(crate) regions: Vec<u32>,
     /// Doubtful decisions, one sentence each.
     pub(crate) notes: Vec<String>,
+    /// Why closed regions are rooms, ascending by region.
+    pub(crate) whys: Vec<(u32, Why)>,
+    /// Spaces as large as a room that are not rooms, in the axes of the grid.
+    pub(crate) spaces: Vec<FoundPlace>,
     /// Surfaces show their fronts to air and their backs to matter.
     pub(crate) fronts_face_air: bool,
+}
+
+impl Matter {
+    /// Returns the spaces as large as a room that are not rooms, in scene coordinates.
+    pub(crate) fn places(&self, frame: &Frame) -> impl Iterator<Item = FoundPlace> {
+        self.spaces.iter().map(|space| FoundPlace {
+            at: frame.to_scene(space.at),
+            why: space.why.clone(),
+        })
+    }
+}
+
+/// Returns `true` if a person fits in a space, given the radius of its largest ball and its volume.
+fn is_room_sized(radius: f64, volume: f64) -> bool {
+    radius >= NARROW && volume >= CloseJoin::LEAST_VOLUME
 }
 
 /// Finds the regions that are not rooms; the largest ball in a room has at least the radius `min_radius`.
@@ -81,7 +97,8 @@ pub(crate) fn find_matter(
     let mut open: Vec<u32> = open.into_iter().flatten().collect();
     open.sort_unstable();
     let wanted: Vec<u32> = enclosed.iter().flatten().chain(&open).copied().collect();
-    let points = sample_points(grid, labels, regions, &wanted);
+    let Sampled { points, n_voxels } = sample_points(grid, labels, regions, &wanted);
+    let n_voxels = |of: &[u32]| of.iter().filter_map(|r| n_voxels.get(r)).sum::<usize>();
     // First hits are enough of air that is open to the outdoors.
     let rays = |region: u32| match open.binary_search(&region) {
         Ok(_) => Rays::First,
@@ -98,9 +115,12 @@ pub(crate) fn find_matter(
         of.fold(Seen::default(), Seen::and)
     };
     let indoors: Vec<u32> = open.iter().copied().filter(|&r| r != OUTDOORS).collect();
-    let facing = Facing::of(&view(&indoors), &view(&[OUTDOORS]));
+    let seen_indoors = view(&indoors);
+    let backs_indoors = (seen_indoors.all > 0.0).then(|| seen_indoors.backs());
+    let facing = Facing::of(backs_indoors, view(&[OUTDOORS]).backs());
 
     let (mut narrow, mut doubtful) = (Vec::new(), Vec::new());
+    let (mut whys, mut spaces) = (Vec::new(), Vec::new());
     let mut any_room = !indoors.is_empty();
     for group in enclosed {
         // A voxel center next to a wall is at least half a voxel away from it.
@@ -109,18 +129,36 @@ pub(crate) fn find_matter(
             .map(|r| f64::from(radius[r]) - 0.5)
             .fold(0.0, f64::max)
             * grid.voxel;
-        let view = view(&group);
-        if is_crevice(widest, min_radius, view.backs()) {
-            narrow.extend(group);
-        } else if facing.is_matter(&view) {
-            doubtful.push(group);
-        } else {
-            any_room = true;
+        let why = view(&group).facts(widest).why(facing, min_radius);
+        let volume = n_voxels(&group) as f64 * grid.voxel.powi(3);
+        if why.reason != Reason::Enclosed && is_room_sized(widest, volume) {
+            let inside = points.get(&group[0]).and_then(|of| of.first());
+            spaces.extend(inside.map(|&at| FoundPlace {
+                at,
+                why: why.clone().with(&[(Fact::Volume, volume)]),
+            }));
+        }
+        match why.reason {
+            Reason::Crevice => narrow.extend(group),
+            Reason::Solid => doubtful.push(group),
+            _ => {
+                any_room = true;
+                whys.extend(group.into_iter().map(|region| (region, why.clone())));
+            }
         }
     }
+    if facing == Facing::Outward {
+        let backs = indoors
+            .iter()
+            .filter_map(|r| Some((*r, seen.get(r)?.backs())));
+        whys.extend(backs.map(|(region, backs)| (region, why_open(backs))));
+    }
+    whys.sort_unstable_by_key(|w| w.0);
     let mut matter = Matter {
         regions: narrow,
         notes: Vec::new(),
+        whys,
+        spaces,
         fronts_face_air: facing == Facing::Outward,
     };
     matter.regions.sort_unstable();
@@ -131,8 +169,7 @@ pub(crate) fn find_matter(
     // The evidence that surfaces face inward must hold more voxels than would be lost by it: beside a cave it may be a
     // crevice of the outside.
     let lost: Vec<u32> = doubtful.iter().flatten().copied().collect();
-    let is_outvoted = facing == Facing::Inward
-        && n_voxels(labels, regions, &lost) > n_voxels(labels, regions, &indoors);
+    let is_outvoted = facing == Facing::Inward && n_voxels(&lost) > n_voxels(&indoors);
     if is_outvoted
         || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance)
     {
@@ -141,6 +178,10 @@ pub(crate) fn find_matter(
             if n == 1 { "" } else { "s" },
             if n == 1 { "is" } else { "are" },
         ));
+        matter.spaces.retain(|s| s.why.reason != Reason::Solid);
+        let shell = |region| (region, Why::given(Reason::Shell));
+        matter.whys.extend(lost.into_iter().map(shell));
+        matter.whys.sort_unstable_by_key(|w| w.0);
     } else {
         matter.notes.push(format!(
             "the inside{} of {n} closed solid{} {}{}",
@@ -151,7 +192,7 @@ pub(crate) fn find_matter(
             } else {
                 "are not rooms"
             },
-            facing.reason(),
+            by_facing(facing),
         ));
         matter.regions.extend(doubtful.into_iter().flatten());
     }
@@ -159,68 +200,13 @@ pub(crate) fn find_matter(
     matter
 }
 
-/// Returns the number of voxels of some regions.
-fn n_voxels(labels: &Labels, regions: &Regions, of: &[u32]) -> usize {
-    let of: BTreeSet<u32> = of.iter().copied().collect();
-    let mut n = 0;
-    labels.for_runs(0..labels.len(), |voxels, label| {
-        if label != 0 && of.contains(&regions.region_of_basin[label as usize]) {
-            n += voxels.len();
-        }
-    });
-    n
-}
-
-/// The facing of the surfaces of a scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Facing {
-    /// Away from matter.
-    Outward,
-    /// Into matter.
-    Inward,
-    /// Inconsistent.
-    Anyhow,
-}
-
-impl Facing {
-    /// Decides by the view of indoor air that is open to the outdoors, if there is any: sheets modelled from
-    /// inside show the outdoors nothing but backs.
-    fn of(indoors: &Seen, outdoors: &Seen) -> Self {
-        if indoors.all > 0.0 {
-            match indoors.backs() {
-                b if b <= ASTRAY => Self::Outward,
-                b if b >= 1.0 - ASTRAY => Self::Inward,
-                _ => Self::Anyhow,
-            }
-        } else if outdoors.backs() <= ASTRAY {
-            Self::Outward
-        } else {
-            Self::Anyhow
-        }
-    }
-
-    /// Returns `true` if a closed-off region with this view is matter.
-    fn is_matter(self, seen: &Seen) -> bool {
-        match self {
-            Self::Outward => {
-                seen.leaving[0] > LEAVING * seen.aside && seen.back_aside > BACKS * seen.aside
-            }
-            Self::Inward => {
-                seen.leaving[1] > LEAVING * seen.aside
-                    && seen.aside - seen.back_aside > BACKS * seen.aside
-            }
-            Self::Anyhow => seen.backs() > ASTRAY && seen.walled < 0.5 * seen.all,
-        }
-    }
-
-    fn reason(self) -> &'static str {
-        match self {
-            Self::Outward => "",
-            Self::Inward => " (the surfaces of this model face into solid matter)",
-            Self::Anyhow => {
-                " (the surfaces of this model face either way; these have no openings, and only a single \
-                 sheet bounds them)"
-            }
+/// Returns the reason for which solids are told, where surfaces do not face outward.
+fn by_facing(facing: Facing) -> &'static str {
+    match facing {
+        Facing::Outward => "",
+        Facing::Inward => " (the surfaces of this model face into solid matter)",
+        Facing::Anyhow => {
+            " (the surfaces of this model face either way; these have no openings, and only a single sheet bounds them)"
         }
     }
 }
@@ -319,6 +305,18 @@ impl Seen {
     fn backs(&self) -> f64 {
         self.back / self.all.max(1.0)
     }
+
+    /// Returns the facts of a closed space in which the largest ball has this radius. [Units: wu]
+    fn facts(&self, radius: f64) -> EnclosedFacts {
+        let of_aside = |n: f64| n / self.aside.max(1.0);
+        EnclosedFacts {
+            radius,
+            backs: self.backs(),
+            walled: self.walled / self.all.max(1.0),
+            backs_aside: of_aside(self.back_aside),
+            leaving: self.leaving.map(of_aside),
+        }
+    }
 }
 
 /// Returns `true` if closed shells are the whole scene: they bound nearly all structure, and if surfaces
@@ -398,13 +396,14 @@ fn groups(regions: &Regions) -> Vec<Vec<u32>> {
     groups.into_values().collect()
 }
 
+/// Points of regions, and their sizes.
+struct Sampled {
+    points: BTreeMap<u32, Vec<DVec3>>,
+    n_voxels: BTreeMap<u32, usize>,
+}
+
 /// Returns up to [`POINTS`] voxel centers of each wanted region, evenly picked in scan order.
-fn sample_points(
-    grid: &Grid,
-    labels: &Labels,
-    regions: &Regions,
-    wanted: &[u32],
-) -> BTreeMap<u32, Vec<DVec3>> {
+fn sample_points(grid: &Grid, labels: &Labels, regions: &Regions, wanted: &[u32]) -> Sampled {
     let mut is_wanted = vec![false; regions.region_of_basin.len()];
     for &r in wanted {
         is_wanted[r as usize] = true;
@@ -459,5 +458,8 @@ fn sample_points(
     for (region, point) in sampled.into_iter().flatten() {
         points.entry(region).or_default().push(point);
     }
-    points
+    Sampled {
+        points,
+        n_voxels: total,
+    }
 }

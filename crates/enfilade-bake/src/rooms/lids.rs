@@ -15,6 +15,7 @@
 //! The walls must stand upright along +Y. Cost: linear in voxels for the heights of columns, then
 //! linear in the plan's columns for each height at which walls end.
 
+use enfilade_cpg::{Reason, Why};
 use enfilade_geom::{Allowance, DVec3, Plane, Winding};
 
 use crate::voxel::{BitVolume, Grid};
@@ -109,6 +110,7 @@ fn level_candidate(grid: &Grid, faces: &[u64], row: usize, height: f64) -> Candi
     Candidate {
         winding,
         closed: 0.0,
+        why: Why::given(Reason::Lid),
     }
 }
 

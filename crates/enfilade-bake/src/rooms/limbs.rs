@@ -34,7 +34,7 @@ use crate::MergeSettings;
 use crate::structure::OUTDOORS;
 
 /// A limb is at least this many of its widths long, of which up to half a width lies in the room before its mouth.
-const LONG: f64 = 2.5;
+pub(super) const LONG: f64 = 2.5;
 /// Cells on the axis of a limb are farther from its walls than this share of its half-width.
 const ON_AXIS: f64 = 0.9;
 /// Factor from one width tried to the next.
@@ -53,6 +53,7 @@ pub(crate) fn split_limbs(
 ) {
     let least = settings.min_radius / grid.voxel;
     let mut limbs: Vec<(u32, usize, Vec<[usize; 2]>)> = Vec::new();
+    let mut lengths: BTreeMap<u32, Option<f64>> = BTreeMap::new();
     // Largest half-width of each region, in plan. [Units: vx]
     let mut thickness: BTreeMap<u32, f64> = BTreeMap::new();
     let n = regions.region_of_basin.len();
@@ -67,6 +68,7 @@ pub(crate) fn split_limbs(
         thickness.insert(region, thickest);
         for limb in found {
             thickness.insert((n + limbs.len()) as u32, limb.half_width);
+            lengths.insert((n + limbs.len()) as u32, Some(limb.length));
             let columns = limb.cells.iter().map(|&c| plan.column(c)).collect();
             limbs.push((region, plan.row, columns));
             peaks.push((limb.half_width + 0.5) as f32);
@@ -93,6 +95,7 @@ pub(crate) fn split_limbs(
         }
     }
     regions.region_of_basin.extend(n as u32..peaks.len() as u32);
+    regions.limbs.append(&mut lengths);
     let by_basin = contact_faces(labels);
     regions.contacts = contacts_of(regions, &by_basin);
     let flooded = Flooded {
@@ -185,6 +188,8 @@ pub(crate) struct Limb {
     pub(crate) cells: Vec<usize>,
     /// [Units: vx]
     pub(crate) half_width: f64,
+    /// Length in widths.
+    pub(crate) length: f64,
 }
 
 /// Position of one layer of a region.
@@ -328,12 +333,15 @@ impl Plan {
                 }
                 let roomy: Vec<usize> = cells.iter().copied().filter(|&c| !is_crevice(c)).collect();
                 let work = self.is_free.len() as u64 / 16 + 5 * cells.len() as u64;
-                if allowance.spend(work)
-                    && self.length(&roomy, core(), is_net) >= LONG * 2.0 * widest
-                {
+                if !allowance.spend(work) {
+                    continue;
+                }
+                let length = self.length(&roomy, core(), is_net) / (2.0 * widest);
+                if length >= LONG {
                     found.push(Limb {
                         cells,
                         half_width: widest,
+                        length,
                     });
                 }
             }

@@ -17,8 +17,9 @@ use rayon::prelude::*;
 use super::flooded::Faces;
 use super::regions::Regions;
 use super::slabs::LAYERS;
+use crate::judge::DOORWAY;
 use crate::structure::OUTDOORS;
-use crate::void::{DOORWAY, STANDING, STEP, WIDTH};
+use crate::void::{STANDING, STEP, WIDTH};
 use crate::voxel::{Grid, Labels};
 
 /// Joins the regions of low spaces that touch, in the labels of a flooded volume.

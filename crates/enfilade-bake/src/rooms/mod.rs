@@ -16,7 +16,6 @@ mod fork_place;
 mod forks;
 mod fronts;
 mod hollow;
-mod judge;
 mod lids;
 mod limb_rule;
 mod limbs;

@@ -23,15 +23,18 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use enfilade_cpg::{Fact, Why};
+use enfilade_geom::DVec3;
 use rayon::prelude::*;
 
 use super::flooded::{Flooded, contact_faces};
-use super::fronts::{Faces, group_faces, is_in};
-use super::judge::{OpeningFacts, judge};
+use super::fronts::{Faces, Front, group_faces, is_in};
 use super::sections::section_of;
 use super::slabs::{LAYERS, sum};
 use crate::MergeSettings;
+use crate::judge::{OpeningFacts, OpeningVerdict, judge};
 use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms, lies_in_slab};
+use crate::voxel::Labels;
 
 /// Rooms as unions of basins.
 #[derive(Clone, Debug)]
@@ -40,6 +43,35 @@ pub(crate) struct Regions {
     pub(crate) region_of_basin: Vec<u32>,
     /// Faces between each pair of regions (lower label first).
     pub(crate) contacts: BTreeMap<(u32, u32), Faces>,
+    /// Greatest distance at which two regions touch, where the flood knows it. [Units: vx]
+    pub(crate) saddles: BTreeMap<(u32, u32), f32>,
+    /// Joins that were close, in order.
+    pub(crate) joins: Vec<CloseJoin>,
+    /// Corridors and arms of forks, each by a basin of it, with its length in widths if it is a corridor.
+    pub(crate) limbs: BTreeMap<u32, Option<f64>>,
+}
+
+/// An opening that nearly parted two cells, each as large as a room.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CloseJoin {
+    /// Middle of the opening. [Units: wu]
+    pub(crate) at: DVec3,
+    pub(crate) verdict: OpeningVerdict,
+    /// Volume of the smaller of the two. [Units: wu³]
+    pub(crate) volume: f64,
+}
+
+impl CloseJoin {
+    /// Joins of a greater openness are not close: some way beyond what a model's noise changes.
+    const MOST_OPEN: f64 = 1.3;
+    /// Smaller cells are not rooms. [Units: wu³]
+    pub(super) const LEAST_VOLUME: f64 = 3.0;
+
+    /// Returns why there is one cell.
+    pub(super) fn why(&self, settings: &MergeSettings) -> Why {
+        let volume = (Fact::Volume, self.volume);
+        self.verdict.why(settings, false).with(&[volume])
+    }
 }
 
 impl Regions {
@@ -78,6 +110,8 @@ pub(crate) fn merge_basins(
         neighbors: vec![BTreeSet::new(); n],
         contacts: contact_faces(flooded.labels),
         saddles: saddles.clone(),
+        n_voxels: n_voxels_of(flooded.labels, n),
+        joins: Vec::new(),
         storeys_apart: true,
     };
     merger.peak[OUTDOORS as usize] = f32::INFINITY;
@@ -113,6 +147,9 @@ struct BasinMerger<'a> {
     neighbors: Vec<BTreeSet<u32>>,
     contacts: BTreeMap<(u32, u32), Faces>,
     saddles: BTreeMap<(u32, u32), f32>,
+    /// Voxels of each cell, at the index of the basin that names it.
+    n_voxels: Vec<usize>,
+    joins: Vec<CloseJoin>,
     /// Treats openings that lie in a slab as shut for now.
     storeys_apart: bool,
 }
@@ -243,8 +280,73 @@ impl BasinMerger<'_> {
         Regions {
             region_of_basin,
             contacts,
+            saddles: self.saddles,
+            joins: self.joins,
+            limbs: BTreeMap::new(),
         }
     }
+
+    /// Returns the radius of the largest ball that passes between two cells ÷ that of the smaller of the largest in each.
+    fn balls(&self, (a, b): Pair) -> f64 {
+        let smaller = self.peak[a as usize].min(self.peak[b as usize]);
+        balls_of(&self.saddles, (a, b), smaller)
+    }
+
+    /// Returns the verdicts on the openings between two cells, each with its middle: on the two largest, since a third is smaller
+    /// still.
+    fn verdicts(&self, (a, b): Pair, faces: &[u64], balls: f64) -> Vec<(OpeningVerdict, DVec3)> {
+        self.flooded.allowance.spend(WORK);
+        let side = |at| self.cell[self.flooded.labels.at(at) as usize] == a;
+        let cell_of = |label: u32| self.cell[label as usize];
+        let fronts = group_faces(self.flooded, faces, &side);
+        let verdict = |front: &Front| {
+            let facts = OpeningFacts {
+                is_between_storeys: self.storeys_apart && self.lies_in_slab(&front.opening),
+                closed: front.opening.closed,
+                is_to_outdoors: a == OUTDOORS,
+                balls,
+            };
+            let section = || section_of(self.flooded, self.settings, front, [a, b], &cell_of);
+            (judge(self.settings, facts, section), front.opening.center)
+        };
+        fronts.iter().take(2).map(verdict).collect()
+    }
+
+    /// Keeps a join that was close, before it is made.
+    fn keep(&mut self, pair: Pair, openness: f64) {
+        let n_voxels = [pair.0, pair.1].map(|c| match c {
+            OUTDOORS => usize::MAX,
+            c => self.n_voxels[c as usize],
+        });
+        let volume = n_voxels[0].min(n_voxels[1]) as f64 * self.flooded.grid.voxel.powi(3);
+        if openness >= CloseJoin::MOST_OPEN || volume < CloseJoin::LEAST_VOLUME {
+            return;
+        }
+        let Some(faces) = self.contacts.get(&pair) else {
+            return;
+        };
+        let verdicts = self.verdicts(pair, faces, self.balls(pair)).into_iter();
+        let most = verdicts.max_by(|p, q| p.0.openness.total_cmp(&q.0.openness));
+        self.joins.extend(most.map(|(verdict, at)| CloseJoin {
+            at,
+            verdict,
+            volume,
+        }));
+    }
+}
+
+/// Returns the radius of the largest ball that passes between two cells ÷ the `smaller` of the largest in each. Pairs made by a cut
+/// have no saddle: the ratio is unknown, so the sections decide.
+pub(super) fn balls_of(saddles: &BTreeMap<Pair, f32>, pair: Pair, smaller: f32) -> f64 {
+    let saddle = saddles.get(&pair).copied().unwrap_or(f32::INFINITY);
+    f64::from(saddle / smaller.max(1e-6))
+}
+
+/// Returns the number of voxels of each basin but the outdoors.
+fn n_voxels_of(labels: &Labels, n_basins: usize) -> Vec<usize> {
+    let mut n = vec![0; n_basins];
+    labels.for_runs(0..labels.len(), |run, label| n[label as usize] += run.len());
+    n
 }
 
 impl Mergeable for BasinMerger<'_> {
@@ -268,39 +370,18 @@ impl Mergeable for BasinMerger<'_> {
         let Some(faces) = self.contacts.get(&(a, b)) else {
             return 0.0;
         };
-        let smaller_peak = self.peak[a as usize].min(self.peak[b as usize]);
-        // Pairs made by a cut have no saddle: the radius ratio is unknown, so the sections decide.
-        let saddle = self.saddles.get(&(a, b)).copied().unwrap_or(f32::INFINITY);
-        let radius = self.settings.radius_gain * f64::from(saddle / smaller_peak.max(1e-6));
-        let low = radius
-            * if a == OUTDOORS {
-                self.settings.outdoor_gain
-            } else {
-                1.0
-            }
-            / self.settings.threshold;
-        if low < 1.0 {
-            return low;
+        let balls = self.balls((a, b));
+        // A neck parts them, whatever its shape.
+        let by_balls = self.settings.by_balls(balls, a == OUTDOORS);
+        if by_balls < 1.0 {
+            return by_balls;
         }
-        self.flooded.allowance.spend(WORK);
-        let side = |at| self.cell[self.flooded.labels.at(at) as usize] == a;
-        let fronts = group_faces(self.flooded, faces, &side);
-        // The two largest are enough: a third opening between the same two is smaller still.
-        fronts
-            .iter()
-            .take(2)
-            .map(|front| {
-                let facts = OpeningFacts {
-                    is_between_storeys: self.storeys_apart && self.lies_in_slab(&front.opening),
-                    closed: front.opening.closed,
-                    is_to_outdoors: a == OUTDOORS,
-                    by_balls: low,
-                };
-                let cell_of = |label: u32| self.cell[label as usize];
-                let section = || section_of(self.flooded, self.settings, front, [a, b], &cell_of);
-                judge(self.settings, &facts, section).1
-            })
-            .fold(0.0, f64::max)
+        let verdicts = self.verdicts((a, b), faces, balls).into_iter();
+        verdicts.map(|(v, _)| v.openness).fold(0.0, f64::max)
+    }
+
+    fn keep_close(&mut self, pair: Pair, openness: f64) {
+        self.keep(pair, openness);
     }
 
     /// The cell with more neighbors survives, except that outdoors always does.
@@ -320,6 +401,7 @@ impl Mergeable for BasinMerger<'_> {
         }
         self.basins[a as usize].extend(joined);
         self.peak[a as usize] = self.peak[a as usize].max(self.peak[b as usize]);
+        self.n_voxels[a as usize] += self.n_voxels[b as usize];
         self.version[a as usize] += 1;
         self.contacts.remove(&pair);
         self.saddles.remove(&pair);

@@ -6,6 +6,7 @@ use enfilade_geom::DVec3;
 use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
 use crate::MergeSettings;
+use crate::judge::{FRAMED, OpeningSection};
 use crate::structure::{Jambs, OUTDOORS, Opening, connected_count, rim_share};
 use crate::voxel::Grid;
 
@@ -23,18 +24,6 @@ const STEEP: f64 = 0.5;
 /// Lattice steps around an opening's rim within which most pinches show: a pass over the full surround costs ten
 /// times as much around a small opening.
 const CLOSE: f64 = 3.0;
-
-/// Measures of an opening and the space beside it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OpeningSection {
-    /// Area of the opening ÷ the smaller of the largest cross-sections of its two cells. Below the threshold of the
-    /// settings, the first sections found to be large enough are taken.
-    pub(super) ratio: f64,
-    /// Share of the rim that is wall. 0 below the threshold.
-    pub(super) wall: f64,
-    /// Has a lintel or two jambs, or is not upright, or leaves hang in it.
-    pub(super) is_framed: bool,
-}
 
 /// Measures the opening of `front`, between the cells of `pair`. `cell_of` returns the cell of a basin.
 pub(super) fn section_of(
@@ -87,7 +76,13 @@ fn measured(
     let enough = n_open / settings.threshold;
     let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
     let is_level = opening.plane.normal.y.abs() > STEEP;
-    let is_framed = |jambs: Jambs| is_level || has_leaves || jambs.frame();
+    let frame = |jambs: Jambs| {
+        if is_level || has_leaves {
+            1.0
+        } else {
+            jambs.frame()
+        }
+    };
     // From the opening outward, as far sections are the large ones.
     for s in 0..=reach + at.abs() {
         let [before, after] = &mut sides;
@@ -99,18 +94,21 @@ fn measured(
             rayon::join(|| look(before, 0, at - s), || look(after, 1, at + s));
         }
         let n = smaller(&sides, a) as f64;
-        if n > enough && is_framed(slices.jambs(&sides)) {
-            return OpeningSection {
-                ratio: n_open / n,
-                wall: 0.0,
-                is_framed: true,
-            };
+        if n > enough {
+            let frame = frame(slices.jambs(&sides));
+            if frame >= FRAMED {
+                return OpeningSection {
+                    ratio: n_open / n,
+                    wall: 0.0,
+                    frame,
+                };
+            }
         }
     }
     let jambs = slices.jambs(&sides);
     let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
     // A beam across the whole room does not make a wall, and neither do pilasters.
-    let has_wall = is_level || jambs.left && jambs.right && jambs.share >= PILASTERS;
+    let has_wall = is_level || jambs.both() >= FRAMED && jambs.share >= PILASTERS;
     OpeningSection {
         ratio: match smaller(&sides, a) {
             0 => 1.0,
@@ -121,7 +119,7 @@ fn measured(
         } else {
             0.0
         },
-        is_framed: is_framed(jambs),
+        frame: frame(jambs),
     }
 }
 

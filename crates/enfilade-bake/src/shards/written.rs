@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use enfilade_cpg::{Fact, Reason, Why};
 use enfilade_geom::{Aabb, DVec3, Winding};
 use serde::{Deserialize, Serialize};
 
 use crate::Resolution;
 use crate::complex::{Label, Vote};
 use crate::pieces::KeptPiece;
-use crate::proposal::Proposal;
+use crate::proposal::{FoundPlace, Proposal};
 use crate::rooms::{self, Basins};
 use crate::structure::Candidate;
 use crate::voxel::Labels;
@@ -17,14 +18,52 @@ use crate::voxel::Labels;
 #[derive(Serialize, Deserialize)]
 pub(crate) struct WrittenRooms {
     bounds: [[f64; 3]; 2],
-    /// Polygons, and the share that leaves and panes fill.
-    candidates: Vec<(Vec<[f64; 3]>, f64)>,
+    candidates: Vec<WrittenCandidate>,
     votes: Vec<([f64; 3], WrittenLabel, f32)>,
     voids: Vec<([f64; 3], u32)>,
+    places: Vec<([f64; 3], WrittenWhy)>,
+    whys: Vec<(u32, WrittenWhy)>,
     tubes: [f64; 2],
     counts: Vec<(String, f64)>,
     notes: Vec<String>,
     settings: BTreeMap<String, String>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WrittenCandidate {
+    polygon: Vec<[f64; 3]>,
+    closed: f64,
+    why: WrittenWhy,
+}
+
+/// A decision in a form without optional fields.
+#[derive(Serialize, Deserialize)]
+struct WrittenWhy {
+    reason: Reason,
+    limit: Option<f32>,
+    facts: Vec<(Fact, f32)>,
+}
+
+impl WrittenWhy {
+    fn of(why: &Why) -> Self {
+        Self {
+            reason: why.reason,
+            limit: why.limit,
+            facts: why
+                .facts
+                .iter()
+                .map(|(&fact, &value)| (fact, value))
+                .collect(),
+        }
+    }
+
+    fn read(self) -> Why {
+        Why {
+            reason: self.reason,
+            limit: self.limit,
+            facts: self.facts.into_iter().collect(),
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -38,10 +77,12 @@ impl KeptPiece for Proposal {
     type Written = WrittenRooms;
 
     fn written(&self) -> WrittenRooms {
-        let candidate = |c: &Candidate| {
-            let points = c.winding.points.iter().map(DVec3::to_array);
-            (points.collect(), c.closed)
+        let candidate = |c: &Candidate| WrittenCandidate {
+            polygon: c.winding.points.iter().map(DVec3::to_array).collect(),
+            closed: c.closed,
+            why: WrittenWhy::of(&c.why),
         };
+        let place = |p: &FoundPlace| (p.at.to_array(), WrittenWhy::of(&p.why));
         let vote = |v: &Vote| {
             let label = match v.label {
                 Label::Region(region) => WrittenLabel::Region(region),
@@ -56,6 +97,10 @@ impl KeptPiece for Proposal {
             candidates: self.candidates.iter().map(candidate).collect(),
             votes: self.votes.iter().map(vote).collect(),
             voids: self.voids.iter().map(|v| (v.0.to_array(), v.1)).collect(),
+            places: self.places.iter().map(place).collect(),
+            whys: (self.whys.iter())
+                .map(|(region, why)| (*region, WrittenWhy::of(why)))
+                .collect(),
             tubes: self.tubes,
             counts: self.counts.iter().map(count).collect(),
             notes: self.notes.clone(),
@@ -74,9 +119,14 @@ impl KeptPiece for Proposal {
             },
             weight,
         };
-        let candidate = |(points, closed): (Vec<[f64; 3]>, f64)| Candidate {
-            winding: Winding::new(points.into_iter().map(DVec3::from_array).collect()),
-            closed,
+        let candidate = |c: WrittenCandidate| Candidate {
+            winding: Winding::new(c.polygon.into_iter().map(DVec3::from_array).collect()),
+            closed: c.closed,
+            why: c.why.read(),
+        };
+        let place = |(at, why): ([f64; 3], WrittenWhy)| FoundPlace {
+            at: DVec3::from_array(at),
+            why: why.read(),
         };
         let count = |(name, n): (String, f64)| {
             let known = rooms::COUNTS.into_iter().find(|known| *known == name);
@@ -87,6 +137,10 @@ impl KeptPiece for Proposal {
         Some(Self {
             candidates: written.candidates.into_iter().map(candidate).collect(),
             voids: voids.map(|(p, r)| (DVec3::from_array(p), r)).collect(),
+            places: written.places.into_iter().map(place).collect(),
+            whys: (written.whys.into_iter())
+                .map(|(region, why)| (region, why.read()))
+                .collect(),
             tubes: written.tubes,
             counts: written
                 .counts

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{Batch, Cell, CellId, Locator, PortalId, SourceRuns, World};
+use enfilade_cpg::{
+    Batch, Cell, CellId, CellPortalGraph, Fact, Locator, Place, Portal, PortalId, Reason,
+    SourceRuns, Why, World,
+};
 use enfilade_geom::scene::Primitive;
 
 use crate::layout::{Layout, layout_of};
@@ -36,6 +39,10 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
                 cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);
             }
             cell.volume += from.volume;
+            // The reason for a room or the outdoors is that of both.
+            if from.outdoor && !cell.outdoor || cell.is_void && !from.is_void {
+                cell.why.clone_from(&from.why);
+            }
             cell.is_void &= from.is_void;
             let is_first_name = is_numbered(&cell.name) && !is_numbered(&from.name);
             if (from.outdoor || is_first_name) && !cell.outdoor {
@@ -56,6 +63,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
         out.dedup();
         out
     };
+    let mut places = old.places.clone();
     let mut portals = Vec::new();
     let mut portal_of = Vec::with_capacity(old.portals.len());
     for p in &old.portals {
@@ -68,10 +76,16 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
                     .portals
                     .push(PortalId(portals.len() as u32));
             }
-            portals.push(enfilade_cpg::Portal {
+            portals.push(Portal {
                 cells: joined,
                 ..p.clone()
             });
+        } else if p
+            .cells
+            .iter()
+            .all(|c| old[*c].is_room() && old[*c].holds_person())
+        {
+            places.push(merged_at(old, p));
         }
     }
     let mut batches = Batches::default();
@@ -98,11 +112,25 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     out.graph.locator = locator(&old.locator, &cell_of);
     out.graph.cells = cells;
     out.graph.portals = portals;
+    out.graph.places = places;
     out.graph.specials =
         renumbered_specials(&old.specials, |c| cell_of[c.idx()], |p| portal_of[p.idx()]);
     out.batches = batches;
     out.details = details;
     (out, cell_of)
+}
+
+/// Returns the decision that two rooms are one, at the portal between them.
+fn merged_at(graph: &CellPortalGraph, portal: &Portal) -> Place {
+    let volume = portal.cells.map(|c| f64::from(graph[c].volume));
+    let facts = [
+        (Fact::Area, f64::from(portal.area)),
+        (Fact::Volume, volume[0].min(volume[1])),
+    ];
+    Place {
+        at: portal.center(),
+        why: Why::given(Reason::Merged).with(&facts),
+    }
 }
 
 /// Returns `true` if a builder gave this name by number.

@@ -2,19 +2,8 @@
 
 use enfilade_geom::{Allowance, Bvh, DVec3, Ray};
 
-/// A space that fits no ball of this radius is matter if most rays hit back faces. [Units: wu]
-const NARROW: f64 = 0.5;
 /// Sample points in a space, from which rays tell if it is a room.
 pub(crate) const POINTS: usize = 32;
-/// Inside matter, more than this share of the rays that hit anything hit a back face first.
-pub(crate) const BACKS: f64 = 0.6;
-
-/// Returns `true` if a closed-off space is too narrow for a room. `widest` is the radius of the largest ball that fits,
-/// `min_radius` that of the smallest room, `backs` the share of back faces seen from the space.
-pub(crate) fn is_crevice(widest: f64, min_radius: f64, backs: f64) -> bool {
-    widest < min_radius || (backs > BACKS && widest < NARROW)
-}
-
 /// Returns directions along the axes and diagonals, slightly off, so that rays do not run along edges.
 fn directions() -> impl Iterator<Item = DVec3> {
     let steps = || (-1..=1).map(f64::from);

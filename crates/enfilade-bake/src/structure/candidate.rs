@@ -15,6 +15,8 @@
 
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Plane, Triangle, Winding, triangle_area_normal};
 
+use enfilade_cpg::Why;
+
 use super::picture::Picture;
 use crate::SmallestHole;
 use crate::voxel::{BitVolume, for_runs};
@@ -39,6 +41,8 @@ pub(crate) struct Candidate {
     pub(crate) winding: Winding,
     /// Share of the opening that a door leaf or a pane fills.
     pub(crate) closed: f64,
+    /// Why there are two cells.
+    pub(crate) why: Why,
 }
 
 /// Distance beyond the front's extent at which a section counts as unbounded. [Units: wu]
@@ -46,7 +50,7 @@ const MARGIN: f64 = 0.7;
 /// Largest distance of a candidate from the front's mean plane. [Units: wu]
 const OFFSET: f64 = 0.6;
 
-/// Fits a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, which `bvh` indexes.
+/// Fits the polygon of a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, which `bvh` indexes.
 /// Slits narrower than `hole` count as closed: through them a section would extend into the hollow of a wall.
 #[must_use]
 pub(crate) fn fit_candidate(
@@ -57,7 +61,7 @@ pub(crate) fn fit_candidate(
     bvh: &Bvh,
     hole: f64,
     allowance: &Allowance,
-) -> Candidate {
+) -> Winding {
     let bounds = Aabb::of_points(centers).expanded(OFFSET + MARGIN);
     let mut near = Vec::new();
     bvh.for_each_in_box(&bounds, |t| near.push(t));
@@ -72,10 +76,7 @@ pub(crate) fn fit_candidate(
                 // A picture of so many cells; each triangle is drawn into it.
                 let n = section.open.n_voxels() / 4 + 5 * around.len() + centers.len() / 2;
                 if !allowance.spend(n as u64) {
-                    return Candidate {
-                        winding: section.winding(),
-                        closed: opening.closed,
-                    };
+                    return section.winding();
                 }
                 let better = best
                     .as_ref()
@@ -91,10 +92,7 @@ pub(crate) fn fit_candidate(
     }
     let section =
         best.unwrap_or_else(|| free_section(&opening.plane, centers, &around, [spacing, hole]));
-    Candidate {
-        winding: section.winding(),
-        closed: opening.closed,
-    }
+    section.winding()
 }
 
 /// Returns directions worth trying, unit length, facing like the opening's own normal: those of walls, the
@@ -320,8 +318,7 @@ mod tests {
             0.01,
             &Allowance::default(),
         );
-        assert_eq!(found.closed, 0.25);
-        let on = |k: usize| found.winding.points.iter().map(move |p| p[k]);
+        let on = |k: usize| found.points.iter().map(move |p| p[k]);
         let range = |k: usize| {
             (
                 on(k).fold(f64::MAX, f64::min),

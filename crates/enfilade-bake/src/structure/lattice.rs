@@ -26,24 +26,27 @@ fn for_rim(mask: &[bool], side: [usize; 2], mut visit: impl FnMut(usize)) {
     }
 }
 
-/// Least share of one side of an opening's rim at which the space beside it must reach farther, for a lintel or jamb.
-const FRAMED: f64 = 0.5;
-
-/// The sides of an opening at which the space beside it reaches past its rim. Where it does not, a wall or the ceiling
-/// runs through.
+/// The sides of an opening: the share of each at which the space beside it reaches past the rim. Where it does not, a wall or the
+/// ceiling runs through.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Jambs {
-    pub(crate) left: bool,
-    pub(crate) right: bool,
-    pub(crate) lintel: bool,
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) lintel: f64,
     /// The part of the width of the space that lies beside the opening.
     pub(crate) share: f64,
 }
 
 impl Jambs {
-    /// Returns `true` for an opening in a wall. Any other is a bend, an alcove, an arm of a room.
-    pub(crate) fn frame(self) -> bool {
-        self.lintel || self.left && self.right
+    /// Returns the share of the lintel, or of the lesser jamb, whichever is more: high for an opening in a wall, low for a bend, an
+    /// alcove, an arm of a room.
+    pub(crate) fn frame(self) -> f64 {
+        self.lintel.max(self.both())
+    }
+
+    /// Returns the share of the lesser jamb.
+    pub(crate) fn both(self) -> f64 {
+        self.left.min(self.right)
     }
 
     /// Measures the opening `mask`; `is_beside` holds where there is space beside it. `up` is the height gained with each
@@ -92,8 +95,7 @@ impl Jambs {
                 beside[n] += usize::from(is_there && is_beside(k));
             }
         });
-        let [left, right, lintel] =
-            [0, 1, 2].map(|n| rim[n] > 0 && beside[n] as f64 >= FRAMED * rim[n] as f64);
+        let [left, right, lintel] = [0, 1, 2].map(|n| beside[n] as f64 / rim[n].max(1) as f64);
         Self {
             left,
             right,
@@ -141,6 +143,7 @@ pub(crate) fn connected_count(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judge::FRAMED;
 
     const SIDE: [usize; 2] = [61, 57];
 
@@ -171,7 +174,7 @@ mod tests {
         };
         let mask: Vec<bool> = (0..SIDE[0] * SIDE[1]).map(is_in(opening)).collect();
         let jambs = Jambs::of(&mask, SIDE, up, is_in(room));
-        [jambs.left, jambs.right, jambs.lintel]
+        [jambs.left, jambs.right, jambs.lintel].map(|share| share >= FRAMED)
     }
 
     #[test]
@@ -216,14 +219,14 @@ mod tests {
     #[test]
     fn an_opening_has_a_frame_with_a_lintel_or_two_jambs() {
         for bits in 0..8 {
-            let [left, right, lintel] = [1, 2, 4].map(|bit| bits & bit != 0);
+            let [left, right, lintel] = [1, 2, 4].map(|bit| f64::from(u8::from(bits & bit != 0)));
             let jambs = Jambs {
                 left,
                 right,
                 lintel,
                 share: 0.0,
             };
-            assert_eq!(jambs.frame(), bits >= 3, "{jambs:?}");
+            assert_eq!(jambs.frame() >= FRAMED, bits >= 3, "{jambs:?}");
         }
     }
 }

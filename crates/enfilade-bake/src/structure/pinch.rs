@@ -8,17 +8,6 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
-use crate::MergeSettings;
-
-impl MergeSettings {
-    /// Returns the openness of an opening; from 1 on, the two cells are one room. `ratio` is the opening's area ÷ the
-    /// smaller of the sections of space beside it, `wall` the share of its rim that is wall.
-    pub(crate) fn openness(&self, ratio: f64, wall: f64) -> f64 {
-        let wall = (wall / self.wall_rim).min(1.0);
-        ratio / (self.threshold + (self.wall_threshold - self.threshold) * wall)
-    }
-}
-
 /// Two cells that touch.
 pub(crate) type Pair = (u32, u32);
 
@@ -30,10 +19,12 @@ pub(crate) trait Mergeable: Sync {
     fn pairs(&self) -> Vec<Pair>;
     /// Returns `true` if there still is an opening between the two.
     fn is_pair(&self, pair: Pair) -> bool;
-    /// Returns the openness of the openings between the two: see [`MergeSettings::openness`].
+    /// Returns the openness of the openings between the two; from 1 on, they are one room.
     fn openness(&self, pair: Pair) -> f64;
     /// Returns how often each of the two was joined with others.
     fn ages(&self, pair: Pair) -> [u32; 2];
+    /// Is told of each join before it is made, so that close ones can be kept.
+    fn keep_close(&mut self, pair: Pair, openness: f64);
     /// Joins the two; returns the pairs whose openings have changed.
     fn join(&mut self, pair: Pair) -> Vec<Pair>;
 }
@@ -92,6 +83,7 @@ pub(crate) fn join_rooms<M: Mergeable>(cells: &mut M) {
             queue.extend(weighed(cells, &stale));
             continue;
         }
+        cells.keep_close(top.pair, top.openness);
         let changed = cells.join(top.pair);
         queue.extend(weighed(cells, &changed));
     }

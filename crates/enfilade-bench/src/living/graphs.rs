@@ -128,6 +128,7 @@ fn space(
             outline,
             area: 1.0,
             fittings: Vec::new(),
+            why: Vec::new(),
         });
     }
     let cells = (0..middles.len()).map(|i| Cell {

@@ -68,6 +68,7 @@ mod tests {
             pieces: Vec::new(),
             area: 0.05,
             fittings: Vec::new(),
+            why: Vec::new(),
         };
         let gap = |cells, y: f64| Leak {
             portal: 0,

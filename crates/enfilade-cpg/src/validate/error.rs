@@ -61,6 +61,12 @@ pub enum GraphError {
     /// The leak path has a single point, or one that is not finite.
     #[error("the leak path must be empty or have at least two points, all finite")]
     LeakPath,
+    /// A number of a decision is not finite.
+    #[error("{owner}: a number of its decision is not finite")]
+    Decision {
+        /// The cell, portal or place.
+        owner: String,
+    },
     /// A source or a reference to one is invalid.
     #[error("{}: {}", shown(owner), shown(problem))]
     Source {

@@ -262,6 +262,7 @@ impl<'a> Reader<'a> {
                 outdoor: c.outdoor,
                 is_void: c.void,
                 is_land: c.land,
+                why: c.why.clone(),
             })
         });
         let cells = cells.collect::<Result<_, _>>()?;
@@ -273,6 +274,7 @@ impl<'a> Reader<'a> {
             cells,
             portals,
             specials,
+            places: graph.places.clone(),
             locator,
             provenance: Provenance {
                 generator: p.generator.clone(),
@@ -317,6 +319,7 @@ impl<'a> Reader<'a> {
                 area: p.area as f32,
                 fittings: (p.fittings.iter().map(|f| fitting::read(i, f)))
                     .collect::<Result<_, _>>()?,
+                why: p.why.clone(),
             });
         }
         if !corners.is_empty() {

@@ -154,6 +154,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 fixtures: placed.nodes,
                 leak_path,
                 pvs,
+                places: graph.places.clone(),
                 provenance: provenance(world),
                 statistics: statistics(layout, world),
             },
@@ -530,6 +531,7 @@ fn cells(world: &World) -> Vec<json::CellJson> {
         outdoor: cell.outdoor,
         void: cell.is_void,
         land: cell.is_land,
+        why: cell.why.clone(),
     };
     world.graph.cells.iter().enumerate().map(cell).collect()
 }
@@ -547,6 +549,7 @@ fn portals(world: &World) -> Vec<json::PortalJson> {
             .map(|piece| piece.len() as u32)
             .collect(),
         fittings: portal.fittings.iter().map(fitting::written).collect(),
+        why: portal.why.clone(),
     };
     world.graph.portals.iter().map(portal).collect()
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use crate::PortalKind;
+use crate::{Place, PortalKind, Why};
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -238,6 +238,8 @@ pub(super) struct Graph {
     pub(super) leak_path: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) pvs: Option<PvsJson>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) places: Vec<Place>,
     pub(super) provenance: ProvenanceJson,
     pub(super) statistics: BTreeMap<String, f64>,
 }
@@ -258,6 +260,8 @@ pub(super) struct CellJson {
     pub(super) void: bool,
     #[serde(default, skip_serializing_if = "is_false")]
     pub(super) land: bool,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) why: Vec<Why>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -272,6 +276,8 @@ pub(super) struct PortalJson {
     pub(super) pieces: Vec<u32>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) fittings: Vec<FittingJson>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) why: Vec<Why>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -2,10 +2,10 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use enfilade_cpg::{
-    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Fitting, FittingPart, Locator,
-    LocatorNode, MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Portal, PortalId,
-    PortalKind, Provenance, Pvs, SourceRuns, SpecialId, SpecialPortal, SpecialShape, Statistics,
-    VisibleParts, VisibleVolumes, Way, World,
+    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Fact, Fitting, FittingPart,
+    Locator, LocatorNode, MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Place, Portal,
+    PortalId, PortalKind, Provenance, Pvs, Reason, SourceRuns, SpecialId, SpecialPortal,
+    SpecialShape, Statistics, VisibleParts, VisibleVolumes, Way, Why, World,
 };
 use enfilade_geom::scene::{
     About, Fixture, FixtureKind, Image, Material, Mesh, Primitive, SourceNode, Texture,
@@ -50,6 +50,11 @@ pub(crate) fn cell(name: &str, aabb: [[f32; 3]; 2], portals: &[u32]) -> Cell {
         outdoor: name == "outdoors",
         is_void: false,
         is_land: false,
+        why: vec![Why::compared(
+            Reason::Standing,
+            0.05,
+            &[(Fact::Standing, 0.75)],
+        )],
     }
 }
 
@@ -64,6 +69,7 @@ pub(crate) fn doorway(x: f32, z0: f32, z1: f32, height: f32, cells: [u32; 2]) ->
         outline,
         area: height * (z1 - z0),
         fittings: Vec::new(),
+        why: vec![Why::given(Reason::Asked).with(&[(Fact::Area, 2.0)])],
     }
 }
 
@@ -142,6 +148,10 @@ pub(crate) fn two_rooms() -> World {
         statistics: Statistics {
             counts: [("input_triangles".to_owned(), 8.0), ("odd".to_owned(), 0.1)].into(),
         },
+        places: vec![Place {
+            at: [1.0, 2.0, 3.0],
+            why: Why::compared(Reason::Wide, 0.7, &[(Fact::Share, 0.75)]),
+        }],
     };
     let batch = |cells: &[u32], primitive| Batch {
         cells: cells.iter().copied().map(CellId).collect(),

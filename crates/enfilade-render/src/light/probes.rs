@@ -365,6 +365,7 @@ mod tests {
             pieces: Vec::new(),
             fittings: Vec::new(),
             area: to - from,
+            why: Vec::new(),
         };
         let mut world = World::default();
         world.graph.cells = vec![

@@ -15,6 +15,7 @@ fn portal(x: f32, cells: [u32; 2], kind: PortalKind) -> Portal {
         outline,
         area: 2.0,
         fittings: Vec::new(),
+        why: Vec::new(),
     }
 }
 

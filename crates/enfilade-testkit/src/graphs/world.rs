@@ -120,6 +120,7 @@ fn portal_of(grid: &Grid, face: &Face, (low, high, kind): FaceHole) -> Portal {
         outline,
         area: area as f32,
         fittings: Vec::new(),
+        why: Vec::new(),
     }
 }
 

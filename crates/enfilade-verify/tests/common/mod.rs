@@ -138,6 +138,7 @@ pub(crate) fn portal(cells: [CellId; 2], kind: PortalKind, quad: Quad) -> Portal
         outline,
         area: n.length() as f32,
         fittings: Vec::new(),
+        why: Vec::new(),
     }
 }
 

@@ -455,6 +455,7 @@ mod tests {
             outline,
             area: 3.78,
             fittings: Vec::new(),
+            why: Vec::new(),
         };
         Aperture::of(&portal).unwrap()
     }
