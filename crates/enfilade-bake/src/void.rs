@@ -10,7 +10,7 @@
 //! Cost: up to `MAX_COLUMNS`² walks down the locator's tree for each cell.
 
 use enfilade_cpg::{CellId, Locator, Reason, Why};
-use enfilade_geom::{Aabb, Allowance, DVec3, Sets};
+use enfilade_geom::{Aabb, Allowance, DVec3, Sets, is_rather_level};
 use rayon::prelude::*;
 
 use crate::complex::{Label, Partition, PartitionPortal};
@@ -193,8 +193,7 @@ fn doorway_of(portal: &PartitionPortal, locator: &Locator) -> Option<(f64, [bool
         at.fold([f64::MAX, f64::MIN], |[lo, hi], t| [lo.min(t), hi.max(t)])
     };
     let ([left, right], [low, high]) = (range(along.normalize_or_zero()), range(DVec3::Y));
-    // Upright: nearer to the vertical than to the horizontal.
-    if along.length() < 0.7 || right - left < WIDTH {
+    if is_rather_level(portal.plane.normal) || right - left < WIDTH {
         return None;
     }
     let ahead = along.cross(DVec3::Y).normalize() * BEYOND;

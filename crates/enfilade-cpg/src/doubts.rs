@@ -8,8 +8,6 @@ use enfilade_geom::triangle_area_normal;
 
 use crate::{Cell, CellId, CellPortalGraph, Portal, PortalKind, World};
 
-/// Openings with a larger vertical part of the normal (the sine of 45 degrees) count as in a floor or ceiling.
-const LEVEL: f32 = 0.707;
 /// Least share of a room's footprint that a floor covers, or an opening to the sky.
 const PART: f32 = 0.25;
 /// Least and largest usual height of a door. The leaves of halls and of cupboards are others; so the middle one
@@ -89,10 +87,6 @@ impl Portal {
     fn is_doorway(&self) -> bool {
         matches!(self.kind, PortalKind::Open | PortalKind::Door)
     }
-
-    fn is_flat(&self) -> bool {
-        self.normal[1].abs() > LEVEL
-    }
 }
 
 impl World {
@@ -157,14 +151,14 @@ fn flat_doorways(graph: &CellPortalGraph) -> Option<Doubt> {
     };
     let (all, flat) = (
         doorways().count(),
-        doorways().filter(|p| p.is_flat()).count(),
+        doorways().filter(|p| p.is_level()).count(),
     );
     (all >= FEW && 2 * flat > all).then_some(Doubt::FlatDoorways(flat, all))
 }
 
 /// Judges the middle height of the doors; without any, of open doorways between rooms as slim as doors.
 fn door_height(graph: &CellPortalGraph) -> Option<Doubt> {
-    let upright = || graph.portals.iter().filter(|p| !p.is_flat());
+    let upright = || graph.portals.iter().filter(|p| !p.is_level());
     let doors = upright().filter(|p| p.kind == PortalKind::Door);
     let mut heights: Vec<f32> = doors.map(|p| p.size()[1]).collect();
     let mut usual = DOOR;
@@ -214,7 +208,7 @@ fn open_to_sky(graph: &CellPortalGraph, rooms: &[(CellId, &Cell)]) -> Option<Dou
     let is_open = |(_, cell): &&(CellId, &Cell)| {
         let overhead = cell.portals.iter().map(|p| &graph[*p]).filter(|p| {
             let is_out = p.cells.iter().any(|c| graph[*c].outdoor);
-            is_out && p.is_flat() && p.kind != PortalKind::Window
+            is_out && p.is_level() && p.kind != PortalKind::Window
         });
         overhead.map(|p| p.area).sum::<f32>() > PART * cell.footprint()
     };

@@ -4,7 +4,7 @@
 //! windows; in doubt, it reports nothing.
 
 use crate::{CellPortalGraph, Portal, PortalId, PortalKind};
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, is_rather_level};
 
 /// Least width of a window. [Units: wu]
 const NARROW: f32 = 0.3;
@@ -12,8 +12,6 @@ const NARROW: f32 = 0.3;
 const GAP: f32 = 0.05;
 /// Least share of its bounding rectangle that a rectangle, arch or circle (0.785) fills, even behind a cross.
 const REGULAR: f32 = 0.6;
-/// Openings with a larger vertical part of the normal (the sine of 45 degrees) count as in a floor or ceiling.
-const LEVEL: f32 = 0.707;
 
 /// The reason why an opening may be a hole of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -90,7 +88,7 @@ fn reason(p: &Portal) -> Option<HoleReason> {
         }
         PortalKind::Open | PortalKind::Window => {}
     }
-    if p.kind == PortalKind::Open && p.normal[1].abs() > LEVEL {
+    if p.kind == PortalKind::Open && p.is_level() {
         Some(HoleReason::Overhead)
     } else if width.min(height) < NARROW {
         Some(HoleReason::Narrow)
@@ -111,6 +109,12 @@ impl Portal {
         size_across(vector(&self.normal), &outline).map(|v| v as f32)
     }
 
+    /// Returns `true` if it lies in a floor, a ceiling or a roof rather than in a wall.
+    #[must_use]
+    pub fn is_level(&self) -> bool {
+        is_rather_level(DVec3::from(self.normal.map(f64::from)))
+    }
+
     /// Returns the mean of the outline's vertices. [Units: wu]
     #[must_use]
     pub fn center(&self) -> [f32; 3] {
@@ -127,10 +131,10 @@ pub(crate) fn size_across(
     normal: DVec3,
     points: &(impl Iterator<Item = DVec3> + Clone),
 ) -> [f64; 2] {
-    let up_hint = if normal.y.abs() < f64::from(LEVEL) {
-        DVec3::Y
-    } else {
+    let up_hint = if is_rather_level(normal) {
         DVec3::Z
+    } else {
+        DVec3::Y
     };
     let across = up_hint.cross(normal).normalize_or_zero();
     let up = normal.cross(across);

@@ -2,7 +2,7 @@
 //!
 //! Shelves and louvers are not: they lie straight above each other.
 
-use crate::{Aabb, DVec3, Triangle, triangle_area_normal};
+use crate::{Aabb, Attitude, DVec3, Triangle, is_rather_level, triangle_area_normal};
 
 /// Rise from one step to the next: of stairs to climb up to that of space-saving stairs and tiers of seats. [Units: wu]
 const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.40;
@@ -10,8 +10,6 @@ const RISE: std::ops::RangeInclusive<f64> = 0.10..=0.40;
 const GOING: std::ops::RangeInclusive<f64> = 0.12..=1.2;
 /// Area of a step. [Units: wu²]
 const STEP_AREA: std::ops::RangeInclusive<f64> = 0.03..=4.0;
-/// Cosine of the largest tilt of a tread.
-const LEVEL: f64 = 0.99;
 /// Least share of treads in the area that faces up.
 const MIN_LEVEL_SHARE: f64 = 0.5;
 /// … and in the whole area. In a narrow flight that is massive down to the ground, an eighth is treads;
@@ -87,12 +85,13 @@ fn levels(triangles: &[Triangle], side: f64) -> Vec<Level> {
         .filter_map(|t| {
             let n = triangle_area_normal(t);
             let area = n.length() * 0.5;
-            let slope = n.y * side;
+            let is_ahead = n.y * side > 0.0;
             total += area;
-            if slope > 0.5 * n.length() {
+            if is_ahead && is_rather_level(n) {
                 upward += area;
             }
-            (slope > LEVEL * n.length() && area > 1e-6).then(|| {
+            let is_level = is_ahead && Attitude::of(n) == Attitude::Level;
+            (is_level && area > 1e-6).then(|| {
                 let middle = (t[0] + t[1] + t[2]) / 3.0;
                 (middle.y, middle, area)
             })

@@ -6,6 +6,7 @@
 
 mod aabb;
 mod allowance;
+mod attitude;
 mod bvh;
 mod flight;
 mod loose_grid;
@@ -23,6 +24,7 @@ mod winding;
 
 pub use aabb::Aabb;
 pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse, Tab};
+pub use attitude::{Attitude, faces, is_rather_level};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use flight::{MOST_FLIGHT_PLAN, are_treads, is_flight};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_cpg::{CellId, World};
-use enfilade_geom::{DVec2, DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Attitude, DVec2, DVec3, Triangle, is_rather_level, triangle_area_normal};
 
 /// Half the height of the window in which floor areas add up to one level. [Units: wu]
 const WINDOW: f64 = 0.1;
@@ -111,9 +111,8 @@ fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
         for t in p.triangles() {
             let n = triangle_area_normal(&t);
             // Surfaces within 45° of level are walkable, whichever way they face: models turn floors upside down.
-            if n.y.abs() > 0.7 * n.length() && n.y != 0.0 {
-                // Slopes within 8° count as level.
-                let is_level = n.y.abs() > 0.99 * n.length();
+            if is_rather_level(n) {
+                let is_level = Attitude::of(n) == Attitude::Level;
                 ask(world, &t, 0.5 * n.length(), is_level, &mut out);
             }
         }

@@ -121,7 +121,7 @@ impl View<'_> {
         let [one, other] = portal.cells.map(|c| shortened(&self.world.graph[c].name));
         let hint = Some(format!("{id}, {one} and {other}"));
         let flat: Vec<DVec2> = outline.iter().map(|p| DVec2::new(p.x, p.z)).collect();
-        if portal.normal[1].abs() > 0.7 {
+        if portal.is_level() {
             let is_near = |(floor, top): (f64, f64)| high > floor - FLOOR && low < top + FLOOR;
             // The outline of a level crack would cross the plan without telling where one passes.
             let is_drawn = class != Class::Crack && self.spans(portal).any(is_near);

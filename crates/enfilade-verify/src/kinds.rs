@@ -13,8 +13,6 @@ use crate::subject::to_dvec;
 
 /// Largest width of every piece of a crack: nobody climbs through. [Units: wu]
 const CRACK_WIDTH: f64 = 0.3;
-/// Largest rise of the normal of an upright opening.
-const UPRIGHT: f64 = 0.5;
 /// Least height of a sill over the ground. [Units: wu]
 const SILL: f64 = 0.4;
 /// Least height of a window's sill over the ground, to the outdoors. [Units: wu]
@@ -210,7 +208,7 @@ fn leads_outdoors(world: &World, p: &Portal) -> bool {
 }
 
 fn is_upright(p: &Portal) -> bool {
-    f64::from(p.normal[1]).abs() < UPRIGHT
+    !p.is_level()
 }
 
 /// Returns least and greatest height of an opening's `foot` over the ground on the higher side, at several points

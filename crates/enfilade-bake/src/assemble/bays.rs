@@ -12,7 +12,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::PortalKind;
-use enfilade_geom::{DVec3, Sets, Winding};
+use enfilade_geom::{DVec3, Sets, Winding, is_rather_level};
 
 use super::Judged;
 use super::kinds::SLIT;
@@ -62,7 +62,7 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
     let mut facades: BTreeMap<[u32; 2], Vec<(usize, Extent)>> = BTreeMap::new();
     for (i, judged) in portals.iter().enumerate() {
         let p = &judged.portal;
-        if judged.kind == PortalKind::Window && judged.is_pane && p.plane.normal.y.abs() < 0.5 {
+        if judged.kind == PortalKind::Window && judged.is_pane && !is_rather_level(p.plane.normal) {
             facades.entry(p.cells).or_default().push((i, Extent::of(p)));
         }
     }

@@ -5,7 +5,7 @@
 
 use enfilade_cpg::PortalKind;
 use enfilade_geom::scene::{Filling, Role};
-use enfilade_geom::{Aabb, DVec3, Ray, Triangle, shells};
+use enfilade_geom::{Aabb, DVec3, Ray, Triangle, is_rather_level, shells};
 use rayon::prelude::*;
 
 use super::Cut;
@@ -183,7 +183,7 @@ impl<'a> Judge<'a> {
 }
 
 fn is_upright(p: &PartitionPortal) -> bool {
-    p.plane.normal.y.abs() < 0.5
+    !is_rather_level(p.plane.normal)
 }
 
 fn bottom(p: &PartitionPortal) -> f64 {

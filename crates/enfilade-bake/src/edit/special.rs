@@ -8,7 +8,7 @@ use enfilade_cpg::{
     CellId, CellPortalGraph, GraphError, MonitorCamera, Pass, PortalId, SpecialId, SpecialPortal,
     SpecialProblem, SpecialShape, Way, World,
 };
-use enfilade_geom::{DMat3, DQuat, DVec3, Plane, Similarity, Winding, shown};
+use enfilade_geom::{DMat3, DQuat, DVec3, Plane, Similarity, Winding, is_rather_level, shown};
 
 use super::{AddPortalError, checked, place};
 use crate::specials::without;
@@ -16,9 +16,6 @@ use crate::specials::without;
 /// How far before a wall the cell of a polygon is looked for, nearest first: people type coordinates with two or three digits, and
 /// pictures are thick. [Units: wu]
 const BEFORE: [f64; 3] = [0.01, 0.05, 0.25];
-
-/// Normals with a larger vertical component are those of hatches, which have no upright.
-const LEVEL: f64 = 0.707;
 
 /// The place of a special portal.
 #[derive(Clone, Debug, PartialEq)]
@@ -435,7 +432,8 @@ fn fitted(graph: &CellPortalGraph, is_same: bool, is_scaled: bool) -> Vec<Simila
         edges.sort_by(|a, b| b.length_squared().total_cmp(&a.length_squared()));
         edges
     };
-    let is_hatch = normal.y.abs() > LEVEL || inward.y.abs() > LEVEL;
+    // Hatches have no upright.
+    let is_hatch = is_rather_level(normal) || is_rather_level(inward);
     let most = if is_hatch { PI } else { FRAC_PI_4 };
     // Counter-clockwise about the normal into the cell, as the first is about its own.
     let longest = edges(normal, &pieces).first().map(|e| upright * *e);
@@ -463,10 +461,10 @@ fn fitted(graph: &CellPortalGraph, is_same: bool, is_scaled: bool) -> Vec<Simila
 
 /// Returns the axes of an opening: across, upward, and its normal.
 fn frame(normal: DVec3) -> DMat3 {
-    let hint = if normal.y.abs() < LEVEL {
-        DVec3::Y
-    } else {
+    let hint = if is_rather_level(normal) {
         DVec3::Z
+    } else {
+        DVec3::Y
     };
     let across = hint.cross(normal).normalize_or_zero();
     DMat3::from_cols(across, normal.cross(across), normal)

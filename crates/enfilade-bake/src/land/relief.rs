@@ -1,13 +1,11 @@
 //! The height map of a scene: for each square of the plan, the highest surface and the lowest.
 
-use enfilade_geom::{Aabb, Allowance, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Allowance, Attitude, Triangle, triangle_area_normal};
 
 /// Least edge of a square: six of them are as wide as a lane. [Units: wu]
 const SQUARE: f64 = 0.5;
 /// Most squares along one side of the plan.
 const MOST_ALONG: f64 = 1024.0;
-/// Triangles steeper than this are walls: the vertical part of their normals is smaller.
-const STEEP: f64 = 0.05;
 /// Cost of a square that a triangle touches, in units of [`Allowance`]: so many of them are one.
 const SQUARES_A_WORK: u64 = 16;
 
@@ -57,7 +55,7 @@ impl Relief {
         let [nx, nz] = self.dims;
         let normal = triangle_area_normal(t);
         let bounds = Aabb::of_points(t);
-        let is_steep = normal.y.abs() <= STEEP * normal.length();
+        let is_steep = Attitude::of(normal) == Attitude::Upright;
         let height = |x: f64, z: f64| {
             let up = (normal.x * (x - t[0].x) + normal.z * (z - t[0].z)) / normal.y;
             (t[0].y - up).clamp(bounds.min.y, bounds.max.y)

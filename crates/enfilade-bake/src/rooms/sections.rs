@@ -1,7 +1,7 @@
 //! Cross-sections beside an opening: the share of the space on either side that an opening leaves
 //! open.
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, is_rather_level};
 
 use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
@@ -17,9 +17,6 @@ const PINCHED: f64 = 0.9;
 
 /// Jambs that take a smaller part of the width of the space are pilasters.
 const PILASTERS: f64 = 0.125;
-
-/// Vertical part of the normal above which an opening lies in a floor or roof rather than in a wall.
-const STEEP: f64 = 0.5;
 
 /// Lattice steps around an opening's rim within which most pinches show: a pass over the full surround costs ten
 /// times as much around a small opening.
@@ -75,7 +72,7 @@ fn measured(
     // Once both are this large, the opening is a pinch in any case.
     let enough = n_open / settings.threshold;
     let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
-    let is_level = opening.plane.normal.y.abs() > STEEP;
+    let is_level = is_rather_level(opening.plane.normal);
     let frame = |jambs: Jambs| {
         if is_level || has_leaves {
             1.0

@@ -7,7 +7,7 @@
 //!
 //! Cost: a ray for each 0.5 m² of level surface, and a walk down a few voxels.
 
-use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
+use enfilade_geom::{Allowance, Attitude, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
 use crate::structure::count_backs;
@@ -37,7 +37,7 @@ pub(crate) fn shallow_voids(
         .par_iter()
         .flat_map_iter(|t| {
             let n = triangle_area_normal(t);
-            let faces_up = n.y > 0.95 * n.length();
+            let faces_up = n.y > 0.0 && Attitude::of(n) == Attitude::Level;
             let wanted = (n.length() * 0.5 / SAMPLE_AREA).ceil() as usize;
             let samples = if faces_up {
                 wanted.clamp(1, MAX_SAMPLES)

@@ -7,7 +7,9 @@
 //! a table top) fills no opening between two rooms, so it changes nothing.
 
 use enfilade_geom::scene::{Role, Scene, TriangleSource};
-use enfilade_geom::{Aabb, Bvh, DVec3, NearSeries, Triangle, triangle_area_normal};
+use enfilade_geom::{
+    Aabb, Bvh, DVec3, NearSeries, Triangle, is_rather_level, triangle_area_normal,
+};
 
 /// Largest thickness of a flat object. [Units: wu] A door with its frame and handles has about 0.3.
 pub(crate) const MAX_THICKNESS: f64 = 0.4;
@@ -111,7 +113,11 @@ impl Plate {
     fn of(triangles: &[Triangle]) -> Self {
         let n = thin_direction(triangles);
         // The other two extents run along the horizontal and the vertical of the plate.
-        let level = if n.y.abs() > 0.7 { DVec3::X } else { DVec3::Y };
+        let level = if is_rather_level(n) {
+            DVec3::X
+        } else {
+            DVec3::Y
+        };
         let u = (level - n * n.dot(level)).normalize();
         let range = |d: DVec3| {
             let points = triangles.iter().flatten();

@@ -7,10 +7,8 @@
 
 use std::borrow::Cow;
 
-use enfilade_geom::{Aabb, DVec3, Triangle, Winding, triangle_area_normal};
+use enfilade_geom::{Aabb, Attitude, DVec3, Triangle, Winding, triangle_area_normal};
 
-/// Largest tilt of a wall's normal. [Units: sine of the angle to the level]
-const UPRIGHT: f64 = 0.1;
 /// Walls within this angle of a direction count for it. [Units: degrees]
 const SPREAD: usize = 1;
 /// Least share of all walls that a direction needs.
@@ -40,7 +38,7 @@ impl Frame {
         for t in triangles {
             let n = triangle_area_normal(t);
             let area = n.length();
-            if n.y.abs() >= UPRIGHT * area {
+            if Attitude::of(n) != Attitude::Upright {
                 continue;
             }
             let [x, z] = folded(n.x, n.z);

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Allowance, DVec3, Sets, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, Allowance, Attitude, DVec3, Sets, Triangle, triangle_area_normal};
 
 /// Edge of a square. [Units: wu]
 const SQUARE: f64 = 2.0;
@@ -20,9 +20,7 @@ const MOST_ALONG: f64 = 2048.0;
 const MOST: usize = 1 << 24;
 /// Land around what is built: as far as measures of openings reach, and a wide yard. [Units: wu]
 const MARGIN: f64 = 8.0;
-/// Triangles steeper than this are walls: the vertical part of their normals is smaller.
-const STEEP: f64 = 0.25;
-/// … if they are as high as this within a square. [Units: wu]
+/// Upright triangles are walls if they are as high as this within a square. [Units: wu]
 const WALL: f64 = 1.0;
 /// Most buildings of a site.
 const MOST_BUILDINGS: usize = 1 << 12;
@@ -258,7 +256,7 @@ fn patches_of(
             return None;
         }
         let normal = triangle_area_normal(t);
-        let is_steep = normal.y.abs() <= STEEP * normal.length();
+        let is_steep = Attitude::of(normal) == Attitude::Upright;
         // Height above a point of the plane's plan; steep triangles are everywhere as high as a whole.
         let height = |x: f64, z: f64| {
             t[0].y - (normal.x * (x - t[0].x) + normal.z * (z - t[0].z)) / normal.y

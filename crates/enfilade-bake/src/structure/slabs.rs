@@ -4,21 +4,19 @@
 //!
 //! Cost: linear in triangles.
 
-use enfilade_geom::{DVec3, Triangle, triangle_area_normal};
+use enfilade_geom::{Attitude, DVec3, Triangle, is_rather_level, triangle_area_normal};
 
 /// Least share of the scene's plan that the surfaces of a level cover.
 const MIN_SHARE: f64 = 0.08;
 /// Largest distance between the two faces of one slab. [Units: wu]
 const MAX_SLAB: f64 = 0.5;
 
-/// Least vertical part of the unit normal of an opening in a slab: within 26° of level.
-const LEVEL: f64 = 0.9;
 /// An opening nearer than this to the middle of a slab lies in it. [Units: wu]
 const NEAR: f64 = 0.2;
 
 /// Returns `true` if an opening with this normal at this height lies in one of the `slabs`.
 pub(crate) fn lies_in_slab(normal: DVec3, height: f64, slabs: &[f64]) -> bool {
-    normal.y.abs() > LEVEL && slabs.iter().any(|h| (h - height).abs() < NEAR)
+    is_rather_level(normal) && slabs.iter().any(|h| (h - height).abs() < NEAR)
 }
 
 /// Returns the heights (+Y) of the middles of slabs, ascending. [Units: wu]
@@ -34,7 +32,7 @@ pub(crate) fn slab_heights(triangles: &[Triangle]) -> Vec<f64> {
             }
         }
         let n = triangle_area_normal(t);
-        if n.y.abs() > 0.98 * n.length() && n.y != 0.0 {
+        if Attitude::of(n) == Attitude::Level {
             levels.push(((t[0].y + t[1].y + t[2].y) / 3.0, n.y.abs() * 0.5));
         }
     }

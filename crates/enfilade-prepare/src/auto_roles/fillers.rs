@@ -8,7 +8,9 @@
 //! are cut out of one.
 
 use super::units::Unit;
-use enfilade_geom::{Bvh, DVec3, Ray, Sets, Triangle, triangle_area_normal};
+use enfilade_geom::{
+    Bvh, DVec3, Ray, Sets, Triangle, faces, is_rather_level, triangle_area_normal,
+};
 
 /// Largest reach of a wall before and behind the thing: no wall with an opening is thicker. [Units: wu]
 const WALL: f64 = 0.6;
@@ -32,8 +34,6 @@ const GRID: usize = 5;
 const AIR: f64 = 0.2;
 /// … over this share of its face: furniture may stand before the rest.
 const OPEN: f64 = 0.5;
-/// Surfaces turned more than 45° from its face do not bound a wall in its plane.
-const FACING: f64 = 0.7;
 /// The wall that holds it overlaps it in depth by this share of the thinner of the two: a picture frame lies
 /// before its wall.
 const OVERLAP: f64 = 0.25;
@@ -224,7 +224,7 @@ fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Ca
         return None;
     }
     let sides = [0, 1, 2, 3].map(|side| holds(unit, index, side, around));
-    let is_upright = unit.axes[0].y.abs() < FACING;
+    let is_upright = !is_rather_level(unit.axes[0]);
     let (thickness, leaf) = thickness_between_air(unit, index, around)?;
     let candidate = Candidate {
         unit: index,
@@ -309,7 +309,7 @@ fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> 
         found.push(Crossing {
             unit: around.unit_of[h.triangle as usize],
             at: (2.0 * h.t - 1.0) * reach,
-            is_facing: n.dot(across).abs() > FACING * n.length(),
+            is_facing: faces(n, across),
         });
     });
     found.sort_by(|a, b| a.unit.cmp(&b.unit).then(a.at.total_cmp(&b.at)));

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use enfilade_geom::{Aabb, DVec3, Sets, Triangle, triangle_area_normal};
+use enfilade_geom::{Aabb, DVec3, Sets, Triangle, faces, is_rather_level, triangle_area_normal};
 
 /// Parts nearer than this are one unit: a handle and its leaf, the triangles of a mesh without shared vertices.
 /// [Units: wu]
@@ -11,8 +11,6 @@ const TOGETHER: f64 = 0.01;
 const MOST_PARTS: usize = 2_000;
 /// Normals that differ by less than 11° count as one direction.
 const ONE_DIRECTION: f64 = 0.98;
-/// A direction gives a box its second axis only if more than 45° from the first.
-const LEVEL: f64 = 0.7;
 /// Most directions kept, so that a sphere costs no more than a box.
 const MOST_DIRECTIONS: usize = 64;
 
@@ -127,9 +125,8 @@ pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
 pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
     let side = directions(triangles.iter())
         .into_iter()
-        .map(|d| DVec3::new(d.0.x, 0.0, d.0.z))
-        .find(|d| d.length() > LEVEL)
-        .map_or(DVec3::X, |d| canonical(d.normalize()));
+        .find(|d| !is_rather_level(d.0))
+        .map_or(DVec3::X, |d| canonical(d.0.with_y(0.0).normalize()));
     let axes = [side, DVec3::Y.cross(side), DVec3::Y];
     let (center, half) = box_along(axes, &triangles.iter());
     Unit {
@@ -224,7 +221,7 @@ fn own_box<'t>(
         // A flat thing turns with its sides.
         directions
             .iter()
-            .filter(|d| d.0.dot(across).abs() < LEVEL)
+            .filter(|d| !faces(d.0, across))
             .find_map(|d| (d.0 - across * across.dot(d.0)).try_normalize())
             .unwrap_or(DVec3::X)
     } else {

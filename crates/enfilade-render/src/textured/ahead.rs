@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
 use enfilade_cpg::World;
+use enfilade_geom::is_rather_level;
 use enfilade_runtime::View;
 use glam::{DVec3, Vec3};
 
@@ -288,7 +289,8 @@ impl Studio {
         let Some(doorway) = own.doorway(&self.world, id).doorway.clone() else {
             return true;
         };
-        let is_level = doorway.axes[2].y.abs() > LEVEL;
+        // A walker's height over its plane changes with each step.
+        let is_level = is_rather_level(doorway.axes[2]);
         let mut is_geometry = false;
         for eye in &place.around {
             let at = doorway.place(Vec3::from(*eye).as_dvec3());
@@ -377,6 +379,3 @@ impl Studio {
 
 /// Share of the transition distance from which on textures are wanted: a walker comes nearer while one turns into geometry.
 const NEAREST: f64 = 0.8;
-
-/// Least height of a unit normal for which a doorway counts as level: a walker's height over its plane changes with each step.
-const LEVEL: f64 = 0.5;

@@ -1,7 +1,7 @@
 //! An opening in its own directions, to measure how much of it its fittings cover.
 
 use enfilade_cpg::Portal;
-use enfilade_geom::{Aabb, DVec3, Triangle};
+use enfilade_geom::{Aabb, DVec3, Triangle, is_rather_level};
 
 use crate::subject::to_dvec;
 
@@ -63,7 +63,7 @@ impl FittedOpening {
 
     /// Returns `true` if it stands upright, as doors do.
     pub(super) fn is_upright(&self) -> bool {
-        self.directions[2].y.abs() < 0.5
+        !is_rather_level(self.directions[2])
     }
 
     /// Returns a box in the world around everything closer to the opening than `reach`. [Units: wu]

@@ -5,8 +5,6 @@ use enfilade_geom::{Aabb, DVec2, DVec3, Triangle};
 
 /// Samples along each side of a rectangle.
 const SAMPLES: usize = 32;
-/// An opening is upright if the y-component of its normal is smaller.
-const LEVEL: f64 = 0.5;
 
 /// The rectangle around an upright opening or a plate, and coordinates along it.
 #[derive(Clone, Debug)]
@@ -25,10 +23,10 @@ pub(crate) struct Rectangle {
 impl Rectangle {
     /// Returns the rectangle around a portal's pieces; `None` if the portal is not upright.
     pub(crate) fn of_portal(portal: &Portal) -> Option<Self> {
-        let normal = DVec3::from(portal.normal.map(f64::from));
-        if normal.y.abs() >= LEVEL {
+        if portal.is_level() {
             return None;
         }
+        let normal = DVec3::from(portal.normal.map(f64::from));
         let corners = portal.pieces.iter().flatten();
         let corners: Vec<DVec3> = corners.map(|p| DVec3::from(p.map(f64::from))).collect();
         Some(Self::around(normal, &corners))

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{Portal, PortalKind};
-use enfilade_geom::{Aabb, DVec3, Triangle};
+use enfilade_geom::{Aabb, DVec3, Triangle, is_rather_level};
 
 use super::opening::{Mask, Rectangle};
 use crate::structure::{MAX_THICKNESS, thin_direction};
@@ -145,7 +145,11 @@ impl<'t> Shell<'t> {
         let corners: Vec<DVec3> = owned.iter().flatten().copied().collect();
         let flat = DVec3::new(normal.x, 0.0, normal.z);
         // A horizontal shell is not a door plate, whatever the direction of view.
-        let normal = if normal.y.abs() < 0.5 { flat } else { DVec3::Z };
+        let normal = if is_rather_level(normal) {
+            DVec3::Z
+        } else {
+            flat
+        };
         let seen_along = |n: DVec3| Rectangle::around(n.normalize(), &corners);
         let (facing, aside) = (seen_along(normal), seen_along(DVec3::Y.cross(normal)));
         // Jambs make up most of a frame's surface; its shape shows in the direction from which it is widest.
