@@ -14,9 +14,9 @@ use super::fronts::{
 use super::lids::Lids;
 use super::limbs::LONG;
 use super::regions::{Regions, balls_of};
-use super::sections::section_of;
+use super::sections::whole_section_of;
 use crate::MergeSettings;
-use crate::judge::{OpeningFacts, judge};
+use crate::judge::{OpeningFacts, why_parted, why_unjoined};
 use crate::structure::{Candidate, OUTDOORS, fit_candidate};
 use crate::voxel::SparseVolume;
 
@@ -126,11 +126,10 @@ impl Openings<'_> {
             is_to_outdoors: pair[0] == OUTDOORS,
             balls: facts.balls(pair),
         };
-        let section = || section_of(self.flooded, self.settings, front, pair, &region_of);
-        let verdict = judge(self.settings, of_opening, section);
+        let section = whole_section_of(self.flooded, self.settings, front, pair, &region_of);
         let area = (Fact::Area, front.opening.area);
-        if verdict.openness < 1.0 {
-            return verdict.why(self.settings, true).with(&[area]);
+        if let Some(why) = why_parted(self.settings, of_opening, section) {
+            return why.with(&[area]);
         }
         // A rule of another kind parts them.
         let limb = pair.into_iter().find_map(|region| facts.limbs.get(&region));
@@ -139,7 +138,7 @@ impl Openings<'_> {
                 Why::compared(Reason::Mouth, LONG, &[(Fact::Length, *length), area])
             }
             Some(None) => Why::given(Reason::Mouth).with(&[area]),
-            None => verdict.why(self.settings, true).with(&[area]),
+            None => why_unjoined(self.settings, of_opening, section).with(&[area]),
         }
     }
 }

@@ -17,6 +17,7 @@ use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
 use super::low::join_low;
 use super::regions::Regions;
+use super::sheltered::sheltered;
 use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
 use crate::proposal::{FoundPlace, Proposal};
@@ -78,6 +79,7 @@ pub(crate) fn propose(
         allowance,
     );
     notes.extend_from_slice(&matter.notes);
+    let sheltered = sheltered(&grid, &labels, &regions, &structure.bvh, allowance);
 
     context.begin(Stage::Candidates)?;
     let openings = Openings {
@@ -116,7 +118,12 @@ pub(crate) fn propose(
         at: frame.to_scene(join.at),
         why: join.why(&config.merge),
     });
-    let places = joins.chain(matter.places(frame)).collect();
+    let spaces = matter.spaces.iter().chain(&sheltered);
+    let spaces = spaces.map(|space| FoundPlace {
+        at: frame.to_scene(space.at),
+        why: space.why.clone(),
+    });
+    let places = joins.chain(spaces).collect();
     let found = [n_occupied, basins.n_basins, candidates.len()];
     let counts = counts_of(&grid, frame, found);
     Ok(Proposal {

@@ -33,7 +33,7 @@ use super::regions::{CloseJoin, Regions};
 use super::slabs::LAYERS;
 use crate::judge::{EnclosedFacts, Facing, NARROW, why_open};
 use crate::proposal::FoundPlace;
-use crate::structure::{Frame, OUTDOORS, POINTS, rays_from};
+use crate::structure::{OUTDOORS, POINTS, rays_from};
 
 /// Two surfaces nearer than this are the two faces of a wall. [Units: wu]
 const WALL: f64 = 0.5;
@@ -59,16 +59,6 @@ pub(crate) struct Matter {
     pub(crate) spaces: Vec<FoundPlace>,
     /// Surfaces show their fronts to air and their backs to matter.
     pub(crate) fronts_face_air: bool,
-}
-
-impl Matter {
-    /// Returns the spaces as large as a room that are not rooms, in scene coordinates.
-    pub(crate) fn places(&self, frame: &Frame) -> impl Iterator<Item = FoundPlace> {
-        self.spaces.iter().map(|space| FoundPlace {
-            at: frame.to_scene(space.at),
-            why: space.why.clone(),
-        })
-    }
 }
 
 /// Returns `true` if a person fits in a space, given the radius of its largest ball and its volume.
