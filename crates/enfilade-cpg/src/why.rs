@@ -370,6 +370,28 @@ impl Fact {
         )
     }
 
+    /// Returns the name that files and tables use.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Share => "share",
+            Self::Balls => "balls",
+            Self::Wall => "wall",
+            Self::Frame => "frame",
+            Self::Closed => "closed",
+            Self::Area => "area",
+            Self::Length => "length",
+            Self::Standing => "standing",
+            Self::Floor => "floor",
+            Self::Doorway => "doorway",
+            Self::Backs => "backs",
+            Self::Inside => "inside",
+            Self::Walled => "walled",
+            Self::Radius => "radius",
+            Self::Volume => "volume",
+        }
+    }
+
     /// Returns the quantity in words, and its unit.
     #[must_use]
     pub fn words(self) -> (&'static str, &'static str) {
@@ -394,6 +416,7 @@ impl Fact {
     }
 }
 
+/// Writes the decision, what was compared, and all other facts; with `{:#}` not the latter.
 impl fmt::Display for Why {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.reason.words())?;
@@ -409,6 +432,9 @@ impl fmt::Display for Why {
                 " ({words} {value}{unit}, {side} {limit}{unit}; margin {:.2})",
                 self.margin()
             )?;
+        }
+        if f.alternate() {
+            return Ok(());
         }
         let decided = decided.map(|d| d.0);
         let mut is_first = true;
@@ -453,6 +479,11 @@ mod tests {
         for part in ["one cell", "0.8512", "from 0.7", "area 2 m²", "margin 0.50"] {
             assert!(said.contains(part), "{said}");
         }
+        let short = format!("{:#}", Why::compared(Reason::Wide, 0.7, &facts));
+        assert!(
+            said.starts_with(&short) && !short.contains("area"),
+            "{short}"
+        );
     }
 
     #[test]
@@ -467,5 +498,7 @@ mod tests {
     fn names_are_those_in_files() {
         let text = serde_json::to_string(&Reason::Unframed).unwrap();
         assert_eq!(text, format!("\"{}\"", Reason::Unframed.name()));
+        let text = serde_json::to_string(&Fact::Doorway).unwrap();
+        assert_eq!(text, format!("\"{}\"", Fact::Doorway.name()));
     }
 }

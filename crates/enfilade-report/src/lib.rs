@@ -29,6 +29,7 @@ mod plain;
 mod plan;
 #[cfg(feature = "print")]
 mod raster;
+mod reasons;
 mod relief;
 mod section;
 mod shafts;

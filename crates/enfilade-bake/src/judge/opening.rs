@@ -176,7 +176,9 @@ impl OpeningVerdict {
                 (Reason::Neck, Some(most))
             }
             OpeningKind::Narrow => (Reason::Narrow, limit),
-            OpeningKind::Wide | OpeningKind::Unframed if is_parting => (Reason::Unjoined, limit),
+            OpeningKind::Wide if is_parting => (Reason::Unjoined, limit),
+            // What was weighed is the frame, not the share that the reason compares.
+            OpeningKind::Unframed if is_parting => (Reason::Unjoined, None),
             OpeningKind::Wide => (Reason::Wide, limit),
             OpeningKind::Unframed => (Reason::Unframed, Some(FRAMED)),
         };
@@ -266,7 +268,9 @@ mod tests {
             assert_eq!(verdict.kind, *expected, "{what}");
             let is_one = matches!(verdict.kind, Wide | Unframed);
             assert_eq!(verdict.openness >= 1.0, is_one, "{what}");
-            assert!(verdict.why(&settings, !is_one).holds(), "{what}");
+            for is_parting in [!is_one, true] {
+                assert!(verdict.why(&settings, is_parting).holds(), "{what}");
+            }
         }
     }
 }
