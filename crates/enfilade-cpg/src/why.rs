@@ -387,6 +387,7 @@ impl Fact {
             Self::Backs => "backs",
             Self::Inside => "inside",
             Self::Walled => "walled",
+            Self::Shelter => "shelter",
             Self::Radius => "radius",
             Self::Volume => "volume",
         }

@@ -49,7 +49,7 @@ impl About {
             Reason::Enclosed | Reason::Facing | Reason::Turned | Reason::Shell => Self::Air,
             Reason::Outside => Self::Outdoors,
             Reason::Land => Self::Land,
-            Reason::Wide | Reason::Unframed | Reason::Merged => Self::Inside,
+            Reason::Wide | Reason::Unframed | Reason::Merged | Reason::Sheltered => Self::Inside,
             Reason::Solid | Reason::Crevice => Self::Matter,
         }
     }
@@ -62,7 +62,7 @@ impl About {
             Self::Air => "rooms and voids",
             Self::Outdoors => "the outdoors",
             Self::Land => "land",
-            Self::Inside => "places within a room",
+            Self::Inside => "places within a cell",
             Self::Matter => "matter",
         }
     }
@@ -189,7 +189,8 @@ fn area_problem(graph: &CellPortalGraph, portal: &Portal, why: &Why) -> Option<S
     let is_framed = matches!(why.reason, Reason::Shut | Reason::Kept);
     let too_small = own / if is_framed { MOST_FRAMED } else { MOST_PLANE };
     // Several portals of one opening have the same decision.
-    let of_opening = graph.portals.iter().filter(|p| p.why.contains(why));
+    let beside = graph[portal.cells[0]].portals.iter().map(|&p| &graph[p]);
+    let of_opening = beside.filter(|p| p.why.contains(why));
     let all: f64 = of_opening.map(|p| f64::from(p.area)).sum();
     let is_wrong = said < too_small || is_framed && said > MOST_FRAMED * all;
     is_wrong.then(|| {
