@@ -13,7 +13,7 @@ use enfilade_geom::Triangle;
 use crate::kinds::is_by_rule;
 use crate::subject::{Subject, to_dvec};
 
-/// What a decision is about.
+/// A kind of thing that a decision is about.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum About {
     Portal,
@@ -149,7 +149,7 @@ fn label_problem(cell: &Cell) -> Option<String> {
     })
 }
 
-/// Returns the problem of a place that is no cell, but lies in one. Where an opening was, the middle of what was cut may be in a wall.
+/// Returns the problem of a place that is not a cell, but lies in one. Where an opening was, the middle of what was cut may be in a wall.
 fn matter_problem(subject: &Subject, place: &Place) -> Option<String> {
     let cell = subject.locator.locate(to_dvec(place.at))?;
     let (name, what) = (place.why.reason.name(), subject.cell_name(cell));

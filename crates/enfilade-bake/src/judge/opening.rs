@@ -177,7 +177,7 @@ impl OpeningVerdict {
             }
             OpeningKind::Narrow => (Reason::Narrow, limit),
             OpeningKind::Wide if is_parting => (Reason::Unjoined, limit),
-            // What was weighed is the frame, not the share that the reason compares.
+            // Its frame was weighed, not the share that the reason compares.
             OpeningKind::Unframed if is_parting => (Reason::Unjoined, None),
             OpeningKind::Wide => (Reason::Wide, limit),
             OpeningKind::Unframed => (Reason::Unframed, Some(FRAMED)),

@@ -40,13 +40,25 @@ pub(super) fn section_of(
     if rest > 0.0 && front.opening.closed < LEAVES {
         let close = settings.surround - rest * step;
         let slices = Slices::beside(flooded, close, front, cell_of);
-        let section = measured(&slices, settings, &front.opening, pair, Extent::Enough);
+        let section = measured(
+            &slices,
+            settings,
+            &front.opening,
+            pair,
+            WantedSections::Enough,
+        );
         if section.ratio < settings.threshold {
             return section;
         }
     }
     let slices = Slices::beside(flooded, settings.surround, front, cell_of);
-    measured(&slices, settings, &front.opening, pair, Extent::Enough)
+    measured(
+        &slices,
+        settings,
+        &front.opening,
+        pair,
+        WantedSections::Enough,
+    )
 }
 
 /// Measures the opening of `front` as [`section_of`], with the largest sections beside it.
@@ -58,12 +70,18 @@ pub(super) fn whole_section_of(
     cell_of: &(impl Fn(u32) -> u32 + Sync),
 ) -> OpeningSection {
     let slices = Slices::beside(flooded, settings.surround, front, cell_of);
-    measured(&slices, settings, &front.opening, pair, Extent::Whole)
+    measured(
+        &slices,
+        settings,
+        &front.opening,
+        pair,
+        WantedSections::Whole,
+    )
 }
 
-/// Extent to which sections are looked for.
+/// WantedSections to which sections are looked for.
 #[derive(Clone, Copy, PartialEq)]
-enum Extent {
+enum WantedSections {
     /// Up to sections so large that the opening is narrow.
     Enough,
     /// All of them.
@@ -75,7 +93,7 @@ fn measured(
     settings: &MergeSettings,
     opening: &Opening,
     [a, b]: [u32; 2],
-    extent: Extent,
+    extent: WantedSections,
 ) -> OpeningSection {
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
@@ -117,7 +135,7 @@ fn measured(
             rayon::join(|| look(before, 0, at - s), || look(after, 1, at + s));
         }
         let n = smaller(&sides, a) as f64;
-        if extent == Extent::Enough && n > enough {
+        if extent == WantedSections::Enough && n > enough {
             let frame = frame(slices.jambs(&sides));
             if frame >= FRAMED {
                 return OpeningSection {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use super::{Judged, buildings};
+use super::{JudgedWorld, buildings};
 use crate::rows::Chosen;
 
 /// A decision on an opening between two cells, with its label.
@@ -22,8 +22,8 @@ pub(crate) fn bench_facts(chosen: &Chosen, is_csv: bool) -> anyhow::Result<()> {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
         chosen.has_scene(&name)
     });
-    let judged: Vec<Judged> = dirs
-        .map(|dir| Judged::of(&dir))
+    let judged: Vec<JudgedWorld> = dirs
+        .map(|dir| JudgedWorld::of(&dir))
         .collect::<anyhow::Result<_>>()?;
     let all: Vec<Labelled<'_>> = judged.iter().flat_map(labelled).collect();
     if is_csv {
@@ -35,7 +35,7 @@ pub(crate) fn bench_facts(chosen: &Chosen, is_csv: bool) -> anyhow::Result<()> {
 }
 
 /// Labels the decisions of a building: a portal that an opening of the truth matches is right.
-fn labelled(judged: &Judged) -> impl Iterator<Item = Labelled<'_>> {
+fn labelled(judged: &JudgedWorld) -> impl Iterator<Item = Labelled<'_>> {
     let right: BTreeSet<u64> = judged.score.matches.iter().map(|m| m.portal).collect();
     judged.whys.iter().map(move |why| Labelled {
         scene: &judged.name,

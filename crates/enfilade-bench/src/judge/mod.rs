@@ -18,7 +18,7 @@ pub(crate) use facts::bench_facts;
 const ASKED: [&str; 3] = ["duplex", "institute", "kit-edc"];
 
 /// A building with truth, baked and scored.
-struct Judged {
+struct JudgedWorld {
     name: String,
     /// Share of right rooms.
     rooms: f64,
@@ -33,7 +33,7 @@ struct Judged {
     n_subjects: usize,
 }
 
-impl Judged {
+impl JudgedWorld {
     /// Bakes and scores a building.
     fn of(dir: &Path) -> anyhow::Result<Self> {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
@@ -93,8 +93,8 @@ pub(crate) fn bench_judge(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> 
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
         is_wanted && chosen.has_scene(&name)
     });
-    let judged: Vec<Judged> = dirs
-        .map(|dir| Judged::of(&dir))
+    let judged: Vec<JudgedWorld> = dirs
+        .map(|dir| JudgedWorld::of(&dir))
         .collect::<anyhow::Result<_>>()?;
     for j in judged
         .iter()
@@ -111,7 +111,7 @@ pub(crate) fn bench_judge(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> 
 }
 
 /// Prints the rows of the verdict: whether the worlds that it doubts are those that are wrong.
-fn print_verdicts(judged: &[Judged], out: &mut RowPrinter) {
+fn print_verdicts(judged: &[JudgedWorld], out: &mut RowPrinter) {
     for j in judged {
         let is_wrong = j.trust == "good" && j.rooms < 0.8 || j.trust == "low" && j.rooms > 0.95;
         let note = format!("{}; {:.2} of rooms right", j.trust, j.rooms);
