@@ -22,6 +22,7 @@ use enfilade_geom::scene::{Mesh, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, Allowance, DMat3, DVec3, Plane, Winding};
 use rayon::prelude::*;
 
+use crate::budget::WORK_A_LOOK;
 use crate::complex::{Label, Partition, PartitionPortal};
 use crate::layout::{Layout, layout_of};
 use crate::structure::{Candidate, SceneStructure, plates};
@@ -121,10 +122,9 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
 
 /// Returns the portals of a cut, divided between the objects that fill them.
 pub(crate) fn portals_of(cut: &Cut<'_>, is_void: &dyn Fn(u32) -> bool) -> Vec<Portal> {
-    let plates = plates(cut.structure.scene).into_iter();
-    let plates: Vec<_> = plates.map(fillers::FlatObject::new).collect();
+    let plates = plates(cut.structure.scene);
     let in_turn = cut.partition.portals.par_iter();
-    let in_turn = in_turn.filter(cut.allowance.each(WORK_A_PORTAL));
+    let in_turn = in_turn.filter(cut.allowance.each(WORK_A_LOOK));
     let judge = kinds::Judge::new(cut);
     let judge = &judge;
     let judged = in_turn.filter_map(storable).flat_map_iter(|p| {
@@ -341,10 +341,6 @@ fn grown(outline: &Winding, plane: &Plane, by: f64) -> Winding {
     }
 }
 
-/// Costs of judging a portal and of finding the cells of a triangle, in units of [`Allowance`].
-const WORK_A_PORTAL: u64 = 50;
-const WORK_A_TRIANGLE: u64 = 10;
-
 #[derive(Default)]
 struct BatchBuilder {
     primitive: Primitive,
@@ -472,7 +468,7 @@ fn cells_of_object(
     let mut cells = Vec::new();
     for p in &scene.meshes[o.mesh as usize].primitives {
         let triangles = p.placed_triangles(o.transform);
-        for triangle in triangles.filter(allowance.each(WORK_A_TRIANGLE)) {
+        for triangle in triangles.filter(allowance.each(WORK_A_LOOK)) {
             locator.cells_touching(&triangle, &mut cells);
         }
     }

@@ -31,6 +31,9 @@ const MEMORY: u64 = 8 << 30;
 const WORK: u64 = 400_000_000;
 const WORK_A_TRIANGLE: u64 = 200_000;
 
+/// Work of a ray, or of another search in a tree: what a loop over such searches spends on each.
+pub(crate) const WORK_A_LOOK: u64 = 10;
+
 /// Additional work for each voxel.
 const WORK_A_VOXEL: u64 = 5;
 

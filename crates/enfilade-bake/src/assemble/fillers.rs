@@ -7,11 +7,11 @@
 //! `O(portals · plates)` comparisons of boxes; each cut is exact, so both parts together are the opening.
 
 use enfilade_cpg::PortalKind;
-use enfilade_geom::{Aabb, Allowance, DVec3, Plane, Triangle, Winding, poly, shells};
+use enfilade_geom::filler::{DEEPEST, FILLED};
+use enfilade_geom::{Aabb, Allowance, DVec3, Plane, Rectangle, Triangle, Winding, poly, shells};
 
-use super::fittings::{DEEP, FULL, LEAST_DOOR, Rectangle, WIDEST_TURN};
 use crate::complex::PartitionPortal;
-use crate::structure::MAX_THICKNESS;
+use crate::structure::Plate;
 
 /// Vertices nearer than this to a cut count as on it: parts narrower than the rounding to `f32` would vanish. [Units: wu]
 const ON_CUT: f64 = 1e-5;
@@ -37,25 +37,12 @@ struct Filler {
     is_leaf: bool,
 }
 
-/// A flat object that may fill an opening.
-pub(super) struct FlatObject {
-    triangles: Vec<Triangle>,
-    aabb: Aabb,
-}
-
-impl FlatObject {
-    pub(super) fn new(triangles: Vec<Triangle>) -> Self {
-        let aabb = Aabb::of_points(triangles.as_flattened());
-        Self { triangles, aabb }
-    }
-}
-
 /// Divides an opening between the `plates` that fill it. One part if they cannot be parted, or fewer than two do;
 /// otherwise each part has its filler.
 pub(super) fn divided(
     portal: &PartitionPortal,
     is_on_floor: bool,
-    plates: &[FlatObject],
+    plates: &[Plate],
     allowance: &Allowance,
 ) -> Vec<PartitionPortal> {
     let whole = || vec![portal.clone()];
@@ -68,7 +55,7 @@ pub(super) fn divided(
         .flat_map(|w| w.points.clone())
         .collect();
     let opening = Rectangle::around(portal.plane.normal, &corners);
-    let reach = Aabb::of_points(&corners).expanded(DEEP);
+    let reach = Aabb::of_points(&corners).expanded(DEEPEST);
     let near = plates.iter().filter(|p| p.aabb.overlaps(&reach));
     let fillers = near.filter_map(|p| filler(&opening, is_on_floor, p));
     let fillers: Vec<Filler> = fillers.collect();
@@ -86,38 +73,38 @@ pub(super) fn divided(
 }
 
 /// Returns the plate as a filler of the opening; `None` if it does not lie in it.
-fn filler(opening: &Rectangle, is_on_floor: bool, plate: &FlatObject) -> Option<Filler> {
+fn filler(opening: &Rectangle, is_on_floor: bool, plate: &Plate) -> Option<Filler> {
     let bounds = opening.bounds(&plate.triangles);
     let size = bounds.size();
     let z = (bounds.min.z + bounds.max.z) * 0.5 - opening.low.z;
-    if size.z > MAX_THICKNESS || z.abs() > DEEP {
+    if size.z > DEEPEST || z.abs() > DEEPEST {
         return None;
     }
     let common = bounds.max.min(opening.high) - bounds.min.max(opening.low);
     if common.x.min(common.y) <= 0.0 || common.x * common.y < WITHIN * size.x * size.y {
         return None;
     }
-    let is_leaf = is_on_floor
-        && bounds.min.y < opening.low.y + REBATE
-        && size.y >= LEAST_DOOR
-        && size.x <= WIDEST_TURN;
+    let is_leaf = plate.is_leaf && is_on_floor && bounds.min.y < opening.low.y + REBATE;
     Some(Filler {
         across: [bounds.min.x, bounds.max.x],
         up: [bounds.min.y, bounds.max.y],
-        is_bare: is_bare(opening, &plate.triangles),
+        is_bare: is_bare(plate),
         is_leaf,
     })
 }
 
 /// Returns `true` if one body of an object reaches to all of its sides, so that no frame runs around it.
-fn is_bare(opening: &Rectangle, triangles: &[Triangle]) -> bool {
-    let around = Rectangle::around(opening.normal, triangles.as_flattened());
-    let (shell_of, n) = shells(triangles);
+fn is_bare(plate: &Plate) -> bool {
+    let (shell_of, n) = shells(&plate.triangles);
     (0..n as u32).any(|shell| {
-        let of = triangles.iter().zip(&shell_of).filter(|t| *t.1 == shell);
+        let of = plate
+            .triangles
+            .iter()
+            .zip(&shell_of)
+            .filter(|t| *t.1 == shell);
         let body: Vec<Triangle> = of.map(|t| *t.0).collect();
-        let frame = around.size() - around.bounds(&body).size();
-        frame.x.max(frame.y) < 2.0 * FRAME && around.mask(body.into_iter()).share() >= FULL
+        let frame = plate.around.size() - plate.around.bounds(&body).size();
+        frame.x.max(frame.y) < 2.0 * FRAME && plate.around.mask(body).share() >= FILLED
     })
 }
 
@@ -218,8 +205,12 @@ mod tests {
         Aabb::new(low, DVec3::new(x1, y1, half_depth)).triangles()
     }
 
+    fn plate(triangles: Vec<Triangle>) -> Plate {
+        Plate::of(triangles).unwrap()
+    }
+
     /// A frame of four bars, and a pane in it.
-    fn window([x0, y0, x1, y1]: [f64; 4]) -> FlatObject {
+    fn window([x0, y0, x1, y1]: [f64; 4]) -> Plate {
         let b = 0.06;
         let bars = [
             [x0, y0, x0 + b, y1],
@@ -229,19 +220,19 @@ mod tests {
         ];
         let mut triangles: Vec<Triangle> = bars.iter().flat_map(|&r| block(r, 0.04)).collect();
         triangles.extend(block([x0 + b, y0 + b, x1 - b, y1 - b], 0.005));
-        FlatObject::new(triangles)
+        plate(triangles)
     }
 
-    fn bare(r: [f64; 4]) -> FlatObject {
-        FlatObject::new(block(r, 0.02))
+    fn bare(r: [f64; 4]) -> Plate {
+        plate(block(r, 0.02))
     }
 
     /// Returns the areas of the parts, in units of 0.01 m², ascending.
-    fn areas(plates: &[FlatObject]) -> Vec<i64> {
+    fn areas(plates: &[Plate]) -> Vec<i64> {
         areas_over(plates, false)
     }
 
-    fn areas_over(plates: &[FlatObject], is_on_floor: bool) -> Vec<i64> {
+    fn areas_over(plates: &[Plate], is_on_floor: bool) -> Vec<i64> {
         let parts = divided(&opening(), is_on_floor, plates, &Allowance::default());
         let mut areas: Vec<i64> = parts
             .iter()
@@ -278,7 +269,7 @@ mod tests {
             [960]
         );
         // Two rows of panes.
-        let grid: Vec<FlatObject> = (0..8)
+        let grid: Vec<Plate> = (0..8)
             .map(|i| (f64::from(i % 4), 1.2 * f64::from(i / 4)))
             .map(|(x, y)| bare([x, y, x + 1.0, y + 1.2]))
             .collect();
@@ -314,6 +305,6 @@ mod tests {
         // Far from the plane.
         let mut far = block([2.0, 0.0, 4.0, 2.4], 0.02);
         far.iter_mut().flatten().for_each(|p| p.z += 0.5);
-        assert_eq!(areas(&[left(), FlatObject::new(far)]), [960]);
+        assert_eq!(areas(&[left(), plate(far)]), [960]);
     }
 }

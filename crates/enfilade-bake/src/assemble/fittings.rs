@@ -6,7 +6,6 @@
 //! Each pair of a portal and a nearby object is examined on its own; a leaf that several portals claim goes to the best
 //! fit. `O(portals · objects)` comparisons of boxes, and `O(n log n)` in the triangles of objects near openings.
 
-mod opening;
 mod parts;
 mod split;
 mod swing;
@@ -15,12 +14,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, PortalKind, World};
 use enfilade_geom::scene::Mesh;
-use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Triangle, shells};
+use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Rectangle, Triangle, shells};
 use rayon::prelude::*;
-
-pub(super) use opening::Rectangle;
-pub(super) use parts::{DEEP, FULL, LEAST_DOOR};
-pub(super) use swing::WIDEST_TURN;
 
 use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
 use swing::Around;

@@ -4,12 +4,12 @@
 //! one is a door if it is as high as one and somebody can step through.
 
 use enfilade_cpg::PortalKind;
+use enfilade_geom::filler::{DEEPEST, LOWEST_DOOR};
 use enfilade_geom::scene::{Filling, Role};
-use enfilade_geom::{Aabb, DVec3, Ray, Triangle, is_rather_level, shells};
+use enfilade_geom::{Aabb, DVec3, Ray, Rectangle, Triangle, is_rather_level, shells};
 use rayon::prelude::*;
 
 use super::Cut;
-use super::fittings::{DEEP, LEAST_DOOR, Rectangle};
 use crate::complex::PartitionPortal;
 
 /// Least height of a parapet that makes an opening a window. [Units: wu]
@@ -77,7 +77,7 @@ impl<'a> Judge<'a> {
     /// Returns `true` if a window may be one pane of several: it does not say that it is a window, and is not as high as a person
     /// from the floor on.
     pub(super) fn is_pane(&self, p: &PartitionPortal) -> bool {
-        self.filling(p).is_none() && !(height(p) >= LEAST_DOOR && self.is_on_floor(p))
+        self.filling(p).is_none() && !(height(p) >= LOWEST_DOOR && self.is_on_floor(p))
     }
 
     /// Returns the kind of a portal.
@@ -100,7 +100,7 @@ impl<'a> Judge<'a> {
                 PortalKind::Open
             };
         }
-        if is_upright && height(p) >= LEAST_DOOR && self.is_stepped_through(p) {
+        if is_upright && height(p) >= LOWEST_DOOR && self.is_stepped_through(p) {
             PortalKind::Door
         } else {
             PortalKind::Window
@@ -122,8 +122,8 @@ impl<'a> Judge<'a> {
         }
         let corners: Vec<DVec3> = p.pieces.iter().flat_map(|w| w.points.clone()).collect();
         let opening = Rectangle::around(p.plane.normal, &corners);
-        let reach = Aabb::of_points(&corners).expanded(DEEP + REBATE);
-        let out = DVec3::new(REBATE, REBATE, DEEP);
+        let reach = Aabb::of_points(&corners).expanded(DEEPEST + REBATE);
+        let out = DVec3::new(REBATE, REBATE, DEEPEST);
         let limits = Aabb::new(opening.low - out, opening.high + out);
         let is_in = |b: &Aabb| limits.contains(b.min) && limits.contains(b.max);
         let near: Vec<&NamedShell> = (self.named.iter())

@@ -3,6 +3,7 @@
 use enfilade_geom::{Aabb, BoxTree, ConvexSolid, DVec3, Purse};
 use rayon::prelude::*;
 
+use crate::budget::WORK_A_LOOK;
 use crate::config::{Guide, Heuristic};
 
 use super::input::BspInput;
@@ -10,9 +11,6 @@ use super::leaves::Bsp;
 use super::tolerance::Tolerance;
 use super::tree::{self, Content, Tree};
 use super::{inside, leak, portals, shape, surfaces};
-
-/// Cost of finding if a leaf is matter, in units of [`Allowance`](enfilade_geom::Allowance).
-const WORK_A_LEAF: u64 = 10;
 
 /// Returns the number of distinct values; equal ones are adjacent.
 fn n_distinct(numbers: &[u32]) -> usize {
@@ -138,7 +136,7 @@ fn settle(
     let shapes = shape::shapes(tree, tolerance, purse);
     let contents = tree.contents.par_iter_mut().zip(&shapes);
     contents.for_each(|(content, shape)| {
-        if !purse.spend(WORK_A_LEAF) {
+        if !purse.spend(WORK_A_LOOK) {
             return;
         }
         match shape {

@@ -1,19 +1,56 @@
-//! Tests if the inside is closed, and finds the way out if it is not.
+//! Tests if the inside of a map is closed, and finds the way out if it is not: any path through the leaves of the tree, since
+//! a sealed map has none. In a building, which has doors, only the widest one says something ([`crate::leak`]).
 
 use std::collections::VecDeque;
 
-use enfilade_geom::scene::Scene;
+use enfilade_geom::scene::{Entity, Scene};
 use enfilade_geom::{ConvexSolid, DVec3, Purse};
 
 use crate::config::{Guide, Heuristic};
 
 use super::input::BspInput;
-use super::leak_path::LeakPath;
 use super::leaves::Bsp;
 use super::tree::Content;
 
+/// A path through open space from a point inside to the void.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeakPath {
+    /// Index of the point inside where it begins.
+    pub from: usize,
+    /// Its vertices, from that point to beyond the outermost surface. [Units: wu]
+    pub points: Vec<DVec3>,
+}
+
+/// Points that a text lists.
+const SHOWN: usize = 8;
+
+impl LeakPath {
+    /// Returns a sentence about it, without a remedy: the class of the entity in the scene, and the first points.
+    #[must_use]
+    pub fn says(&self, scene: &Scene) -> String {
+        let points = self.points.iter().take(SHOWN);
+        let shown: Vec<String> = points
+            .map(|p| format!("{:.2} {:.2} {:.2}", p.x, p.y, p.z))
+            .collect();
+        let class = points_of(scene).nth(self.from);
+        let class = class.map_or("an entity", |(entity, _)| &entity.class);
+        let more = if self.points.len() > SHOWN {
+            ", …"
+        } else {
+            ""
+        };
+        format!(
+            "the map leaks: {class} reaches the void in {} steps, by {}{more}",
+            self.points.len(),
+            shown.join(", "),
+        )
+    }
+}
+
+/// Leaves that a flood from inside reached.
 pub(super) struct Reached {
     pub(super) is_reached: Vec<bool>,
+    /// The way to the border, if it got there.
     pub(super) path: Option<LeakPath>,
 }
 
@@ -26,20 +63,9 @@ pub(super) fn reach(bsp: &Bsp<'_>, inside: &[DVec3]) -> Reached {
             neighbors[p.leaves[side] as usize].push((p.leaves[1 - side], i as u32));
         }
     }
-    // The tree leaves space around the surfaces, so the vertices of its box are in the void.
-    let b = &bsp.tree.bounds;
     let mut is_void = vec![false; n];
-    let margin = b.size() * 1e-4;
-    for k in 0..8 {
-        let pick = |bit: i32, lo: f64, hi: f64| if k & bit == 0 { lo } else { hi };
-        let (lo, hi) = (b.min + margin, b.max - margin);
-        let corner = DVec3::new(
-            pick(1, lo.x, hi.x),
-            pick(2, lo.y, hi.y),
-            pick(4, lo.z, hi.z),
-        );
-        let leaf = bsp.tree.leaf_of(corner) as usize;
-        is_void[leaf] = bsp.is_open[leaf];
+    for leaf in bsp.outer_leaves() {
+        is_void[leaf as usize] = bsp.is_open[leaf as usize];
     }
     let mut via: Vec<Option<(u32, u32)>> = vec![None; n];
     let mut start: Vec<Option<usize>> = vec![None; n];
@@ -100,14 +126,15 @@ fn way_to(
     LeakPath { from, points }
 }
 
+/// Returns the entities that have a position but no shape, which are known to be inside.
+fn points_of(scene: &Scene) -> impl Iterator<Item = (&Entity, DVec3)> {
+    let entities = scene.entities.iter().filter(|e| e.object.is_none());
+    entities.filter_map(|e| Some((e, e.position?)))
+}
+
 /// Returns positions known to be inside: those of entities that have no shape.
 pub(super) fn inside_of(scene: &Scene) -> Vec<DVec3> {
-    scene
-        .entities
-        .iter()
-        .filter(|e| e.object.is_none())
-        .filter_map(|e| e.position)
-        .collect()
+    points_of(scene).map(|(_, at)| at).collect()
 }
 
 /// Returns the path from an entity of the scene to the void; `None` if the solids close every path, and for

@@ -1,8 +1,8 @@
 //! The leaves of a tree, and the portals between them.
 
-use enfilade_geom::{Purse, Winding};
+use enfilade_geom::{Aabb, Purse, Winding};
 
-use super::leak_path::LeakPath;
+use super::leak::LeakPath;
 use super::portals::LeafPortal;
 use super::tolerance::Tolerance;
 use super::tree::{self, Content, Tree};
@@ -106,10 +106,18 @@ impl Bsp<'_> {
         self.drop_closed_portals();
     }
 
-    /// Returns a leaf of the air around everything, at a vertex of the box.
-    pub(super) fn outer_leaf(&self) -> u32 {
+    /// Returns the leaves of the air around everything, at the vertices of the box: the tree leaves space around the
+    /// surfaces.
+    pub(super) fn outer_leaves(&self) -> [u32; 8] {
         let b = &self.tree.bounds;
-        self.tree.leaf_of(b.min + b.size() * 1e-4)
+        let margin = b.size() * 1e-4;
+        let inner = Aabb::new(b.min + margin, b.max - margin);
+        inner.corners().map(|p| self.tree.leaf_of(p))
+    }
+
+    /// Returns one of them.
+    pub(super) fn outer_leaf(&self) -> u32 {
+        self.outer_leaves()[0]
     }
 
     /// Returns, for each plane, `true` if it may be a wall's: with triangles, if it holds two or more. Each triangle

@@ -34,7 +34,6 @@ mod input;
 mod inside;
 mod lattice;
 mod leak;
-mod leak_path;
 mod leaves;
 mod portals;
 mod propose;
@@ -47,8 +46,7 @@ mod tree;
 pub use crate::config::{BspConfig, Guide, Heuristic, Rooms};
 pub use grouping::Grouping;
 pub use input::BspInput;
-pub use leak::find_leak;
-pub use leak_path::LeakPath;
+pub use leak::{LeakPath, find_leak};
 pub use leaves::{Bsp, BspCounts};
 pub(crate) use propose::propose;
 

@@ -210,7 +210,7 @@ fn add_details(old: &World, scene: &Scene, detail_of: &[Option<u32>], boxes: &mu
     }
     let plates = (!changed.is_empty()).then(|| plates(scene));
     for plate in plates.into_iter().flatten() {
-        let b = Aabb::of_points(plate.as_flattened());
+        let b = plate.aabb;
         let lies_in = |t: &Triangle| Aabb::of_points(t).overlaps(&b);
         if changed.iter().any(lies_in) {
             boxes.push(b);

@@ -2,6 +2,8 @@
 
 use enfilade_geom::{Allowance, Bvh, DVec3, Ray};
 
+use crate::budget::WORK_A_LOOK;
+
 /// Sample points in a space, from which rays tell if it is a room.
 pub(crate) const POINTS: usize = 32;
 /// Returns directions along the axes and diagonals, slightly off, so that rays do not run along edges.
@@ -38,13 +40,10 @@ pub(crate) fn is_inside(surfaces: &Bvh, p: DVec3) -> bool {
         })
 }
 
-/// Cost of a ray, in units of [`Allowance`].
-pub(crate) const WORK_A_RAY: u64 = 10;
-
 /// Returns the number of rays that hit a back face, and of rays that hit anything.
 pub(crate) fn count_backs(bvh: &Bvh, points: &[DVec3], allowance: &Allowance) -> (f64, f64) {
     let (mut back, mut all) = (0.0, 0.0);
-    for ray in rays_from(points).take_while(allowance.each(WORK_A_RAY)) {
+    for ray in rays_from(points).take_while(allowance.each(WORK_A_LOOK)) {
         if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
             all += 1.0;
             back += f64::from(u8::from(!hit.front));

@@ -31,7 +31,7 @@ mod stairs;
 mod weld;
 
 pub(crate) use backs::{POINTS, count_backs, is_inside, rays_from};
-pub(crate) use blockers::{MAX_THICKNESS, plates, thin_direction};
+pub(crate) use blockers::{Plate, plates};
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
 pub(crate) use lattice::{Jambs, connected_count, rim_share};

@@ -11,13 +11,11 @@ use super::settle::settle;
 use super::site::{Site, is_bare, sites};
 use super::slabs::slab_heights;
 use super::stairs::find_stairs;
+use crate::budget::WORK_A_LOOK;
 use crate::{BakeConfig, BakeError, Method, SmallestHole};
 
 /// Label of the space around the building.
 pub(crate) const OUTDOORS: u32 = 1;
-
-/// Cost of sorting a triangle, in units of [`Allowance`].
-const WORK_A_TRIANGLE: u64 = 20;
 
 /// Triangles that lie in the border of a box are in it. [Units: wu]
 const ON_BORDER: f64 = 1e-3;
@@ -79,7 +77,7 @@ impl<'a> Structure<'a> {
         allowance: &'a Allowance,
     ) -> Result<Self, BakeError> {
         let (mut sources, mut triangles) = structural_triangles(scene);
-        allowance.spend(WORK_A_TRIANGLE * triangles.len() as u64);
+        allowance.spend(WORK_A_LOOK * triangles.len() as u64);
         let misfit = misfit(&triangles, &Bvh::build(&triangles), allowance);
         let reach = config.smallest_hole.reach(misfit);
         // Brushes are exact.
@@ -160,11 +158,7 @@ impl<'a> Structure<'a> {
     /// Returns the triangles of detail objects that may close an opening, in frame coordinates: shut door leaves,
     /// panes. `surfaces` hold their rims.
     pub(crate) fn blockers(&self, surfaces: &Bvh) -> Vec<Triangle> {
-        let plates = plates(self.scene);
-        let framed = plates
-            .iter()
-            .map(|p| self.frame.triangles_to_grid(p).into_owned());
-        without_open_leaves(framed.collect(), surfaces).concat()
+        without_open_leaves(&plates(self.scene), self.frame, surfaces)
     }
 
     /// Drops what only builders need, once their results are back in scene coordinates.

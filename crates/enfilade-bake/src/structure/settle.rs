@@ -20,9 +20,7 @@ use rayon::prelude::*;
 
 use super::sheets::Sheets;
 use super::weld::PointMesh;
-
-/// Cost of welding and moving a vertex, in units of [`Allowance`].
-const WORK_A_VERTEX: u64 = 20;
+use crate::budget::WORK_A_LOOK;
 
 /// Moves the vertices of triangles that miss each other by up to `reach`, each by about half of that, at most twice.
 /// [Units: wu]
@@ -35,7 +33,7 @@ pub(crate) fn settle(
     closes_gaps: bool,
     allowance: &Allowance,
 ) {
-    if !allowance.spend(WORK_A_VERTEX * 3 * triangles.len() as u64) {
+    if !allowance.spend(WORK_A_LOOK * 3 * triangles.len() as u64) {
         return;
     }
     let mesh = PointMesh::of(triangles, reach);

@@ -8,6 +8,7 @@
 //! are cut out of one.
 
 use super::units::Unit;
+use enfilade_geom::filler::{FillsHole, HELD, HoleFacts};
 use enfilade_geom::{
     Bvh, DVec3, Ray, Sets, Triangle, faces, is_rather_level, triangle_area_normal,
 };
@@ -19,15 +20,6 @@ const WALL: f64 = 0.6;
 const STEPS: [f64; 2] = [0.015, 0.05];
 /// Samples along each side.
 const SAMPLES: usize = 8;
-/// A side is held if this share of it is: the rest is a threshold, a shutter's box, a rounded end.
-const HELD: f64 = 0.7;
-/// Sides that must be held: the lintel and two jambs, or three sides of a window beside a pillar.
-const SIDES: usize = 3;
-/// A thing thinner than this share of the wall around it, holes counted, is not a piece of that wall,
-const THIN: f64 = 0.5;
-/// nor another wall if thinner than this: the thinnest partitions, set between columns and under beams, are
-/// thicker, and leaves are 4 to 6 cm. [Units: wu]
-pub(super) const LEAF: f64 = 0.07;
 /// Rays along each edge of the thing's face.
 const GRID: usize = 5;
 /// Depth of the air before and behind it: a thing that hangs on a wall has none behind it. [Units: wu]
@@ -59,17 +51,10 @@ struct Hold {
 /// A thing that may fill an opening.
 struct Candidate {
     unit: u32,
-    /// Matter along its thin axis, averaged over its face. [Units: wu]
-    thickness: f64,
-    /// The same over the thinnest quarter of its face, holes not counted: a leaf or a pane without its frame. 0
-    /// for a mere frame. [Units: wu]
-    leaf: f64,
+    /// What is known of it without its surroundings.
+    own: HoleFacts,
     /// Matter that holds it at each sample of each side: left, right, below, above.
     sides: [Vec<Vec<Hold>>; 4],
-    /// Anything at all is there, on the left and on the right.
-    ends: [bool; 2],
-    /// It does not lie flat.
-    is_upright: bool,
 }
 
 /// Returns units that fill openings, each with the reason.
@@ -103,110 +88,72 @@ pub(super) fn fillers(
     let mut found = Vec::new();
     for group in groups {
         let members: Vec<&Candidate> = group.iter().map(|&i| &candidates[i as usize]).collect();
-        let held = Held::of(&members, &is_candidate);
+        let held = held(&members, &is_candidate);
         for c in members {
-            if let Some(why) = held.reason(c) {
-                let size = units[c.unit as usize].half * 2.0;
-                let text = format!(
-                    "fills an opening: {:.2} x {:.2} m, {:.2} m thick, {why}",
-                    size.y, size.z, size.x
-                );
-                found.push((c.unit, text));
-            }
+            let facts = c.own.held_as(&held);
+            let why = match facts.judge() {
+                Some(FillsHole::Thin) => format!(
+                    "the wall around it {:.2} m on {} sides",
+                    facts.wall,
+                    facts.n_sides()
+                ),
+                Some(FillsHole::Surrounded) => {
+                    format!("one wall goes round it on {} sides", facts.n_by_one)
+                }
+                None => continue,
+            };
+            let size = units[c.unit as usize].half * 2.0;
+            let text = format!(
+                "fills an opening: {:.2} x {:.2} m, {:.2} m thick, {why}",
+                size.y, size.z, size.x
+            );
+            found.push((c.unit, text));
         }
     }
     found
 }
 
-/// Sides on which its surroundings hold a group.
-struct Held {
-    sides: [bool; 4],
-    /// A leaf where two walls meet: a lintel and one jamb hold it, and another wall replaces the other jamb.
-    is_in_corner: bool,
-    /// Thickness of the thinnest of those sides. [Units: wu]
-    wall: f64,
-    /// Sides held by one connected surface.
-    n_by_one: usize,
-}
-
-impl Held {
-    /// Returns the sides on which walls hold a group. Samples on another candidate are inside the group.
-    fn of(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> Self {
-        let mut held = Self {
-            sides: [false; 4],
-            is_in_corner: false,
-            wall: f64::INFINITY,
-            n_by_one: 0,
-        };
-        let mut n_by: Vec<(u32, usize)> = Vec::new();
-        for side in 0..4 {
-            let mut n_outer = 0;
-            let mut walls = Vec::new();
-            let mut holders: Vec<(u32, usize)> = Vec::new();
-            for sample in members.iter().flat_map(|c| &c.sides[side]) {
-                let walls_here = sample.iter().filter(|h| !is_candidate(h.unit));
-                let thickness = walls_here.clone().map(|h| h.thickness).fold(0.0, f64::max);
-                if thickness == 0.0 && !sample.is_empty() {
-                    continue;
-                }
-                n_outer += 1;
-                if thickness > 0.0 {
-                    walls.push(thickness);
-                }
-                for h in walls_here {
-                    add_one(&mut holders, h.unit);
-                }
-            }
-            let enough = HELD * n_outer as f64;
-            if walls.is_empty() || (walls.len() as f64) < enough {
+/// Returns the sides on which walls hold a group. Samples on another candidate are inside the group.
+fn held(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> HoleFacts {
+    let mut held = HoleFacts {
+        ends: [0, 1].map(|k| members.iter().any(|c| c.own.ends[k])),
+        wall: f64::INFINITY,
+        ..HoleFacts::default()
+    };
+    let mut n_by: Vec<(u32, usize)> = Vec::new();
+    for side in 0..4 {
+        let mut n_outer = 0;
+        let mut walls = Vec::new();
+        let mut holders: Vec<(u32, usize)> = Vec::new();
+        for sample in members.iter().flat_map(|c| &c.sides[side]) {
+            let walls_here = sample.iter().filter(|h| !is_candidate(h.unit));
+            let thickness = walls_here.clone().map(|h| h.thickness).fold(0.0, f64::max);
+            if thickness == 0.0 && !sample.is_empty() {
                 continue;
             }
-            held.sides[side] = true;
-            walls.sort_by(f64::total_cmp);
-            held.wall = held.wall.min(walls[walls.len() / 2]);
-            for (unit, n) in holders {
-                if n as f64 >= enough {
-                    add_one(&mut n_by, unit);
-                }
+            n_outer += 1;
+            if thickness > 0.0 {
+                walls.push(thickness);
+            }
+            for h in walls_here {
+                add_one(&mut holders, h.unit);
             }
         }
-        held.n_by_one = n_by.iter().map(|h| h.1).max().unwrap_or(0);
-        let [left, right, _, above] = held.sides;
-        let has_end = |k: usize| members.iter().any(|c| c.ends[k]);
-        held.is_in_corner = above && (left && has_end(1) || right && has_end(0));
-        held
-    }
-
-    fn n_sides(&self) -> usize {
-        self.sides.iter().filter(|&&is_held| is_held).count()
-    }
-
-    fn has_opening(&self, c: &Candidate) -> bool {
-        let [left, right, ..] = self.sides;
-        let is_leaf = c.is_upright && c.leaf <= LEAF;
-        self.n_sides() >= SIDES || is_leaf && (self.is_in_corner || left && right)
-    }
-
-    fn is_thin(&self, c: &Candidate) -> bool {
-        c.leaf <= LEAF && c.thickness <= THIN * self.wall
-    }
-
-    fn reason(&self, c: &Candidate) -> Option<String> {
-        if !self.has_opening(c) {
-            None
-        } else if self.is_thin(c) {
-            Some(format!(
-                "the wall around it {:.2} m on {} sides",
-                self.wall,
-                self.n_sides()
-            ))
-        } else if self.n_by_one >= SIDES && c.thickness <= self.wall + STEPS[1] {
-            // With a sill or a shutter it may stand out a little; a thing through a wall is not a filler.
-            Some(format!("one wall goes round it on {} sides", self.n_by_one))
-        } else {
-            None
+        let enough = HELD * n_outer as f64;
+        if walls.is_empty() || (walls.len() as f64) < enough {
+            continue;
+        }
+        held.sides[side] = true;
+        walls.sort_by(f64::total_cmp);
+        held.wall = held.wall.min(walls[walls.len() / 2]);
+        for (unit, n) in holders {
+            if n as f64 >= enough {
+                add_one(&mut n_by, unit);
+            }
         }
     }
+    held.n_by_one = n_by.iter().map(|h| h.1).max().unwrap_or(0);
+    held
 }
 
 fn add_one(counts: &mut Vec<(u32, usize)>, key: u32) {
@@ -224,20 +171,21 @@ fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Ca
         return None;
     }
     let sides = [0, 1, 2, 3].map(|side| holds(unit, index, side, around));
-    let is_upright = !is_rather_level(unit.axes[0]);
     let (thickness, leaf) = thickness_between_air(unit, index, around)?;
-    let candidate = Candidate {
-        unit: index,
+    let own = HoleFacts {
+        is_upright: !is_rather_level(unit.axes[0]),
         thickness,
         leaf,
-        sides,
         ends: [-1.0, 1.0].map(|sign| is_at_end(unit, index, sign, around)),
-        is_upright,
+        ..HoleFacts::default()
     };
-    // Anything may hold it here; holders that are candidates themselves are left out once all are known.
-    let held = Held::of(&[&candidate], &|_| false);
-    let may_be = held.is_thin(&candidate) || held.n_by_one >= SIDES - 1;
-    (held.has_opening(&candidate) && may_be).then_some(candidate)
+    let unit = index;
+    let candidate = Candidate { unit, own, sides };
+    // Anything may hold it here; holders that are candidates themselves are left out once all are known, and one wall may
+    // then hold one side more.
+    let mut facts = own.held_as(&held(&[&candidate], &|_| false));
+    facts.n_by_one += 1;
+    facts.judge().map(|_| candidate)
 }
 
 /// Returns the matter that holds a side, at each of its samples.

@@ -3,10 +3,10 @@
 //! The shells of such an object are judged one by one, as if each were an object. Those found to be detail become
 //! objects of their own; the rest stays together.
 
+use enfilade_geom::filler::LEAF;
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Sets, Triangle};
 
-use super::fillers::LEAF;
 use super::furniture::{BAR, LONG};
 use super::units::for_near;
 use super::{DEFAULT, SMALL, Shape, is_by_name, is_open};

@@ -2,21 +2,14 @@
 
 use std::collections::HashMap;
 
-use enfilade_geom::{Aabb, DVec3, Sets, Triangle, faces, is_rather_level, triangle_area_normal};
+use enfilade_geom::filler::NARROWEST;
+use enfilade_geom::{Aabb, DVec3, Rectangle, Sets, Triangle};
 
 /// Parts nearer than this are one unit: a handle and its leaf, the triangles of a mesh without shared vertices.
 /// [Units: wu]
 const TOGETHER: f64 = 0.01;
 /// An object of more parts is one unit: comparing parts takes quadratic time at worst.
 const MOST_PARTS: usize = 2_000;
-/// Normals that differ by less than 11° count as one direction.
-const ONE_DIRECTION: f64 = 0.98;
-/// Most directions kept, so that a sphere costs no more than a box.
-const MOST_DIRECTIONS: usize = 64;
-
-/// Shortest edge of a door or window. [Units: wu]
-const LEAST_EDGE: f64 = 0.35;
-
 /// Reach of casings, sills and handles beyond their unit: across a thick wall, and along it by the width of a
 /// board. [Units: wu]
 const BESIDE: DVec3 = DVec3::new(0.6, 0.2, 0.2);
@@ -36,7 +29,7 @@ pub(super) struct Unit {
 impl Unit {
     /// Returns `true` if it is too small for a door or a window.
     pub(super) fn is_small(&self) -> bool {
-        2.0 * self.half.y.min(self.half.z) < LEAST_EDGE
+        2.0 * self.half.y.min(self.half.z) < NARROWEST
     }
 
     /// Returns `true` if the other is a casing, a sill or a handle of this one: before its face, in the same
@@ -86,14 +79,10 @@ pub(super) fn units_of(object: u32, first: u32, triangles: &[Triangle]) -> Vec<U
     members
         .into_iter()
         .map(|own| {
-            let own_triangles = own.iter().map(|&i| &triangles[i as usize]);
-            let (center, axes, half) = own_box(&own_triangles);
+            let all: Vec<Triangle> = own.iter().map(|&i| triangles[i as usize]).collect();
             Unit {
-                object,
                 triangles: own.iter().map(|i| first + i).collect(),
-                center,
-                axes,
-                half,
+                ..whole(object, &all)
             }
         })
         .collect()
@@ -111,30 +100,22 @@ pub(super) fn parts_of(triangles: &[Triangle]) -> Vec<Unit> {
 
 /// Returns an object as one unit, without its triangles.
 pub(super) fn whole(object: u32, triangles: &[Triangle]) -> Unit {
-    let (center, axes, half) = own_box(&triangles.iter());
-    Unit {
-        object,
-        triangles: Vec::new(),
-        center,
-        axes,
-        half,
-    }
+    in_box(object, &Rectangle::of(triangles))
 }
 
 /// Returns an object as one unit with an upright box: the third axis is up.
 pub(super) fn upright(object: u32, triangles: &[Triangle]) -> Unit {
-    let side = directions(triangles.iter())
-        .into_iter()
-        .find(|d| !is_rather_level(d.0))
-        .map_or(DVec3::X, |d| canonical(d.0.with_y(0.0).normalize()));
-    let axes = [side, DVec3::Y.cross(side), DVec3::Y];
-    let (center, half) = box_along(axes, &triangles.iter());
+    in_box(object, &Rectangle::upright(triangles))
+}
+
+fn in_box(object: u32, around: &Rectangle) -> Unit {
+    let size = around.size();
     Unit {
         object,
         triangles: Vec::new(),
-        center,
-        axes,
-        half,
+        center: around.center(),
+        axes: [around.normal, around.across, around.up],
+        half: 0.5 * DVec3::new(size.z, size.x, size.y),
     }
 }
 
@@ -159,88 +140,6 @@ pub(super) fn for_near(boxes: &[Aabb], mut on_pair: impl FnMut(u32, u32)) {
                 on_pair(a, b);
             }
         }
-    }
-}
-
-/// Returns the directions that the surface faces, up to sign, largest area first.
-fn directions<'t>(triangles: impl Iterator<Item = &'t Triangle>) -> Vec<(DVec3, f64)> {
-    let mut found: Vec<(DVec3, f64)> = Vec::new();
-    for t in triangles {
-        let n = triangle_area_normal(t);
-        let area = n.length();
-        let Some(n) = n.try_normalize() else { continue };
-        if let Some(d) = found.iter_mut().find(|d| d.0.dot(n).abs() > ONE_DIRECTION) {
-            d.1 += area;
-        } else if found.len() < MOST_DIRECTIONS {
-            found.push((n, area));
-        }
-    }
-    found.sort_by(|a, b| b.1.total_cmp(&a.1));
-    found
-}
-
-fn extent<'t>(d: DVec3, triangles: impl Iterator<Item = &'t Triangle>) -> (f64, f64) {
-    triangles
-        .flatten()
-        .map(|p| d.dot(*p))
-        .fold((f64::MAX, f64::MIN), |(lo, hi), t| (lo.min(t), hi.max(t)))
-}
-
-/// Returns the center of the box along three axes, and half its edges.
-fn box_along<'t>(
-    axes: [DVec3; 3],
-    triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
-) -> (DVec3, DVec3) {
-    let mut center = DVec3::ZERO;
-    let half = axes.map(|d| {
-        let (lo, hi) = extent(d, triangles.clone());
-        center += d * (0.5 * (lo + hi));
-        0.5 * (hi - lo)
-    });
-    (center, DVec3::from_array(half))
-}
-
-/// Returns center, axes and half edges of the box along the directions that most of the surface faces.
-fn own_box<'t>(
-    triangles: &(impl Iterator<Item = &'t Triangle> + Clone),
-) -> (DVec3, [DVec3; 3], DVec3) {
-    let directions = directions(triangles.clone());
-    // The thinnest of the three directions with the largest area.
-    let width = |d: &DVec3| {
-        let (lo, hi) = extent(*d, triangles.clone());
-        hi - lo
-    };
-    let across = directions
-        .iter()
-        .take(3)
-        .map(|d| d.0)
-        .min_by(|a, b| width(a).total_cmp(&width(b)))
-        .unwrap_or(DVec3::Y);
-    let across = canonical(across);
-    let level = if across.y.abs() > ONE_DIRECTION {
-        // A flat thing turns with its sides.
-        directions
-            .iter()
-            .filter(|d| !faces(d.0, across))
-            .find_map(|d| (d.0 - across * across.dot(d.0)).try_normalize())
-            .unwrap_or(DVec3::X)
-    } else {
-        DVec3::Y.cross(across).normalize()
-    };
-    let axes = [across, level, across.cross(level)];
-    let (center, half) = box_along(axes, triangles);
-    (center, axes, half)
-}
-
-/// Returns a direction or its reverse, the same for both.
-fn canonical(d: DVec3) -> DVec3 {
-    /// Largest component that rounding makes of zero.
-    const NONE: f64 = 1e-6;
-    let first = [d.x, d.z, d.y].into_iter().find(|c| c.abs() > NONE);
-    if first.is_some_and(|c| c < 0.0) {
-        -d
-    } else {
-        d
     }
 }
 

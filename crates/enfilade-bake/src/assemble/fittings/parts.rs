@@ -7,10 +7,8 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{Portal, PortalKind};
-use enfilade_geom::{Aabb, DVec3, Triangle, is_rather_level};
-
-use super::opening::{Mask, Rectangle};
-use crate::structure::{MAX_THICKNESS, thin_direction};
+use enfilade_geom::filler::{DEEPEST, FILLED, Filler, FillerFacts, LEAF, LOWEST_DOOR};
+use enfilade_geom::{Aabb, DVec3, Mask, Rectangle, Triangle};
 
 /// Height of a leaf over that of its opening; less if a light is above the door, more if it overlaps the frame.
 const HEIGHT: [f64; 2] = [0.7, 1.1];
@@ -18,22 +16,14 @@ const HEIGHT: [f64; 2] = [0.7, 1.1];
 const WIDTH: [f64; 2] = [0.2, 1.1];
 /// Width of an open leaf over that of its opening, for a single leaf and for one of two.
 const OPEN_WIDTHS: [[f64; 2]; 2] = [[0.8, 1.1], [0.4, 0.55]];
-/// Least share of its own rectangle that a body covers; a ring covers less.
-pub(crate) const FULL: f64 = 0.6;
 /// A shut leaf is tilted from the opening's plane by less: the sine of 3 degrees.
 const SHUT: f64 = 0.05;
 /// Largest angle of an open leaf: beyond it, the object would lie along the wall, as a cupboard does. [Units: degrees]
 const MOST_TURNED: f64 = 130.0;
-/// Greatest thickness of an open leaf: a thicker object is a cupboard. [Units: wu]
-const THICK: f64 = 0.1;
 /// Greatest distance from the edge of a leaf or frame to the jamb, sill or head. [Units: wu]
 const OFF: f64 = 0.15;
 /// Greatest distance by which an object on a leaf reaches over its edges. [Units: wu]
 const HAIR: f64 = 0.01;
-/// Greatest distance of a leaf or frame from the portal's plane, within a wall. [Units: wu]
-pub(crate) const DEEP: f64 = 0.4;
-/// Least height of a door: a lower opening with a pane or leaf is a window. [Units: wu]
-pub(crate) const LEAST_DOOR: f64 = 1.5;
 /// Range of widths of openings that have doors. [Units: wu]
 const DOOR_WIDTH: [f64; 2] = [0.5, 6.0];
 /// Least share of a door that an object covers to be its leaf if none of its shells is a plate.
@@ -95,10 +85,18 @@ pub(super) struct Aperture {
 impl Aperture {
     /// Returns `None` if the portal is a crack or not upright.
     pub(super) fn of(portal: &Portal) -> Option<Self> {
-        let around = Rectangle::of_portal(portal).filter(|_| portal.kind != PortalKind::Crack)?;
+        if portal.kind == PortalKind::Crack || portal.is_level() {
+            return None;
+        }
+        let point = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+        let points: Vec<DVec3> = portal.pieces.iter().flatten().map(|p| point(*p)).collect();
+        let around = Rectangle::around(point(portal.normal), &points);
+        let fans = portal.pieces.iter().flat_map(|piece| {
+            (2..piece.len()).map(move |i| [piece[0], piece[i - 1], piece[i]].map(point))
+        });
         Some(Self {
             kind: portal.kind,
-            open: around.open(portal),
+            open: around.mask(fans),
             around,
         })
     }
@@ -106,7 +104,7 @@ impl Aperture {
     /// Returns `true` if a door fits into it, or is in it: hatches and gates are lower, and say that they are doors.
     fn takes_door(&self) -> bool {
         let size = self.around.size();
-        let is_sized = size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LEAST_DOOR;
+        let is_sized = size.x >= DOOR_WIDTH[0] && size.x <= DOOR_WIDTH[1] && size.y >= LOWEST_DOOR;
         is_sized || self.kind == PortalKind::Door
     }
 
@@ -117,9 +115,9 @@ impl Aperture {
         let out = if self.takes_door() {
             r.size().x + OFF
         } else {
-            DEEP
+            DEEPEST
         };
-        let grow = DVec3::new(out.min(DOOR_WIDTH[1]), OFF, out.max(DEEP));
+        let grow = DVec3::new(out.min(DOOR_WIDTH[1]), OFF, out.max(DEEPEST));
         let (low, high) = (r.low - grow, r.high + grow);
         Aabb::new(low, high)
             .corners()
@@ -133,51 +131,37 @@ struct Shell<'t> {
     number: u32,
     triangles: Vec<&'t Triangle>,
     around: Rectangle,
-    /// Share of its own rectangle that it covers.
-    share: f64,
+    facts: FillerFacts,
+    /// Share of its foot that it covers.
     foot: f64,
 }
 
 impl<'t> Shell<'t> {
     fn of(number: u32, triangles: Vec<&'t Triangle>) -> Self {
         let owned: Vec<Triangle> = triangles.iter().map(|t| **t).collect();
-        let normal = thin_direction(&owned);
-        let corners: Vec<DVec3> = owned.iter().flatten().copied().collect();
-        let flat = DVec3::new(normal.x, 0.0, normal.z);
-        // A horizontal shell is not a door plate, whatever the direction of view.
-        let normal = if is_rather_level(normal) {
-            DVec3::Z
-        } else {
-            flat
-        };
-        let seen_along = |n: DVec3| Rectangle::around(n.normalize(), &corners);
-        let (facing, aside) = (seen_along(normal), seen_along(DVec3::Y.cross(normal)));
-        // Jambs make up most of a frame's surface; its shape shows in the direction from which it is widest.
-        let is_deep = aside.size().z < facing.size().z;
-        let around = if is_deep { aside } else { facing };
-        let mask = around.mask(owned.iter().copied());
+        let around = Rectangle::upright(&owned);
+        let mask = around.mask(owned);
         Self {
             number,
             triangles,
-            share: mask.share(),
+            facts: FillerFacts::of(&around, &mask),
             foot: mask.share_at_foot(),
             around,
         }
     }
 
     fn is_body(&self, opening: &Rectangle) -> bool {
-        let (own, size) = (self.around.size(), opening.size());
+        let share = self.facts.size / opening.size();
         let fits = |x: f64, [least, most]: [f64; 2]| x >= least && x <= most;
-        own.z <= MAX_THICKNESS
-            && fits(own.y / size.y, HEIGHT)
-            && fits(own.x / size.x, WIDTH)
-            && self.share >= FULL
+        matches!(self.facts.judge(), Filler::Leaf | Filler::Pane)
+            && fits(share.y, HEIGHT)
+            && fits(share.x, WIDTH)
     }
 
-    /// Returns `true` if it runs around something as high as the opening.
+    /// Returns `true` if it runs around something as high as the opening, however deep it is.
     fn is_ring(&self, opening: &Rectangle) -> bool {
-        let (own, size) = (self.around.size(), opening.size());
-        own.y >= HEIGHT[0] * size.y && own.x >= WIDTH[0] * size.x && self.share < FULL
+        let share = self.facts.size / opening.size();
+        share.y >= HEIGHT[0] && share.x >= WIDTH[0] && self.facts.covered < FILLED
     }
 }
 
@@ -202,9 +186,9 @@ pub(super) fn roles(opening: &Aperture, object: &InShells<'_>) -> Roles {
     let bounds = all()
         .flatten()
         .fold(Aabb::EMPTY, |b, p| b.including(around.place(p)));
-    let is_within_wall = bounds.min.z >= around.low.z - DEEP
-        && bounds.max.z <= around.high.z + DEEP
-        && bounds.size().z <= MAX_THICKNESS + DEEP;
+    let is_within_wall = bounds.min.z >= around.low.z - DEEPEST
+        && bounds.max.z <= around.high.z + DEEPEST
+        && bounds.size().z <= 2.0 * DEEPEST;
     let covered = opening.open.share_in(&around.mask(all()));
     if opening.takes_door() && opening.kind != PortalKind::Window {
         roles.leaves = leaves(opening, &near);
@@ -319,7 +303,7 @@ fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
     let at = r.place(center);
     let z = (r.low.z + r.high.z) * 0.5;
     let is_flat = own.across.dot(r.normal).abs() < SHUT;
-    if is_flat && at.x > r.low.x && at.x < r.high.x && (at.z - z).abs() <= DEEP {
+    if is_flat && at.x > r.low.x && at.x < r.high.x && (at.z - z).abs() <= DEEPEST {
         let covered = opening
             .open
             .share_in(&r.mask(body.triangles.iter().map(|t| **t)));
@@ -333,7 +317,7 @@ fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
         share >= least && share <= most
     };
     let is_on_sill = (own.low.y - r.low.y).abs() <= OFF;
-    if own.size().z > THICK || !OPEN_WIDTHS.into_iter().any(fits) || !is_on_sill {
+    if own.size().z > LEAF || !OPEN_WIDTHS.into_iter().any(fits) || !is_on_sill {
         return None;
     }
     let ends = [-0.5, 0.5].map(|k| center + own.across * (k * width));
@@ -342,7 +326,7 @@ fn pose(opening: &Aperture, body: &Shell) -> Option<(Pose, f64)> {
         for (jamb, sign) in [(r.low.x, 1.0), (r.high.x, -1.0)] {
             let p = r.place(end);
             let off = (p.x - jamb).abs();
-            let is_at_jamb = off <= OFF + own.size().z && (p.z - z).abs() <= DEEP;
+            let is_at_jamb = off <= OFF + own.size().z && (p.z - z).abs() <= DEEPEST;
             let angle = turn(r.across * sign, far - end);
             let turned = angle.abs().to_degrees();
             if is_at_jamb && turned <= MOST_TURNED && best.is_none_or(|(o, _)| off < o) {
@@ -389,7 +373,7 @@ fn is_frame(ring: &Shell, rings: &[&Shell]) -> bool {
     };
     let is_inner = rings.iter().any(|r| lies_in(ring, r));
     let is_outer = rings.iter().any(|r| lies_in(r, ring));
-    !is_inner && (is_outer || ring.foot < FULL)
+    !is_inner && (is_outer || ring.foot < FILLED)
 }
 
 /// Merges leaves that share their rails: a single piece cannot part in the middle.

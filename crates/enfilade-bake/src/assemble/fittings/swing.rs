@@ -8,14 +8,13 @@ use std::cmp::Ordering;
 use std::f64::consts::FRAC_PI_2;
 
 use enfilade_cpg::{CellId, Locator, Motion, MotionKind};
-use enfilade_geom::{Bvh, DMat4, DVec3};
+use enfilade_geom::{Bvh, DMat4, DVec3, Rectangle};
 
-use super::opening::Rectangle;
 use super::parts::{Leaf, Pose};
 
 /// A wider single leaf slides: hinged leaves are made up to 1.25 m wide (DIN 18101), plus some margin for other things
 /// in a model. [Units: wu]
-pub(crate) const WIDEST_TURN: f64 = 1.45;
+const WIDEST_TURN: f64 = 1.45;
 /// Least offset of a handle from the middle, as a share of half the leaf's width.
 const HANDLE: f64 = 0.3;
 /// A leaf is flush with one side of its frame if its middle is off the frame's by more. [Units: wu]
