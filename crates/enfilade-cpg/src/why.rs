@@ -85,6 +85,8 @@ pub enum Reason {
     Solid,
     /// No cell: too narrow for a room.
     Crevice,
+    /// A part of the outdoors, in doubt: it has a floor, a ceiling and walls on nearly all sides.
+    Sheltered,
 }
 
 /// A measured quantity.
@@ -117,6 +119,8 @@ pub enum Fact {
     Inside,
     /// Share of the rays from a space that meet a second surface right behind the first, as at a wall.
     Walled,
+    /// Share of the level rays from a space that meet something.
+    Shelter,
     /// Radius of the largest ball in a space. [Units: wu]
     Radius,
     /// Volume of a space. [Units: wu³]
@@ -172,7 +176,10 @@ impl Why {
     /// limit, a share of the limit; above it, a share of what is left up to 1 if the fact is a share, else of the fact.
     #[must_use]
     pub fn margin(&self) -> f32 {
-        if matches!(self.reason, Reason::Unjoined | Reason::Turned) {
+        if matches!(
+            self.reason,
+            Reason::Unjoined | Reason::Turned | Reason::Sheltered
+        ) {
             return 0.0;
         }
         self.comparison().map_or(1.0, |(fact, value, limit)| {
@@ -239,6 +246,7 @@ impl Reason {
             Self::Enclosed | Self::Solid => Some(Fact::Inside),
             Self::Facing | Self::Turned => Some(Fact::Backs),
             Self::Crevice => Some(Fact::Radius),
+            Self::Sheltered => Some(Fact::Shelter),
             Self::Plane
             | Self::Gap
             | Self::Kept
@@ -298,6 +306,7 @@ impl Reason {
             Self::Shell => "shell",
             Self::Solid => "solid",
             Self::Crevice => "crevice",
+            Self::Sheltered => "sheltered",
         }
     }
 
@@ -339,6 +348,9 @@ impl Reason {
             Self::Shell => "a room: closed shells without openings are the whole scene",
             Self::Solid => "no cell: the inside of a solid, by the backs of the surfaces around it",
             Self::Crevice => "no cell: too narrow for a room",
+            Self::Sheltered => {
+                "outdoors, in doubt: a space with a floor, a ceiling and walls on nearly all sides"
+            }
         }
     }
 }
@@ -375,6 +387,7 @@ impl Fact {
             Self::Backs => "backs",
             Self::Inside => "inside",
             Self::Walled => "walled",
+            Self::Shelter => "shelter",
             Self::Radius => "radius",
             Self::Volume => "volume",
         }
@@ -397,6 +410,7 @@ impl Fact {
             Self::Backs => ("share of rays that meet backs", ""),
             Self::Inside => ("evidence for the inside of a solid", ""),
             Self::Walled => ("share of rays that meet a wall of two faces", ""),
+            Self::Shelter => ("share of level rays that meet something", ""),
             Self::Radius => ("largest ball", " m"),
             Self::Volume => ("volume", " m³"),
         }

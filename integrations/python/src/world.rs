@@ -50,7 +50,7 @@ type SparseRows<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i32>>);
 type AboutTables = (Vec<(String, f64)>, Vec<(String, String)>);
 
 /// The reason of a decision, its margin, its limit, its facts by name, and all in words.
-type Told = (
+type ToldWhy = (
     &'static str,
     f32,
     Option<f32>,
@@ -254,19 +254,19 @@ impl World {
     }
 
     /// Returns the decisions about each cell.
-    fn cell_whys(&self) -> Vec<Vec<Told>> {
+    fn cell_whys(&self) -> Vec<Vec<ToldWhy>> {
         let cells = self.world.graph.cells.iter();
         cells.map(|c| c.why.iter().map(told).collect()).collect()
     }
 
     /// Returns the decisions about each portal.
-    fn portal_whys(&self) -> Vec<Vec<Told>> {
+    fn portal_whys(&self) -> Vec<Vec<ToldWhy>> {
         let portals = self.world.graph.portals.iter();
         portals.map(|p| p.why.iter().map(told).collect()).collect()
     }
 
     /// Returns points of places, and the decision about each.
-    fn places(&self) -> Vec<([f32; 3], Told)> {
+    fn places(&self) -> Vec<([f32; 3], ToldWhy)> {
         let places = self.world.graph.places.iter();
         places.map(|place| (place.at, told(&place.why))).collect()
     }
@@ -324,7 +324,7 @@ impl World {
     }
 }
 
-fn told(why: &Why) -> Told {
+fn told(why: &Why) -> ToldWhy {
     let facts = why.facts.iter().map(|(fact, &value)| (fact.name(), value));
     (
         why.reason.name(),

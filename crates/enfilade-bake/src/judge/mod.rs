@@ -8,7 +8,9 @@
 mod opening;
 mod space;
 
-pub(crate) use opening::{FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge};
+pub(crate) use opening::{
+    FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge, why_parted, why_unjoined,
+};
 pub(crate) use space::{
-    BACKS, DOORWAY, EnclosedFacts, Facing, NARROW, SpaceFacts, is_crevice, why_open,
+    BACKS, DOORWAY, EnclosedFacts, Facing, LEAST_SHELTER, NARROW, SpaceFacts, is_crevice, why_open,
 };

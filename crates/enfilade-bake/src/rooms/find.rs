@@ -10,17 +10,17 @@ use enfilade_geom::{Allowance, DVec3, Triangle};
 use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
 use super::candidates::Openings;
-use super::flooded::Flooded;
 use super::forks::{is_curved, split_forks};
 use super::hollow::{Matter, find_matter};
 use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
 use super::low::join_low;
 use super::regions::Regions;
+use super::sheltered::sheltered;
 use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
 use crate::proposal::{FoundPlace, Proposal};
-use crate::structure::{Frame, Structure};
+use crate::structure::{Candidate, Frame, Structure};
 use crate::tubes::Walls;
 use crate::voxel::{DistanceField, Grid, Labels, SparseVolume};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
@@ -68,27 +68,18 @@ pub(crate) fn propose(
         context,
     )?;
     let Basins { labels, peaks, .. } = basins;
-    let matter = find_matter(
-        &grid,
-        &labels,
-        &regions,
-        &peaks,
-        &structure.bvh,
-        config.merge.min_radius,
-        allowance,
-    );
+    let (bvh, least) = (&structure.bvh, config.merge.min_radius);
+    let matter = find_matter(&grid, &labels, &regions, &peaks, bvh, least, allowance);
     notes.extend_from_slice(&matter.notes);
+    let sheltered = sheltered(&grid, &labels, &regions, bvh, allowance);
 
     context.begin(Stage::Candidates)?;
     let openings = Openings {
-        flooded: Flooded {
-            grid: &grid,
-            labels: &labels,
-            peaks: &peaks,
-            closures: Some(&shut),
-            slabs: &slabs,
-            allowance,
-        },
+        grid: &grid,
+        labels: &labels,
+        peaks: &peaks,
+        shut: &shut,
+        allowance,
         regions: &regions,
         closures: &closures,
         lids: &lids,
@@ -96,7 +87,7 @@ pub(crate) fn propose(
         hole: structure.hole.gap(),
         settings: &config.merge,
     };
-    let mut candidates = openings.candidates();
+    let candidates = openings.candidates();
     drop((closures, lids, shut));
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh, allowance);
     let not_air = (&matter.regions[..], &stairs);
@@ -107,21 +98,20 @@ pub(crate) fn propose(
     drop(labels);
     // From here on, everything is in scene coordinates.
     let frame = &structure.frame;
-    for candidate in &mut candidates {
-        candidate.winding = frame.winding_to_scene(&candidate.winding);
-    }
-    let voids = voids.into_iter().map(|(p, r)| (frame.to_scene(p), r));
-    let voids = voids.collect();
-    let joins = regions.joins.iter().map(|join| FoundPlace {
-        at: frame.to_scene(join.at),
-        why: join.why(&config.merge),
-    });
-    let places = joins.chain(matter.places(frame)).collect();
+    let spaces = matter.spaces.iter().chain(&sheltered);
+    let places = places_of(&regions, spaces, frame, config);
     let found = [n_occupied, basins.n_basins, candidates.len()];
     let counts = counts_of(&grid, frame, found);
     Ok(Proposal {
-        candidates,
-        voids,
+        candidates: (candidates.into_iter())
+            .map(|c| Candidate {
+                winding: frame.winding_to_scene(&c.winding),
+                ..c
+            })
+            .collect(),
+        voids: (voids.into_iter())
+            .map(|(p, region)| (frame.to_scene(p), region))
+            .collect(),
         places,
         whys: matter.whys,
         counts,
@@ -134,6 +124,25 @@ pub(crate) fn propose(
             ballots.count(&grid, frame),
         )
     })
+}
+
+/// Returns the close joins of regions, and `spaces` that are not rooms, in scene coordinates.
+fn places_of<'a>(
+    regions: &Regions,
+    spaces: impl Iterator<Item = &'a FoundPlace>,
+    frame: &Frame,
+    config: &BakeConfig,
+) -> Vec<FoundPlace> {
+    let joins = regions.joins.iter().map(|join| FoundPlace {
+        at: join.at,
+        why: join.why(&config.merge),
+    });
+    let all = joins.chain(spaces.cloned());
+    let placed = all.map(|place| FoundPlace {
+        at: frame.to_scene(place.at),
+        ..place
+    });
+    placed.collect()
 }
 
 /// Returns all structural triangles in the axes of the grid.

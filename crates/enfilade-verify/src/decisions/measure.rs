@@ -1,4 +1,4 @@
-//! What can be measured of the facts behind decisions, with code of its own.
+//! Facts behind decisions, measured with code of its own.
 
 use enfilade_cpg::CellId;
 use enfilade_geom::{Aabb, Bvh, DVec3, Ray};
@@ -105,7 +105,7 @@ fn headroom(subject: &Subject, cell: CellId, bounds: &Aabb, p: DVec3) -> f64 {
         if length < subject.eps {
             continue;
         }
-        // What stands within a cell, a table, divides no height.
+        // A table within a cell divides no height.
         run = if is_in(0.5 * (pair[0] + pair[1])) {
             run + length
         } else {
