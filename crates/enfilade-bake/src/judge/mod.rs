@@ -9,6 +9,4 @@ mod opening;
 mod space;
 
 pub(crate) use opening::{FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge};
-pub(crate) use space::{
-    BACKS, DOORWAY, EnclosedFacts, Facing, NARROW, SpaceFacts, is_crevice, why_open,
-};
+pub(crate) use space::{DOORWAY, EnclosedFacts, Facing, NARROW, SpaceFacts, why_open};

@@ -31,6 +31,8 @@ const WORK_A_FACE: u64 = 5;
 pub(super) struct Openings<'a> {
     pub(super) flooded: Flooded<'a>,
     pub(super) regions: &'a Regions,
+    /// The regions are final, and none of their openings is judged.
+    pub(super) are_final: bool,
     /// Voxels that door leaves and panes fill.
     pub(super) closures: &'a SparseVolume,
     pub(super) lids: &'a Lids,
@@ -119,6 +121,11 @@ impl Openings<'_> {
 
     /// Returns why two regions are apart at an opening.
     fn why(&self, pair: [u32; 2], front: &Front, facts: &RegionFacts) -> Why {
+        let area = (Fact::Area, front.opening.area);
+        if self.are_final {
+            let closed = (Fact::Closed, front.opening.closed);
+            return Why::given(Reason::Kept).with(&[area, closed]);
+        }
         let region_of = |label: u32| self.regions.region_of_basin[label as usize];
         let of_opening = OpeningFacts {
             is_between_storeys: false,
@@ -128,7 +135,6 @@ impl Openings<'_> {
         };
         let section = || section_of(self.flooded, self.settings, front, pair, &region_of);
         let verdict = judge(self.settings, of_opening, section);
-        let area = (Fact::Area, front.opening.area);
         if verdict.openness < 1.0 {
             return verdict.why(self.settings, true).with(&[area]);
         }
