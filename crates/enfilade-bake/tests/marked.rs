@@ -131,6 +131,7 @@ fn mirrors_hang_where_they_are_modeled_and_look_into_their_room() {
     // The rooms are as without them, and nothing counts as edited.
     assert_eq!(out.world.graph.portals, plain.world.graph.portals);
     assert_eq!(out.world.graph.cells.len(), plain.world.graph.cells.len());
+    assert!(out.world.graph.cells.iter().all(|c| !c.why.is_empty()));
     assert_eq!(out.world.graph.statistics.counts.get("edits"), None);
     assert_eq!(out.world.details.len(), 5);
 }

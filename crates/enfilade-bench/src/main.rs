@@ -13,6 +13,7 @@ mod constructive;
 mod facade;
 mod floors;
 mod growth;
+mod judge;
 mod living;
 mod measure;
 mod messy;
@@ -91,6 +92,17 @@ enum What {
     /// Rooms and doors as architects mean them: a row per figure, with the value that it must reach.
     /// Rows: first, more, each with rooms, doors, windows, extra, cells.
     Rooms(Chosen),
+    /// Decisions of a bake: numbers, code, answers to why, and how well the verdict knows which worlds are wrong. Rows: one labelling,
+    /// numbers, code, why, verdict.
+    Judge(Chosen),
+    /// Facts of all decisions of all buildings with truth, by rule; with `--csv` each of them, labelled right or wrong.
+    Facts {
+        #[command(flatten)]
+        chosen: Chosen,
+        /// Print each decision with its facts as CSV.
+        #[arg(long)]
+        csv: bool,
+    },
     /// Things, paths, sound, contacts and moving rooms: a row per figure, with the value that it must reach.
     Living(Chosen),
     /// Special portals, such as mirrors: a row per figure, with the value that it must reach.
@@ -252,6 +264,8 @@ fn run(args: &Cli) -> anyhow::Result<()> {
         What::LevelStep { step, scene } => return constructive::run_step(*step, scene),
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
         What::Rooms(chosen) => return rooms::bench_rooms(chosen, args.json),
+        What::Judge(chosen) => return judge::bench_judge(chosen, args.json),
+        What::Facts { chosen, csv } => return judge::bench_facts(chosen, *csv),
         What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
         What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
         What::PortalTextures(options) => return bench_portal_textures(options, args.json),

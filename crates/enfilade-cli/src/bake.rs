@@ -6,6 +6,7 @@ mod doorless;
 pub(crate) mod found;
 mod gaps;
 mod leak_path;
+mod reasons;
 pub(crate) mod settings;
 
 use std::collections::BTreeMap;
@@ -307,6 +308,9 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
                 stage.name()
             )?;
         }
+    }
+    if verbose {
+        reasons::write_reasons(&mut err, &baked.world.graph)?;
     }
     gaps::write_gaps(&mut err, baked, LEAKS_SHOWN)?;
     cracks::write_cracks(&mut Warned, baked)?;

@@ -85,6 +85,8 @@ pub enum Reason {
     Solid,
     /// No cell: too narrow for a room.
     Crevice,
+    /// A part of the outdoors, in doubt: it has a floor, a ceiling and walls on nearly all sides.
+    Sheltered,
 }
 
 /// A measured quantity.
@@ -117,6 +119,8 @@ pub enum Fact {
     Inside,
     /// Share of the rays from a space that meet a second surface right behind the first, as at a wall.
     Walled,
+    /// Share of the level rays from a space that meet something.
+    Shelter,
     /// Radius of the largest ball in a space. [Units: wu]
     Radius,
     /// Volume of a space. [Units: wu³]
@@ -172,7 +176,10 @@ impl Why {
     /// limit, a share of the limit; above it, a share of what is left up to 1 if the fact is a share, else of the fact.
     #[must_use]
     pub fn margin(&self) -> f32 {
-        if matches!(self.reason, Reason::Unjoined | Reason::Turned) {
+        if matches!(
+            self.reason,
+            Reason::Unjoined | Reason::Turned | Reason::Sheltered
+        ) {
             return 0.0;
         }
         self.comparison().map_or(1.0, |(fact, value, limit)| {
@@ -239,6 +246,7 @@ impl Reason {
             Self::Enclosed | Self::Solid => Some(Fact::Inside),
             Self::Facing | Self::Turned => Some(Fact::Backs),
             Self::Crevice => Some(Fact::Radius),
+            Self::Sheltered => Some(Fact::Shelter),
             Self::Plane
             | Self::Gap
             | Self::Kept
@@ -298,6 +306,7 @@ impl Reason {
             Self::Shell => "shell",
             Self::Solid => "solid",
             Self::Crevice => "crevice",
+            Self::Sheltered => "sheltered",
         }
     }
 
@@ -339,6 +348,9 @@ impl Reason {
             Self::Shell => "a room: closed shells without openings are the whole scene",
             Self::Solid => "no cell: the inside of a solid, by the backs of the surfaces around it",
             Self::Crevice => "no cell: too narrow for a room",
+            Self::Sheltered => {
+                "outdoors, in doubt: a space with a floor, a ceiling and walls on nearly all sides"
+            }
         }
     }
 }
@@ -358,6 +370,29 @@ impl Fact {
         )
     }
 
+    /// Returns the name that files and tables use.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Share => "share",
+            Self::Balls => "balls",
+            Self::Wall => "wall",
+            Self::Frame => "frame",
+            Self::Closed => "closed",
+            Self::Area => "area",
+            Self::Length => "length",
+            Self::Standing => "standing",
+            Self::Floor => "floor",
+            Self::Doorway => "doorway",
+            Self::Backs => "backs",
+            Self::Inside => "inside",
+            Self::Walled => "walled",
+            Self::Shelter => "shelter",
+            Self::Radius => "radius",
+            Self::Volume => "volume",
+        }
+    }
+
     /// Returns the quantity in words, and its unit.
     #[must_use]
     pub fn words(self) -> (&'static str, &'static str) {
@@ -375,12 +410,14 @@ impl Fact {
             Self::Backs => ("share of rays that meet backs", ""),
             Self::Inside => ("evidence for the inside of a solid", ""),
             Self::Walled => ("share of rays that meet a wall of two faces", ""),
+            Self::Shelter => ("share of level rays that meet something", ""),
             Self::Radius => ("largest ball", " m"),
             Self::Volume => ("volume", " m³"),
         }
     }
 }
 
+/// Writes the decision, what was compared, and all other facts; with `{:#}` not the latter.
 impl fmt::Display for Why {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.reason.words())?;
@@ -396,6 +433,9 @@ impl fmt::Display for Why {
                 " ({words} {value}{unit}, {side} {limit}{unit}; margin {:.2})",
                 self.margin()
             )?;
+        }
+        if f.alternate() {
+            return Ok(());
         }
         let decided = decided.map(|d| d.0);
         let mut is_first = true;
@@ -440,6 +480,11 @@ mod tests {
         for part in ["one cell", "0.8512", "from 0.7", "area 2 m²", "margin 0.50"] {
             assert!(said.contains(part), "{said}");
         }
+        let short = format!("{:#}", Why::compared(Reason::Wide, 0.7, &facts));
+        assert!(
+            said.starts_with(&short) && !short.contains("area"),
+            "{short}"
+        );
     }
 
     #[test]
@@ -454,5 +499,7 @@ mod tests {
     fn names_are_those_in_files() {
         let text = serde_json::to_string(&Reason::Unframed).unwrap();
         assert_eq!(text, format!("\"{}\"", Reason::Unframed.name()));
+        let text = serde_json::to_string(&Fact::Doorway).unwrap();
+        assert_eq!(text, format!("\"{}\"", Fact::Doorway.name()));
     }
 }

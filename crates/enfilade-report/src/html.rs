@@ -11,6 +11,7 @@ use crate::graph::graph_svg;
 use crate::label::shortened;
 use crate::matrix::{Order, matrix_svg};
 use crate::plan::{PlanOptions, Plans};
+use crate::reasons::reasons;
 use crate::storeys::Storey;
 use crate::svg::escaped;
 
@@ -57,7 +58,7 @@ pub struct ReportParts {
 /// Writes the page. The world must be valid. The same parts give the same bytes.
 ///
 /// Every element that shows a cell carries its number as `data-cell`. When a pointer rests on one, a script in the
-/// page highlights the others.
+/// page highlights the others, and shows why the cell is there.
 #[must_use]
 pub fn report_html(world: &World, parts: &ReportParts) -> String {
     let plans = Plans::new(world, &PlanOptions::default());
@@ -96,7 +97,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     let (first, rest) = parts.figures.split_at(parts.figures.len().min(1));
     figures(&mut out, first);
     out.push_str(
-        "<section><h2>Plans</h2><p>Point at a room, here or below, to see it everywhere on this page; click to go to it.</p>\n",
+        "<section><h2>Plans</h2><p>Point at a room, here or below, to see it everywhere on this page and why it is there, at a line of the graph for its doorway; click to go to it.</p>\n",
     );
     let mut draw = |class: &str, drawing: &Drawing| {
         let svg = drawing.to_svg();
@@ -128,6 +129,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         let (rows, cells) = self::rooms(world, &storeys, "Voids", is_void);
         table(&mut out, &rows, &cells);
     }
+    reasons(&mut out, world);
     if !rest.is_empty() {
         out.push_str("<section><h2>Pictures</h2>\n");
         figures(&mut out, rest);
@@ -150,7 +152,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     out
 }
 
-/// Highlights the elements of a cell, and hides voids. The page is complete without it.
+/// Highlights the elements of a cell, shows why it is there, and hides voids. The page is complete without it.
 const SCRIPT: &str = include_str!("report.js");
 
 const STYLE: &str = "\
@@ -172,8 +174,10 @@ th:first-child,td:first-child{text-align:left}th{background:#f4f4f2}\
 path.lit{stroke:#000;stroke-width:14}text.lit{font-weight:bold}tr.lit td{background:#ffe8cc}\
 g.lit circle{stroke:#000;stroke-width:5}g.lit .band{fill-opacity:.35}g.lit text{font-weight:bold}line.lit{stroke-width:5;stroke-opacity:1}\
 .no-voids .void,.no-voids .between,.no-voids .twice,.without-voids{display:none}.no-voids .without-voids{display:block}\
+td.why{text-align:left;white-space:normal}#why{position:fixed;left:0;right:0;bottom:0;max-height:30vh;overflow-y:auto;background:#fff;\
+border-top:2px solid #e8590c;padding:.4rem 1.2rem;font-size:.9rem;line-height:1.35}#why p{margin:.25em 0}#why b{margin-right:.5em}\
 footer{color:#777;font-size:.8rem;margin-top:2rem;overflow-wrap:anywhere}\
-@media print{body{max-width:none;padding:0;font-size:11px}section{break-inside:avoid-page}\
+@media print{#why{display:none}body{max-width:none;padding:0;font-size:11px}section{break-inside:avoid-page}\
 .wide{overflow:visible}h2{break-after:avoid}tr,figure{break-inside:avoid}th{-webkit-print-color-adjust:exact;print-color-adjust:exact}}";
 
 /// The main figures, each over its name; those that are zero are left out, except rooms.

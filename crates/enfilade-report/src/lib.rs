@@ -29,6 +29,7 @@ mod plain;
 mod plan;
 #[cfg(feature = "print")]
 mod raster;
+mod reasons;
 mod relief;
 mod section;
 mod shafts;
@@ -53,5 +54,5 @@ pub use plan::{PlanOptions, Plans, plan_svg};
 pub use raster::{MAX_PIXELS, RasterError};
 pub use shapes::{PlanLabel, PlanShape};
 pub use storeys::{Storey, find_storeys};
-pub use verdict::{Verdict, cells_in_words, is_empty, why_empty};
+pub use verdict::{InputDoubt, Verdict, cells_in_words, is_empty, why_empty};
 pub use walk::walk_html;

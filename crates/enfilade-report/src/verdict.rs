@@ -11,13 +11,42 @@ const FOOT: f32 = 0.3048;
 /// come near. [Units: wu]
 const DOOR: [f32; 2] = [1.8, 3.0];
 
-/// How far to trust a world, by what was found in it.
+/// Share of rooms expected to be wrong from which a world is not good: one in ten.
+const GOOD: f32 = 0.1;
+/// … and from which it is probably not the building that was meant.
+const LOW: f32 = 0.4;
+/// Close decisions that are named.
+const NAMED: usize = 3;
+
+/// How far to trust a world, by the margins of the decisions that made its rooms, and by signs in it that it is another than was meant.
 #[derive(Serialize)]
 pub struct Verdict {
     trust: Trust,
     /// A sentence about what was found.
     summary: String,
+    /// Share of the rooms that are expected to be wrong.
+    doubt: f32,
+    /// The places most in doubt.
+    close: Vec<Close>,
     reasons: Vec<Reason>,
+}
+
+/// A place most in doubt.
+#[derive(Serialize)]
+struct Close {
+    position: [f32; 3],
+    /// Chance that the decision is wrong, 0.5 at most.
+    chance: f32,
+    text: String,
+}
+
+/// A doubt about the input that was reported before the bake.
+#[derive(Clone, Debug)]
+pub struct InputDoubt {
+    /// The doubt, and the option that settles it.
+    pub text: String,
+    /// It is about the axis that points up, which a world shows by its floors and doorways.
+    pub is_about_up: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Serialize)]
@@ -45,7 +74,7 @@ struct Reason {
 impl Verdict {
     /// Judges a valid world. `said` are doubts about its input that were reported before the bake.
     #[must_use]
-    pub fn of(world: &World, said: &[String]) -> Self {
+    pub fn of(world: &World, said: &[InputDoubt]) -> Self {
         let doubts = world.doubts();
         let is_grave = |doubt: &Doubt| {
             !matches!(
@@ -53,22 +82,36 @@ impl Verdict {
                 Doubt::NoDoorway(..) | Doubt::OpenToSky(..) | Doubt::MoreCracks { .. }
             )
         };
+        let is_on_its_side =
+            |doubt: &Doubt| matches!(doubt, Doubt::FlatDoorways(..) | Doubt::NoFloors(..));
+        // Rooms with floors and upright doorways refute the doubt about the axis.
+        let lies = doubts.iter().any(is_on_its_side);
+        let said: Vec<&InputDoubt> = said.iter().filter(|d| lies || !d.is_about_up).collect();
+        let of_rooms = world.graph.room_doubt();
+        let takes_room = world.graph.places.iter().any(|p| p.why.takes_room());
         let trust = if is_empty(world) {
             Trust::None
-        } else if !said.is_empty() || doubts.iter().any(is_grave) {
+        } else if !said.is_empty() || doubts.iter().any(is_grave) || of_rooms.share >= LOW {
             Trust::Low
-        } else if doubts.is_empty() {
+        } else if doubts.is_empty() && of_rooms.share < GOOD && !takes_room {
             Trust::Good
         } else {
             Trust::Fair
         };
-        let of_input = said.iter().map(|text| Reason {
-            text: text.clone(),
+        let of_input = said.iter().map(|doubt| Reason {
+            text: doubt.text.clone(),
             options: Vec::new(),
+        });
+        let close = of_rooms.close.iter().take(NAMED).map(|close| Close {
+            position: close.at,
+            chance: close.chance,
+            text: close.why.to_string(),
         });
         Self {
             trust,
             summary: found(world),
+            doubt: of_rooms.share,
+            close: close.collect(),
             reasons: of_input.chain(doubts.iter().map(reason)).collect(),
         }
     }
@@ -122,7 +165,17 @@ impl std::fmt::Display for Verdict {
         if !self.reasons.is_empty() {
             write!(f, "; {}", Reason::all(&self.reasons))?;
         }
-        Ok(())
+        if self.close.is_empty() {
+            return Ok(());
+        }
+        let percent = (100.0 * self.doubt).ceil();
+        write!(f, "; {percent} % of the rooms in doubt, most of all:")?;
+        for (i, close) in self.close.iter().enumerate() {
+            let [x, y, z] = close.position;
+            let comma = if i == 0 { "" } else { ";" };
+            write!(f, "{comma} at {x:.2} {y:.2} {z:.2}, {}", close.text)?;
+        }
+        f.write_str(" (inspect --why all)")
     }
 }
 

@@ -9,7 +9,7 @@
 //! | complete | rays to the first structural triangle; its batch must list the cell in which the ray arrives |
 //! | planar, convex outline | every portal directly: its pieces lie apart from each other and between its two cells; and `validate()` of the world |
 //! | conservative | the world's sets of visible cells, volumes and parts against all these paths, in both directions, and against lines aimed at hidden ones; the run-time's answers ([`verify_views`]) |
-//! | consistent | names, counts, boxes and volumes of cells, and the cells of details, against geometry and locator; kinds of portals, as far as a file determines them; leaves, frames and panes against their shapes, and the motion of leaves; sources against each other; and everything that came with the source against the source ([`compare_details`], [`compare_scene`]) |
+//! | consistent | names, counts, boxes and volumes of cells, and the cells of details, against geometry and locator; kinds of portals, as far as a file determines them; leaves, frames and panes against their shapes, and the motion of leaves; sources against each other; decisions against what cells are and what is measured; and everything that came with the source against the source ([`compare_details`], [`compare_scene`]) |
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -39,6 +39,7 @@
 mod carried;
 mod claims;
 mod complete;
+mod decisions;
 mod details;
 mod evidence;
 mod faces;
@@ -123,6 +124,7 @@ pub fn verify_world_with_progress(
     problems.extend(kinds::check(world, &own));
     problems.extend(fittings::check(world));
     problems.extend(origins::check(world));
+    problems.extend(decisions::check(&subject, &own, options.seed));
     let visible = Visible::new(world, subject.eps);
     problems.extend(visible.iter().flat_map(Visible::check));
     if let Some(source) = source {

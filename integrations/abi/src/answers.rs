@@ -60,6 +60,44 @@ pub struct EnfPortal {
     pub leaf_depth: f32,
 }
 
+/// A measured quantity behind a decision.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct EnfFact {
+    /// Name as in the file, such as `area`, in UTF-8, without a zero byte at its end.
+    pub name: *const c_char,
+    /// Length of the name. [Units: bytes]
+    pub name_length: u32,
+    /// Its value.
+    pub value: f32,
+}
+
+/// A decision of the bake.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct EnfWhy {
+    /// The decision with its facts in words, in UTF-8, without a zero byte at its end.
+    pub text: *const c_char,
+    /// The reason as in the file, such as `narrow`, in UTF-8, without a zero byte at its end.
+    pub reason: *const c_char,
+    /// All that was measured.
+    pub facts: *const EnfFact,
+    /// Length of the text. [Units: bytes]
+    pub text_length: u32,
+    /// Length of the reason. [Units: bytes]
+    pub reason_length: u32,
+    /// Number of facts.
+    pub n_facts: u32,
+    /// Index in `facts` of the fact that was compared with the limit, or `ENF_NO_ID` if nothing was weighed.
+    pub compared: u32,
+    /// The number of the rule, or 0 if nothing was weighed.
+    pub limit: f32,
+    /// Distance of that fact from the limit: 0 at it, 1 far from it and if nothing was weighed.
+    pub margin: f32,
+    /// Middle of the cell's box or of the portal, or a point of the place. [Units: m]
+    pub position: [f32; 3],
+}
+
 /// A leaf of a door and its motion, measured from its pose in the file.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]

@@ -17,6 +17,7 @@ use enfilade_runtime::View;
 
 use crate::answers::{
     EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen, EnfStep,
+    EnfWhy,
 };
 use crate::handle::EnfWorld;
 use crate::last_error;
@@ -232,6 +233,20 @@ pub unsafe extern "C" fn enf_portal(
 ) -> i32 {
     // SAFETY: the pointers are those of the caller.
     unsafe { describe(handle, out, |w| w.portal(portal)) }
+}
+
+/// Tells why the bake made a cell, a portal or a place: decision number `decision`, from 0 on. `of` is `ENF_CELLS`,
+/// `ENF_PORTALS` or `ENF_PLACES`. Returns `ENF_NONE` after the last decision; older files have none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn enf_why(
+    handle: *mut EnfWorld,
+    of: u32,
+    index: u32,
+    decision: u32,
+    out: *mut EnfWhy,
+) -> i32 {
+    // SAFETY: the pointers are those of the caller.
+    unsafe { describe_if_any(handle, out, |w| w.why(of, index, decision), ENF_NONE) }
 }
 
 /// Describes leaf number `leaf` of a portal.

@@ -1,5 +1,7 @@
 //! An open world with the state of its doors and the buffers of its answers.
 
+mod whys;
+
 use enfilade_cpg::wire::decode_glb;
 use enfilade_cpg::{CellId, MotionKind, PortalId, PortalKind, World};
 use enfilade_runtime::{
@@ -7,8 +9,8 @@ use enfilade_runtime::{
 };
 
 use crate::answers::{
-    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen, EnfStep,
-    EnfVisit,
+    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfFact, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen,
+    EnfStep, EnfVisit,
 };
 use crate::status as s;
 use crate::status::Failure;
@@ -25,6 +27,8 @@ pub struct EnfWorld {
     ids: Vec<u32>,
     cell_portals: Vec<u32>,
     crossed: Vec<u32>,
+    facts: Vec<EnfFact>,
+    text: String,
 }
 
 /// Answers of the last view, as plain numbers.
@@ -111,6 +115,8 @@ impl EnfWorld {
             ids: Vec::new(),
             cell_portals: Vec::new(),
             crossed: Vec::new(),
+            facts: Vec::new(),
+            text: String::new(),
             world,
             sight,
         }
@@ -129,6 +135,7 @@ impl EnfWorld {
             s::ENF_DETAILS => self.world.details.len(),
             s::ENF_CHUNKS => self.sight.chunks().len(),
             s::ENF_SPECIALS => self.world.graph.specials.len(),
+            s::ENF_PLACES => self.world.graph.places.len(),
             _ => return Err(Failure::argument(format!("no count has the number {what}"))),
         })
     }

@@ -24,6 +24,8 @@ pub const ENF_DETAILS: u32 = 3;
 pub const ENF_CHUNKS: u32 = 4;
 /// Counts: special portals, such as mirrors.
 pub const ENF_SPECIALS: u32 = 5;
+/// Counts: places within a cell or without one about which something was decided.
+pub const ENF_PLACES: u32 = 6;
 
 /// Kind of a cell: a room.
 pub const ENF_ROOM: u32 = 0;

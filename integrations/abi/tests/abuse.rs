@@ -9,13 +9,21 @@ use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 use enfilade_abi::EnfWorld;
+use enfilade_abi::answers::EnfWhy;
 use enfilade_abi::ffi::*;
 use enfilade_abi::status::*;
 use enfilade_cpg::wire::encode_glb;
+use enfilade_cpg::{Fact, Reason, Why};
 use enfilade_testkit::{GridParams, room_grid};
 
 fn file() -> Vec<u8> {
-    encode_glb(&room_grid(&GridParams::offices(24, 1))).expect("a valid world")
+    let mut world = room_grid(&GridParams::offices(24, 1));
+    let facts = [(Fact::Share, 0.2), (Fact::Area, 1.5)];
+    world.graph.portals[0].why = vec![
+        Why::given(Reason::Gap),
+        Why::compared(Reason::Narrow, 0.7, &facts),
+    ];
+    encode_glb(&world).expect("a valid world")
 }
 
 fn last_error() -> String {
@@ -55,6 +63,8 @@ fn null_is_an_error_everywhere() {
             enf_cell(null_mut(), 0, null_mut()),
             enf_cell(w, 0, null_mut()),
             enf_portal(w, 0, null_mut()),
+            enf_why(null_mut(), ENF_CELLS, 0, 0, null_mut()),
+            enf_why(w, ENF_CELLS, 0, 0, null_mut()),
             enf_leaf(w, 0, 0, null_mut()),
             enf_batch(w, 0, null_mut()),
             enf_detail(w, 0, null_mut()),
@@ -81,7 +91,7 @@ fn null_is_an_error_everywhere() {
             enf_pick(w, null(), p, null_mut()),
         ]
     };
-    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 28]);
+    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 30]);
     assert!(last_error().contains("null"), "{}", last_error());
     // SAFETY: null is allowed.
     unsafe {
@@ -104,6 +114,10 @@ fn ids_that_do_not_exist_and_numbers_that_are_none_are_errors() {
             enf_count(w, 99),
             enf_cell(w, far, MaybeUninit::uninit().as_mut_ptr()),
             enf_portal(w, far, MaybeUninit::uninit().as_mut_ptr()),
+            enf_why(w, ENF_CELLS, far, 0, MaybeUninit::uninit().as_mut_ptr()),
+            enf_why(w, ENF_PORTALS, far, 0, MaybeUninit::uninit().as_mut_ptr()),
+            enf_why(w, ENF_PLACES, 0, 0, MaybeUninit::uninit().as_mut_ptr()),
+            enf_why(w, ENF_DETAILS, 0, 0, MaybeUninit::uninit().as_mut_ptr()),
             enf_leaf(w, 0, far, MaybeUninit::uninit().as_mut_ptr()),
             enf_batch(w, far, MaybeUninit::uninit().as_mut_ptr()),
             enf_detail(w, far, MaybeUninit::uninit().as_mut_ptr()),
@@ -134,7 +148,7 @@ fn ids_that_do_not_exist_and_numbers_that_are_none_are_errors() {
             ),
         ]
     };
-    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 21]);
+    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 25]);
     // SAFETY: as above.
     let without_sets = unsafe { enf_pvs_row(w, 0, MaybeUninit::uninit().as_mut_ptr()) };
     assert_eq!(without_sets, ENF_NONE);
@@ -189,4 +203,41 @@ fn a_view_lists_the_eyes_own_cell_first_and_a_closed_door_hides_the_rest() {
         assert_eq!(after.n_cells, 1);
         assert_eq!(*after.cells, cells[0]);
     }
+}
+
+#[test]
+fn decisions_are_told_with_their_facts() {
+    let Open(w) = &open();
+    let w = *w;
+    let why = |of, index, decision| {
+        let mut out = MaybeUninit::<EnfWhy>::uninit();
+        // SAFETY: there is room for the answer, which is read only where the call says that it was written.
+        unsafe {
+            let status = enf_why(w, of, index, decision, out.as_mut_ptr());
+            (status == 1).then(|| out.assume_init()).ok_or(status)
+        }
+    };
+    // SAFETY: texts are as long as said, and stay until the next decision.
+    let text = |at: *const std::ffi::c_char, n: u32| unsafe {
+        let bytes = std::slice::from_raw_parts(at.cast::<u8>(), n as usize);
+        String::from_utf8(bytes.to_vec()).expect("text")
+    };
+    let first = why(ENF_PORTALS, 0, 0).expect("a decision");
+    assert_eq!(text(first.reason, first.reason_length), "gap");
+    assert_eq!((first.n_facts, first.compared), (0, ENF_NO_ID));
+    let second = why(ENF_PORTALS, 0, 1).expect("a decision");
+    assert_eq!(text(second.reason, second.reason_length), "narrow");
+    let said = text(second.text, second.text_length);
+    assert!(said.contains("0.2, under 0.7"), "{said}");
+    // SAFETY: as many facts as said are there.
+    let facts = unsafe { std::slice::from_raw_parts(second.facts, second.n_facts as usize) };
+    let names: Vec<String> = facts.iter().map(|f| text(f.name, f.name_length)).collect();
+    assert_eq!(names, ["share", "area"]);
+    assert_eq!(
+        (second.compared, facts[0].value, second.limit),
+        (0, 0.2, 0.7)
+    );
+    assert!((second.margin - 0.714).abs() < 1e-3);
+    assert_eq!(why(ENF_PORTALS, 0, 2).err(), Some(ENF_NONE));
+    assert_eq!(why(ENF_CELLS, 0, 0).err(), Some(ENF_NONE));
 }

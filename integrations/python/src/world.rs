@@ -1,11 +1,12 @@
 //! A world: its file, and its graph as arrays.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use enfilade::cpg::wire::{decode_glb, encode_glb};
-use enfilade::cpg::{Cell, CellId, PortalId, PortalKind, Pvs, World as File};
+use enfilade::cpg::{Cell, CellId, PortalId, PortalKind, Pvs, Why, World as File};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::runtime::Sight;
 use enfilade::vis::{VisConfig, VisContext, VisMode, see_world};
@@ -47,6 +48,15 @@ type SparseRows<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i32>>);
 
 /// Counts, and texts, by name.
 type AboutTables = (Vec<(String, f64)>, Vec<(String, String)>);
+
+/// The reason of a decision, its margin, its limit, its facts by name, and all in words.
+type ToldWhy = (
+    &'static str,
+    f32,
+    Option<f32>,
+    BTreeMap<&'static str, f32>,
+    String,
+);
 
 /// Names, kinds, volumes, bounds (two rows each), triangles, and portals of each cell.
 type CellTable<'py> = (
@@ -243,6 +253,24 @@ impl World {
         ))
     }
 
+    /// Returns the decisions about each cell.
+    fn cell_whys(&self) -> Vec<Vec<ToldWhy>> {
+        let cells = self.world.graph.cells.iter();
+        cells.map(|c| c.why.iter().map(told).collect()).collect()
+    }
+
+    /// Returns the decisions about each portal.
+    fn portal_whys(&self) -> Vec<Vec<ToldWhy>> {
+        let portals = self.world.graph.portals.iter();
+        portals.map(|p| p.why.iter().map(told).collect()).collect()
+    }
+
+    /// Returns points of places, and the decision about each.
+    fn places(&self) -> Vec<([f32; 3], ToldWhy)> {
+        let places = self.world.graph.places.iter();
+        places.map(|place| (place.at, told(&place.why))).collect()
+    }
+
     /// Returns the cells of points.
     fn locate<'py>(
         &self,
@@ -294,6 +322,17 @@ impl World {
             _ => Cow::Borrowed(&self.world),
         }
     }
+}
+
+fn told(why: &Why) -> ToldWhy {
+    let facts = why.facts.iter().map(|(fact, &value)| (fact.name(), value));
+    (
+        why.reason.name(),
+        why.margin(),
+        why.limit,
+        facts.collect(),
+        why.to_string(),
+    )
 }
 
 fn cell_kind(cell: &Cell) -> &'static str {

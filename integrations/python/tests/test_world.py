@@ -37,6 +37,23 @@ def test_cells_and_portals_are_sequences_with_columns(world):
         cells.volumes[0] = 1
 
 
+def test_decisions_are_those_of_the_command(world, command, tmp_path):
+    world.save(tmp_path / "w.glb")
+    said = command.json("inspect", tmp_path / "w.glb", "--why", "all")["whys"]
+    things = [*world.cells, *world.portals]
+    assert all(len(thing.why) > 0 for thing in things)
+    whys = [why for thing in things for why in thing.why] + [place.why for place in world.places]
+    assert sorted(why.text for why in whys) == sorted(why["text"] for why in said)
+    for why in whys:
+        assert 0 <= why.margin <= 1 and str(why) == why.text
+        assert (why.limit is None) or why.facts
+    of_portal = {why["portal"]: why for why in said if "portal" in why}
+    for portal in world.portals:
+        (why,) = portal.why
+        found = of_portal[portal.id]
+        assert (why.reason, why.facts.keys()) == (found["reason"], found.get("facts", {}).keys())
+
+
 def test_points_are_located(world):
     middle = [2, 1, 2]
     cell = world.locate(middle)

@@ -437,6 +437,7 @@ impl Parts {
                 portal.cells[end] = self.id(side);
                 portal.kind = base.kind;
                 portal.normal = base.normal;
+                portal.why.clone_from(&base.why);
                 let fittings = base.fittings.iter();
                 portal.fittings = fittings
                     .filter(|f| fits(f.part, is_larger))
@@ -537,9 +538,15 @@ impl Parts {
             .map(|i| format!("cell-{i}"))
             .find(|name| !taken(name))
             .unwrap_or_default();
+        let why = if old.outdoor {
+            vec![Why::given(Reason::Asked)]
+        } else {
+            old.why.clone()
+        };
         out.graph.cells.push(Cell {
             name: new_name,
             outdoor: false,
+            why,
             ..old
         });
         for side in [FRONT, BACK] {

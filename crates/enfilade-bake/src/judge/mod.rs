@@ -8,5 +8,9 @@
 mod opening;
 mod space;
 
-pub(crate) use opening::{FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge};
-pub(crate) use space::{DOORWAY, EnclosedFacts, Facing, NARROW, SpaceFacts, why_open};
+pub(crate) use opening::{
+    FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge, why_parted, why_unjoined,
+};
+pub(crate) use space::{
+    DOORWAY, EnclosedFacts, Facing, LEAST_SHELTER, NARROW, SpaceFacts, why_open,
+};

@@ -113,6 +113,48 @@ pub(crate) fn judge(
     verdict(kind, openness, Some(section))
 }
 
+/// Returns why an opening parts two cells: of the reasons that each do alone, the one with the greatest margin; `None` if it parts
+/// nothing by itself.
+pub(crate) fn why_parted(
+    settings: &MergeSettings,
+    facts: OpeningFacts,
+    section: OpeningSection,
+) -> Option<Why> {
+    let verdict = |kind| OpeningVerdict {
+        kind,
+        openness: 0.0,
+        facts,
+        section: Some(section),
+    };
+    let openness =
+        section.ratio * settings.gain(facts.is_to_outdoors) / settings.most_share(section.wall);
+    let is_framed = section.frame >= FRAMED || facts.is_to_outdoors;
+    let kinds = [
+        (OpeningKind::Shut, facts.closed >= settings.closed_share),
+        (OpeningKind::Narrow, openness < 1.0 && is_framed),
+        (
+            OpeningKind::Neck,
+            settings.by_balls(facts.balls, facts.is_to_outdoors) < 1.0,
+        ),
+    ];
+    let whys = kinds
+        .into_iter()
+        .filter(|k| k.1)
+        .map(|(kind, _)| verdict(kind).why(settings, true));
+    // The first of equals.
+    whys.rev().max_by(|a, b| a.margin().total_cmp(&b.margin()))
+}
+
+/// Returns the doubt that two cells are apart though their opening parts nothing by itself.
+pub(crate) fn why_unjoined(
+    settings: &MergeSettings,
+    facts: OpeningFacts,
+    section: OpeningSection,
+) -> Why {
+    let verdict = judge(settings, facts, || section);
+    verdict.why(settings, true)
+}
+
 impl OpeningVerdict {
     /// Returns the verdict with its facts, as a world tells it. A portal `is_parting` two cells, whatever the verdict.
     pub(crate) fn why(&self, settings: &MergeSettings, is_parting: bool) -> Why {
@@ -134,7 +176,9 @@ impl OpeningVerdict {
                 (Reason::Neck, Some(most))
             }
             OpeningKind::Narrow => (Reason::Narrow, limit),
-            OpeningKind::Wide | OpeningKind::Unframed if is_parting => (Reason::Unjoined, limit),
+            OpeningKind::Wide if is_parting => (Reason::Unjoined, limit),
+            // Its frame was weighed, not the share that the reason compares.
+            OpeningKind::Unframed if is_parting => (Reason::Unjoined, None),
             OpeningKind::Wide => (Reason::Wide, limit),
             OpeningKind::Unframed => (Reason::Unframed, Some(FRAMED)),
         };
@@ -224,7 +268,9 @@ mod tests {
             assert_eq!(verdict.kind, *expected, "{what}");
             let is_one = matches!(verdict.kind, Wide | Unframed);
             assert_eq!(verdict.openness >= 1.0, is_one, "{what}");
-            assert!(verdict.why(&settings, !is_one).holds(), "{what}");
+            for is_parting in [!is_one, true] {
+                assert!(verdict.why(&settings, is_parting).holds(), "{what}");
+            }
         }
     }
 }

@@ -70,6 +70,9 @@ const WALLED: f64 = 0.5;
 /// A space that fits no ball of this radius is matter if most rays hit back faces. [Units: wu]
 pub(crate) const NARROW: f64 = 0.5;
 
+/// Least share of level rays that meet something in a room: one of eight may leave by its door.
+pub(crate) const LEAST_SHELTER: f64 = 0.875;
+
 /// The facing of the surfaces of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Facing {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{Fact, Reason, Why};
-use enfilade_geom::{Bvh, DVec3, Triangle};
+use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 use rayon::prelude::*;
 
 use super::flooded::Flooded;
@@ -14,11 +14,11 @@ use super::fronts::{
 use super::lids::Lids;
 use super::limbs::LONG;
 use super::regions::{Regions, balls_of};
-use super::sections::section_of;
+use super::sections::whole_section_of;
 use crate::MergeSettings;
-use crate::judge::{OpeningFacts, judge};
+use crate::judge::{OpeningFacts, why_parted, why_unjoined};
 use crate::structure::{Candidate, OUTDOORS, fit_candidate};
-use crate::voxel::SparseVolume;
+use crate::voxel::{Grid, Labels, SparseVolume};
 
 /// Smaller openings, in voxel faces, are left to the complex, which finds them as cracks.
 const MIN_FACES: usize = 4;
@@ -29,7 +29,13 @@ const WORK_A_FACE: u64 = 5;
 
 /// The regions of a flooded volume and what stands between them.
 pub(super) struct Openings<'a> {
-    pub(super) flooded: Flooded<'a>,
+    pub(super) grid: &'a Grid,
+    pub(super) labels: &'a Labels,
+    /// Radius of the largest ball in each basin. [Units: vx]
+    pub(super) peaks: &'a [f32],
+    /// Voxels that stop a flood besides those of surfaces.
+    pub(super) shut: &'a SparseVolume,
+    pub(super) allowance: &'a Allowance,
     pub(super) regions: &'a Regions,
     /// The regions are final, and none of their openings is judged.
     pub(super) are_final: bool,
@@ -61,10 +67,21 @@ impl Openings<'_> {
             .collect()
     }
 
+    fn flooded(&self) -> Flooded<'_> {
+        Flooded {
+            grid: self.grid,
+            labels: self.labels,
+            peaks: self.peaks,
+            closures: Some(self.shut),
+            slabs: &[],
+            allowance: self.allowance,
+        }
+    }
+
     fn patches(&self, faces: &[u64]) -> Vec<Faces> {
-        let Flooded {
+        let Self {
             grid, allowance, ..
-        } = self.flooded;
+        } = *self;
         if !allowance.spend(PATCH_WORK_A_FACE * faces.len() as u64) {
             return Vec::new();
         }
@@ -91,12 +108,12 @@ impl Openings<'_> {
         bvh: &Bvh,
         facts: &RegionFacts,
     ) -> Option<Candidate> {
-        let Flooded {
+        let Self {
             grid,
             labels,
             allowance,
             ..
-        } = self.flooded;
+        } = *self;
         // Measured: a picture of the opening, many times finer than its faces.
         if !allowance.spend(WORK + WORK_A_FACE * faces.len() as u64) {
             return None;
@@ -133,10 +150,9 @@ impl Openings<'_> {
             is_to_outdoors: pair[0] == OUTDOORS,
             balls: facts.balls(pair),
         };
-        let section = || section_of(self.flooded, self.settings, front, pair, &region_of);
-        let verdict = judge(self.settings, of_opening, section);
-        if verdict.openness < 1.0 {
-            return verdict.why(self.settings, true).with(&[area]);
+        let section = whole_section_of(self.flooded(), self.settings, front, pair, &region_of);
+        if let Some(why) = why_parted(self.settings, of_opening, section) {
+            return why.with(&[area]);
         }
         // A rule of another kind parts them.
         let limb = pair.into_iter().find_map(|region| facts.limbs.get(&region));
@@ -145,7 +161,7 @@ impl Openings<'_> {
                 Why::compared(Reason::Mouth, LONG, &[(Fact::Length, *length), area])
             }
             Some(None) => Why::given(Reason::Mouth).with(&[area]),
-            None => verdict.why(self.settings, true).with(&[area]),
+            None => why_unjoined(self.settings, of_opening, section).with(&[area]),
         }
     }
 }
@@ -175,7 +191,7 @@ impl RegionFacts {
                 .map(|(&basin, &l)| (region(basin), l))
                 .collect(),
         };
-        for (&r, &peak) in region_of_basin.iter().zip(openings.flooded.peaks) {
+        for (&r, &peak) in region_of_basin.iter().zip(openings.peaks) {
             let of = facts.peaks.entry(r).or_insert(0.0);
             *of = of.max(peak);
         }

@@ -10,7 +10,6 @@ use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 use super::air::{Solid, VoxelAir};
 use super::basins::Basins;
 use super::candidates::Openings;
-use super::flooded::Flooded;
 use super::forks::{is_curved, split_forks};
 use super::hollow::{Matter, find_matter};
 use super::lids::Lids;
@@ -18,10 +17,11 @@ use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
 use super::low::join_low;
 use super::regions::Regions;
+use super::sheltered::sheltered;
 use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
 use crate::proposal::{FoundPlace, Proposal};
-use crate::structure::{Frame, Structure};
+use crate::structure::{Candidate, Frame, Structure};
 use crate::tubes::Walls;
 use crate::voxel::{DistanceField, Grid, Labels, SparseVolume};
 use crate::{BakeConfig, BakeContext, BakeError, MergeSettings, Resolution, Stage};
@@ -82,7 +82,6 @@ pub(crate) struct VoxelRooms {
     closures: SparseVolume,
     shut: SparseVolume,
     lids: Lids,
-    slabs: Vec<f64>,
     share: f64,
     resolution: Resolution,
     n_occupied: usize,
@@ -114,7 +113,6 @@ impl VoxelRooms {
             closures,
             shut,
             lids,
-            slabs: air.slabs,
             share: air.share,
             resolution: air.resolution,
             n_occupied: occupied.count(),
@@ -192,8 +190,10 @@ impl VoxelRooms {
     ) -> Result<Proposal, BakeError> {
         let allowance = context.allowance();
         let matter = self.matter(&structure.bvh, config.merge.min_radius, allowance);
+        let (regions, bvh) = (&self.regions, &structure.bvh);
+        let sheltered = sheltered(&self.grid, &self.labels, regions, bvh, allowance);
         context.begin(Stage::Candidates)?;
-        let mut candidates = self.openings(structure, config, allowance).candidates();
+        let candidates = self.openings(structure, config, allowance).candidates();
         let stairs = inside_of(&structure.stairs, &self.grid, &structure.bvh, allowance);
         let not_air = (&matter.regions[..], &stairs);
         let ballots = Ballots::cast(
@@ -221,21 +221,20 @@ impl VoxelRooms {
         notes.extend_from_slice(&matter.notes);
         // From here on, everything is in scene coordinates.
         let frame = &structure.frame;
-        for candidate in &mut candidates {
-            candidate.winding = frame.winding_to_scene(&candidate.winding);
-        }
-        let voids = voids.into_iter().map(|(p, r)| (frame.to_scene(p), r));
-        let voids = voids.collect();
-        let joins = regions.joins.iter().map(|join| FoundPlace {
-            at: frame.to_scene(join.at),
-            why: join.why(&config.merge),
-        });
-        let places = joins.chain(matter.places(frame)).collect();
+        let spaces = matter.spaces.iter().chain(&sheltered);
+        let places = places_of(&regions, spaces, frame, config);
         let found = [self.n_occupied, self.n_basins, candidates.len()];
         let counts = counts_of(&grid, frame, found);
         Ok(Proposal {
-            candidates,
-            voids,
+            candidates: (candidates.into_iter())
+                .map(|c| Candidate {
+                    winding: frame.winding_to_scene(&c.winding),
+                    ..c
+                })
+                .collect(),
+            voids: (voids.into_iter())
+                .map(|(p, region)| (frame.to_scene(p), region))
+                .collect(),
             places,
             whys: matter.whys,
             counts,
@@ -257,14 +256,11 @@ impl VoxelRooms {
         allowance: &'a Allowance,
     ) -> Openings<'a> {
         Openings {
-            flooded: Flooded {
-                grid: &self.grid,
-                labels: &self.labels,
-                peaks: &self.peaks,
-                closures: Some(&self.shut),
-                slabs: &self.slabs,
-                allowance,
-            },
+            grid: &self.grid,
+            labels: &self.labels,
+            peaks: &self.peaks,
+            shut: &self.shut,
+            allowance,
             regions: &self.regions,
             are_final: self.are_final,
             closures: &self.closures,
@@ -274,6 +270,25 @@ impl VoxelRooms {
             settings: &config.merge,
         }
     }
+}
+
+/// Returns the close joins of regions, and `spaces` that are not rooms, in scene coordinates.
+fn places_of<'a>(
+    regions: &Regions,
+    spaces: impl Iterator<Item = &'a FoundPlace>,
+    frame: &Frame,
+    config: &BakeConfig,
+) -> Vec<FoundPlace> {
+    let joins = regions.joins.iter().map(|join| FoundPlace {
+        at: join.at,
+        why: join.why(&config.merge),
+    });
+    let all = joins.chain(spaces.cloned());
+    let placed = all.map(|place| FoundPlace {
+        at: frame.to_scene(place.at),
+        ..place
+    });
+    placed.collect()
 }
 
 /// Returns points of air that no opening connects to its region: inside stairs, and in shallow voids.

@@ -33,7 +33,7 @@ use super::regions::{CloseJoin, Regions};
 use super::slabs::LAYERS;
 use crate::judge::{EnclosedFacts, Facing, NARROW, why_open};
 use crate::proposal::FoundPlace;
-use crate::structure::{Frame, OUTDOORS, POINTS, rays_from};
+use crate::structure::{OUTDOORS, POINTS, rays_from};
 
 /// Two surfaces nearer than this are the two faces of a wall. [Units: wu]
 const WALL: f64 = 0.5;
@@ -61,16 +61,6 @@ pub(crate) struct Matter {
     pub(crate) fronts_face_air: bool,
 }
 
-impl Matter {
-    /// Returns the spaces as large as a room that are not rooms, in scene coordinates.
-    pub(crate) fn places(&self, frame: &Frame) -> impl Iterator<Item = FoundPlace> {
-        self.spaces.iter().map(|space| FoundPlace {
-            at: frame.to_scene(space.at),
-            why: space.why.clone(),
-        })
-    }
-}
-
 /// Returns `true` if a person fits in a space, given the radius of its largest ball and its volume.
 fn is_room_sized(radius: f64, volume: f64) -> bool {
     radius >= NARROW && volume >= CloseJoin::LEAST_VOLUME
@@ -87,29 +77,23 @@ pub(crate) fn find_matter(
     min_radius: f64,
     allowance: &Allowance,
 ) -> Matter {
-    let mut radius: BTreeMap<u32, f32> = BTreeMap::new();
-    for (basin, &region) in regions.region_of_basin.iter().enumerate() {
-        let r = radius.entry(region).or_insert(0.0);
-        *r = r.max(peaks[basin]);
-    }
+    let radius = radii(regions, peaks);
     let (open, enclosed): (Vec<_>, Vec<_>) =
         groups(regions).into_iter().partition(|g| g[0] == OUTDOORS);
     let mut open: Vec<u32> = open.into_iter().flatten().collect();
     open.sort_unstable();
     let wanted: Vec<u32> = enclosed.iter().flatten().chain(&open).copied().collect();
-    let Sampled { points, n_voxels } = sample_points(grid, labels, regions, &wanted);
+    let RegionSamples { points, n_voxels } = sample_points(grid, labels, regions, &wanted);
     let n_voxels = |of: &[u32]| of.iter().filter_map(|r| n_voxels.get(r)).sum::<usize>();
     // First hits are enough of air that is open to the outdoors.
     let rays = |region: u32| match open.binary_search(&region) {
         Ok(_) => Rays::First,
         Err(_) => Rays::All,
     };
-    let seen: BTreeMap<u32, Seen> = points
-        .par_iter()
-        .map(|(&region, at)| (region, Seen::from(bvh, at, rays(region), allowance)))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect();
+    let look =
+        |(&region, at): (&u32, &Vec<DVec3>)| (region, Seen::from(bvh, at, rays(region), allowance));
+    let seen: Vec<(u32, Seen)> = points.par_iter().map(look).collect();
+    let seen: BTreeMap<u32, Seen> = seen.into_iter().collect();
     let view = |group: &[u32]| {
         let of = group.iter().filter_map(|r| seen.get(r));
         of.fold(Seen::default(), Seen::and)
@@ -148,10 +132,8 @@ pub(crate) fn find_matter(
         }
     }
     if facing == Facing::Outward {
-        let backs = indoors
-            .iter()
-            .filter_map(|r| Some((*r, seen.get(r)?.backs())));
-        whys.extend(backs.map(|(region, backs)| (region, why_open(backs))));
+        let why = |r: &u32| Some((*r, why_open(seen.get(r)?.backs())));
+        whys.extend(indoors.iter().filter_map(why));
     }
     whys.sort_unstable_by_key(|w| w.0);
     let mut matter = Matter {
@@ -173,31 +155,45 @@ pub(crate) fn find_matter(
     if is_outvoted
         || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance)
     {
-        matter.notes.push(format!(
-            "{n} closed shell{} without openings {} the whole scene: treated as rooms, not as solids",
-            if n == 1 { "" } else { "s" },
-            if n == 1 { "is" } else { "are" },
-        ));
+        matter.notes.push(note_on_shells(n));
         matter.spaces.retain(|s| s.why.reason != Reason::Solid);
         let shell = |region| (region, Why::given(Reason::Shell));
         matter.whys.extend(lost.into_iter().map(shell));
         matter.whys.sort_unstable_by_key(|w| w.0);
     } else {
-        matter.notes.push(format!(
-            "the inside{} of {n} closed solid{} {}{}",
-            if n == 1 { "" } else { "s" },
-            if n == 1 { "" } else { "s" },
-            if n == 1 {
-                "is not a room"
-            } else {
-                "are not rooms"
-            },
-            by_facing(facing),
-        ));
+        matter.notes.push(note_on_solids(n, facing));
         matter.regions.extend(doubtful.into_iter().flatten());
     }
     matter.regions.sort_unstable();
     matter
+}
+
+/// Returns the radius of the largest ball in each region. [Units: vx]
+fn radii(regions: &Regions, peaks: &[f32]) -> BTreeMap<u32, f32> {
+    let mut radius: BTreeMap<u32, f32> = BTreeMap::new();
+    for (&region, &peak) in regions.region_of_basin.iter().zip(peaks) {
+        let r = radius.entry(region).or_insert(0.0);
+        *r = r.max(peak);
+    }
+    radius
+}
+
+fn note_on_shells(n: usize) -> String {
+    let (s, are) = if n == 1 { ("", "is") } else { ("s", "are") };
+    format!(
+        "{n} closed shell{s} without openings {are} the whole scene: treated as rooms, not as solids"
+    )
+}
+
+fn note_on_solids(n: usize, facing: Facing) -> String {
+    let (s, are) = match n {
+        1 => ("", "is not a room"),
+        _ => ("s", "are not rooms"),
+    };
+    format!(
+        "the inside{s} of {n} closed solid{s} {are}{}",
+        by_facing(facing)
+    )
 }
 
 /// Returns the reason for which solids are told, where surfaces do not face outward.
@@ -397,13 +393,13 @@ fn groups(regions: &Regions) -> Vec<Vec<u32>> {
 }
 
 /// Points of regions, and their sizes.
-struct Sampled {
+struct RegionSamples {
     points: BTreeMap<u32, Vec<DVec3>>,
     n_voxels: BTreeMap<u32, usize>,
 }
 
 /// Returns up to [`POINTS`] voxel centers of each wanted region, evenly picked in scan order.
-fn sample_points(grid: &Grid, labels: &Labels, regions: &Regions, wanted: &[u32]) -> Sampled {
+fn sample_points(grid: &Grid, labels: &Labels, regions: &Regions, wanted: &[u32]) -> RegionSamples {
     let mut is_wanted = vec![false; regions.region_of_basin.len()];
     for &r in wanted {
         is_wanted[r as usize] = true;
@@ -458,7 +454,7 @@ fn sample_points(grid: &Grid, labels: &Labels, regions: &Regions, wanted: &[u32]
     for (region, point) in sampled.into_iter().flatten() {
         points.entry(region).or_default().push(point);
     }
-    Sampled {
+    RegionSamples {
         points,
         n_voxels: total,
     }

@@ -51,7 +51,6 @@ pub(crate) fn split_limbs(
 ) {
     let least = settings.min_radius / grid.voxel;
     let mut limbs: Vec<(u32, usize, Vec<[usize; 2]>)> = Vec::new();
-    let mut lengths: BTreeMap<u32, Option<f64>> = BTreeMap::new();
     // Largest half-width of each region, in plan. [Units: vx]
     let mut thickness: BTreeMap<u32, f64> = BTreeMap::new();
     let n = regions.region_of_basin.len();
@@ -65,8 +64,9 @@ pub(crate) fn split_limbs(
     for (region, plan, (thickest, found)) in found {
         thickness.insert(region, thickest);
         for limb in found {
-            thickness.insert((n + limbs.len()) as u32, limb.half_width);
-            lengths.insert((n + limbs.len()) as u32, Some(limb.length));
+            let basin = (n + limbs.len()) as u32;
+            thickness.insert(basin, limb.half_width);
+            regions.limbs.insert(basin, Some(limb.length));
             let columns = limb.cells.iter().map(|&c| plan.column(c)).collect();
             limbs.push((region, plan.row, columns));
             peaks.push((limb.half_width + 0.5) as f32);
@@ -93,7 +93,6 @@ pub(crate) fn split_limbs(
         }
     }
     regions.region_of_basin.extend(n as u32..peaks.len() as u32);
-    regions.limbs.append(&mut lengths);
     let by_basin = contact_faces(labels);
     regions.contacts = contacts_of(regions, &by_basin);
     let flooded = Flooded {

@@ -25,6 +25,7 @@ mod refill;
 mod regions;
 mod rims;
 mod sections;
+mod sheltered;
 mod slabs;
 mod voids;
 mod votes;

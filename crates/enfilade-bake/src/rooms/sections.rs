@@ -25,7 +25,8 @@ const STEEP: f64 = 0.5;
 /// times as much around a small opening.
 const CLOSE: f64 = 3.0;
 
-/// Measures the opening of `front`, between the cells of `pair`. `cell_of` returns the cell of a basin.
+/// Measures the opening of `front`, between the cells of `pair`, as far as needed to tell if it parts them. `cell_of` returns the cell of a
+/// basin.
 pub(super) fn section_of(
     flooded: Flooded<'_>,
     settings: &MergeSettings,
@@ -39,13 +40,52 @@ pub(super) fn section_of(
     if rest > 0.0 && front.opening.closed < LEAVES {
         let close = settings.surround - rest * step;
         let slices = Slices::beside(flooded, close, front, cell_of);
-        let section = measured(&slices, settings, &front.opening, pair);
+        let section = measured(
+            &slices,
+            settings,
+            &front.opening,
+            pair,
+            WantedSections::Enough,
+        );
         if section.ratio < settings.threshold {
             return section;
         }
     }
     let slices = Slices::beside(flooded, settings.surround, front, cell_of);
-    measured(&slices, settings, &front.opening, pair)
+    measured(
+        &slices,
+        settings,
+        &front.opening,
+        pair,
+        WantedSections::Enough,
+    )
+}
+
+/// Measures the opening of `front` as [`section_of`], with the largest sections beside it.
+pub(super) fn whole_section_of(
+    flooded: Flooded<'_>,
+    settings: &MergeSettings,
+    front: &Front,
+    pair: [u32; 2],
+    cell_of: &(impl Fn(u32) -> u32 + Sync),
+) -> OpeningSection {
+    let slices = Slices::beside(flooded, settings.surround, front, cell_of);
+    measured(
+        &slices,
+        settings,
+        &front.opening,
+        pair,
+        WantedSections::Whole,
+    )
+}
+
+/// WantedSections to which sections are looked for.
+#[derive(Clone, Copy, PartialEq)]
+enum WantedSections {
+    /// Up to sections so large that the opening is narrow.
+    Enough,
+    /// All of them.
+    Whole,
 }
 
 fn measured(
@@ -53,6 +93,7 @@ fn measured(
     settings: &MergeSettings,
     opening: &Opening,
     [a, b]: [u32; 2],
+    extent: WantedSections,
 ) -> OpeningSection {
     let unit = slices.step * slices.step;
     let reach = (settings.reach / slices.step).round() as i64;
@@ -94,7 +135,7 @@ fn measured(
             rayon::join(|| look(before, 0, at - s), || look(after, 1, at + s));
         }
         let n = smaller(&sides, a) as f64;
-        if n > enough {
+        if extent == WantedSections::Enough && n > enough {
             let frame = frame(slices.jambs(&sides));
             if frame >= FRAMED {
                 return OpeningSection {

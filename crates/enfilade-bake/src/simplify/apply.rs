@@ -33,22 +33,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
                 ..from.clone()
             });
         } else {
-            let cell = &mut cells[*slot as usize];
-            for k in 0..3 {
-                cell.aabb[0][k] = cell.aabb[0][k].min(from.aabb[0][k]);
-                cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);
-            }
-            cell.volume += from.volume;
-            // The reason for a room or the outdoors is that of both.
-            if from.outdoor && !cell.outdoor || cell.is_void && !from.is_void {
-                cell.why.clone_from(&from.why);
-            }
-            cell.is_void &= from.is_void;
-            let is_first_name = is_numbered(&cell.name) && !is_numbered(&from.name);
-            if (from.outdoor || is_first_name) && !cell.outdoor {
-                cell.name.clone_from(&from.name);
-            }
-            cell.outdoor |= from.outdoor;
+            absorb(&mut cells[*slot as usize], from);
         }
         cell_of.push(CellId(*slot));
     }
@@ -118,6 +103,25 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     out.batches = batches;
     out.details = details;
     (out, cell_of)
+}
+
+/// Adds a cell to another of its group, all but its lists and counts.
+fn absorb(cell: &mut Cell, from: &Cell) {
+    for k in 0..3 {
+        cell.aabb[0][k] = cell.aabb[0][k].min(from.aabb[0][k]);
+        cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);
+    }
+    cell.volume += from.volume;
+    // The reason for a room or the outdoors is that of both.
+    if from.outdoor && !cell.outdoor || cell.is_void && !from.is_void {
+        cell.why.clone_from(&from.why);
+    }
+    cell.is_void &= from.is_void;
+    let is_first_name = is_numbered(&cell.name) && !is_numbered(&from.name);
+    if (from.outdoor || is_first_name) && !cell.outdoor {
+        cell.name.clone_from(&from.name);
+    }
+    cell.outdoor |= from.outdoor;
 }
 
 /// Returns the decision that two rooms are one, at the portal between them.

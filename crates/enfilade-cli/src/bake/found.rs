@@ -9,6 +9,8 @@ use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::shown;
 use enfilade::import::{CleaningOptions, ImportReport, RepairOptions, cleaning_report};
 
+use enfilade_report::InputDoubt;
+
 use crate::screen::{At, Told, Warned, write_lines};
 
 /// Reports what was read; with `verbose`, also the roles of the objects and all notes of the import.
@@ -81,7 +83,7 @@ pub(crate) fn settings_of(
 
 /// Returns the doubts about unit and axis, for the verdict. They are reported; the bake ends if the files state neither,
 /// as their numbers alone then speak.
-pub(crate) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<String>> {
+pub(crate) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<InputDoubt>> {
     if let Some(why) = report.refusal() {
         bail!("{why}");
     }
@@ -92,7 +94,12 @@ pub(crate) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<String>> {
     if let Some(doubt) = report.up_doubt.as_ref().filter(|doubt| !doubt.is_clear) {
         writeln!(Warned, "{}", doubt.text)?;
     }
-    Ok(said)
+    let up = report.up_doubt.as_ref().map(|doubt| &doubt.text);
+    let doubt = |text: String| InputDoubt {
+        is_about_up: Some(&text) == up,
+        text,
+    };
+    Ok(said.into_iter().map(doubt).collect())
 }
 
 /// Most names listed for one reason.

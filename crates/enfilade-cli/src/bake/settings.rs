@@ -140,7 +140,7 @@ pub(crate) struct BakeOptions {
     /// Number of threads; one per core if not given. The result is the same.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Print the roles of objects with their reasons, notes of the import and stage times.
+    /// Print the roles of objects with their reasons, notes of the import, stage times, and how often a bake decided for which reason.
     #[arg(short, long)]
     pub(crate) verbose: bool,
 }

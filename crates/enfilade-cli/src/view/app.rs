@@ -358,6 +358,7 @@ impl App<'_> {
                 };
             }
             KeyCode::KeyR => shown.radar = !shown.radar,
+            KeyCode::KeyI => shown.whys = !shown.whys,
             KeyCode::KeyO => shown.portals = !shown.portals,
             KeyCode::KeyP => shown.plain = !shown.plain,
             KeyCode::KeyT => shown.tints = !shown.tints,
@@ -505,7 +506,11 @@ impl App<'_> {
                 open.titles.here(&open.lived.space, &outside)
             } else {
                 let pointed = Pointed::at(&open.lived.space, &outside, FAR);
-                open.titles.ahead(&open.lived.space, &pointed.ray)
+                if open.shown.whys {
+                    open.titles.why_ahead(&open.lived.space, &pointed.ray)
+                } else {
+                    open.titles.ahead(&open.lived.space, &pointed.ray)
+                }
             };
         }
         let Some(open) = &mut self.open else {

@@ -23,6 +23,8 @@ pub(super) struct Shown {
     pub(super) portals: bool,
     /// `true` if the radar is on.
     pub(super) radar: bool,
+    /// `true` if the crosshair tells why what is there is there.
+    pub(super) whys: bool,
     pub(super) plain: bool,
     pub(super) paint: Paint,
     pub(super) cells: Vec<u32>,
@@ -33,7 +35,7 @@ pub(super) struct Shown {
     pub(super) mode: Mode,
     /// Waits for the adapter, and occlusion queries, in the mode that uses them.
     pub(super) queries: Option<[u32; 2]>,
-    /// Name of the cell at the crosshair.
+    /// Name of the cell at the crosshair, or why it is there.
     pub(super) ahead: String,
     /// `true` if distant rooms and objects are spared.
     pub(super) spares: bool,
@@ -91,6 +93,7 @@ M              drawn: portals, far portals as textures,
 T              tint the portals that are textures
 L              spare small portals and what is behind them
 R              radar: things around, on the map and in words
+I              why the room or doorway at the crosshair is there
 C              paint: lit, cells, overdraw
 O              outline doorways and narrowed views
 P              plain: no shadows, no ambient occlusion

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use enfilade::cpg::Cell;
+use enfilade::cpg::{Cell, Why};
 use enfilade::geom::{DVec3, shown};
 use enfilade::world::{PartId, Place, Space};
-use enfilade_render::Camera;
+use enfilade_render::{Camera, portal_looked_at};
 
 use super::pointed::FAR;
 
@@ -37,12 +37,24 @@ impl Titles {
 
     /// The name of the cell in the middle of the picture: of the air before the surface there.
     pub(super) fn ahead(&self, space: &Space, camera: &Camera) -> String {
-        let [.., forward] = camera.axes().map(|axis| axis.as_dvec3());
-        let eye = DVec3::from(camera.eye.map(f64::from));
-        let far = f64::from(FAR);
-        let wall = space.first_wall(PartId::ROOT, [eye, eye + forward * far]);
-        let away = (wall.unwrap_or(1.0) * far - 0.02).max(0.0);
-        self.titled(space, space.locate(PartId::ROOT, eye + forward * away))
+        self.titled(space, place_ahead(space, camera))
+    }
+
+    /// The same with why it is there, or why the portal is that the middle of the picture looks through.
+    pub(super) fn why_ahead(&self, space: &Space, camera: &Camera) -> String {
+        let place = place_ahead(space, camera);
+        let (subject, whys): (_, &[Why]) = match portal_looked_at(space, camera) {
+            Some((part, portal, _)) => {
+                let whys = &space.world(part).graph[portal].why;
+                (portal.to_string(), whys)
+            }
+            None => {
+                let of = |place: Place| &space.world(place.part).graph[place.cell].why[..];
+                (self.titled(space, place), place.map_or(&[], of))
+            }
+        };
+        let lines = whys.iter().map(|why| format!("\n{why:#}"));
+        std::iter::once(subject).chain(lines).collect()
     }
 
     /// The name of the cell of the eye.
@@ -50,6 +62,16 @@ impl Titles {
         let eye = DVec3::from(camera.eye.map(f64::from));
         self.titled(space, space.locate(PartId::ROOT, eye))
     }
+}
+
+/// Returns the place of the air before the surface in the middle of the picture.
+fn place_ahead(space: &Space, camera: &Camera) -> Option<Place> {
+    let [.., forward] = camera.axes().map(|axis| axis.as_dvec3());
+    let eye = DVec3::from(camera.eye.map(f64::from));
+    let far = f64::from(FAR);
+    let wall = space.first_wall(PartId::ROOT, [eye, eye + forward * far]);
+    let away = (wall.unwrap_or(1.0) * far - 0.02).max(0.0);
+    space.locate(PartId::ROOT, eye + forward * away)
 }
 
 fn kind_of(cell: &Cell) -> &'static str {
@@ -64,7 +86,8 @@ fn kind_of(cell: &Cell) -> &'static str {
 mod tests {
     use super::*;
     use enfilade::World;
-    use enfilade::cpg::CellId;
+    use enfilade::cpg::{CellId, Fact, PortalId, Reason};
+    use enfilade_testkit::{GridParams, room_grid};
 
     #[test]
     fn a_title_is_one_line_whatever_the_name() {
@@ -81,5 +104,36 @@ mod tests {
         };
         let title = Titles::default().titled(&space, Some(place));
         assert_eq!(title, r"Ha\nll\u{1b} (void)");
+    }
+
+    #[test]
+    fn the_crosshair_tells_why_of_the_doorway_or_else_of_the_cell() {
+        let mut world = room_grid(&GridParams::two_rooms());
+        let facts = [(Fact::Share, 0.2), (Fact::Area, 1.5)];
+        world.graph.portals[0].why = vec![Why::compared(Reason::Narrow, 0.7, &facts)];
+        for cell in &mut world.graph.cells {
+            cell.why = vec![Why::given(Reason::Unscaled)];
+        }
+        let vector = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+        let portal = world.graph.portals[0].clone();
+        let [low, high] = world.graph[portal.cells[0]].aabb.map(vector);
+        let eye = 0.5 * (low + high);
+        let space = Space::new(world).unwrap();
+        let told = |to: DVec3| {
+            let camera = Camera {
+                eye: eye.as_vec3().to_array(),
+                toward: (to - eye).normalize().as_vec3().to_array(),
+                fov_y: 1.0,
+            };
+            Titles::default().why_ahead(&space, &camera)
+        };
+        let of_portal = told(vector(portal.center()));
+        assert!(
+            of_portal.starts_with(&format!("{}\ntwo cells", PortalId(0)))
+                && of_portal.ends_with("margin 0.71)"),
+            "{of_portal}"
+        );
+        let of_cell = told(eye + DVec3::Y);
+        assert!(of_cell.contains("\na room: "), "{of_cell}");
     }
 }

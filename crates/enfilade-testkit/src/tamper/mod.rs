@@ -3,6 +3,7 @@
 //! Where a change touches what is counted (triangles of a cell, lists of portals), the counts are made to agree again, so
 //! that it is found for what it does and not for a number that was forgotten.
 
+mod decisions;
 mod fittings;
 mod geometry;
 mod graph;
@@ -75,6 +76,7 @@ impl Tampering {
 pub fn tamperings() -> impl Iterator<Item = &'static Tampering> {
     [
         graph::ALL,
+        decisions::ALL,
         geometry::ALL,
         fittings::ALL,
         origins::ALL,

@@ -10,6 +10,34 @@ import numpy as np
 from . import _arrays, _native
 
 
+@dataclass(frozen=True)
+class Why:
+    """A decision of the bake about a cell, a portal or a place. ``str`` of it is the text."""
+
+    reason: str
+    """As in the file, such as ``"narrow"``; the page on reasons lists them."""
+    margin: float
+    """How far the fact that decided is from its limit: 0 at it, 1 far from it and where nothing was weighed."""
+    limit: Optional[float]
+    """The number of the rule, with which the fact was compared; None where nothing was weighed."""
+    facts: Dict[str, float]
+    """All that was measured, such as ``"area"``."""
+    text: str
+    """The decision, its margin and its facts in words."""
+
+    def __str__(self) -> str:
+        return self.text
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place about which something was decided: an opening within a cell, or a space that is no cell."""
+
+    at: Tuple[float, float, float]
+    """A point of it."""
+    why: Why
+
+
 @dataclass(frozen=True, eq=False)
 class Cell:
     """A connected region of air: a room, the outdoors, or a void in which nobody can stand."""
@@ -27,6 +55,8 @@ class Cell:
     """The number of triangles of walls seen without passing a portal."""
     portals: Tuple[int, ...]
     """The ids of its portals."""
+    why: Tuple[Why, ...] = ()
+    """Why it is there. Empty in files of older versions."""
 
     @property
     def outdoors(self) -> bool:
@@ -56,6 +86,8 @@ class Portal:
     """(3,) float32."""
     normal: np.ndarray
     """The direction from the first cell to the second. (3,) float32."""
+    why: Tuple[Why, ...] = ()
+    """Why there are two cells. Empty in files of older versions."""
 
     def __repr__(self) -> str:
         width, height = self.size
@@ -79,6 +111,7 @@ class Cells(Sequence):
         columns = native.cells()
         self.names, self.kinds, self.volumes, bounds, self._triangles, self._portals = columns
         self.bounds = bounds.reshape(-1, 2, 3)
+        self._whys = [_whys(of) for of in native.cell_whys()]
         _freeze(self.volumes, self.bounds)
         self._by_name: Dict[str, int] = {}
         for i, name in enumerate(self.names):
@@ -107,6 +140,7 @@ class Cells(Sequence):
             self.bounds[i],
             int(self._triangles[i]),
             tuple(self._portals[i]),
+            self._whys[i],
         )
 
     def __repr__(self) -> str:
@@ -134,6 +168,7 @@ class Portals(Sequence):
     def __init__(self, native: _native.World) -> None:
         columns = native.portals()
         self.cells, self.kinds, self.areas, self.sizes, self.centers, self.normals, self.polygons = columns
+        self._whys = [_whys(of) for of in native.portal_whys()]
         _freeze(self.cells, self.areas, self.sizes, self.centers, self.normals, *self.polygons)
 
     def __len__(self) -> int:
@@ -157,6 +192,7 @@ class Portals(Sequence):
             self.sizes[i],
             self.centers[i],
             self.normals[i],
+            self._whys[i],
         )
 
     def __repr__(self) -> str:
@@ -288,6 +324,11 @@ class World:
         if self._portals is None:
             self._portals = Portals(self._native)
         return self._portals
+
+    @property
+    def places(self) -> List[Place]:
+        """Openings within cells that nearly part them, and spaces as large as a room that are no cells, with the reasons."""
+        return [Place((x, y, z), Why(*why)) for (x, y, z), why in self._native.places()]
 
     @property
     def storeys(self) -> List[Storey]:
@@ -452,6 +493,10 @@ def _index(index: Any, n: int, what: str) -> int:
     if not -n <= i < n:
         raise IndexError(f"{what} {i}: the world has {n}, counted from 0")
     return i % n
+
+
+def _whys(decisions: List[Tuple[Any, ...]]) -> Tuple[Why, ...]:
+    return tuple(Why(*why) for why in decisions)
 
 
 def _freeze(*arrays: np.ndarray) -> None:
