@@ -7,7 +7,7 @@ use std::ops::Range;
 use enfilade_cpg::{CellId, Locator};
 use enfilade_geom::{DVec3, Sets};
 
-use crate::complex::{Complex, Label, LeafCells, OpenContact, Partition};
+use crate::complex::{Complex, Label, LeafCells, OpenContact, Partition, Vote};
 use crate::proposal::BEYOND;
 use crate::structure::OUTDOORS;
 
@@ -138,66 +138,54 @@ fn renumber_locator(locator: &mut Locator, number: &[u32]) {
 /// candidates cover, have no opening between them. [Units: wu²]
 const MAX_LEAK: f64 = 1.0;
 
-/// Makes regions one that no plane separates, also as those of `voids`.
+/// Gives regions that no plane separates one label, in the votes and the voids. Returns `true` if there were any.
 ///
 /// A portal is planar. Where two regions meet in the open, outside their candidates (over a flight of
 /// stairs, say), the border between them would follow arbitrary planes of the cell complex: dozens of
 /// meaningless portals. Such regions are one room. The outdoors and the `land` in it are never joined so.
 pub(crate) fn join_unparted(
     complex: &Complex<'_>,
-    cells: &mut LeafCells,
+    cells: &LeafCells,
+    votes: &mut [Vote],
     voids: &mut [(DVec3, u32)],
     land: &Range<u32>,
-) {
+) -> bool {
     let mut between: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
-    let add = |between: &mut BTreeMap<_, OpenContact>, [a, b]: [u32; 2], contact: OpenContact| {
-        if a != b {
+    for (pair, contact) in complex.contacts(cells) {
+        let [a, b] = pair.map(|c| cells.label_of_cell[c as usize].region());
+        if let (Some(a), Some(b)) = (a, b)
+            && a != b
+        {
             let sum = between.entry([a.min(b), a.max(b)]).or_default();
             sum.on_candidates += contact.on_candidates;
             sum.beside += contact.beside;
         }
-    };
-    for (pair, contact) in complex.contacts(cells) {
-        if let [Some(a), Some(b)] = pair.map(|c| cells.label_of_cell[c as usize].region()) {
-            add(&mut between, [a, b], contact);
-        }
     }
-    // The least region stands for all of a set.
-    let mut regions: Vec<u32> = between.keys().flatten().copied().collect();
-    regions.sort_unstable();
-    regions.dedup();
-    let place = |region: u32| regions.partition_point(|&m| m < region) as u32;
-    let is_open = |region: &u32| *region == OUTDOORS || land.contains(region);
-    let mut sets = Sets::new(regions.len());
-    // Regions that became one have the openings of both.
-    loop {
-        let n = between.len();
-        for (pair, contact) in &between {
-            // A model full of holes must not lose its rooms to the outdoors.
-            let is_unparted = contact.beside > MAX_LEAK && contact.beside > contact.on_candidates;
-            if is_unparted && !pair.iter().any(is_open) {
-                let [a, b] = pair.map(place);
-                sets.join(a, b);
-            }
-        }
-        let mut home = |region: u32| regions[sets.find(place(region)) as usize];
-        for (pair, contact) in std::mem::take(&mut between) {
-            add(&mut between, pair.map(&mut home), contact);
-        }
-        if between.len() == n {
-            break;
+    // The least label stands for all of a set.
+    let mut labels: Vec<u32> = between.keys().flatten().copied().collect();
+    labels.sort_unstable();
+    labels.dedup();
+    let mut sets = Sets::new(labels.len());
+    for (pair, contact) in between {
+        // A model full of holes must not lose its rooms to the outdoors.
+        let is_unparted = contact.beside > MAX_LEAK && contact.beside > contact.on_candidates;
+        let is_open = |region: &u32| *region == OUTDOORS || land.contains(region);
+        if !pair.iter().any(is_open) && is_unparted {
+            let [a, b] = pair.map(|l| labels.partition_point(|&m| m < l) as u32);
+            sets.join(a, b);
         }
     }
     let stands_for = sets.into_least();
-    if (0..).zip(&stands_for).all(|(i, &least)| i == least) {
-        return;
-    }
-    let home = |region: u32| match regions.binary_search(&region) {
-        Ok(i) => regions[stands_for[i] as usize],
-        Err(_) => region,
+    let relabel = |label: &mut u32| {
+        if let Ok(i) = labels.binary_search(label) {
+            *label = labels[stands_for[i] as usize];
+        }
     };
-    voids
-        .iter_mut()
-        .for_each(|(_, region)| *region = home(*region));
-    complex.join_regions(cells, home);
+    for vote in votes {
+        if let Label::Region(region) = &mut vote.label {
+            relabel(region);
+        }
+    }
+    voids.iter_mut().for_each(|(_, region)| relabel(region));
+    (0..).zip(&stands_for).any(|(i, &least)| i != least)
 }

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::Sets;
-
 use super::Label;
 
 /// The cell of leaves in no cell.
@@ -51,33 +49,5 @@ impl LeafCells {
             .outside
             .map(|c| number[c as usize])
             .filter(|&c| c != SOLID);
-    }
-
-    /// Makes one cell of each set of cells, and numbers all by label, then by falling volume. A set's label is the least.
-    pub(super) fn join(&mut self, sets: Sets) {
-        let of_old = sets.into_least();
-        let mut joined: BTreeMap<u32, (Label, f64)> = BTreeMap::new();
-        for (c, &set) in of_old.iter().enumerate() {
-            let (label, volume) = (self.label_of_cell[c], self.volumes[c]);
-            let of = joined.entry(set).or_insert((label, 0.0));
-            of.0 = of.0.min(label);
-            of.1 += volume;
-        }
-        let mut order: Vec<u32> = joined.keys().copied().collect();
-        let place = |set: &u32| joined[set];
-        order.sort_by(|a, b| {
-            let ((of_a, a_volume), (of_b, b_volume)) = (place(a), place(b));
-            of_a.cmp(&of_b)
-                .then(b_volume.total_cmp(&a_volume))
-                .then(a.cmp(b))
-        });
-        let number: BTreeMap<u32, u32> = order.iter().copied().zip(0..).collect();
-        let of_cell = |c: u32| number[&of_old[c as usize]];
-        for cell in self.cell_of_leaf.iter_mut().filter(|c| **c != SOLID) {
-            *cell = of_cell(*cell);
-        }
-        self.outside = self.outside.map(of_cell);
-        self.label_of_cell = order.iter().map(|set| joined[set].0).collect();
-        self.volumes = order.iter().map(|set| joined[set].1).collect();
     }
 }

@@ -51,7 +51,7 @@ mod tree;
 
 use std::collections::BTreeMap;
 
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Sets, Triangle, Winding};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Triangle, Winding};
 
 use facet::Visitor;
 use graph::{Clearance, LeafGraph};
@@ -321,85 +321,6 @@ impl Complex<'_> {
             }
         }
         contacts
-    }
-
-    /// Makes regions one that `stands_for` maps to the same region: their cells get its label, and those that open to each other are
-    /// joined. Other labels stay.
-    ///
-    /// Time: `O(F)` for `F` openings.
-    pub fn join_regions(&self, cells: &mut LeafCells, stands_for: impl Fn(u32) -> u32) {
-        self.graph.spend_pass();
-        for label in &mut cells.label_of_cell {
-            if let Label::Region(region) = label {
-                *region = stands_for(*region);
-            }
-        }
-        let mut sets = Sets::new(cells.label_of_cell.len());
-        for facet in &self.graph.facets {
-            let [a, b] = facet.leaves.map(|l| cells.cell_of_leaf[l as usize]);
-            let is_one = a != b
-                && ![a, b].contains(&leaf_cells::SOLID)
-                && cells.label_of_cell[a as usize] == cells.label_of_cell[b as usize];
-            if is_one {
-                sets.join(a, b);
-            }
-        }
-        cells.join(sets);
-    }
-
-    /// Makes a cell, a void of the region given, of the closed space at each point that is in no cell, or in one of the region `beyond`:
-    /// of all leaves to which it is open. Spaces that open to a cell of another region are left as they are.
-    ///
-    /// Time: `O(F)` for `F` openings.
-    pub fn add_voids(&self, cells: &mut LeafCells, points: &[(DVec3, u32)], beyond: u32) {
-        self.graph.spend_pass();
-        let region_at = |cells: &LeafCells, leaf: usize| match cells.cell_of_leaf[leaf] {
-            leaf_cells::SOLID => None,
-            cell => cells.label_of_cell[cell as usize].region(),
-        };
-        let is_free = |cells: &LeafCells, leaf: usize| {
-            region_at(cells, leaf).is_none_or(|region| region == beyond)
-        };
-        let component_of = self.graph.components();
-        let mut region_of: BTreeMap<u32, u32> = BTreeMap::new();
-        for &(point, region) in points {
-            let leaf = self.leaf_of(point).map(|l| l as usize);
-            if let Some(leaf) = leaf.filter(|&l| is_free(cells, l)) {
-                region_of.entry(component_of[leaf]).or_insert(region);
-            }
-        }
-        if region_of.is_empty() {
-            return;
-        }
-        for facet in self.graph.facets.iter().filter(|f| !f.is_narrow) {
-            let [a, b] = facet.leaves.map(|l| l as usize);
-            for (leaf, other) in [(a, b), (b, a)] {
-                let own = region_of.get(&component_of[leaf]).copied();
-                if own.is_some() && !is_free(cells, other) && region_at(cells, other) != own {
-                    region_of.remove(&component_of[leaf]);
-                }
-            }
-        }
-        let mut cell_of: BTreeMap<u32, u32> = BTreeMap::new();
-        for (leaf, component) in component_of.iter().enumerate() {
-            let Some(&region) = region_of.get(component) else {
-                continue;
-            };
-            if !is_free(cells, leaf) {
-                continue;
-            }
-            if cells.cell_of_leaf[leaf] != leaf_cells::SOLID {
-                cells.volumes[cells.cell_of_leaf[leaf] as usize] -= self.graph.volumes[leaf];
-            }
-            let cell = *cell_of.entry(*component).or_insert_with(|| {
-                cells.label_of_cell.push(Label::Void(region));
-                cells.volumes.push(0.0);
-                cells.label_of_cell.len() as u32 - 1
-            });
-            cells.cell_of_leaf[leaf] = cell;
-            cells.volumes[cell as usize] += self.graph.volumes[leaf];
-        }
-        cells.join(Sets::new(cells.label_of_cell.len()));
     }
 
     /// Finds the portals between cells, the cells that see each triangle, and the locator.
