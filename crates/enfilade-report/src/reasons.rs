@@ -57,11 +57,11 @@ pub(crate) fn reasons(out: &mut String, world: &World) {
     } else {
         String::new()
     };
-    let _ = write!(
+    let _ = writeln!(
         out,
         "<section><h2>Reasons</h2><p>Why each room and doorway is there: the decision of the bake, how close it was (margin 0: at the \
          limit), and the facts behind it. What is most in doubt comes first.{note}</p><details><summary>{n} decisions</summary>\
-         <div class=\"wide\"><table id=\"reasons\">\n"
+         <div class=\"wide\"><table id=\"reasons\">"
     );
     for row in rows {
         let _ = writeln!(

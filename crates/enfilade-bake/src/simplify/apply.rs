@@ -112,16 +112,50 @@ fn absorb(cell: &mut Cell, from: &Cell) {
         cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);
     }
     cell.volume += from.volume;
-    // The reason for a room or the outdoors is that of both.
-    if from.outdoor && !cell.outdoor || cell.is_void && !from.is_void {
-        cell.why.clone_from(&from.why);
-    }
+    cell.why = why_of_both(cell, from);
     cell.is_void &= from.is_void;
     let is_first_name = is_numbered(&cell.name) && !is_numbered(&from.name);
     if (from.outdoor || is_first_name) && !cell.outdoor {
         cell.name.clone_from(&from.name);
     }
     cell.outdoor |= from.outdoor;
+}
+
+/// Returns why two cells together are what they are: the reason for the outdoors or a room is that of both, by the floor of both.
+fn why_of_both(cell: &Cell, from: &Cell) -> Vec<Why> {
+    let takes = from.outdoor && !cell.outdoor || cell.is_void && !from.is_void;
+    let (lead, rest) = if takes { (from, cell) } else { (cell, from) };
+    let floor_of = |why: &Why| {
+        let fact = |fact: Fact| why.facts.get(&fact).copied().map(f64::from);
+        Some([
+            fact(Fact::Floor)?,
+            fact(Fact::Standing)?,
+            fact(Fact::Doorway)?,
+        ])
+    };
+    let Some([floor, standing, doorway]) = rest.why.iter().find_map(floor_of) else {
+        return lead.why.clone();
+    };
+    let of_both = |why: &Why| {
+        let Some([own_floor, own_standing, own_doorway]) = floor_of(why) else {
+            return why.clone();
+        };
+        let both = own_floor + floor;
+        let share = (own_floor * own_standing + floor * standing) / both.max(f64::MIN_POSITIVE);
+        let facts = [
+            (Fact::Floor, both),
+            (Fact::Standing, share),
+            (Fact::Doorway, own_doorway.max(doorway)),
+        ];
+        let mut joined = why.clone().with(&facts);
+        if !joined.holds() {
+            // A small room beside a large void is still a room, though not by the floor of both.
+            joined = why.clone();
+            joined.facts.remove(&Fact::Floor);
+        }
+        joined
+    };
+    lead.why.iter().map(of_both).collect()
 }
 
 /// Returns the decision that two rooms are one, at the portal between them.
