@@ -10,9 +10,6 @@ use crate::Resolution;
 use crate::complex::{Label, LabelSettings, Vote};
 use crate::structure::{Candidate, OUTDOORS};
 
-/// Region of everything beyond the part of a scene that is baked, and of matter that its border cuts.
-pub(crate) const BEYOND: u32 = u32::MAX >> 1;
-
 /// A decision about a place that is not a cell, in scene coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundPlace {

@@ -28,11 +28,15 @@ addEventListener("load", () => {
   answers.others_of_row = [...document.querySelectorAll(".lit[data-cell]")].filter((e) => e.dataset.cell !== cell).length;
   const room = [...document.querySelectorAll("path.cell")].find((e) => e.dataset.cell !== cell);
   point(room);
-  answers.row_of_plan = n(`tr.lit[data-cell="${room.dataset.cell}"]`);
+  const row = `table:not(#reasons) tr.lit[data-cell="${room.dataset.cell}"]`;
+  answers.row_of_plan = n(row);
+  answers.reasons = n(`#reasons tr[data-cell="${room.dataset.cell}"]`);
+  answers.reasons_lit = n(`#reasons tr.lit[data-cell="${room.dataset.cell}"]`);
+  answers.told = n("#why:not([hidden]) p");
   answers.left_lit = n(`.lit[data-cell="${cell}"]`);
   room.dispatchEvent(new MouseEvent("click", { bubbles: true }));
   point(one("h1"));
-  answers.kept = n(`tr.lit[data-cell="${room.dataset.cell}"]`);
+  answers.kept = n(row);
   answers.edges = n("line.lit");
   answers.voids = document.body.dataset.voids.split(" ").filter(Boolean).length;
   answers.voids_before = seen("tr.void");
@@ -182,6 +186,11 @@ fn rooms_light_up_everywhere_and_voids_go() {
     assert!(number("matrix_of_row") >= 1, "{a}");
     assert_eq!((number("row_of_plan"), number("left_lit")), (1, 0), "{a}");
     assert_eq!(number("kept"), 1, "{a}");
+    assert!(
+        number("reasons") >= 1 && number("told") >= number("reasons"),
+        "{a}"
+    );
+    assert_eq!(number("reasons_lit"), number("reasons"), "{a}");
     assert!(number("edges") >= 1, "{a}");
     assert_eq!(
         (

@@ -8,8 +8,8 @@ mod common;
 use common::{
     nasty_rooms, two_rooms, two_rooms_with_parts, two_rooms_with_pvs, two_rooms_with_specials,
 };
-use enfilade_cpg::World;
 use enfilade_cpg::wire::{EXTENSION, encode_glb};
+use enfilade_cpg::{Fact, Reason, World};
 use serde_json::{Value, json};
 
 const SCHEMA: &str = include_str!("../../../docs/schema/ENFILADE_cell_portal_graph.schema.json");
@@ -187,6 +187,7 @@ fn the_schema_names_every_field_that_is_written() {
                 "fixtures",
                 "leakPath",
                 "pvs",
+                "places",
             ][..],
         ),
         ("/cells/0", &["void"]),
@@ -235,4 +236,31 @@ fn the_schema_names_every_field_that_is_written() {
         bad.pointer_mut(pointer).unwrap()["typo"] = json!(1);
         assert!(check(&schema, &schema, &bad, "").is_err(), "{pointer}");
     }
+}
+
+/// The names of an enum's variants in files, from the error about a name that it has not.
+fn names<T: serde::de::DeserializeOwned + std::fmt::Debug>() -> Vec<String> {
+    let error = serde_json::from_str::<T>("\"?\"").unwrap_err().to_string();
+    let (_, expected) = error.split_once("expected one of").unwrap();
+    let quoted = expected.split('`').skip(1).step_by(2);
+    let mut names: Vec<String> = quoted.map(String::from).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn the_schema_names_all_reasons_and_facts() {
+    let schema: Value = serde_json::from_str(SCHEMA).unwrap();
+    let why = &schema["$defs"]["why"]["properties"];
+    let listed = why["reason"]["enum"].as_array().unwrap();
+    let mut reasons: Vec<String> = listed
+        .iter()
+        .map(|name| name.as_str().unwrap().into())
+        .collect();
+    reasons.sort();
+    assert_eq!(reasons, names::<Reason>());
+    let facts = why["facts"]["properties"].as_object().unwrap();
+    let mut facts: Vec<String> = facts.keys().cloned().collect();
+    facts.sort();
+    assert_eq!(facts, names::<Fact>());
 }

@@ -123,7 +123,8 @@ fn own_problem(why: &Why) -> Option<String> {
 /// Returns the problem of a decision about something else.
 fn foreign_problem(why: &Why, wanted: &[About], what: &str) -> Option<String> {
     let about = About::of(why.reason);
-    (!wanted.contains(&about)).then(|| {
+    // A person may ask for portals and for parts of cells.
+    (why.reason != Reason::Asked && !wanted.contains(&about)).then(|| {
         let (name, about) = (why.reason.name(), about.words());
         format!("it is {what}, but the decision '{name}' is about {about}")
     })
@@ -143,7 +144,7 @@ fn label_problem(cell: &Cell) -> Option<String> {
         let has_main = cell
             .why
             .iter()
-            .any(|why| About::of(why.reason) == wanted[0]);
+            .any(|why| why.reason == Reason::Asked || About::of(why.reason) == wanted[0]);
         (!cell.why.is_empty() && !has_main)
             .then(|| format!("it is {what}, but no decision says so"))
     })

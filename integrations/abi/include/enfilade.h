@@ -63,6 +63,11 @@
 #define ENF_SPECIALS 5
 
 /*
+ Counts: places within a cell or without one about which something was decided.
+ */
+#define ENF_PLACES 6
+
+/*
  Kind of a cell: a room.
  */
 #define ENF_ROOM 0
@@ -207,6 +212,70 @@ typedef struct EnfPortal {
    */
   float leaf_depth;
 } EnfPortal;
+
+/*
+ A measured quantity behind a decision.
+ */
+typedef struct EnfFact {
+  /*
+   Name as in the file, such as `area`, in UTF-8, without a zero byte at its end.
+   */
+  const char *name;
+  /*
+   Length of the name. [Units: bytes]
+   */
+  uint32_t name_length;
+  /*
+   Its value.
+   */
+  float value;
+} EnfFact;
+
+/*
+ A decision of the bake.
+ */
+typedef struct EnfWhy {
+  /*
+   The decision with its facts in words, in UTF-8, without a zero byte at its end.
+   */
+  const char *text;
+  /*
+   The reason as in the file, such as `narrow`, in UTF-8, without a zero byte at its end.
+   */
+  const char *reason;
+  /*
+   All that was measured.
+   */
+  const struct EnfFact *facts;
+  /*
+   Length of the text. [Units: bytes]
+   */
+  uint32_t text_length;
+  /*
+   Length of the reason. [Units: bytes]
+   */
+  uint32_t reason_length;
+  /*
+   Number of facts.
+   */
+  uint32_t n_facts;
+  /*
+   Index in `facts` of the fact that was compared with the limit, or `ENF_NO_ID` if nothing was weighed.
+   */
+  uint32_t compared;
+  /*
+   The number of the rule, or 0 if nothing was weighed.
+   */
+  float limit;
+  /*
+   Distance of that fact from the limit: 0 at it, 1 far from it and if nothing was weighed.
+   */
+  float margin;
+  /*
+   Middle of the cell's box or of the portal, or a point of the place. [Units: m]
+   */
+  float position[3];
+} EnfWhy;
 
 /*
  A leaf of a door and its motion, measured from its pose in the file.
@@ -581,6 +650,16 @@ int32_t enf_cell(struct EnfWorld *handle, uint32_t cell, struct EnfCell *out);
  Describes a portal and its present state.
  */
 int32_t enf_portal(struct EnfWorld *handle, uint32_t portal, struct EnfPortal *out);
+
+/*
+ Tells why the bake made a cell, a portal or a place: decision number `decision`, from 0 on. `of` is `ENF_CELLS`,
+ `ENF_PORTALS` or `ENF_PLACES`. Returns `ENF_NONE` after the last decision; older files have none.
+ */
+int32_t enf_why(struct EnfWorld *handle,
+                uint32_t of,
+                uint32_t index,
+                uint32_t decision,
+                struct EnfWhy *out);
 
 /*
  Describes leaf number `leaf` of a portal.

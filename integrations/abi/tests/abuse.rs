@@ -64,7 +64,7 @@ fn null_is_an_error_everywhere() {
             enf_cell(w, 0, null_mut()),
             enf_portal(w, 0, null_mut()),
             enf_why(null_mut(), ENF_CELLS, 0, 0, null_mut()),
-            enf_why(w, ENF_CELLS, 0, 0, null_mut()),
+            enf_why(w, ENF_PORTALS, 0, 0, null_mut()),
             enf_leaf(w, 0, 0, null_mut()),
             enf_batch(w, 0, null_mut()),
             enf_detail(w, 0, null_mut()),

@@ -8,8 +8,10 @@ use enfilade::bake::{BakeConfig, BakeContext, Method, Progress, Stage, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::geom::DMat4;
 use enfilade::geom::scene::Scene;
-use enfilade::import::{ArrayMesh, IfcConverter, ImportOptions, Imported, import, import_arrays};
-use enfilade_report::{Verdict, is_empty, why_empty};
+use enfilade::import::{
+    ArrayMesh, IfcConverter, ImportOptions, ImportReport, Imported, import, import_arrays,
+};
+use enfilade_report::{InputDoubt, Verdict, is_empty, why_empty};
 use enfilade_settings::{Resolved, Settings, parse_toml};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -156,7 +158,7 @@ fn work(
         }
         warnings.push(why);
     } else if !baked.world.doubts().is_empty() {
-        warnings.push(Verdict::of(&baked.world, &said).to_string());
+        warnings.push(Verdict::of(&baked.world, &doubted(&said, report)).to_string());
     }
     // As readers of its file get it: rounded.
     let bug = |e| BakeError::new_err(format!("the baked world breaks an invariant (a bug): {e}"));
@@ -240,6 +242,16 @@ impl Options {
         import_options.ifc = Some(ifc);
         Ok((import_options, resolved))
     }
+}
+
+/// Returns doubts about the input, as the verdict takes them.
+fn doubted(said: &[String], report: &ImportReport) -> Vec<InputDoubt> {
+    let up = report.up_doubt.as_ref().map(|doubt| &doubt.text);
+    let doubt = |text: &String| InputDoubt {
+        text: text.clone(),
+        is_about_up: Some(text) == up,
+    };
+    said.iter().map(doubt).collect()
 }
 
 /// Hands on the stages of a bake.
