@@ -13,6 +13,7 @@ use enfilade_cpg::{CellId, Locator, Reason, Why};
 use enfilade_geom::{Aabb, Allowance, DVec3, Sets, is_rather_level};
 use rayon::prelude::*;
 
+use crate::budget::WORK_A_LOOK;
 use crate::complex::{Label, Partition, PartitionPortal};
 use crate::judge::SpaceFacts;
 
@@ -28,9 +29,6 @@ const BEYOND: f64 = 0.6;
 const SPACING: f64 = 0.25;
 /// Most columns along a side of a cell; larger cells have wider spacing.
 const MAX_COLUMNS: f64 = 128.0;
-
-/// Cost of a column, in units of [`Allowance`].
-const WORK_A_COLUMN: u64 = 20;
 
 /// Labels the voids of a partition as such, and returns for each cell why it is a room or a void. Cells of one region that open to each other are one space, since slits and
 /// hatches divide what is one to a builder.
@@ -129,7 +127,7 @@ fn facts_of(locator: &Locator, cell: CellId, bounds: &Aabb, allowance: &Allowanc
         bounds.center() - DVec3::new(nx as f64 - 1.0, 0.0, nz as f64 - 1.0) * (spacing / 2.0);
     let mut heights = vec![0.0; nx * nz];
     for (k, height) in heights.iter_mut().enumerate() {
-        if !allowance.spend(WORK_A_COLUMN) {
+        if !allowance.spend(2 * WORK_A_LOOK) {
             break;
         }
         let p = first + DVec3::new((k % nx) as f64, 0.0, (k / nx) as f64) * spacing;

@@ -30,6 +30,7 @@ use std::f64::consts::PI;
 use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::cells::{CellPortal, Cells};
+use crate::budget::WORK_A_LOOK;
 use crate::config::{Choices, Weight};
 
 pub use remaining::RemainingPortal;
@@ -38,8 +39,7 @@ pub(super) use remaining::{Resolved, begun_before, remaining};
 /// A cell of less than this share of its ball's volume does not contain the ball, which lies in a neighbor: it is a
 /// bundle of spikes. Bundles have a hundredth or so, rooms several times the ball.
 const HOLDS: f64 = 0.1;
-/// Costs of a step, and of each portal that it changes, in units of [`Allowance`].
-const WORK_A_STEP: u64 = 10;
+/// Cost of each portal that a step changes, in units of [`Allowance`].
 const WORK_A_PAIR: u64 = 5;
 
 /// Factor on the weight of a crevice's portal at the mouth of a branch. Weights of crevices are negative, so crevices
@@ -393,7 +393,7 @@ impl Merging {
     /// Merges until no portal is left. Also returns, for each step, the initial portal that it removed.
     fn run(mut self, allowance: &Allowance) -> (Decimation, Vec<(u32, u32)>) {
         while let Some(candidate) = self.next_candidate() {
-            if !allowance.spend(WORK_A_STEP + WORK_A_PAIR * self.n_pairs(candidate.pair)) {
+            if !allowance.spend(WORK_A_LOOK + WORK_A_PAIR * self.n_pairs(candidate.pair)) {
                 break;
             }
             self.remove(&candidate);

@@ -17,12 +17,12 @@ use enfilade_geom::{Allowance, DVec3};
 use super::order::insertion_order;
 use super::predicate::{LARGEST, LEAST, Predicates};
 use super::tetrahedra::{Delaunay, INFINITE, Tetrahedron, walk};
+use crate::budget::WORK_A_LOOK;
 use crate::error::DelaunayError;
 
 /// Most points: seven tetrahedra per point, with four facets each, must fit in 32 bits with room to spare.
 const MOST_POINTS: usize = 100_000_000;
-/// Costs of inserting a point, and of each tetrahedron that it makes, in units of [`Allowance`].
-const WORK_A_POINT: u64 = 10;
+/// Cost of each tetrahedron that a point makes, in units of [`Allowance`].
 const WORK_A_FAN: u64 = 2;
 
 /// For a new point in slot `i`, the edge that remains when vertex `j` is dropped, in the direction opposite to that of
@@ -339,7 +339,7 @@ impl Insertion {
     /// makes.
     fn insert_within(&mut self, v: u32, allowance: &Allowance) -> bool {
         self.insert(v);
-        allowance.spend(WORK_A_POINT + WORK_A_FAN * self.fans.len() as u64)
+        allowance.spend(WORK_A_LOOK + WORK_A_FAN * self.fans.len() as u64)
     }
 
     fn insert(&mut self, v: u32) {

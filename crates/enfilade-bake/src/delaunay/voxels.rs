@@ -8,12 +8,10 @@ use super::cells::{Cells, OUTDOOR_CELL};
 use super::labels::{BranchMouth, Branches};
 use super::space::Space;
 use crate::MergeSettings;
+use crate::budget::WORK_A_LOOK;
 use crate::rooms::{Basins, Regions, THICKER, VoxelAir, VoxelRooms};
 use crate::structure::OUTDOORS;
 use crate::tubes::Walls;
-
-/// Cost of a look-up, in units of [`Allowance`].
-const WORK: u64 = 10;
 
 /// The voxels of cells.
 pub(super) struct CellVoxels {
@@ -35,7 +33,9 @@ impl CellVoxels {
             // The search for a voxel begins where it ended for the one before.
             let mut hint = 0;
             move |p: DVec3| {
-                let part = allowance.spend(WORK).then(|| space.part_at(p, hint, walls));
+                let part = allowance
+                    .spend(WORK_A_LOOK)
+                    .then(|| space.part_at(p, hint, walls));
                 part.flatten().map(|part| {
                     hint = part;
                     cells.cell_of_part[part as usize]

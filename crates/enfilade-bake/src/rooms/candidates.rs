@@ -16,6 +16,7 @@ use super::limbs::LONG;
 use super::regions::{Regions, balls_of};
 use super::sections::whole_section_of;
 use crate::MergeSettings;
+use crate::budget::WORK_A_LOOK;
 use crate::judge::{OpeningFacts, why_parted, why_unjoined};
 use crate::structure::{Candidate, OUTDOORS, fit_candidate};
 use crate::voxel::{Grid, Labels, SparseVolume};
@@ -23,8 +24,7 @@ use crate::voxel::{Grid, Labels, SparseVolume};
 /// Smaller openings, in voxel faces, are left to the complex, which finds them as cracks.
 const MIN_FACES: usize = 4;
 
-/// Cost of fitting a candidate, in units of [`Allowance`], plus that of each face of its opening.
-const WORK: u64 = 100;
+/// Cost of each face of an opening to which a candidate is fitted, in units of [`Allowance`].
 const WORK_A_FACE: u64 = 5;
 
 /// The regions of a flooded volume and what stands between them.
@@ -115,7 +115,7 @@ impl Openings<'_> {
             ..
         } = *self;
         // Measured: a picture of the opening, many times finer than its faces.
-        if !allowance.spend(WORK + WORK_A_FACE * faces.len() as u64) {
+        if !allowance.spend(10 * WORK_A_LOOK + WORK_A_FACE * faces.len() as u64) {
             return None;
         }
         if let Some(lid) = self.lids.candidate_of(grid, &faces) {

@@ -27,6 +27,7 @@ use enfilade_cpg::{Fact, Reason, Why};
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets};
 use rayon::prelude::*;
 
+use crate::budget::WORK_A_LOOK;
 use crate::voxel::{Grid, Labels};
 
 use super::regions::{CloseJoin, Regions};
@@ -207,9 +208,6 @@ fn by_facing(facing: Facing) -> &'static str {
     }
 }
 
-/// Cost of a ray, in units of [`Allowance`]; each hit costs one more.
-const WORK_A_RAY: u64 = 10;
-
 /// Hits of a ray that are looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Rays {
@@ -250,7 +248,7 @@ impl Seen {
                 ray.t_max = hit.t;
             }
             bvh.for_each_hit(&ray, |hit| hits.push((hit.t, hit.front)));
-            if !allowance.spend(WORK_A_RAY + hits.len() as u64) {
+            if !allowance.spend(WORK_A_LOOK + hits.len() as u64) {
                 break;
             }
             // At one place a back counts as first: where two solids touch, the ray leaves one before it

@@ -32,6 +32,7 @@ use super::fronts::{Faces, Front, group_faces, is_in};
 use super::sections::section_of;
 use super::slabs::{LAYERS, sum};
 use crate::MergeSettings;
+use crate::budget::WORK_A_LOOK;
 use crate::judge::{OpeningFacts, OpeningVerdict, judge};
 use crate::structure::{Mergeable, OUTDOORS, Opening, Pair, join_rooms, lies_in_slab};
 use crate::voxel::Labels;
@@ -140,10 +141,6 @@ pub(crate) fn merge_basins(
     merger.absorb_bays();
     merger.finish()
 }
-
-/// Cost of weighing an opening, in units of [`Allowance`](enfilade_geom::Allowance), besides its faces and the sections
-/// beside it.
-const WORK: u64 = 100;
 
 struct BasinMerger<'a> {
     flooded: Flooded<'a>,
@@ -306,7 +303,7 @@ impl BasinMerger<'_> {
     /// Returns the verdicts on the openings between two cells, each with its middle: on the two largest, since a third is smaller
     /// still.
     fn verdicts(&self, (a, b): Pair, faces: &[u64], balls: f64) -> Vec<(OpeningVerdict, DVec3)> {
-        self.flooded.allowance.spend(WORK);
+        self.flooded.allowance.spend(10 * WORK_A_LOOK);
         let side = |at| self.cell[self.flooded.labels.at(at) as usize] == a;
         let cell_of = |label: u32| self.cell[label as usize];
         let fronts = group_faces(self.flooded, faces, &side);

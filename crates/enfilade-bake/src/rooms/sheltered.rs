@@ -10,6 +10,7 @@ use enfilade_geom::{Allowance, Bvh, DVec3, Ray, Sets};
 use rayon::prelude::*;
 
 use super::regions::{CloseJoin, Regions};
+use crate::budget::WORK_A_LOOK;
 use crate::judge::LEAST_SHELTER;
 use crate::proposal::FoundPlace;
 use crate::structure::OUTDOORS;
@@ -21,8 +22,6 @@ const SPACING: f64 = 0.8;
 const REACH: f64 = 20.0;
 /// Rays in the horizontal.
 const ASIDE: usize = 8;
-/// Cost of a point, in units of [`Allowance`].
-const WORK_A_POINT: u64 = 20;
 
 /// Returns a point of each sheltered space of a room's size in the outdoors, in the axes of the grid.
 pub(super) fn sheltered(
@@ -40,7 +39,7 @@ pub(super) fn sheltered(
         let [x, y, z] = voxel(i);
         let is_out = regions.region_of_basin[labels.at([x, y, z]) as usize] == OUTDOORS;
         let p = grid.center(x, y, z);
-        let is_around = is_out && bvh.bounds().contains(p) && allowance.spend(WORK_A_POINT);
+        let is_around = is_out && bvh.bounds().contains(p) && allowance.spend(2 * WORK_A_LOOK);
         (is_around && is_covered(bvh, p)).then(|| walls_around(bvh, p))
     };
     let found: Vec<Option<f64>> = (0..nx * ny * nz).into_par_iter().map(shelter).collect();

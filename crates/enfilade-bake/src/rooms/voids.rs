@@ -10,6 +10,7 @@
 use enfilade_geom::{Allowance, Attitude, Bvh, DVec3, Ray, Triangle, triangle_area_normal};
 use rayon::prelude::*;
 
+use crate::budget::WORK_A_LOOK;
 use crate::structure::count_backs;
 
 /// Voids are lower than this. [Units: wu] Higher ones are rooms of their own.
@@ -20,8 +21,6 @@ const MAX_CEILING: f64 = 0.4;
 const SAMPLE_AREA: f64 = 0.5;
 /// Most samples on one triangle.
 const MAX_SAMPLES: usize = 64;
-/// Cost of a sample, in units of [`Allowance`].
-const WORK_A_SAMPLE: u64 = 10;
 
 /// Returns points in shallow voids, each with the region below its floor, in order of the triangles.
 ///
@@ -44,7 +43,7 @@ pub(crate) fn shallow_voids(
             } else {
                 0
             };
-            let samples_in_turn = (0..samples).filter(allowance.each(WORK_A_SAMPLE));
+            let samples_in_turn = (0..samples).filter(allowance.each(WORK_A_LOOK));
             samples_in_turn.filter_map(move |k| {
                 let p = sample(t, k, samples);
                 let ray = Ray {
@@ -84,7 +83,7 @@ pub(crate) fn inside_stairs(
     region_at: &(dyn Fn(DVec3) -> u32 + Sync),
     allowance: &Allowance,
 ) -> Vec<(DVec3, u32)> {
-    let in_turn = stairs.par_iter().filter(allowance.each(WORK_A_SAMPLE));
+    let in_turn = stairs.par_iter().filter(allowance.each(WORK_A_LOOK));
     let inside = in_turn.filter_map(|t| {
         let inward = -triangle_area_normal(t).try_normalize()?;
         let origin = (t[0] + t[1] + t[2]) / 3.0 + inward * 1e-4;

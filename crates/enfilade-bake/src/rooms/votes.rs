@@ -6,6 +6,7 @@ use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Ray, Triangle};
 use rayon::prelude::*;
 
 use super::regions::Regions;
+use crate::budget::WORK_A_LOOK;
 use crate::complex::{Label, Vote};
 use crate::structure::Frame;
 use crate::voxel::{BitVolume, Grid, Labels, voxelize};
@@ -15,8 +16,6 @@ pub(super) const MAX_VOTES: usize = 1_000_000;
 /// Voxels this close to where two regions meet do not vote: a candidate may lie on either
 /// side of them. [Units: wu]
 const UNSURE: f64 = 0.35;
-/// Cost of a ray, in units of [`Allowance`].
-const WORK_A_RAY: u64 = 10;
 
 /// Compact votes: there are many, and the labels are still in memory.
 pub(super) struct Ballots {
@@ -183,7 +182,7 @@ pub(super) fn inside_of(
         .into_par_iter()
         .flat_map_iter(|([z, x], [low, high])| (low..=high).map(move |y| [x, y, z]))
         .filter(is_free)
-        .filter(allowance.each(WORK_A_RAY))
+        .filter(allowance.each(WORK_A_LOOK))
         .filter(is_inside)
         .collect();
     for [x, y, z] in inner {
