@@ -95,7 +95,7 @@ impl Proposal {
             vote.label = match vote.label {
                 Label::Region(region) => Label::Region(moved(region)),
                 Label::Void(region) => Label::Void(moved(region)),
-                Label::Solid => Label::Solid,
+                label @ (Label::Beyond | Label::Solid) => label,
             };
         }
         other.voids.iter_mut().for_each(|v| v.1 = moved(v.1));
