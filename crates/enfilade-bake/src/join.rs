@@ -1,14 +1,12 @@
 //! Joins cells that belong together: a shallow void and the room below it, although no opening connects
-//! them, voids that open to each other, and regions that no plane separates.
+//! them, and voids that open to each other.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use enfilade_cpg::{CellId, Locator};
-use enfilade_geom::{DVec3, Sets};
+use enfilade_geom::Sets;
 
-use crate::complex::{Complex, Label, LeafCells, OpenContact, Partition, Vote};
-use crate::proposal::BEYOND;
+use crate::complex::{Label, Partition};
 use crate::structure::OUTDOORS;
 
 /// Merges each cell that opens to no other region with the largest cell of its region: shallow voids, the insides of
@@ -22,19 +20,20 @@ pub(crate) fn join_enclosed(partition: &mut Partition) {
             *best = c as u32;
         }
     }
-    let region = |c: u32| partition.label_of_cell[c as usize].region();
+    let label = |c: u32| partition.label_of_cell[c as usize];
     let mut sets = Sets::new(n);
     let mut opens_elsewhere = vec![false; n];
     for p in &partition.portals {
-        let regions = p.cells.map(region);
-        if regions[0] != regions[1] && !regions.contains(&Some(BEYOND)) {
+        let labels = p.cells.map(label);
+        let [a, b] = labels.map(Label::region);
+        if a != b && !labels.contains(&Label::Beyond) {
             p.cells
                 .iter()
                 .for_each(|&c| opens_elsewhere[c as usize] = true);
         }
     }
     for c in 0..n as u32 {
-        let label = partition.label_of_cell[c as usize];
+        let label = label(c);
         if !opens_elsewhere[c as usize]
             && label != Label::Region(OUTDOORS)
             && let Some(region) = label.region()
@@ -132,60 +131,4 @@ fn renumber_locator(locator: &mut Locator, number: &[u32]) {
     for node in &mut locator.nodes {
         node.children = node.children.map(|c| renumbered(c, number));
     }
-}
-
-/// Regions that touch outside their candidates over more than this area, and over more than the
-/// candidates cover, have no opening between them. [Units: wu²]
-const MAX_LEAK: f64 = 1.0;
-
-/// Gives regions that no plane separates one label, in the votes and the voids. Returns `true` if there were any.
-///
-/// A portal is planar. Where two regions meet in the open, outside their candidates (over a flight of
-/// stairs, say), the border between them would follow arbitrary planes of the cell complex: dozens of
-/// meaningless portals. Such regions are one room. The outdoors and the `land` in it are never joined so.
-pub(crate) fn join_unparted(
-    complex: &Complex<'_>,
-    cells: &LeafCells,
-    votes: &mut [Vote],
-    voids: &mut [(DVec3, u32)],
-    land: &Range<u32>,
-) -> bool {
-    let mut between: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
-    for (pair, contact) in complex.contacts(cells) {
-        let [a, b] = pair.map(|c| cells.label_of_cell[c as usize].region());
-        if let (Some(a), Some(b)) = (a, b)
-            && a != b
-        {
-            let sum = between.entry([a.min(b), a.max(b)]).or_default();
-            sum.on_candidates += contact.on_candidates;
-            sum.beside += contact.beside;
-        }
-    }
-    // The least label stands for all of a set.
-    let mut labels: Vec<u32> = between.keys().flatten().copied().collect();
-    labels.sort_unstable();
-    labels.dedup();
-    let mut sets = Sets::new(labels.len());
-    for (pair, contact) in between {
-        // A model full of holes must not lose its rooms to the outdoors.
-        let is_unparted = contact.beside > MAX_LEAK && contact.beside > contact.on_candidates;
-        let is_open = |region: &u32| *region == OUTDOORS || land.contains(region);
-        if !pair.iter().any(is_open) && is_unparted {
-            let [a, b] = pair.map(|l| labels.partition_point(|&m| m < l) as u32);
-            sets.join(a, b);
-        }
-    }
-    let stands_for = sets.into_least();
-    let relabel = |label: &mut u32| {
-        if let Ok(i) = labels.binary_search(label) {
-            *label = labels[stands_for[i] as usize];
-        }
-    };
-    for vote in votes {
-        if let Label::Region(region) = &mut vote.label {
-            relabel(region);
-        }
-    }
-    voids.iter_mut().for_each(|(_, region)| relabel(region));
-    (0..).zip(&stands_for).any(|(i, &least)| i != least)
 }

@@ -44,7 +44,8 @@ impl Method {
                 Partition, Geometry,
             ],
             Self::Delaunay => &[
-                Structure, Tetrahedra, Decimation, Candidates, Complex, Partition, Geometry,
+                Structure, Tetrahedra, Voxelize, Distance, Decimation, Candidates, Complex,
+                Partition, Geometry,
             ],
         }
     }

@@ -10,9 +10,6 @@ use crate::Resolution;
 use crate::complex::{Label, LabelSettings, Vote};
 use crate::structure::{Candidate, OUTDOORS};
 
-/// Region of everything beyond the part of a scene that is baked, and of matter that its border cuts.
-pub(crate) const BEYOND: u32 = u32::MAX >> 1;
-
 /// A decision about a place that is not a cell, in scene coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct FoundPlace {
@@ -98,7 +95,7 @@ impl Proposal {
             vote.label = match vote.label {
                 Label::Region(region) => Label::Region(moved(region)),
                 Label::Void(region) => Label::Void(moved(region)),
-                Label::Solid => Label::Solid,
+                label @ (Label::Beyond | Label::Solid) => label,
             };
         }
         other.voids.iter_mut().for_each(|v| v.1 = moved(v.1));

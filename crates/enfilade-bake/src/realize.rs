@@ -1,19 +1,15 @@
 //! From a proposal to a world: an exact cut of space into convex leaves, cells by votes, portals where cells are open
 //! to each other, and geometry assigned to the cells that see it. The same for all builders.
 
-use std::collections::BTreeSet;
-
 use enfilade_cpg::{Place, Provenance, Reason, Statistics, Why, World};
 use enfilade_geom::scene::Role;
 use enfilade_geom::{Allowance, Triangle};
 
 use crate::assemble::{Cut, assemble};
-use crate::complex::{
-    Complex, ComplexInput, Label, LeafCells, Partition, Vote, build_complex_within,
-};
-use crate::join::{join_enclosed, join_unparted, join_voids};
-use crate::proposal::{BEYOND, FoundPlace, Proposal};
-use crate::structure::Structure;
+use crate::complex::{Complex, ComplexInput, LabelInput, Partition, build_complex_within};
+use crate::join::{join_enclosed, join_voids};
+use crate::proposal::{FoundPlace, Proposal};
+use crate::structure::{OUTDOORS, Structure};
 use crate::void::mark_voids;
 use crate::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, SmallestHole, Stage};
 
@@ -56,7 +52,7 @@ pub(crate) fn realize(
     };
     let complex = build_complex_within(&input, context.allowance());
     context.begin(Stage::Partition)?;
-    let Divided { partition, whys } = part(&complex, &mut proposal, context.allowance());
+    let Divided { partition, whys } = part(&complex, &proposal, context.allowance());
     proposal.counts.push(("leaves", complex.n_leaves() as f64));
     proposal.votes = Vec::new();
     let outward = complex.opening_tolerance();
@@ -89,10 +85,6 @@ pub(crate) fn realize(
     })
 }
 
-/// Weight of a point in a void that no room's votes reached: enough for its own component, however small a part it is of all
-/// voids of its region: a flight of closed boxes. [Units: wu³]
-const VOID_WEIGHT: f32 = 1.0;
-
 /// Returns the close decisions of a proposal, as a world has them.
 pub(crate) fn places_of(proposal: &Proposal) -> Vec<Place> {
     let place = |place: &FoundPlace| Place {
@@ -110,11 +102,7 @@ pub(crate) struct Divided {
 }
 
 /// Divides the leaves of the complex among cells.
-pub(crate) fn part(
-    complex: &Complex<'_>,
-    proposal: &mut Proposal,
-    allowance: &Allowance,
-) -> Divided {
+pub(crate) fn part(complex: &Complex<'_>, proposal: &Proposal, allowance: &Allowance) -> Divided {
     let is_tree = proposal.is_tree();
     let Proposal {
         votes,
@@ -125,40 +113,14 @@ pub(crate) fn part(
         whys,
         ..
     } = proposal;
-    let mut cells = complex.label(votes, label);
-    while *joins_unparted && join_unparted(complex, &cells, votes, voids, land) {
-        cells = complex.label(votes, label);
-    }
-    // Voids that no room's votes reached.
-    let region = |c: u32| cells.label_of_cell[c as usize].region();
-    let is_reached = |c: u32| region(c) != Some(BEYOND);
-    let mut unreached: Vec<Vote> = std::mem::take(voids)
-        .into_iter()
-        .filter(|(p, _)| !complex.cell_at(&cells, *p).is_some_and(is_reached))
-        .map(|(point, region)| Vote {
-            point,
-            label: Label::Void(region),
-            weight: VOID_WEIGHT,
-        })
-        .collect();
-    if !unreached.is_empty() {
-        let n = votes.len();
-        votes.append(&mut unreached);
-        cells = complex.label(votes, label);
-        unreached = votes.split_off(n);
-        // A void that opens to another room than its own is a cavity of the construction: left as it was.
-        let opening = opening_elsewhere(complex, &cells);
-        let n_unreached = unreached.len();
-        unreached.retain(|v| {
-            let cell = complex.cell_at(&cells, v.point);
-            cell.is_none_or(|c| !opening.contains(&c))
-        });
-        let is_final = unreached.len() == n_unreached;
-        votes.append(&mut unreached);
-        if !is_final {
-            cells = complex.label(votes, label);
-        }
-    }
+    // The outdoors and open land stay apart: a model full of holes must not lose its rooms to them.
+    let may_join = |region| *joins_unparted && region != OUTDOORS && !land.contains(&region);
+    let cells = complex.label(&LabelInput {
+        votes,
+        voids,
+        may_join: &may_join,
+        settings: *label,
+    });
     let mut partition = complex.realize(cells);
     join_enclosed(&mut partition);
     let mut of_cell = if is_tree {
@@ -187,17 +149,6 @@ pub(crate) fn part(
         whys: whys.collect(),
         partition,
     }
-}
-
-/// Returns the cells that open to a cell of another region.
-fn opening_elsewhere(complex: &Complex<'_>, cells: &LeafCells) -> BTreeSet<u32> {
-    let region = |c: u32| cells.label_of_cell[c as usize].region();
-    let pairs = complex.contacts(cells).into_keys();
-    let elsewhere = pairs.filter(|pair| {
-        let regions = pair.map(region);
-        regions[0] != regions[1] && !regions.contains(&Some(BEYOND))
-    });
-    elsewhere.flatten().collect()
 }
 
 /// Assigns the geometry and records the provenance of the world.

@@ -9,28 +9,35 @@
 //! 3. Parts of one label that open to each other are rejoined, across candidates too.
 //! 4. Groups without a label, or with too little volume for a cell, join the neighbor with which a border would cost
 //!    most: the one they open to most, through a candidate if need be. Groups without votes that open only through
-//!    gaps are solid.
+//!    gaps are voids where the caller knows points of one region's, else solid.
 //! 5. Crumbs, too thin for a ball of the smallest hole, join the cell or solid to which they have the largest gaps,
 //!    through gaps in the air if there are any: a sliver that leads from within a wall into the air is not solid.
+//! 6. Labels that no plane separates are one: where two meet in the open, beside their candidates, the border between
+//!    them would follow arbitrary planes, in dozens of meaningless portals.
 //!
 //! Time: `O(F log F)` in open facets. Every merge reduces the number of groups, so it ends.
 
 use std::borrow::Cow;
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::ops::AddAssign;
 
-use enfilade_geom::Sets;
+use enfilade_geom::{DVec3, Sets};
 use rayon::prelude::*;
 
 use super::cut::{absorb_chips, dissolve_slivers, move_borders};
 use super::graph::{LeafGraph, NO_CANDIDATE, OpenFacet};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
-use super::{Label, LabelSettings, Vote};
+use super::{Label, LabelInput, LabelSettings};
 
-fn tally_by(tally: &Tally, mut key: impl FnMut(u32) -> u32) -> Tally {
-    let mut out = Tally::new();
-    for (&(leaf, label), &w) in tally {
-        *out.entry((key(leaf), label)).or_default() += w;
+/// Labels that meet beside their candidates over more than this area, and over more than on them, are one. [Units: wu²]
+const MAX_LEAK: f64 = 1.0;
+
+/// Adds up the values of each key.
+fn sums<K: Ord, V: Default + AddAssign>(entries: impl Iterator<Item = (K, V)>) -> BTreeMap<K, V> {
+    let mut out = BTreeMap::new();
+    for (key, value) in entries {
+        *out.entry(key).or_default() += value;
     }
     out
 }
@@ -41,6 +48,8 @@ struct Group {
     /// whenever it takes in another.
     root: u32,
     label: Option<Label>,
+    /// Numbers of points of voids in it, by region.
+    voids: BTreeMap<u32, u32>,
     /// It is a cell, whatever happens around it.
     keeps: bool,
     volume: f64,
@@ -52,25 +61,31 @@ struct Group {
     leak: f64,
 }
 
+/// Numbers of points of voids, by leaf and region.
+type Voids = BTreeMap<(u32, u32), u32>;
+
 /// Cost of locating and counting a vote, in units of [`enfilade_geom::Allowance`].
 const WORK_A_VOTE: u64 = 2;
 
-/// Divides the leaves among cells. `leaf_of` returns the leaf of a vote.
+/// Divides the leaves among cells. `leaf_of` returns the leaf of a point.
 pub(super) fn label_leaves(
     graph: &LeafGraph<'_>,
-    votes: &[Vote],
-    settings: &LabelSettings,
+    input: &LabelInput<'_>,
     has_seals: bool,
-    leaf_of: impl Fn(&Vote) -> Option<u32> + Sync + Send,
+    leaf_of: impl Fn(DVec3) -> Option<u32> + Sync + Send,
 ) -> LeafCells {
+    let LabelInput {
+        votes, settings, ..
+    } = input;
     let n_leaves = graph.volumes.len();
     let mut tally = Tally::new();
     // Located in parallel but counted in order, so that sums round alike for any number of threads.
-    let leaf_of = |v: &Vote| {
+    let leaf_of = |p: DVec3| {
         let may_look = graph.purse.spend(WORK_A_VOTE);
-        may_look.then(|| leaf_of(v)).flatten()
+        may_look.then(|| leaf_of(p)).flatten()
     };
-    let leaves: Vec<Option<u32>> = votes.par_iter().with_min_len(1024).map(leaf_of).collect();
+    let located = votes.par_iter().with_min_len(1024);
+    let leaves: Vec<Option<u32>> = located.map(|v| leaf_of(v.point)).collect();
     for (vote, leaf) in votes.iter().zip(leaves) {
         if let Some(leaf) = leaf
             && vote.label != Label::Solid
@@ -124,15 +139,18 @@ pub(super) fn label_leaves(
         label_of_set[leaf as usize] = label;
     }
     grow_together(graph, &mut sets, &mut label_of_set, &component_of, leaked);
-
     rejoin(graph, &mut sets, &mut label_of_set);
 
-    let groups = merge_groups(graph, &mut sets, &label_of_set, settings);
+    let voids = input.voids.iter();
+    let voids = sums(voids.filter_map(|&(p, region)| Some(((leaf_of(p)?, region), 1))));
+    let mut groups = merge_groups(graph, &mut sets, &label_of_set, &voids, settings);
+    make_voids(&mut groups, settings);
     let groups = give_away_crumbs(graph, &mut sets, groups, has_seals);
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
     absorb_chips(graph, &mut cells, settings.min_volume);
     dissolve_slivers(graph, &mut cells);
+    join_unparted(graph, &mut cells, input.may_join);
     keep_border_outside(graph, &mut cells);
     cells
 }
@@ -162,7 +180,9 @@ fn strong_labels(
     for (leaf, &c) in component_of.iter().enumerate() {
         volume[c as usize] += graph.volumes[leaf];
     }
-    let by_component = tally_by(tally, |leaf| component_of[leaf as usize]);
+    let entries = tally.iter();
+    let by_component: Tally =
+        sums(entries.map(|(&(leaf, label), &w)| ((component_of[leaf as usize], label), w)));
     let (mut of_label, mut of_component) =
         (BTreeMap::<Label, f64>::new(), BTreeMap::<u32, f64>::new());
     for (&(c, label), &w) in &by_component {
@@ -214,6 +234,88 @@ fn grow_together(
     }
 }
 
+/// Joins cells whose labels no plane separates, and the labels of all other cells and voids with them. The labels of regions that
+/// `may_join` rejects stay.
+fn join_unparted(
+    graph: &LeafGraph<'_>,
+    cells: &mut LeafCells,
+    may_join: &(dyn Fn(u32) -> bool + Sync),
+) {
+    let same = unparted(graph, cells, may_join);
+    if same.is_empty() {
+        return;
+    }
+    let joined = |label: Label| same.get(&label).copied().unwrap_or(label);
+    for label in &mut cells.label_of_cell {
+        *label = match *label {
+            Label::Void(region) => {
+                let of = joined(Label::Region(region)).region();
+                Label::Void(of.unwrap_or(region))
+            }
+            other => joined(other),
+        };
+    }
+    let mut sets = Sets::new(cells.label_of_cell.len());
+    for f in &graph.facets {
+        let [a, b] = f.leaves.map(|l| cells.cell_of_leaf[l as usize]);
+        let label = |c: u32| cells.label_of_cell.get(c as usize);
+        if a != b && label(a).is_some() && label(a) == label(b) {
+            sets.join(a, b);
+        }
+    }
+    let least = sets.into_least();
+    let home = |c: u32| least.get(c as usize).copied().unwrap_or(SOLID);
+    cells.cell_of_leaf.iter_mut().for_each(|c| *c = home(*c));
+    cells.outside = cells.outside.map(home);
+    cells.drop_empty(&graph.volumes);
+}
+
+/// Returns the label that stands for each of those that no plane separates from another, the least of them.
+fn unparted(
+    graph: &LeafGraph<'_>,
+    cells: &LeafCells,
+    may_join: &(dyn Fn(u32) -> bool + Sync),
+) -> BTreeMap<Label, Label> {
+    graph.spend_pass();
+    let label = |leaf: u32| {
+        let cell = cells.cell_of_leaf[leaf as usize] as usize;
+        match cells.label_of_cell.get(cell)? {
+            label @ Label::Region(region) if may_join(*region) => Some(*label),
+            _ => None,
+        }
+    };
+    // Area beside candidates, and on them, between two labels.
+    let mut between: BTreeMap<[Label; 2], [f64; 2]> = BTreeMap::new();
+    for f in graph.facets.iter().filter(|f| !f.is_narrow) {
+        if let [Some(a), Some(b)] = f.leaves.map(label)
+            && a != b
+        {
+            let areas = between.entry([a.min(b), a.max(b)]).or_default();
+            areas[usize::from(f.candidate != NO_CANDIDATE)] += f64::from(f.area);
+        }
+    }
+    let mut same = BTreeMap::new();
+    // Two labels may be parted, and not any more once one of them is joined to a third.
+    while let Some(([a, b], _)) = between
+        .iter()
+        .find(|(_, [beside, on])| *beside > MAX_LEAK && beside > on)
+    {
+        let (a, b) = (*a, *b);
+        same.values_mut().filter(|l| **l == b).for_each(|l| *l = a);
+        same.insert(b, a);
+        let renamed = |label: Label| if label == b { a } else { label };
+        let old = std::mem::take(&mut between).into_iter();
+        for (pair, areas) in old {
+            let [p, q] = pair.map(renamed);
+            if p != q {
+                let sum = between.entry([p.min(q), p.max(q)]).or_default();
+                *sum = [sum[0] + areas[0], sum[1] + areas[1]];
+            }
+        }
+    }
+    same
+}
+
 /// Joins parts of one region that only a candidate separates: a candidate reaches beyond its opening, and two
 /// candidates of one opening have a slice of a room between them.
 fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [Label]) {
@@ -246,14 +348,25 @@ fn may_merge(graph: &LeafGraph<'_>, a: &Group, b: &Group) -> bool {
     graph.purse.spend(2 + n_neighbors as u64)
 }
 
-/// Makes a group of each set that is open, by least leaf.
+/// Makes a group of each set that is open or holds a point of a void, by least leaf.
 fn groups_of(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
     label_of_set: &[Label],
+    voids: &Voids,
 ) -> BTreeMap<u32, Group> {
     const NOT_OPEN: usize = usize::MAX;
-    let is_open = open_sets(graph, sets, label_of_set);
+    let mut is_open = open_sets(graph, sets, label_of_set);
+    let mut voids_of_set: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
+    for (&(leaf, region), &n) in voids {
+        let set = sets.find(leaf);
+        is_open[set as usize] = true;
+        *voids_of_set
+            .entry(set)
+            .or_default()
+            .entry(region)
+            .or_default() += n;
+    }
     let mut place = vec![NOT_OPEN; is_open.len()];
     let mut list: Vec<(u32, Group)> = Vec::new();
     for leaf in 0..graph.volumes.len() as u32 {
@@ -268,6 +381,7 @@ fn groups_of(
             let group = Group {
                 root: set,
                 label: (label != Label::Solid).then_some(label),
+                voids: voids_of_set.remove(&set).unwrap_or_default(),
                 keeps: false,
                 volume: 0.0,
                 neighbors: BTreeMap::new(),
@@ -294,18 +408,36 @@ fn groups_of(
     list.into_iter().collect()
 }
 
-/// Merges groups without a label, and small duplicates of a label, into their neighbors.
-fn merge_groups(
-    graph: &LeafGraph<'_>,
-    sets: &mut Sets,
-    label_of_set: &[Label],
-    settings: &LabelSettings,
-) -> BTreeMap<u32, Group> {
-    let mut groups = groups_of(graph, sets, label_of_set);
+/// Makes voids of groups that are no cells by their votes, and hold points of voids of one region that has a cell: with
+/// several, it is a cavity of the construction, and solid. Regions count by the shares of [`strong_labels`].
+fn make_voids(groups: &mut BTreeMap<u32, Group>, settings: &LabelSettings) {
+    let kept = groups.values().filter(|g| g.keeps);
+    let rooms: BTreeSet<u32> = kept.filter_map(|g| g.label?.region()).collect();
+    let closed = groups.values().filter(|g| !g.keeps);
+    let found = closed.flat_map(|g| g.voids.clone());
+    let of_region: BTreeMap<u32, u32> = sums(found);
+    for group in groups.values_mut().filter(|g| !g.keeps) {
+        let n_all: u32 = group.voids.values().sum();
+        let is_strong = |(r, n): &(&u32, &u32)| {
+            f64::from(**n) >= settings.strong_share * f64::from(of_region[r])
+                || f64::from(**n) >= (1.0 - settings.dominance) * f64::from(n_all)
+        };
+        let mut strong = group.voids.iter().filter(is_strong);
+        if let (Some((region, _)), None) = (strong.next(), strong.next())
+            && rooms.contains(region)
+        {
+            group.label = Some(Label::Void(*region));
+        }
+    }
+    keep_cells(groups, |label| matches!(label, Label::Void(_)), settings);
+}
+
+/// Decides which of the groups with labels that `of` accepts are cells.
+fn keep_cells(groups: &mut BTreeMap<u32, Group>, of: fn(&Label) -> bool, settings: &LabelSettings) {
     // The largest group of each label keeps it, whatever its size.
     let mut main: BTreeMap<Label, (f64, Reverse<u32>)> = BTreeMap::new();
-    for (&id, group) in &groups {
-        if let Some(label) = group.label {
+    for (&id, group) in groups.iter() {
+        if let Some(label) = group.label.filter(of) {
             let key = (group.volume, Reverse(id));
             let best = main.entry(label).or_insert(key);
             if key > *best {
@@ -313,13 +445,25 @@ fn merge_groups(
             }
         }
     }
-    for (&id, group) in &mut groups {
+    for (&id, group) in groups.iter_mut() {
         // A closet opens at its door and a shaft not at all, but a hollow in furniture leaks all over.
         let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * group.open;
-        let is_part = group.volume >= settings.min_volume
-            && (settings.keeps_closed || !group.neighbors.is_empty());
-        group.keeps = !is_cavity && group.label.is_some_and(|l| main[&l].1.0 == id || is_part);
+        let is_part = group.volume >= settings.min_volume;
+        let is_cell = |label: Label| !is_cavity && (is_part || main[&label].1.0 == id);
+        group.keeps |= group.label.filter(of).is_some_and(is_cell);
     }
+}
+
+/// Merges groups without a label, and small duplicates of a label, into their neighbors; voids not into the space beyond.
+fn merge_groups(
+    graph: &LeafGraph<'_>,
+    sets: &mut Sets,
+    label_of_set: &[Label],
+    voids: &Voids,
+    settings: &LabelSettings,
+) -> BTreeMap<u32, Group> {
+    let mut groups = groups_of(graph, sets, label_of_set, voids);
+    keep_cells(&mut groups, |_| true, settings);
     // Smallest first; volumes are not negative, so their bits compare like numbers.
     let entry = |id: u32, group: &Group| Reverse((group.volume.to_bits(), group.root, id));
     let mut queue: BinaryHeap<Reverse<(u64, u32, u32)>> = groups
@@ -334,7 +478,10 @@ fn merge_groups(
             let by_cost = |a: &(&u32, &f64), b: &(&u32, &f64)| {
                 a.1.total_cmp(b.1).then_with(|| root(b.0).cmp(&root(a.0)))
             };
-            group.neighbors.iter().max_by(by_cost)
+            let is_void = !group.voids.is_empty();
+            let is_taken = |id: &u32| is_void && groups[id].label == Some(Label::Beyond);
+            let others = group.neighbors.iter().filter(|n| !is_taken(n.0));
+            others.max_by(by_cost)
         });
         let Some(to) = to.map(|(&to, _)| to) else {
             continue;
@@ -348,6 +495,7 @@ fn merge_groups(
         host.root = sets.join(merged.root, host.root);
         host.volume += merged.volume;
         host.label = host.label.or(merged.label);
+        host.voids = sums(host.voids.into_iter().chain(merged.voids));
         host.neighbors.remove(&id);
         for (other, cost) in merged.neighbors.into_iter().filter(|n| n.0 != to) {
             *host.neighbors.entry(other).or_default() += cost;
@@ -494,7 +642,7 @@ mod tests {
         let home = |graph: &LeafGraph<'_>| {
             let mut sets = Sets::new(3);
             let labels = [Label::Region(10), Label::Region(20), Label::Solid];
-            merge_groups(graph, &mut sets, &labels, &settings);
+            merge_groups(graph, &mut sets, &labels, &Voids::new(), &settings);
             (0..2).find(|&room| sets.find(room) == sets.find(2))
         };
         assert_eq!(home(&graph), Some(0));
@@ -534,6 +682,7 @@ mod tests {
                 &graph,
                 &mut sets,
                 &[Label::Region(10), Label::Solid, Label::Solid],
+                &Voids::new(),
                 &LabelSettings::default(),
             );
             give_away_crumbs(&graph, &mut sets, groups, true);

@@ -49,7 +49,7 @@ mod tagged;
 mod thin;
 mod tree;
 
-use std::collections::BTreeMap;
+use std::fmt;
 
 use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Purse, Triangle, Winding};
 
@@ -92,6 +92,8 @@ pub struct ComplexInput<'a> {
 pub enum Label {
     /// A region of the caller's.
     Region(u32),
+    /// The space beyond that which is divided.
+    Beyond,
     /// A void of that region, which no opening connects with the rest of it, or in which nobody can stand.
     Void(u32),
     /// No space. Votes with it do not count.
@@ -104,7 +106,7 @@ impl Label {
     pub fn region(self) -> Option<u32> {
         match self {
             Self::Region(region) | Self::Void(region) => Some(region),
-            Self::Solid => None,
+            Self::Beyond | Self::Solid => None,
         }
     }
 }
@@ -120,13 +122,39 @@ pub struct Vote {
     pub weight: f32,
 }
 
-/// Area of the openings, other than cracks, between two cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct OpenContact {
-    /// Area on candidates. [Units: wu²]
-    pub on_candidates: f64,
-    /// Area beside them. [Units: wu²]
-    pub beside: f64,
+/// Statements by which leaves are grouped into cells.
+#[derive(Clone, Copy)]
+pub struct LabelInput<'a> {
+    /// Points of spaces.
+    pub votes: &'a [Vote],
+    /// Points of air that no opening connects to its region, and that region: what no vote reaches is a void there. [Units: wu]
+    pub voids: &'a [(DVec3, u32)],
+    /// Returns `false` for regions that stay apart even where no plane separates them from others.
+    pub may_join: &'a (dyn Fn(u32) -> bool + Sync),
+    /// Bounds.
+    pub settings: LabelSettings,
+}
+
+impl fmt::Debug for LabelInput<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [n_votes, n_voids] = [self.votes.len(), self.voids.len()];
+        let mut out = f.debug_struct("LabelInput");
+        out.field("n_votes", &n_votes).field("n_voids", &n_voids);
+        out.field("settings", &self.settings)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> From<&'a [Vote]> for LabelInput<'a> {
+    /// Votes alone: regions stay apart, and nothing is a void.
+    fn from(votes: &'a [Vote]) -> Self {
+        Self {
+            votes,
+            voids: &[],
+            may_join: &|_| false,
+            settings: LabelSettings::default(),
+        }
+    }
 }
 
 /// Settings for grouping leaves into cells.
@@ -136,9 +164,6 @@ pub struct LabelSettings {
     pub min_volume: f64,
     /// A smaller region that also opens to others beside its candidates is a cavity and joins them. [Units: wu³]
     pub min_room: f64,
-    /// Make a part of a region that opens nowhere, apart from its main part, a cell of its own. Otherwise it is
-    /// solid: if votes come from connected air, they got there through openings that the complex closes.
-    pub keeps_closed: bool,
     /// A label with this share of a component's votes owns it, unless another label is strong there.
     pub dominance: f64,
     /// A label is strong in a component with this share of all its votes.
@@ -150,7 +175,6 @@ impl Default for LabelSettings {
         Self {
             min_volume: 0.5,
             min_room: 1.5,
-            keeps_closed: true,
             dominance: 0.9,
             strong_share: 0.2,
         }
@@ -292,35 +316,9 @@ impl Complex<'_> {
     ///
     /// Time: one look-up per vote, and `O(F log F)` for `F` openings. Deterministic for any number of threads.
     #[must_use]
-    pub fn label(&self, votes: &[Vote], settings: &LabelSettings) -> LeafCells {
-        let leaf_of = |v: &Vote| self.leaf_of(v.point);
-        label::label_leaves(&self.graph, votes, settings, self.has_seals, leaf_of)
-    }
-
-    /// Returns the cell at a point; `None` in solids. Everything outside the box is outdoors.
-    #[must_use]
-    pub fn cell_at(&self, cells: &LeafCells, p: DVec3) -> Option<u32> {
-        let leaf = self.leaf_of(p).map(|l| cells.cell_of_leaf[l as usize]);
-        leaf.map_or(cells.outside, |c| (c != leaf_cells::SOLID).then_some(c))
-    }
-
-    /// Returns the area of the openings between each two cells, not counting cracks.
-    ///
-    /// Time: `O(F log F)` for `F` openings; makes no polygons.
-    #[must_use]
-    pub fn contacts(&self, cells: &LeafCells) -> BTreeMap<[u32; 2], OpenContact> {
-        let mut contacts: BTreeMap<[u32; 2], OpenContact> = BTreeMap::new();
-        for facet in self.graph.facets.iter().filter(|f| !f.is_narrow) {
-            let [a, b] = facet.leaves.map(|l| cells.cell_of_leaf[l as usize]);
-            if a != b && ![a, b].contains(&leaf_cells::SOLID) {
-                let contact = contacts.entry([a.min(b), a.max(b)]).or_default();
-                *match facet.candidate {
-                    graph::NO_CANDIDATE => &mut contact.beside,
-                    _ => &mut contact.on_candidates,
-                } += f64::from(facet.area);
-            }
-        }
-        contacts
+    pub fn label(&self, input: &LabelInput<'_>) -> LeafCells {
+        let leaf_of = |p| self.leaf_of(p);
+        label::label_leaves(&self.graph, input, self.has_seals, leaf_of)
     }
 
     /// Finds the portals between cells, the cells that see each triangle, and the locator.
@@ -334,7 +332,10 @@ impl Complex<'_> {
     /// Divides the leaves among cells by votes, and realizes the result.
     #[must_use]
     pub fn partition(&self, votes: &[Vote], settings: &LabelSettings) -> Partition {
-        self.realize(self.label(votes, settings))
+        self.realize(self.label(&LabelInput {
+            settings: *settings,
+            ..votes.into()
+        }))
     }
 }
 

@@ -71,7 +71,7 @@ fn rooms_of(
         let leaf = bsp.tree.leaf_of(structure.frame.to_scene(p));
         Some(cell_of_leaf[leaf as usize]).filter(|&cell| cell != NO_CELL)
     };
-    let basins = Basins::of_parts(&air, cell_at, context.allowance());
+    let (basins, _) = Basins::of_parts(&air, || cell_at, context.allowance());
     let mut proposal = rooms::propose(structure, air, basins, config, context)?;
     proposal.label = label_settings(structure.scene);
     if !bsp.is_open[bsp.outer_leaf() as usize] {

@@ -11,7 +11,7 @@ use super::ground::Ground;
 use super::tree::cell_of;
 use crate::assemble::{Cut, SealPart, portals_of};
 use crate::complex::{ComplexInput, Label, Partition, TriangleCells, Vote, build_complex_within};
-use crate::proposal::{BEYOND, Proposal};
+use crate::proposal::Proposal;
 use crate::realize::{Divided, part, places_of};
 use crate::rooms::{self, VoxelRange};
 use crate::structure::{Candidate, OUTDOORS, Structure};
@@ -68,7 +68,7 @@ pub(super) fn bake_part(
     close_off(&mut proposal, ground, &grid);
     let is_near = |t: &u32| ground.boxes[*t as usize].overlaps(&grid.aabb());
     let numbers: Vec<u32> = (0..ground.boxes.len() as u32).filter(is_near).collect();
-    let (divided, outward) = cut_by(&mut proposal, ground, &numbers, &grid, context)?;
+    let (divided, outward) = cut_by(&proposal, ground, &numbers, &grid, context)?;
     let Divided {
         mut partition,
         whys,
@@ -104,7 +104,7 @@ pub(super) fn bake_part(
     // Matter that the faces cut joins the space beyond: nothing else is open to it.
     let is_beyond: Vec<bool> = label_of_cell
         .iter()
-        .map(|label| label.region() == Some(BEYOND))
+        .map(|label| *label == Label::Beyond)
         .collect();
     for node in &mut locator.nodes {
         node.children = node.children.map(|c| match cell_of(c) {
@@ -153,14 +153,14 @@ fn close_off(proposal: &mut Proposal, ground: &Ground<'_>, grid: &Grid) {
     let beyond = beyond.iter().filter(|p| !block.contains([*p], 0.0));
     proposal.votes.extend(beyond.map(|&point| Vote {
         point,
-        label: Label::Region(BEYOND),
+        label: Label::Beyond,
         weight,
     }));
 }
 
 /// Makes a proposal for a part exact, within the box of the whole scene; returns also how far outlines grow.
 fn cut_by(
-    proposal: &mut Proposal,
+    proposal: &Proposal,
     ground: &Ground<'_>,
     numbers: &[u32],
     grid: &Grid,

@@ -13,7 +13,7 @@ use super::regions::{Regions, merge_basins};
 use super::slabs::cut_at_slabs;
 use crate::BakeConfig;
 use crate::structure::OUTDOORS;
-use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, border};
+use crate::voxel::{BitVolume, Grid, Labels, border};
 
 /// Marks a voxel that has a part, but no basin yet; the other bits are the part.
 const WAITING: u32 = 1 << 31;
@@ -30,20 +30,21 @@ pub(crate) struct Basins {
 }
 
 impl Basins {
-    /// Makes a basin of each connected set of air voxels in one part. `part_at` returns the part of a point, below 2³¹, or
-    /// `None` for matter. Everything that connects to the border is outdoors.
+    /// Makes a basin of each connected set of air voxels in one part; returns them with the part of each. `locator` returns a
+    /// function for the points of a row, one after the other, which returns the part of a point, below 2³¹, or `None` for matter.
+    /// Everything that connects to the border is outdoors.
     ///
-    /// Linear in voxels, besides the calls of `part_at` for those that are not far from everything; 6 bytes a voxel.
-    pub(crate) fn of_parts(
+    /// Linear in voxels, besides the look-ups of those that are not far from everything; 6 bytes a voxel.
+    pub(crate) fn of_parts<P: FnMut(DVec3) -> Option<u32>>(
         air: &VoxelAir,
-        part_at: impl Fn(DVec3) -> Option<u32> + Sync,
+        locator: impl Fn() -> P + Sync,
         allowance: &Allowance,
-    ) -> Self {
+    ) -> (Self, Vec<u32>) {
         let dims = air.grid.dims;
         let (distances, far) = air.solid.distances(allowance);
         let mut outdoors = border(dims);
         outdoors.union_with(&far);
-        let part_of = |i: usize| {
+        let part_of = |part_at: &mut P, i: usize| {
             if distances[i] == 0 || !allowance.spend(1) {
                 return 0;
             }
@@ -53,9 +54,17 @@ impl Basins {
             let [x, y, z] = air.grid.coords(i);
             part_at(air.grid.center(x, y, z)).map_or(0, |part| WAITING | part)
         };
-        let mut labels: Vec<u32> = (0..distances.len()).into_par_iter().map(part_of).collect();
-        let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
-        let n = number_parts(dims, &mut labels, outer);
+        let mut labels = vec![0; distances.len()];
+        let rows = labels.par_chunks_mut(dims[0]).enumerate();
+        rows.for_each(|(row, labels)| {
+            let mut part_at = locator();
+            for (i, label) in (row * dims[0]..).zip(labels) {
+                *label = part_of(&mut part_at, i);
+            }
+        });
+        let outer = locator()(air.grid.center(0, 0, 0)).unwrap_or(0);
+        let parts = number_parts(dims, &mut labels, outer);
+        let n = parts.len();
         let mut peaks = vec![0_u16; n];
         for (&label, &distance) in labels.iter().zip(&distances) {
             let peak = &mut peaks[label as usize];
@@ -74,7 +83,7 @@ impl Basins {
             radius(faces.iter().map(distance).max().unwrap_or(0))
         };
         let contacts = contact_faces(&labels);
-        Self {
+        let basins = Self {
             saddles: contacts
                 .iter()
                 .map(|(&pair, f)| (pair, saddle(f)))
@@ -82,11 +91,12 @@ impl Basins {
             n_basins: n - 1,
             labels,
             peaks,
-        }
+        };
+        (basins, parts)
     }
 
     /// Gives the air inside closures to the basins beside it.
-    pub(super) fn refill(&mut self, occupied: &BitVolume) {
+    pub(crate) fn refill(&mut self, occupied: &BitVolume) {
         flood_closures(&mut self.labels, occupied);
     }
 
@@ -97,29 +107,28 @@ impl Basins {
         }
     }
 
+    /// Merges basins to rooms.
     pub(super) fn merge(
         &self,
-        grid: &Grid,
-        shut: &SparseVolume,
-        slabs: &[f64],
+        air: &VoxelAir,
         config: &BakeConfig,
         allowance: &Allowance,
     ) -> Regions {
         let flooded = Flooded {
-            grid,
+            grid: &air.grid,
             labels: &self.labels,
             peaks: &self.peaks,
-            closures: Some(shut),
-            slabs,
+            closures: Some(&air.solid.shut),
+            slabs: &air.slabs,
             allowance,
         };
         merge_basins(flooded, &self.saddles, &config.merge)
     }
 }
 
-/// Replaces the parts of voxels by basins, numbered in order of their first voxels; returns the number of labels. Waiting
+/// Replaces the parts of voxels by basins, numbered in order of their first voxels; returns the part of each label. Waiting
 /// voxels of part `outer` that connect to those that are outdoors are, too.
-fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> usize {
+fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> Vec<u32> {
     let mut stack: Vec<usize> = (0..labels.len())
         .filter(|&i| labels[i] == OUTDOORS)
         .collect();
@@ -138,15 +147,16 @@ fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> usi
         }
     };
     flood(labels, &mut stack, WAITING | outer, OUTDOORS);
-    let mut n = OUTDOORS + 1;
+    let mut parts = vec![outer; OUTDOORS as usize + 1];
     for i in 0..labels.len() {
         let part = labels[i];
         if part & WAITING != 0 {
-            labels[i] = n;
+            let basin = parts.len() as u32;
+            labels[i] = basin;
             stack.push(i);
-            flood(labels, &mut stack, part, n);
-            n += 1;
+            flood(labels, &mut stack, part, basin);
+            parts.push(part & !WAITING);
         }
     }
-    n as usize
+    parts
 }

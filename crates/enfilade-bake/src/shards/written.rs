@@ -70,6 +70,7 @@ impl WrittenWhy {
 enum WrittenLabel {
     Region(u32),
     Void(u32),
+    Beyond,
     Solid,
 }
 
@@ -87,6 +88,7 @@ impl KeptPiece for Proposal {
             let label = match v.label {
                 Label::Region(region) => WrittenLabel::Region(region),
                 Label::Void(region) => WrittenLabel::Void(region),
+                Label::Beyond => WrittenLabel::Beyond,
                 Label::Solid => WrittenLabel::Solid,
             };
             (v.point.to_array(), label, v.weight)
@@ -115,6 +117,7 @@ impl KeptPiece for Proposal {
             label: match label {
                 WrittenLabel::Region(region) => Label::Region(region),
                 WrittenLabel::Void(region) => Label::Void(region),
+                WrittenLabel::Beyond => Label::Beyond,
                 WrittenLabel::Solid => Label::Solid,
             },
             weight,

@@ -48,7 +48,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
         out.dedup();
         out
     };
-    let mut places = old.places.clone();
+    let places = [old.places.clone(), merged_rooms(old, &cell_of)].concat();
     let mut portals = Vec::new();
     let mut portal_of = Vec::with_capacity(old.portals.len());
     for p in &old.portals {
@@ -65,12 +65,6 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
                 cells: joined,
                 ..p.clone()
             });
-        } else if p
-            .cells
-            .iter()
-            .all(|c| old[*c].is_room() && old[*c].holds_person())
-        {
-            places.push(merged_at(old, p));
         }
     }
     let mut batches = Batches::default();
@@ -158,17 +152,33 @@ fn why_of_both(cell: &Cell, from: &Cell) -> Vec<Why> {
     lead.why.iter().map(of_both).collect()
 }
 
-/// Returns the decision that two rooms are one, at the portal between them.
-fn merged_at(graph: &CellPortalGraph, portal: &Portal) -> Place {
-    let volume = portal.cells.map(|c| f64::from(graph[c].volume));
-    let facts = [
-        (Fact::Area, f64::from(portal.area)),
-        (Fact::Volume, volume[0].min(volume[1])),
-    ];
-    Place {
-        at: portal.center(),
-        why: Why::given(Reason::Merged).with(&facts),
+/// Returns the decisions by which rooms are parts of others: one for each room but the largest of its cell, at the widest of its
+/// portals that are gone. `cell_of` has the new cell of each.
+fn merged_rooms(old: &CellPortalGraph, cell_of: &[CellId]) -> Vec<Place> {
+    let to = |c: CellId| cell_of[c.idx()];
+    let is_room = |c: &CellId| old[*c].is_room() && old[*c].holds_person();
+    let mut largest: BTreeMap<CellId, CellId> = BTreeMap::new();
+    for c in old.cell_ids().filter(is_room) {
+        let best = largest.entry(to(c)).or_insert(c);
+        if old[c].volume > old[*best].volume {
+            *best = c;
+        }
     }
+    let lost = old
+        .cell_ids()
+        .filter(|c| is_room(c) && largest[&to(*c)] != *c);
+    let merged_at = |c: CellId| {
+        let portals = old[c].portals.iter().map(|&p| &old[p]);
+        let gone = portals.filter(|p| to(p.cells[0]) == to(p.cells[1]));
+        let portal = gone.max_by(|a, b| a.area.total_cmp(&b.area))?;
+        let facts = [(Fact::Area, portal.area), (Fact::Volume, old[c].volume)];
+        let facts = facts.map(|(fact, value)| (fact, f64::from(value)));
+        Some(Place {
+            at: portal.center(),
+            why: Why::given(Reason::Merged).with(&facts),
+        })
+    };
+    lost.filter_map(merged_at).collect()
 }
 
 /// Returns `true` if a builder gave this name by number.
@@ -283,4 +293,50 @@ fn locator(old: &Locator, cell_of: &[CellId]) -> Locator {
     }
     out.root = settled(root);
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_cpg::PortalKind;
+
+    #[test]
+    fn rooms_that_a_doorway_between_them_joins_are_told() {
+        // A row: a hall, a doorway half a meter thick, a room, and a shaft too narrow for a person.
+        let cell = |from: f32, to: f32, portals: &[u32]| Cell {
+            aabb: [[from, 0.0, 0.0], [to, 3.0, 4.0]],
+            volume: (to - from) * 12.0,
+            portals: portals.iter().map(|&p| PortalId(p)).collect(),
+            ..Cell::default()
+        };
+        let portal = |a: u32, area: f32| Portal {
+            cells: [CellId(a), CellId(a + 1)],
+            kind: PortalKind::Open,
+            normal: [1.0, 0.0, 0.0],
+            area,
+            outline: Vec::new(),
+            pieces: Vec::new(),
+            why: Vec::new(),
+            fittings: Vec::new(),
+        };
+        let mut world = World::default();
+        world.graph.cells = vec![
+            cell(0.0, 9.0, &[0]),
+            cell(9.0, 9.5, &[0, 1]),
+            cell(9.5, 14.0, &[1, 2]),
+            cell(14.0, 14.2, &[2]),
+        ];
+        world.graph.portals = vec![portal(0, 6.0), portal(1, 6.5), portal(2, 1.0)];
+        let lost = |into: &[u32]| -> Vec<Why> {
+            let places = merged(&world, into).0.graph.places;
+            places.into_iter().map(|place| place.why).collect()
+        };
+        assert!(lost(&[0, 0, 2, 2]).is_empty());
+        let [why] = &lost(&[0; 4])[..] else {
+            panic!("one room is lost")
+        };
+        assert_eq!(why.reason, Reason::Merged);
+        let facts = [(Fact::Area, 6.5), (Fact::Volume, 54.0)];
+        assert_eq!(why.facts, facts.into());
+    }
 }

@@ -38,7 +38,7 @@ pub(crate) fn bench_facts(chosen: &Chosen, is_csv: bool) -> anyhow::Result<()> {
 fn labelled(judged: &JudgedWorld) -> impl Iterator<Item = Labelled<'_>> {
     let right: BTreeSet<u64> = judged.score.matches.iter().map(|m| m.portal).collect();
     judged.whys.iter().map(move |why| Labelled {
-        scene: &judged.name,
+        scene: &judged.verdict.name,
         why,
         is_right: why["portal"].as_u64().map(|p| right.contains(&p)),
     })

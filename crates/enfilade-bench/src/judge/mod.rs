@@ -1,6 +1,7 @@
 //! `bench judge`: rows on the decisions of a bake. How few numbers they need, that each can say why, and that the verdict on a world
 //! doubts the worlds that are wrong.
 
+mod cases;
 mod facts;
 mod size;
 
@@ -17,15 +18,30 @@ pub(crate) use facts::bench_facts;
 /// Buildings whose every cell and portal must say why it is there.
 const ASKED: [&str; 3] = ["duplex", "institute", "kit-edc"];
 
-/// A building with truth, baked and scored.
-struct JudgedWorld {
+/// What the verdict says of a world, and what is right.
+#[derive(Clone)]
+struct Verdict {
     name: String,
     /// Share of right rooms.
     rooms: f64,
     /// Word of the verdict.
     trust: String,
-    /// Share of rooms in doubt, by the verdict.
+    /// Share of rooms in doubt.
     doubt: f64,
+}
+
+impl Verdict {
+    /// Returns word and doubt of what `bake --json` prints.
+    fn said(said: &Value) -> (String, f64) {
+        let trust = said["verdict"]["trust"].as_str().unwrap_or_default();
+        let doubt = said["verdict"]["doubt"].as_f64().unwrap_or(f64::NAN);
+        (trust.to_owned(), doubt)
+    }
+}
+
+/// A building with truth, baked and scored.
+struct JudgedWorld {
+    verdict: Verdict,
     score: Score,
     /// Decisions, as `inspect --why all --json` prints them.
     whys: Vec<Value>,
@@ -46,14 +62,14 @@ impl JudgedWorld {
         let whys: Value = serde_json::from_str(&whys)?;
         let graph = inspect(&world)?;
         let score = score_world(dir, &world, &graph)?;
+        let (trust, doubt) = Verdict::said(&said);
         Ok(Self {
-            name: name.into_owned(),
-            rooms: score.figures[0].unwrap_or(f64::NAN),
-            trust: said["verdict"]["trust"]
-                .as_str()
-                .unwrap_or_default()
-                .to_owned(),
-            doubt: said["verdict"]["doubt"].as_f64().unwrap_or(f64::NAN),
+            verdict: Verdict {
+                name: name.into_owned(),
+                rooms: score.figures[0].unwrap_or(f64::NAN),
+                trust,
+                doubt,
+            },
             score,
             whys: list(&whys["whys"]).to_vec(),
             n_subjects: list(&graph["cells"]).len() + list(&graph["portals"]).len(),
@@ -98,20 +114,30 @@ pub(crate) fn bench_judge(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> 
         .collect::<anyhow::Result<_>>()?;
     for j in judged
         .iter()
-        .filter(|j| chosen.has_row("why") && ASKED.contains(&j.name.as_str()))
+        .filter(|j| chosen.has_row("why") && ASKED.contains(&j.verdict.name.as_str()))
     {
         let n = j.n_silent();
         let note = format!("of {} cells and portals", j.n_subjects);
-        out.print("why", &j.name, Some(n as f64), "0", Some(n == 0), &note);
+        out.print(
+            "why",
+            &j.verdict.name,
+            Some(n as f64),
+            "0",
+            Some(n == 0),
+            &note,
+        );
     }
     if chosen.has_row("verdict") {
-        print_verdicts(&judged, &mut out);
+        let mut verdicts: Vec<Verdict> = judged.iter().map(|j| j.verdict.clone()).collect();
+        let cases = cases::verdicts()?.into_iter();
+        verdicts.extend(cases.filter(|v| chosen.has_scene(&v.name)));
+        print_verdicts(&verdicts, &mut out);
     }
     out.finish()
 }
 
 /// Prints the rows of the verdict: whether the worlds that it doubts are those that are wrong.
-fn print_verdicts(judged: &[JudgedWorld], out: &mut RowPrinter) {
+fn print_verdicts(judged: &[Verdict], out: &mut RowPrinter) {
     for j in judged {
         let is_wrong = j.trust == "good" && j.rooms < 0.8 || j.trust == "low" && j.rooms > 0.95;
         let note = format!("{}; {:.2} of rooms right", j.trust, j.rooms);
@@ -128,7 +154,7 @@ fn print_verdicts(judged: &[JudgedWorld], out: &mut RowPrinter) {
     let pairs: Vec<(f64, f64)> = judged.iter().map(|j| (j.doubt, 1.0 - j.rooms)).collect();
     if pairs.len() > 2 {
         let value = rank_correlation(&pairs);
-        let note = format!("{} buildings", pairs.len());
+        let note = format!("{} buildings and cases", pairs.len());
         out.print(
             "verdict: rank correlation",
             "all",
