@@ -6,20 +6,20 @@
 //! 2. A component with one dominant label belongs to it. One with several strong labels has a leak: it is grown
 //!    together along its openings, widest first, unless that would join two labels (Kruskal's forest), so that cells
 //!    meet at the narrowest places.
-//! 3. Labels that no plane separates are one: where two meet in the open, beside their candidates, the border between
-//!    them would follow arbitrary planes, in dozens of meaningless portals.
-//! 4. Parts of one label that open to each other are rejoined, across candidates too.
-//! 5. Groups without a label, or with too little volume for a cell, join the neighbor with which a border would cost
+//! 3. Parts of one label that open to each other are rejoined, across candidates too.
+//! 4. Groups without a label, or with too little volume for a cell, join the neighbor with which a border would cost
 //!    most: the one they open to most, through a candidate if need be. Groups without votes that open only through
-//!    gaps are voids where the caller knows a point of one, else solid.
-//! 6. Crumbs, too thin for a ball of the smallest hole, join the cell or solid to which they have the largest gaps,
+//!    gaps are voids where the caller knows points of one region's, else solid.
+//! 5. Crumbs, too thin for a ball of the smallest hole, join the cell or solid to which they have the largest gaps,
 //!    through gaps in the air if there are any: a sliver that leads from within a wall into the air is not solid.
+//! 6. Labels that no plane separates are one: where two meet in the open, beside their candidates, the border between
+//!    them would follow arbitrary planes, in dozens of meaningless portals.
 //!
 //! Time: `O(F log F)` in open facets. Every merge reduces the number of groups, so it ends.
 
 use std::borrow::Cow;
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::ops::AddAssign;
 
 use enfilade_geom::{DVec3, Sets};
@@ -28,10 +28,8 @@ use rayon::prelude::*;
 use super::cut::{absorb_chips, dissolve_slivers, move_borders};
 use super::graph::{LeafGraph, NO_CANDIDATE, OpenFacet};
 use super::leaf_cells::{LeafCells, SOLID, Tally};
+use super::unparted::join_unparted;
 use super::{Label, LabelInput, LabelSettings};
-
-/// Labels that meet beside their candidates over more than this area, and over more than on them, are one. [Units: wu²]
-const MAX_LEAK: f64 = 1.0;
 
 /// Adds up the values of each key.
 fn sums<K: Ord, V: Default + AddAssign>(entries: impl Iterator<Item = (K, V)>) -> BTreeMap<K, V> {
@@ -48,8 +46,8 @@ struct Group {
     /// whenever it takes in another.
     root: u32,
     label: Option<Label>,
-    /// Region of the voids of which a point lies in it.
-    void: Option<u32>,
+    /// Numbers of points of voids in it, by region.
+    voids: BTreeMap<u32, u32>,
     /// It is a cell, whatever happens around it.
     keeps: bool,
     volume: f64,
@@ -61,7 +59,7 @@ struct Group {
     leak: f64,
 }
 
-/// Numbers of points in voids, by leaf and region.
+/// Numbers of points of voids, by leaf and region.
 type Voids = BTreeMap<(u32, u32), u32>;
 
 /// Cost of locating and counting a vote, in units of [`enfilade_geom::Allowance`].
@@ -139,38 +137,20 @@ pub(super) fn label_leaves(
         label_of_set[leaf as usize] = label;
     }
     grow_together(graph, &mut sets, &mut label_of_set, &component_of, leaked);
-    let same = unparted(graph, &mut sets, &label_of_set, input.may_join);
-    let joined = |label: Label| same.get(&label).copied().unwrap_or(label);
-    label_of_set.iter_mut().for_each(|l| *l = joined(*l));
-    let tally = sums((tally.into_iter()).map(|((leaf, label), w)| ((leaf, joined(label)), w)));
     rejoin(graph, &mut sets, &mut label_of_set);
 
-    let voids = input.voids.iter().filter_map(|&(p, region)| {
-        let label = joined(Label::Region(region));
-        Some(((leaf_of(p)?, label.region()?), 1))
-    });
-    let groups = merge_groups(graph, &mut sets, &label_of_set, &sums(voids), settings);
+    let voids = input.voids.iter();
+    let voids = sums(voids.filter_map(|&(p, region)| Some(((leaf_of(p)?, region), 1))));
+    let mut groups = merge_groups(graph, &mut sets, &label_of_set, &voids, settings);
+    make_voids(&mut groups, settings);
     let groups = give_away_crumbs(graph, &mut sets, groups, has_seals);
     let mut cells = number_cells(graph, &mut sets, &groups);
     move_borders(graph, &mut cells, &tally);
     absorb_chips(graph, &mut cells, settings.min_volume);
     dissolve_slivers(graph, &mut cells);
-    keep_border_outside(graph, &mut cells);
+    join_unparted(graph, &mut cells, input.may_join);
+    cells.keep_border_outside(&graph.at_border, &graph.volumes);
     cells
-}
-
-/// Returns leaves at the border that ended up in other cells to the outside.
-fn keep_border_outside(graph: &LeafGraph<'_>, cells: &mut LeafCells) {
-    let Some(outside) = cells.outside else { return };
-    for leaf in (0..graph.volumes.len()).filter(|&l| graph.at_border[l]) {
-        let cell = std::mem::replace(&mut cells.cell_of_leaf[leaf], outside);
-        if cell != outside {
-            if cell != SOLID {
-                cells.volumes[cell as usize] -= graph.volumes[leaf];
-            }
-            cells.volumes[outside as usize] += graph.volumes[leaf];
-        }
-    }
 }
 
 /// Returns the strong labels in each component, and leaves out components without any.
@@ -238,47 +218,6 @@ fn grow_together(
     }
 }
 
-/// Returns the label that stands for each of those that no plane separates from another, the least of them. The labels of
-/// regions that `may_join` rejects stay, as do those of voids.
-fn unparted(
-    graph: &LeafGraph<'_>,
-    sets: &mut Sets,
-    label_of_set: &[Label],
-    may_join: &(dyn Fn(u32) -> bool + Sync),
-) -> BTreeMap<Label, Label> {
-    graph.spend_pass();
-    // Area beside candidates, and on them, between two labels.
-    let mut between: BTreeMap<[Label; 2], [f64; 2]> = BTreeMap::new();
-    for f in graph.facets.iter().filter(|f| !f.is_narrow) {
-        let [a, b] = f.leaves.map(|l| label_of_set[sets.find(l) as usize]);
-        let joins = |label| matches!(label, Label::Region(region) if may_join(region));
-        if a != b && joins(a) && joins(b) {
-            let areas = between.entry([a.min(b), a.max(b)]).or_default();
-            areas[usize::from(f.candidate != NO_CANDIDATE)] += f64::from(f.area);
-        }
-    }
-    let mut same = BTreeMap::new();
-    // Two labels may be parted, and not any more once one of them is joined to a third.
-    while let Some(([a, b], _)) = between
-        .iter()
-        .find(|(_, [beside, on])| *beside > MAX_LEAK && beside > on)
-    {
-        let (a, b) = (*a, *b);
-        same.values_mut().filter(|l| **l == b).for_each(|l| *l = a);
-        same.insert(b, a);
-        let renamed = |label: Label| if label == b { a } else { label };
-        let old = std::mem::take(&mut between).into_iter();
-        for (pair, areas) in old {
-            let [p, q] = pair.map(renamed);
-            if p != q {
-                let sum = between.entry([p.min(q), p.max(q)]).or_default();
-                *sum = [sum[0] + areas[0], sum[1] + areas[1]];
-            }
-        }
-    }
-    same
-}
-
 /// Joins parts of one region that only a candidate separates: a candidate reaches beyond its opening, and two
 /// candidates of one opening have a slice of a room between them.
 fn rejoin(graph: &LeafGraph<'_>, sets: &mut Sets, label_of_set: &mut [Label]) {
@@ -320,14 +259,15 @@ fn groups_of(
 ) -> BTreeMap<u32, Group> {
     const NOT_OPEN: usize = usize::MAX;
     let mut is_open = open_sets(graph, sets, label_of_set);
-    let voids = sums((voids.iter()).map(|(&(leaf, region), &n)| ((sets.find(leaf), region), n)));
-    voids.keys().for_each(|k| is_open[k.0 as usize] = true);
-    let mut void_of_set: BTreeMap<u32, (u32, u32)> = BTreeMap::new();
-    for (&(set, region), &n) in &voids {
-        let most = void_of_set.entry(set).or_insert((n, region));
-        if n > most.0 {
-            *most = (n, region);
-        }
+    let mut voids_of_set: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
+    for (&(leaf, region), &n) in voids {
+        let set = sets.find(leaf);
+        is_open[set as usize] = true;
+        *voids_of_set
+            .entry(set)
+            .or_default()
+            .entry(region)
+            .or_default() += n;
     }
     let mut place = vec![NOT_OPEN; is_open.len()];
     let mut list: Vec<(u32, Group)> = Vec::new();
@@ -343,7 +283,7 @@ fn groups_of(
             let group = Group {
                 root: set,
                 label: (label != Label::Solid).then_some(label),
-                void: void_of_set.get(&set).map(|void| void.1),
+                voids: voids_of_set.remove(&set).unwrap_or_default(),
                 keeps: false,
                 volume: 0.0,
                 neighbors: BTreeMap::new(),
@@ -370,6 +310,30 @@ fn groups_of(
     list.into_iter().collect()
 }
 
+/// Makes voids of groups that are not cells by their votes, and hold points of voids of one region that has a cell: with
+/// several, it is a cavity of the construction, and solid. Regions count by the shares of [`strong_labels`].
+fn make_voids(groups: &mut BTreeMap<u32, Group>, settings: &LabelSettings) {
+    let kept = groups.values().filter(|g| g.keeps);
+    let rooms: BTreeSet<u32> = kept.filter_map(|g| g.label?.region()).collect();
+    let closed = groups.values().filter(|g| !g.keeps);
+    let found = closed.flat_map(|g| g.voids.clone());
+    let of_region: BTreeMap<u32, u32> = sums(found);
+    for group in groups.values_mut().filter(|g| !g.keeps) {
+        let n_all: u32 = group.voids.values().sum();
+        let is_strong = |(r, n): &(&u32, &u32)| {
+            f64::from(**n) >= settings.strong_share * f64::from(of_region[r])
+                || f64::from(**n) >= (1.0 - settings.dominance) * f64::from(n_all)
+        };
+        let mut strong = group.voids.iter().filter(is_strong);
+        if let (Some((region, _)), None) = (strong.next(), strong.next())
+            && rooms.contains(region)
+        {
+            group.label = Some(Label::Void(*region));
+        }
+    }
+    keep_cells(groups, |label| matches!(label, Label::Void(_)), settings);
+}
+
 /// Decides which of the groups with labels that `of` accepts are cells.
 fn keep_cells(groups: &mut BTreeMap<u32, Group>, of: fn(&Label) -> bool, settings: &LabelSettings) {
     // The largest group of each label keeps it, whatever its size.
@@ -392,8 +356,7 @@ fn keep_cells(groups: &mut BTreeMap<u32, Group>, of: fn(&Label) -> bool, setting
     }
 }
 
-/// Merges groups without a label, and small duplicates of a label, into their neighbors. What has no neighbor but the space
-/// beyond, and a point of a void, becomes one.
+/// Merges groups without a label, and small duplicates of a label, into their neighbors; voids not into the space beyond.
 fn merge_groups(
     graph: &LeafGraph<'_>,
     sets: &mut Sets,
@@ -417,7 +380,7 @@ fn merge_groups(
             let by_cost = |a: &(&u32, &f64), b: &(&u32, &f64)| {
                 a.1.total_cmp(b.1).then_with(|| root(b.0).cmp(&root(a.0)))
             };
-            let is_void = group.label.is_none() && group.void.is_some();
+            let is_void = !group.voids.is_empty();
             let is_taken = |id: &u32| is_void && groups[id].label == Some(Label::Beyond);
             let others = group.neighbors.iter().filter(|n| !is_taken(n.0));
             others.max_by(by_cost)
@@ -434,7 +397,7 @@ fn merge_groups(
         host.root = sets.join(merged.root, host.root);
         host.volume += merged.volume;
         host.label = host.label.or(merged.label);
-        host.void = host.void.or(merged.void);
+        host.voids = sums(host.voids.into_iter().chain(merged.voids));
         host.neighbors.remove(&id);
         for (other, cost) in merged.neighbors.into_iter().filter(|n| n.0 != to) {
             *host.neighbors.entry(other).or_default() += cost;
@@ -448,14 +411,6 @@ fn merge_groups(
         }
         groups.insert(to, host);
     }
-    for group in groups.values_mut().filter(|g| g.label.is_none()) {
-        group.label = group.void.map(Label::Void);
-    }
-    keep_cells(
-        &mut groups,
-        |label| matches!(label, Label::Void(_)),
-        settings,
-    );
     groups.into_values().map(|g| (g.root, g)).collect()
 }
 

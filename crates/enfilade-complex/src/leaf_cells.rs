@@ -24,6 +24,20 @@ pub struct LeafCells {
 pub(super) type Tally = BTreeMap<(u32, Label), f64>;
 
 impl LeafCells {
+    /// Returns leaves at the border that ended up in other cells to the outside.
+    pub(super) fn keep_border_outside(&mut self, at_border: &[bool], volume_of_leaf: &[f64]) {
+        let Some(outside) = self.outside else { return };
+        for leaf in (0..at_border.len()).filter(|&l| at_border[l]) {
+            let cell = std::mem::replace(&mut self.cell_of_leaf[leaf], outside);
+            if cell != outside {
+                if cell != SOLID {
+                    self.volumes[cell as usize] -= volume_of_leaf[leaf];
+                }
+                self.volumes[outside as usize] += volume_of_leaf[leaf];
+            }
+        }
+    }
+
     /// Renumbers the cells without those that lost every leaf, and recomputes their volumes from the leaves.
     pub(super) fn drop_empty(&mut self, volume_of_leaf: &[f64]) {
         let n = self.label_of_cell.len();

@@ -48,6 +48,7 @@ mod surface;
 mod tagged;
 mod thin;
 mod tree;
+mod unparted;
 
 use std::fmt;
 

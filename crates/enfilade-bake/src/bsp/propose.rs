@@ -137,7 +137,6 @@ fn label_settings(scene: &Scene) -> LabelSettings {
         min_room: 0.0,
         dominance: 1.0,
         strong_share: 0.2,
-        ..LabelSettings::default()
     }
 }
 

@@ -18,7 +18,7 @@ pub(crate) use facts::bench_facts;
 /// Buildings whose every cell and portal must say why it is there.
 const ASKED: [&str; 3] = ["duplex", "institute", "kit-edc"];
 
-/// What the verdict says of a world, and what is right.
+/// The verdict on a world, beside the truth.
 #[derive(Clone)]
 struct Verdict {
     name: String,
