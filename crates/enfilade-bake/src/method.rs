@@ -44,8 +44,7 @@ impl Method {
                 Partition, Geometry,
             ],
             Self::Delaunay => &[
-                Structure, Tetrahedra, Voxelize, Distance, Decimation, Candidates, Complex,
-                Partition, Geometry,
+                Structure, Tetrahedra, Decimation, Candidates, Complex, Partition, Geometry,
             ],
         }
     }

@@ -350,7 +350,8 @@ fn keep_cells(groups: &mut BTreeMap<u32, Group>, of: fn(&Label) -> bool, setting
     for (&id, group) in groups.iter_mut() {
         // A closet opens at its door and a shaft not at all, but a hollow in furniture leaks all over.
         let is_cavity = group.volume < settings.min_room && group.leak > 0.25 * group.open;
-        let is_part = group.volume >= settings.min_volume;
+        let is_part = group.volume >= settings.min_volume
+            && (settings.keeps_closed || !group.neighbors.is_empty());
         let is_cell = |label: Label| !is_cavity && (is_part || main[&label].1.0 == id);
         group.keeps |= group.label.filter(of).is_some_and(is_cell);
     }

@@ -165,6 +165,9 @@ pub struct LabelSettings {
     pub min_volume: f64,
     /// A smaller region that also opens to others beside its candidates is a cavity and joins them. [Units: wu³]
     pub min_room: f64,
+    /// Make a part of a region that opens nowhere, apart from its main part, a cell of its own. Otherwise it is
+    /// solid: if votes come from connected air, they got there through openings that the complex closes.
+    pub keeps_closed: bool,
     /// A label with this share of a component's votes owns it, unless another label is strong there.
     pub dominance: f64,
     /// A label is strong in a component with this share of all its votes.
@@ -176,6 +179,7 @@ impl Default for LabelSettings {
         Self {
             min_volume: 0.5,
             min_room: 1.5,
+            keeps_closed: true,
             dominance: 0.9,
             strong_share: 0.2,
         }

@@ -462,17 +462,27 @@ fn the_hollow_of_a_wall_is_solid() {
 }
 
 #[test]
-fn votes_that_got_into_a_closed_hollow_make_a_cell_of_it() {
+fn votes_that_got_into_a_closed_hollow_make_a_cell_of_it_only_if_asked() {
     let mut t = two_rooms(0.0);
     block(&mut t, [1.0, 0.5, 1.0], [2.0, 1.5, 2.0]);
     let c = build(&t, &[candidate_at_x(3.1, [-0.1, 2.3], [0.8, 2.1])]);
     // The room's votes ignore the block.
     let votes = room_votes(&c.bounds());
-    let p = c.partition(&votes, &LabelSettings::default());
-    assert_promises(&t, &p, &c.bounds(), 2_000);
-    let at = |q| p.locator.locate(DVec3::from_array(q));
-    let [hollow, room] = [[1.5, 1.0, 1.5], [0.5, 1.0, 0.5]].map(at);
+    let at = |keeps_closed| {
+        let settings = LabelSettings {
+            keeps_closed,
+            ..LabelSettings::default()
+        };
+        let p = c.partition(&votes, &settings);
+        assert_promises(&t, &p, &c.bounds(), 2_000);
+        [[1.5, 1.0, 1.5], [0.5, 1.0, 0.5], [4.0, 1.0, 2.0]]
+            .map(|q| p.locator.locate(DVec3::from_array(q)))
+    };
+    let [hollow, room, other] = at(true);
     assert!(hollow.is_some() && hollow != room, "{hollow:?} {room:?}");
+    let [hollow, room, next] = at(false);
+    assert!(hollow.is_none() && room.is_some(), "{hollow:?} {room:?}");
+    assert!(next.is_some() && other.is_some());
 }
 
 #[test]

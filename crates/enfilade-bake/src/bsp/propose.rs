@@ -71,7 +71,7 @@ fn rooms_of(
         let leaf = bsp.tree.leaf_of(structure.frame.to_scene(p));
         Some(cell_of_leaf[leaf as usize]).filter(|&cell| cell != NO_CELL)
     };
-    let (basins, _) = Basins::of_parts(&air, || cell_at, context.allowance());
+    let basins = Basins::of_parts(&air, cell_at, context.allowance());
     let mut proposal = rooms::propose(structure, air, basins, config, context)?;
     proposal.label = label_settings(structure.scene);
     if !bsp.is_open[bsp.outer_leaf() as usize] {
@@ -137,6 +137,7 @@ fn label_settings(scene: &Scene) -> LabelSettings {
         min_room: 0.0,
         dominance: 1.0,
         strong_share: 0.2,
+        ..LabelSettings::default()
     }
 }
 

@@ -11,10 +11,11 @@
 //! | air, and ways through it | `space` | §4.2.2; Dey, Giesen & Goswami 2003 |
 //! | merging of parts of the air between which nothing narrows | `cells` | ours |
 //! | tubes that leave a room without a pinch | `branches`; `labels`: the result | ours, after Matheron 1975 |
-//! | corridors that leave a room without a pinch | `voxels`, by the rule of `rooms` | ours |
+//! | corridors that leave a room without a pinch | `limbs`, by the rule of `rooms` | ours |
 //! | portals removed one by one | `decimate`; `decimate/remaining`: those left after a step | §4.1.4, §4.2.3, §4.3 |
 //! | overruling by a person | `review` | §4.2.3 |
-//! | matter, candidates and votes of the remaining rooms | `voxels`, by the rules of `rooms` | ours |
+//! | remaining rooms, and matter | `standing` | ours |
+//! | candidates and votes | `rooms` | ours |
 //!
 //! `session` runs the stages up to decimation, `propose` the rest.
 
@@ -25,6 +26,7 @@ mod cut;
 mod decimate;
 mod insert;
 mod labels;
+mod limbs;
 mod limits;
 mod openings;
 mod order;
@@ -32,10 +34,11 @@ mod predicate;
 mod propose;
 mod refine;
 mod review;
+mod rooms;
 mod session;
 mod space;
+mod standing;
 mod tetrahedra;
-mod voxels;
 
 #[cfg(test)]
 mod space_tests;

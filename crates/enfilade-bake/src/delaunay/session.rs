@@ -1,10 +1,9 @@
 //! The state of decimation, which a bake runs through at once and a user step by step.
 
-use std::collections::BTreeSet;
 use std::sync::Mutex;
 
 use enfilade_geom::scene::Scene;
-use enfilade_geom::{Allowance, Bvh, DVec3};
+use enfilade_geom::{Allowance, Bvh, DVec3, Triangle};
 
 use super::branches::find_branches;
 use super::cells::{Cells, divided_at_mouths, flow_together};
@@ -12,13 +11,13 @@ use super::decimate::{
     Decimation, Merging, RemainingPortal, Resolved, Rules, begun_before, decided, decimate,
     default_stop, remaining,
 };
+use super::limbs::RoomSpace;
 use super::limits::{BYTES_A_POINT, Limits};
 use super::space::{Space, divide_within};
-use super::voxels::CellVoxels;
+use super::standing::{CellSpace, KnownBacks, LargestParts, count_rooms};
 use crate::budget::n_structural;
 use crate::config::{Choices, Weight};
-use crate::rooms::{self, VoxelRooms};
-use crate::structure::{OUTDOORS, Structure, in_own_order};
+use crate::structure::{Structure, in_own_order};
 use crate::tubes::Walls;
 use crate::{BakeConfig, BakeContext, BakeError, Method, Stage};
 
@@ -34,17 +33,24 @@ pub struct Session {
     resolved: Vec<Resolved>,
     /// The same decimation in progress, a little before the step of which the portals were asked for last.
     begun: Mutex<Option<Merging>>,
-    /// The cells in voxels.
-    voxels: CellVoxels,
-    /// All structural triangles.
-    surfaces: Bvh,
+    /// Structural triangles that bound rooms: all but stairs.
+    pub(super) walls: Vec<Triangle>,
+    /// BVH of the walls.
+    pub(super) bvh: Bvh,
+    /// For [`CellSpace`].
+    largest: LargestParts,
+    known_backs: KnownBacks,
+    pub(super) closures: Vec<Triangle>,
+    pub(super) stairs: Bvh,
+    /// The smallest hole. [Units: wu]
+    pub(super) hole: f64,
 }
 
 impl Session {
     /// Divides the air of a scene and decimates. `config` is that of a bake by [`Method::Delaunay`].
     ///
     /// # Errors
-    /// If nothing is structural, a coordinate is out of limits, the scene is too large for the voxel budget, or the caller cancels.
+    /// If nothing is structural, a coordinate is out of limits, or the caller cancels.
     pub fn begin(
         scene: &Scene,
         config: &BakeConfig,
@@ -64,45 +70,39 @@ impl Session {
         config: &BakeConfig,
         context: &BakeContext<'_>,
     ) -> Result<Self, BakeError> {
-        let allowance = context.allowance();
         context.begin(Stage::Tetrahedra)?;
         config.check_opening()?;
         // The result must not depend on the order of triangles in a file.
-        let triangles = &in_own_order(&structure.walls);
-        let bvh = &Bvh::build(triangles);
-        let walls = Walls { triangles, bvh };
-        let closures = in_own_order(&structure.blockers(bvh));
-        let shut = [closures, in_own_order(&structure.missing)].concat();
-        let budget = &config.budget;
-        let limits = Limits {
-            n_points: budget.points(structure.triangles.len(), BYTES_A_POINT),
-            allowance,
-        };
-        let space = divide_within(triangles, &shut, bvh, config.min_opening, &limits)?;
-        let air = rooms::prepare(structure, config, context)?;
-        context.begin(Stage::Decimation)?;
-        let voxels_of = |cells: &Cells, air| CellVoxels::of(&space, cells, bvh, air, allowance);
-        let cells = flow_together(&space);
-        let room_of_cell = rooms_of(&cells, config, allowance);
-        let room_of_part = cells.cell_of_part.iter();
-        let room_of_part: Vec<u32> = room_of_part.map(|&c| room_of_cell[c as usize]).collect();
-        let mut voxels = voxels_of(&cells, air.clone());
-        let branches = find_branches(&space, &room_of_part, &walls, allowance).with_limbs(
-            &space,
-            voxels.of_rooms(&room_of_cell),
+        let walls = in_own_order(&structure.walls);
+        let bvh = Bvh::build(&walls);
+        let closures = in_own_order(&structure.blockers(&bvh));
+        let shut = [closures.clone(), in_own_order(&structure.missing)].concat();
+        let space = divide_within(
             &walls,
-            &config.merge,
-            allowance,
+            &shut,
+            &bvh,
+            config.min_opening,
+            &Limits {
+                n_points: config
+                    .budget
+                    .points(structure.triangles.len(), BYTES_A_POINT),
+                allowance: context.allowance(),
+            },
+        )?;
+        context.begin(Stage::Decimation)?;
+        let cells = with_branches(
+            &space,
+            flow_together(&space),
+            [config.min_opening, config.merge.min_radius],
+            &Walls {
+                triangles: &walls,
+                bvh: &bvh,
+            },
+            context.allowance(),
         );
-        let cells = if branches.is_empty() {
-            cells
-        } else {
-            let branches = branches.without_leftovers(&space, &cells.cell_of_part);
-            let cells = divided_at_mouths(&space, &cells, &branches);
-            voxels = voxels_of(&cells, air);
-            cells
-        };
         let mut session = Self {
+            largest: LargestParts::of(&space, &cells),
+            known_backs: KnownBacks::default(),
             space,
             cells,
             decimation: Decimation {
@@ -112,32 +112,36 @@ impl Session {
             },
             resolved: Vec::new(),
             begun: Mutex::new(None),
-            voxels,
-            surfaces: Bvh::build(&structure.triangles),
+            walls,
+            bvh,
+            closures,
+            stairs: Bvh::build(&structure.stairs),
+            hole: structure.hole.gap(),
         };
-        session.decimate_within(config, allowance);
+        session.decimate_within(config, context.allowance());
         Ok(session)
-    }
-
-    /// Returns the rooms left after the first `n_steps`, in voxels.
-    pub(super) fn rooms_after(&self, n_steps: usize) -> VoxelRooms {
-        self.voxels.of_rooms(&self.decimation.after(n_steps))
     }
 
     /// Returns the number of rooms left after the first `n_steps`, which is the number of cells indoors that
     /// [`bake_session`](crate::bake_session) makes of them, and the number of other cells: crevices, and interiors of
     /// walls, which are dropped.
     ///
-    /// Linear in voxels, and rays from each room: a fraction of a second.
+    /// `O(n log n)` in the initial cells, and rays from the rooms that no count before had: milliseconds, and a fraction of a
+    /// second for the first.
     #[must_use]
     pub fn count_rooms(&self, n_steps: usize, config: &BakeConfig) -> [usize; 2] {
-        let rooms = self.rooms_after(n_steps);
+        let room_of_cell = self.decimation.after(n_steps);
         let least = config.merge.min_radius;
-        let matter = rooms.matter(&self.surfaces, least, &Allowance::default());
-        let all: BTreeSet<u32> = rooms.regions.region_of_basin.into_iter().collect();
-        let n = all.range(OUTDOORS + 1..).count();
-        let n_matter = matter.regions.len();
-        [n - n_matter, n_matter]
+        count_rooms(&self.air(), &room_of_cell, least, &self.known_backs)
+    }
+
+    pub(super) fn air(&self) -> CellSpace<'_> {
+        CellSpace {
+            space: &self.space,
+            cells: &self.cells,
+            bvh: &self.bvh,
+            largest: &self.largest,
+        }
     }
 
     /// Returns the portals left after the first `n_steps`, with their weights at that step. `config` is that of the last
@@ -186,11 +190,39 @@ fn rules_of(config: &BakeConfig) -> Rules {
     }
 }
 
-/// Returns the room of each cell with which a decimation without choices ends.
-fn rooms_of(cells: &Cells, config: &BakeConfig, allowance: &Allowance) -> Vec<u32> {
+/// Divides cells where branches and corridors leave the rooms with which a decimation without choices ends.
+fn with_branches(
+    space: &Space,
+    cells: Cells,
+    [narrowest, min_radius]: [f64; 2],
+    walls: &Walls<'_>,
+    allowance: &Allowance,
+) -> Cells {
     let weight = Weight::ScaleFree;
     let stop = default_stop(weight);
-    let least = config.merge.min_radius;
-    let rooms = decimate(cells, weight, stop, least, &Choices::default(), allowance);
-    rooms.after(rooms.stop)
+    let rooms = decimate(
+        &cells,
+        weight,
+        stop,
+        min_radius,
+        &Choices::default(),
+        allowance,
+    );
+    let room_of_cell = rooms.after(rooms.stop);
+    let room = |&c: &u32| room_of_cell[c as usize];
+    let room_of_part: Vec<u32> = cells.cell_of_part.iter().map(room).collect();
+    let rooms = RoomSpace {
+        space,
+        walls,
+        room_of_part: &room_of_part,
+        allowance,
+    };
+    let branches = find_branches(space, &room_of_part, walls, allowance);
+    let branches = branches.with_limbs(&rooms, narrowest, min_radius);
+    if branches.is_empty() {
+        cells
+    } else {
+        let branches = branches.without_leftovers(space, &cells.cell_of_part);
+        divided_at_mouths(space, &cells, &branches)
+    }
 }

@@ -12,5 +12,5 @@ pub(crate) use opening::{
     FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge, why_parted, why_unjoined,
 };
 pub(crate) use space::{
-    DOORWAY, EnclosedFacts, Facing, LEAST_SHELTER, NARROW, SpaceFacts, why_open,
+    BACKS, DOORWAY, EnclosedFacts, Facing, LEAST_SHELTER, NARROW, SpaceFacts, is_crevice, why_open,
 };

@@ -61,7 +61,7 @@ impl SpaceFacts {
 /// along an edge.
 const LEAVING: f64 = 0.9;
 /// Inside matter, more than this share of the rays that hit anything hit a back face first.
-const BACKS: f64 = 0.6;
+pub(crate) const BACKS: f64 = 0.6;
 /// Surfaces are trusted if known air sees at most this share of backs, and turned if it sees at
 /// most this share of fronts: half the share seen of randomly oriented surfaces.
 const ASTRAY: f64 = 0.25;
@@ -114,7 +114,7 @@ impl Facing {
 
 /// Returns `true` if a closed-off space is too narrow for a room. `widest` is the radius of the largest ball that fits,
 /// `min_radius` that of the smallest room, `backs` the share of back faces seen from the space.
-fn is_crevice(widest: f64, min_radius: f64, backs: f64) -> bool {
+pub(crate) fn is_crevice(widest: f64, min_radius: f64, backs: f64) -> bool {
     widest < least_radius(min_radius, backs)
 }
 

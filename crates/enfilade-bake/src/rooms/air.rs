@@ -13,7 +13,6 @@ use crate::voxel::{
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
 /// The air of a scene in voxels, before it is divided.
-#[derive(Clone)]
 pub(crate) struct VoxelAir {
     pub(crate) grid: Grid,
     pub(crate) solid: Solid,
@@ -133,9 +132,8 @@ pub(crate) fn measure(
 }
 
 /// Voxels that are not air, or are closed to the flood.
-#[derive(Clone)]
 pub(crate) struct Solid {
-    pub(crate) occupied: BitVolume,
+    pub(super) occupied: BitVolume,
     /// Voxels that door leaves and panes fill.
     pub(super) closures: SparseVolume,
     pub(super) lids: Lids,

@@ -13,7 +13,7 @@ use super::regions::{Regions, merge_basins};
 use super::slabs::cut_at_slabs;
 use crate::BakeConfig;
 use crate::structure::OUTDOORS;
-use crate::voxel::{BitVolume, Grid, Labels, border};
+use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, border};
 
 /// Marks a voxel that has a part, but no basin yet; the other bits are the part.
 const WAITING: u32 = 1 << 31;
@@ -30,21 +30,20 @@ pub(crate) struct Basins {
 }
 
 impl Basins {
-    /// Makes a basin of each connected set of air voxels in one part; returns them with the part of each. `locator` returns a
-    /// function for the points of a row, one after the other, which returns the part of a point, below 2³¹, or `None` for matter.
-    /// Everything that connects to the border is outdoors.
+    /// Makes a basin of each connected set of air voxels in one part. `part_at` returns the part of a point, below 2³¹, or
+    /// `None` for matter. Everything that connects to the border is outdoors.
     ///
-    /// Linear in voxels, besides the look-ups of those that are not far from everything; 6 bytes a voxel.
-    pub(crate) fn of_parts<P: FnMut(DVec3) -> Option<u32>>(
+    /// Linear in voxels, besides the calls of `part_at` for those that are not far from everything; 6 bytes a voxel.
+    pub(crate) fn of_parts(
         air: &VoxelAir,
-        locator: impl Fn() -> P + Sync,
+        part_at: impl Fn(DVec3) -> Option<u32> + Sync,
         allowance: &Allowance,
-    ) -> (Self, Vec<u32>) {
+    ) -> Self {
         let dims = air.grid.dims;
         let (distances, far) = air.solid.distances(allowance);
         let mut outdoors = border(dims);
         outdoors.union_with(&far);
-        let part_of = |part_at: &mut P, i: usize| {
+        let part_of = |i: usize| {
             if distances[i] == 0 || !allowance.spend(1) {
                 return 0;
             }
@@ -54,17 +53,9 @@ impl Basins {
             let [x, y, z] = air.grid.coords(i);
             part_at(air.grid.center(x, y, z)).map_or(0, |part| WAITING | part)
         };
-        let mut labels = vec![0; distances.len()];
-        let rows = labels.par_chunks_mut(dims[0]).enumerate();
-        rows.for_each(|(row, labels)| {
-            let mut part_at = locator();
-            for (i, label) in (row * dims[0]..).zip(labels) {
-                *label = part_of(&mut part_at, i);
-            }
-        });
-        let outer = locator()(air.grid.center(0, 0, 0)).unwrap_or(0);
-        let parts = number_parts(dims, &mut labels, outer);
-        let n = parts.len();
+        let mut labels: Vec<u32> = (0..distances.len()).into_par_iter().map(part_of).collect();
+        let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
+        let n = number_parts(dims, &mut labels, outer);
         let mut peaks = vec![0_u16; n];
         for (&label, &distance) in labels.iter().zip(&distances) {
             let peak = &mut peaks[label as usize];
@@ -83,7 +74,7 @@ impl Basins {
             radius(faces.iter().map(distance).max().unwrap_or(0))
         };
         let contacts = contact_faces(&labels);
-        let basins = Self {
+        Self {
             saddles: contacts
                 .iter()
                 .map(|(&pair, f)| (pair, saddle(f)))
@@ -91,12 +82,11 @@ impl Basins {
             n_basins: n - 1,
             labels,
             peaks,
-        };
-        (basins, parts)
+        }
     }
 
     /// Gives the air inside closures to the basins beside it.
-    pub(crate) fn refill(&mut self, occupied: &BitVolume) {
+    pub(super) fn refill(&mut self, occupied: &BitVolume) {
         flood_closures(&mut self.labels, occupied);
     }
 
@@ -107,28 +97,29 @@ impl Basins {
         }
     }
 
-    /// Merges basins to rooms.
     pub(super) fn merge(
         &self,
-        air: &VoxelAir,
+        grid: &Grid,
+        shut: &SparseVolume,
+        slabs: &[f64],
         config: &BakeConfig,
         allowance: &Allowance,
     ) -> Regions {
         let flooded = Flooded {
-            grid: &air.grid,
+            grid,
             labels: &self.labels,
             peaks: &self.peaks,
-            closures: Some(&air.solid.shut),
-            slabs: &air.slabs,
+            closures: Some(shut),
+            slabs,
             allowance,
         };
         merge_basins(flooded, &self.saddles, &config.merge)
     }
 }
 
-/// Replaces the parts of voxels by basins, numbered in order of their first voxels; returns the part of each label. Waiting
+/// Replaces the parts of voxels by basins, numbered in order of their first voxels; returns the number of labels. Waiting
 /// voxels of part `outer` that connect to those that are outdoors are, too.
-fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> Vec<u32> {
+fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> usize {
     let mut stack: Vec<usize> = (0..labels.len())
         .filter(|&i| labels[i] == OUTDOORS)
         .collect();
@@ -147,16 +138,15 @@ fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> Vec
         }
     };
     flood(labels, &mut stack, WAITING | outer, OUTDOORS);
-    let mut parts = vec![outer; OUTDOORS as usize + 1];
+    let mut n = OUTDOORS + 1;
     for i in 0..labels.len() {
         let part = labels[i];
         if part & WAITING != 0 {
-            let basin = parts.len() as u32;
-            labels[i] = basin;
+            labels[i] = n;
             stack.push(i);
-            flood(labels, &mut stack, part, basin);
-            parts.push(part & !WAITING);
+            flood(labels, &mut stack, part, n);
+            n += 1;
         }
     }
-    parts
+    n as usize
 }

@@ -37,8 +37,6 @@ pub(super) struct Openings<'a> {
     pub(super) shut: &'a SparseVolume,
     pub(super) allowance: &'a Allowance,
     pub(super) regions: &'a Regions,
-    /// The regions are final, and none of their openings is judged.
-    pub(super) are_final: bool,
     /// Voxels that door leaves and panes fill.
     pub(super) closures: &'a SparseVolume,
     pub(super) lids: &'a Lids,
@@ -138,11 +136,6 @@ impl Openings<'_> {
 
     /// Returns why two regions are apart at an opening.
     fn why(&self, pair: [u32; 2], front: &Front, facts: &RegionFacts) -> Why {
-        let area = (Fact::Area, front.opening.area);
-        if self.are_final {
-            let closed = (Fact::Closed, front.opening.closed);
-            return Why::given(Reason::Kept).with(&[area, closed]);
-        }
         let region_of = |label: u32| self.regions.region_of_basin[label as usize];
         let of_opening = OpeningFacts {
             is_between_storeys: false,
@@ -151,6 +144,7 @@ impl Openings<'_> {
             balls: facts.balls(pair),
         };
         let section = whole_section_of(self.flooded(), self.settings, front, pair, &region_of);
+        let area = (Fact::Area, front.opening.area);
         if let Some(why) = why_parted(self.settings, of_opening, section) {
             return why.with(&[area]);
         }

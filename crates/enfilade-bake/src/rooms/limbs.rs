@@ -26,7 +26,7 @@ use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, distance};
 
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
-use super::limb_rule::{LimbRule, sagitta};
+use super::limb_rule::{LimbRule, THICKER, sagitta};
 use super::regions::Regions;
 use super::sections::section_of;
 use super::slabs::LAYERS;
@@ -35,6 +35,8 @@ use crate::structure::OUTDOORS;
 
 /// A limb is at least this many of its widths long, of which up to half a width lies in the room before its mouth.
 pub(super) const LONG: f64 = 2.5;
+/// Cells on the axis of a limb are farther from its walls than this share of its half-width.
+const ON_AXIS: f64 = 0.9;
 /// Factor from one width tried to the next.
 const STEP: f64 = 1.15;
 
@@ -355,6 +357,28 @@ impl Plan {
             half_width *= STEP;
         }
         (thickest, out)
+    }
+
+    /// Returns a cell about on the axis of a limb, away from where its list of cells begins.
+    pub(crate) fn middle(&self, limb: &Limb) -> usize {
+        let to_wall = self.distance_to(|c| !self.is_free[c]);
+        let from_half = limb.cells.len() / 2..;
+        let rest = limb.cells[from_half].iter().chain(&limb.cells).copied();
+        let is_wide = |&c: &usize| f64::from(to_wall[c]) - 0.5 >= ON_AXIS * limb.half_width;
+        rest.clone()
+            .find(is_wide)
+            .or(rest.clone().next())
+            .unwrap_or(0)
+    }
+
+    /// Returns the cells of a limb, up to the line across each mouth: there a disc of the room reaches into the limb.
+    pub(crate) fn up_to_mouths(&self, limb: &Limb) -> Vec<usize> {
+        let sagitta = sagitta(THICKER, limb.half_width);
+        let mut is_in = vec![false; self.is_free.len()];
+        limb.cells.iter().for_each(|&c| is_in[c] = true);
+        let to_limb = self.distance_to(|c| is_in[c]);
+        let is_near = |&c: &usize| self.is_free[c] && f64::from(to_limb[c]) <= sagitta;
+        (0..is_in.len()).filter(is_near).collect()
     }
 
     /// Returns the length of an area between the thicker parts `core`: from mouth to mouth, or to its end. 0 if

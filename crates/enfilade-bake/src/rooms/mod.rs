@@ -31,11 +31,12 @@ mod voids;
 mod votes;
 mod voxel_balls;
 
-pub(crate) use air::{FLOODED, Plot, VoxelAir, measure, plots, prepare};
+pub(crate) use air::{FLOODED, Plot, measure, plots, prepare};
 pub(crate) use basins::Basins;
-pub(crate) use find::{COUNTS, VoxelRooms, propose};
+pub(crate) use find::{COUNTS, propose};
 pub(crate) use flooded::Flooded;
 pub(crate) use limb_rule::{LimbRule, THICKER};
-pub(crate) use limbs::split_limbs;
+pub(crate) use limbs::{Limb, Plan, split_limbs};
 pub(crate) use part::{VoxelRange, WholeAir};
-pub(crate) use regions::{Regions, merge_basins};
+pub(crate) use regions::merge_basins;
+pub(crate) use voids::inside_stairs;

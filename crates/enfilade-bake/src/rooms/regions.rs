@@ -76,19 +76,8 @@ impl CloseJoin {
 }
 
 impl Regions {
-    /// Makes a region of each basin.
-    pub(crate) fn of_basins(labels: &Labels, n_labels: usize) -> Self {
-        Self {
-            region_of_basin: (0..n_labels as u32).collect(),
-            contacts: contact_faces(labels),
-            saddles: BTreeMap::new(),
-            joins: Vec::new(),
-            limbs: BTreeMap::new(),
-        }
-    }
-
     /// Gives each region the name that `name` returns; regions of one name are one.
-    pub(crate) fn rename(&mut self, name: impl Fn(u32) -> u32) {
+    pub(super) fn rename(&mut self, name: impl Fn(u32) -> u32) {
         for region in &mut self.region_of_basin {
             *region = name(*region);
         }

@@ -29,6 +29,17 @@ pub(crate) fn rays_from(points: &[DVec3]) -> impl Iterator<Item = Ray> {
     points.iter().flat_map(rays)
 }
 
+/// Returns `true` if rays from `p` along all axes, both ways, hit back faces.
+pub(crate) fn is_inside(surfaces: &Bvh, p: DVec3) -> bool {
+    // Along an axis one coordinate is near 1, along a diagonal three are.
+    let axes = directions().filter(|d| d.length_squared() < 2.0);
+    surfaces.bounds().contains(p)
+        && axes.into_iter().all(|direction| {
+            let hit = surfaces.closest_hit(&ray(p, direction), |_| false);
+            hit.is_some_and(|hit| !hit.front)
+        })
+}
+
 /// Returns the number of rays that hit a back face, and of rays that hit anything.
 pub(crate) fn count_backs(bvh: &Bvh, points: &[DVec3], allowance: &Allowance) -> (f64, f64) {
     let (mut back, mut all) = (0.0, 0.0);

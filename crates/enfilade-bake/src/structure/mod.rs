@@ -30,7 +30,7 @@ mod slabs;
 mod stairs;
 mod weld;
 
-pub(crate) use backs::{POINTS, count_backs, rays_from};
+pub(crate) use backs::{POINTS, count_backs, is_inside, rays_from};
 pub(crate) use blockers::{Plate, plates};
 pub(crate) use candidate::{Candidate, Opening, fit_candidate};
 pub(crate) use frame::Frame;
