@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use enfilade_cpg::{CellPortalGraph, Doubt, World};
+use enfilade_cpg::{CellPortalGraph, Doubt, Place, Reason as Decision, World};
 use serde::Serialize;
 
 /// A foot. [Units: wu]
@@ -88,12 +88,12 @@ impl Verdict {
         let lies = doubts.iter().any(is_on_its_side);
         let said: Vec<&InputDoubt> = said.iter().filter(|d| lies || !d.is_about_up).collect();
         let of_rooms = world.graph.room_doubt();
-        let takes_room = world.graph.places.iter().any(|p| p.why.takes_room());
+        let taken = taken(&world.graph);
         let trust = if is_empty(world) {
             Trust::None
         } else if !said.is_empty() || doubts.iter().any(is_grave) || of_rooms.share >= LOW {
             Trust::Low
-        } else if doubts.is_empty() && of_rooms.share < GOOD && !takes_room {
+        } else if doubts.is_empty() && of_rooms.share < GOOD && taken.is_none() {
             Trust::Good
         } else {
             Trust::Fair
@@ -112,7 +112,10 @@ impl Verdict {
             summary: found(world),
             doubt: of_rooms.share,
             close: close.collect(),
-            reasons: of_input.chain(doubts.iter().map(reason)).collect(),
+            reasons: of_input
+                .chain(taken)
+                .chain(doubts.iter().map(reason))
+                .collect(),
         }
     }
 }
@@ -228,6 +231,28 @@ fn found(world: &World) -> String {
     rooms
 }
 
+/// Returns the reason for less trust if spaces as large as rooms are no rooms of their own.
+fn taken(graph: &CellPortalGraph) -> Option<Reason> {
+    let taken: Vec<&Place> = (graph.places.iter())
+        .filter(|place| place.why.takes_room())
+        .collect();
+    let mut text = match taken.len() {
+        0 => return None,
+        1 => "a space as large as a room is none of its own:".to_owned(),
+        n => format!("{n} spaces as large as rooms are none of their own:"),
+    };
+    for (i, place) in taken.iter().take(NAMED).enumerate() {
+        let [x, y, z] = place.at;
+        let comma = if i == 0 { "" } else { "," };
+        let _ = write!(text, "{comma} at {x:.2} {y:.2} {z:.2} {:#}", place.why);
+    }
+    let is_merged = taken.iter().any(|p| p.why.reason == Decision::Merged);
+    Some(Reason {
+        text,
+        options: is_merged.then_some("--min-cost 0").into_iter().collect(),
+    })
+}
+
 fn reason(doubt: &Doubt) -> Reason {
     let (text, options): (String, &[&str]) = match *doubt {
         Doubt::NoRooms => (
@@ -310,6 +335,30 @@ fn reason(doubt: &Doubt) -> Reason {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_space_that_is_no_room_of_its_own_is_named_with_its_place() {
+        let place = |reason| Place {
+            at: [1.0, 2.0, 3.5],
+            why: enfilade_cpg::Why::given(reason),
+        };
+        let of = |places| {
+            taken(&CellPortalGraph {
+                places,
+                ..CellPortalGraph::default()
+            })
+        };
+        assert!(of(vec![]).is_none());
+        assert!(of(vec![place(Decision::Wide)]).is_none());
+        let merged = of(vec![place(Decision::Wide), place(Decision::Merged)]).unwrap();
+        assert!(
+            merged.text.contains("at 1.00 2.00 3.50 one cell"),
+            "{}",
+            merged.text
+        );
+        assert_eq!(merged.options, ["--min-cost 0"]);
+        assert!(of(vec![place(Decision::Solid)]).unwrap().options.is_empty());
+    }
 
     #[test]
     fn doors_as_high_in_feet_as_doors_are_name_feet() {
