@@ -34,7 +34,8 @@ pub(crate) struct Plate {
 impl Plate {
     /// Returns an object as a plate; `None` if it is not flat, or too narrow.
     pub(crate) fn of(triangles: Vec<Triangle>) -> Option<Self> {
-        let around = Rectangle::of(&triangles);
+        // The bars of a railing face along it, so it is deep, and shuts nothing.
+        let around = Rectangle::around(facing(&triangles), triangles.as_flattened());
         let facts = FillerFacts::of(&around, &around.mask(triangles.iter().copied()));
         let shape = facts.judge();
         (!matches!(shape, Filler::Deep | Filler::Narrow)).then(|| Self {

@@ -4,19 +4,22 @@
 //!
 //! Cost: linear in triangles.
 
-use enfilade_geom::{Attitude, DVec3, Triangle, is_rather_level, triangle_area_normal};
+use enfilade_geom::{Attitude, DVec3, Triangle, triangle_area_normal};
 
 /// Least share of the scene's plan that the surfaces of a level cover.
 const MIN_SHARE: f64 = 0.08;
 /// Largest distance between the two faces of one slab. [Units: wu]
 const MAX_SLAB: f64 = 0.5;
 
+/// Least vertical part of the unit normal of an opening in a slab: within 26 degrees of level, as the faces of voxels show it.
+/// Higher, and rooms join through holes in slabs (the dungeon kit's); lower, and flights of stairs count as holes (duplex).
+const LEVEL: f64 = 0.9;
 /// An opening nearer than this to the middle of a slab lies in it. [Units: wu]
 const NEAR: f64 = 0.2;
 
 /// Returns `true` if an opening with this normal at this height lies in one of the `slabs`.
 pub(crate) fn lies_in_slab(normal: DVec3, height: f64, slabs: &[f64]) -> bool {
-    is_rather_level(normal) && slabs.iter().any(|h| (h - height).abs() < NEAR)
+    normal.y.abs() > LEVEL && slabs.iter().any(|h| (h - height).abs() < NEAR)
 }
 
 /// Returns the heights (+Y) of the middles of slabs, ascending. [Units: wu]
