@@ -1,4 +1,4 @@
-//! What fills openings (leaves, panes and their frames), judged by facts: of its shape, and of the hole in which it is.
+//! Things that fill openings (leaves, panes and their frames), judged by facts: of shape, and of the hole that one is in.
 //!
 //! Pure functions over one table of numbers, for all who ask: roles of objects without names, what shuts an opening, what
 //! divides one, and what moves in it. [`Rectangle`] measures the facts of a shape.
@@ -42,7 +42,7 @@ pub struct FillerFacts {
     pub covered: f64,
 }
 
-/// What a thing is by its shape alone.
+/// Kind of a thing by its shape alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filler {
     /// Upright, as high as a door.

@@ -57,7 +57,7 @@ impl Rectangle {
         let directions = directions(triangles);
         let first = directions.iter().take(3);
         let tried = first.map(|&normal| {
-            // What lies level turns with its sides.
+            // A level thing turns with its sides.
             let side = directions.iter().filter(|d| !faces(**d, normal));
             let mut side = side.filter_map(|d| (d - normal * normal.dot(*d)).try_normalize());
             let across = match Attitude::of(normal) {

@@ -231,7 +231,7 @@ fn found(world: &World) -> String {
     rooms
 }
 
-/// Returns the reason for less trust if spaces as large as rooms are no rooms of their own.
+/// Returns the reason for less trust if spaces as large as rooms are not rooms of their own.
 fn taken(graph: &CellPortalGraph) -> Option<Reason> {
     let taken: Vec<&Place> = (graph.places.iter())
         .filter(|place| place.why.takes_room())

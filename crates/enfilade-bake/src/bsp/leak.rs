@@ -9,17 +9,8 @@ use enfilade_geom::{ConvexSolid, DVec3, Purse};
 use crate::config::{Guide, Heuristic};
 
 use super::input::BspInput;
-use super::leaves::Bsp;
+use super::leaves::{Bsp, LeakPath};
 use super::tree::Content;
-
-/// A path through open space from a point inside to the void.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LeakPath {
-    /// Index of the point inside where it begins.
-    pub from: usize,
-    /// Its vertices, from that point to beyond the outermost surface. [Units: wu]
-    pub points: Vec<DVec3>,
-}
 
 /// Points that a text lists.
 const SHOWN: usize = 8;

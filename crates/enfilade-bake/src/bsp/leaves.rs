@@ -1,8 +1,7 @@
 //! The leaves of a tree, and the portals between them.
 
-use enfilade_geom::{Aabb, Purse, Winding};
+use enfilade_geom::{Aabb, DVec3, Purse, Winding};
 
-use super::leak::LeakPath;
 use super::portals::LeafPortal;
 use super::tolerance::Tolerance;
 use super::tree::{self, Content, Tree};
@@ -26,6 +25,15 @@ pub struct Bsp<'a> {
     pub(super) leak: Option<LeakPath>,
     /// The purse that pays for work on it.
     pub(super) purse: Purse<'a>,
+}
+
+/// A path through open space from a point inside to the void.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeakPath {
+    /// Index of the point inside where it begins.
+    pub from: usize,
+    /// Its vertices, from that point to beyond the outermost surface. [Units: wu]
+    pub points: Vec<DVec3>,
 }
 
 /// Counts of a tree.

@@ -46,8 +46,8 @@ mod tree;
 pub use crate::config::{BspConfig, Guide, Heuristic, Rooms};
 pub use grouping::Grouping;
 pub use input::BspInput;
-pub use leak::{LeakPath, find_leak};
-pub use leaves::{Bsp, BspCounts};
+pub use leak::find_leak;
+pub use leaves::{Bsp, BspCounts, LeakPath};
 pub(crate) use propose::propose;
 
 #[cfg(test)]

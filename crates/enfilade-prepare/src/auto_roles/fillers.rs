@@ -51,7 +51,7 @@ struct Hold {
 /// A thing that may fill an opening.
 struct Candidate {
     unit: u32,
-    /// What is known of it without its surroundings.
+    /// Facts of it without its surroundings.
     own: HoleFacts,
     /// Matter that holds it at each sample of each side: left, right, below, above.
     sides: [Vec<Vec<Hold>>; 4],
