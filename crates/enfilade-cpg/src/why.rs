@@ -119,6 +119,8 @@ pub enum Fact {
     Inside,
     /// Share of the rays from a space that meet a second surface right behind the first, as at a wall.
     Walled,
+    /// Share of the level ways out of a closed space, through its sheets, that lead to another space than most do.
+    Between,
     /// Share of the level rays from a space that meet something.
     Shelter,
     /// Radius of the largest ball in a space. [Units: wu]
@@ -367,6 +369,7 @@ impl Fact {
                 | Self::Standing
                 | Self::Backs
                 | Self::Walled
+                | Self::Between
         )
     }
 
@@ -387,6 +390,7 @@ impl Fact {
             Self::Backs => "backs",
             Self::Inside => "inside",
             Self::Walled => "walled",
+            Self::Between => "between",
             Self::Shelter => "shelter",
             Self::Radius => "radius",
             Self::Volume => "volume",
@@ -410,6 +414,10 @@ impl Fact {
             Self::Backs => ("share of rays that meet backs", ""),
             Self::Inside => ("evidence for the inside of a solid", ""),
             Self::Walled => ("share of rays that meet a wall of two faces", ""),
+            Self::Between => (
+                "share of the ways out through its sheets that lead elsewhere than most",
+                "",
+            ),
             Self::Shelter => ("share of level rays that meet something", ""),
             Self::Radius => ("largest ball", " m"),
             Self::Volume => ("volume", " m³"),

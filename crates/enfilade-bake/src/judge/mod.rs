@@ -12,5 +12,6 @@ pub(crate) use opening::{
     FRAMED, OpeningFacts, OpeningSection, OpeningVerdict, judge, why_parted, why_unjoined,
 };
 pub(crate) use space::{
-    BACKS, DOORWAY, EnclosedFacts, Facing, LEAST_SHELTER, NARROW, SpaceFacts, is_crevice, why_open,
+    BACKS, BETWEEN, DOORWAY, EnclosedFacts, Facing, LEAST_SHELTER, NARROW, SpaceFacts, is_crevice,
+    is_hollow_piece, why_open,
 };

@@ -67,7 +67,11 @@ pub(crate) const BACKS: f64 = 0.6;
 const ASTRAY: f64 = 0.25;
 /// Least share of rays that meet a wall of two faces, not a single sheet, from a room among surfaces that face anyhow.
 const WALLED: f64 = 0.5;
-/// A space that fits no ball of this radius is matter if most rays hit back faces. [Units: wu]
+/// Least share of the level ways out of a closed room among surfaces that face anyhow, through its sheets, that lead to another
+/// space than most do. All around a thing that stands in a hall is the hall. Higher, and suites beside one corridor are solid
+/// (bristol-house); lower, and a column that touches a second room is a room.
+pub(crate) const BETWEEN: f64 = 0.1;
+/// A space that fits no ball of this radius is matter if most rays hit back faces: it is thinner than a person. [Units: wu]
 pub(crate) const NARROW: f64 = 0.5;
 
 /// Least share of level rays that meet something in a room: one of eight may leave by its door.
@@ -97,6 +101,8 @@ pub(crate) struct EnclosedFacts {
     pub(crate) backs_aside: f64,
     /// … and leave one solid more than they enter, if surfaces face outward, and if inward.
     pub(crate) leaving: [f64; 2],
+    /// Level ways out through its sheets that lead to another space than most do, of those that lead to air.
+    pub(crate) between: f64,
 }
 
 impl Facing {
@@ -127,6 +133,12 @@ fn least_radius(min_radius: f64, backs: f64) -> f64 {
     }
 }
 
+/// Returns `true` if a space open to the outdoors is the inside of a piece of wall without an end: surfaces `facing` outward turn
+/// their backs to it, and it is thinner than a person.
+pub(crate) fn is_hollow_piece(facing: Facing, widest: f64, backs: f64) -> bool {
+    facing == Facing::Outward && backs > BACKS && widest < NARROW
+}
+
 /// Returns why a space that is open to the outdoors is a room, given the share of rays from it that meet backs: air in any case, but in
 /// doubt if it looks like the inside of a solid.
 pub(crate) fn why_open(backs: f64) -> Why {
@@ -147,7 +159,9 @@ impl EnclosedFacts {
             // A ray that meets nothing shows no front.
             Facing::Inward if self.leaving[1] == 0.0 => 0.0,
             Facing::Inward => of(self.leaving[1], 1.0 - self.backs_aside),
-            Facing::Anyhow => (self.backs / ASTRAY).min((1.0 - self.walled) / (1.0 - WALLED)),
+            Facing::Anyhow => (self.backs / ASTRAY)
+                .min((1.0 - self.walled) / (1.0 - WALLED))
+                .min((NARROW / self.radius).max(BETWEEN / self.between)),
         }
     }
 
@@ -158,6 +172,7 @@ impl EnclosedFacts {
             (Fact::Radius, self.radius),
             (Fact::Backs, self.backs),
             (Fact::Walled, self.walled),
+            (Fact::Between, self.between),
             (Fact::Inside, inside),
         ];
         if is_crevice(self.radius, min_radius, self.backs) {
@@ -211,6 +226,7 @@ mod tests {
             walled: 0.9,
             backs_aside: 0.0,
             leaving: [0.0; 2],
+            between: 0.0,
         };
         let inside = EnclosedFacts {
             radius: 1.2,
@@ -218,6 +234,7 @@ mod tests {
             walled: 0.1,
             backs_aside: 1.0,
             leaving: [1.0, 0.0],
+            between: 0.0,
         };
         use Facing::{Anyhow, Inward, Outward};
         let turned = EnclosedFacts {
@@ -254,6 +271,40 @@ mod tests {
                 EnclosedFacts {
                     backs: 0.5,
                     walled: 0.2,
+                    ..room
+                },
+                Reason::Solid,
+            ),
+            (
+                "a suite between others",
+                Anyhow,
+                EnclosedFacts {
+                    backs: 0.5,
+                    walled: 0.2,
+                    between: 0.11,
+                    ..room
+                },
+                Reason::Enclosed,
+            ),
+            (
+                "a column that touches a second room",
+                Anyhow,
+                EnclosedFacts {
+                    backs: 0.5,
+                    walled: 0.2,
+                    between: 0.09,
+                    ..room
+                },
+                Reason::Solid,
+            ),
+            (
+                "a shaft between others",
+                Anyhow,
+                EnclosedFacts {
+                    radius: 0.45,
+                    backs: 0.5,
+                    walled: 0.2,
+                    between: 0.5,
                     ..room
                 },
                 Reason::Solid,
@@ -310,6 +361,15 @@ mod tests {
             assert_eq!(why.reason, reason, "{what}: {why}");
             assert!(why.holds(), "{what}: {why}");
         }
+    }
+
+    #[test]
+    fn a_piece_of_wall_without_an_end_is_thin_and_shows_its_backs() {
+        use Facing::{Anyhow, Outward};
+        assert!(is_hollow_piece(Outward, 0.45, 0.9));
+        assert!(!is_hollow_piece(Outward, 0.55, 0.9));
+        assert!(!is_hollow_piece(Outward, 0.45, 0.5));
+        assert!(!is_hollow_piece(Anyhow, 0.45, 0.9));
     }
 
     #[test]

@@ -13,8 +13,9 @@
 //! Not every model allows this test. The known air (regions open to the outdoors, or else the
 //! outdoors) decides. If it sees fronts, surfaces are trusted; if it sees backs, they are turned; if it sees some of
 //! each, only connections count: a closed-off region is matter if a single sheet separates it from its
-//! surroundings, and a room if walls do, or if fronts face it from all sides
-//! (as in a vessel or a level modelled from inside).
+//! surroundings, and a room if walls do, or if fronts face it from all sides (as in a vessel or a level modelled from
+//! inside), or if it lies between other spaces ([`super::beside`]). Air that opens outdoors is matter only where it is
+//! the inside of a piece of wall without an end.
 //!
 //! A scene that consists only of such a shell is a building, not a boulder: kept, with a note.
 //!
@@ -30,9 +31,10 @@ use rayon::prelude::*;
 use crate::budget::WORK_A_LOOK;
 use crate::voxel::{Grid, Labels};
 
+use super::beside::{Beside, beside, between};
 use super::regions::{CloseJoin, Regions};
 use super::slabs::LAYERS;
-use crate::judge::{EnclosedFacts, Facing, NARROW, why_open};
+use crate::judge::{EnclosedFacts, Facing, NARROW, is_hollow_piece, why_open};
 use crate::proposal::FoundPlace;
 use crate::structure::{OUTDOORS, POINTS, rays_from};
 
@@ -67,6 +69,38 @@ fn is_room_sized(radius: f64, volume: f64) -> bool {
     radius >= NARROW && volume >= CloseJoin::LEAST_VOLUME
 }
 
+/// Regions connected by openings, none to the outdoors.
+struct Closed {
+    /// Ascending.
+    regions: Vec<u32>,
+    facts: EnclosedFacts,
+    n_voxels: usize,
+}
+
+/// Returns the mean share of backs that regions of these sizes see: a hundred hollow pieces of wall are less air than three
+/// halls. `None` if they see nothing.
+fn mean_backs<'s>(regions: impl Iterator<Item = (&'s Seen, f64)>) -> Option<f64> {
+    let seen = regions.filter(|r| r.0.all > 0.0);
+    let (backs, all) = seen.fold((0.0, 0.0), |(backs, all), (seen, size)| {
+        (backs + size * seen.backs(), all + size)
+    });
+    (all > 0.0).then(|| backs / all)
+}
+
+/// Returns `true` if a scene in which nothing is open makes more sense with its surfaces turned: its rooms are larger then, and
+/// more of them open to each other, as rooms do and solids do not.
+fn are_inside_out(closed: &[Closed], min_radius: f64) -> bool {
+    let rooms = |facing| {
+        let is_room = |c: &&Closed| c.facts.why(facing, min_radius).reason == Reason::Enclosed;
+        let rooms = closed.iter().filter(is_room);
+        rooms.fold((0, 0), |(n_joined, n_voxels), c| {
+            (n_joined + c.regions.len() - 1, n_voxels + c.n_voxels)
+        })
+    };
+    let (own, turned) = (rooms(Facing::Outward), rooms(Facing::Inward));
+    turned.0 > own.0 && turned.1 > own.1
+}
+
 /// Finds the regions that are not rooms; the largest ball in a room has at least the radius `min_radius`.
 #[must_use]
 pub(crate) fn find_matter(
@@ -85,7 +119,8 @@ pub(crate) fn find_matter(
     open.sort_unstable();
     let wanted: Vec<u32> = enclosed.iter().flatten().chain(&open).copied().collect();
     let RegionSamples { points, n_voxels } = sample_points(grid, labels, regions, &wanted);
-    let n_voxels = |of: &[u32]| of.iter().filter_map(|r| n_voxels.get(r)).sum::<usize>();
+    let size = |region: &u32| n_voxels.get(region).copied().unwrap_or(0);
+    let n_voxels = |of: &[u32]| of.iter().map(size).sum::<usize>();
     // First hits are enough of air that is open to the outdoors.
     let rays = |region: u32| match open.binary_search(&region) {
         Ok(_) => Rays::First,
@@ -99,36 +134,66 @@ pub(crate) fn find_matter(
         let of = group.iter().filter_map(|r| seen.get(r));
         of.fold(Seen::default(), Seen::and)
     };
+    // A voxel center next to a wall is at least half a voxel away from it.
+    let widest_of = |r: &u32| (f64::from(radius[r]) - 0.5).max(0.0) * grid.voxel;
+    let closed_of = |mut regions: Vec<u32>| {
+        regions.sort_unstable();
+        let widest = regions.iter().map(widest_of).fold(0.0, f64::max);
+        Closed {
+            facts: view(&regions).facts(widest),
+            n_voxels: n_voxels(&regions),
+            regions,
+        }
+    };
+    let mut closed: Vec<Closed> = enclosed.into_iter().map(closed_of).collect();
     let indoors: Vec<u32> = open.iter().copied().filter(|&r| r != OUTDOORS).collect();
-    let seen_indoors = view(&indoors);
-    let backs_indoors = (seen_indoors.all > 0.0).then(|| seen_indoors.backs());
-    let facing = Facing::of(backs_indoors, view(&[OUTDOORS]).backs());
+    let sized = indoors
+        .iter()
+        .filter_map(|r| Some((seen.get(r)?, size(r) as f64)));
+    let mut facing = Facing::of(mean_backs(sized), view(&[OUTDOORS]).backs());
+    if indoors.is_empty() && facing == Facing::Outward && are_inside_out(&closed, min_radius) {
+        facing = Facing::Inward;
+    }
+    let is_hollow = |r: &u32| {
+        let seen = seen.get(r);
+        seen.is_some_and(|s| is_hollow_piece(facing, widest_of(r), s.backs()))
+    };
+    let (mut narrow, indoors): (Vec<u32>, Vec<u32>) = indoors.into_iter().partition(is_hollow);
+    let n_pieces = narrow.len();
+    if facing == Facing::Anyhow {
+        let beside_of = |c: &Closed| {
+            let points = c.regions.iter().filter_map(|r| points.get(r)).flatten();
+            beside(grid, labels, regions, &c.regions, points, allowance)
+        };
+        let beside: Vec<Beside> = closed.par_iter().map(beside_of).collect();
+        let is_room = |c: &&Closed| c.facts.why(facing, min_radius).reason == Reason::Enclosed;
+        let rooms = closed.iter().filter(is_room).flat_map(|c| &c.regions);
+        let air = open.iter().chain(rooms).copied().collect();
+        let groups = closed.iter().map(|c| &c.regions[..]).zip(&beside);
+        let between = between(&groups.collect::<Vec<_>>(), air);
+        for (c, between) in closed.iter_mut().zip(between) {
+            c.facts.between = between;
+        }
+    }
 
-    let (mut narrow, mut doubtful) = (Vec::new(), Vec::new());
-    let (mut whys, mut spaces) = (Vec::new(), Vec::new());
+    let (mut doubtful, mut whys, mut spaces) = (Vec::new(), Vec::new(), Vec::new());
     let mut any_room = !indoors.is_empty();
-    for group in enclosed {
-        // A voxel center next to a wall is at least half a voxel away from it.
-        let widest = group
-            .iter()
-            .map(|r| f64::from(radius[r]) - 0.5)
-            .fold(0.0, f64::max)
-            * grid.voxel;
-        let why = view(&group).facts(widest).why(facing, min_radius);
-        let volume = n_voxels(&group) as f64 * grid.voxel.powi(3);
-        if why.reason != Reason::Enclosed && is_room_sized(widest, volume) {
-            let inside = points.get(&group[0]).and_then(|of| of.first());
+    for c in closed {
+        let why = c.facts.why(facing, min_radius);
+        let volume = c.n_voxels as f64 * grid.voxel.powi(3);
+        if why.reason != Reason::Enclosed && is_room_sized(c.facts.radius, volume) {
+            let inside = points.get(&c.regions[0]).and_then(|of| of.first());
             spaces.extend(inside.map(|&at| FoundPlace {
                 at,
                 why: why.clone().with(&[(Fact::Volume, volume)]),
             }));
         }
         match why.reason {
-            Reason::Crevice => narrow.extend(group),
-            Reason::Solid => doubtful.push(group),
+            Reason::Crevice => narrow.extend(c.regions),
+            Reason::Solid => doubtful.push(c.regions),
             _ => {
                 any_room = true;
-                whys.extend(group.into_iter().map(|region| (region, why.clone())));
+                whys.extend(c.regions.into_iter().map(|region| (region, why.clone())));
             }
         }
     }
@@ -145,6 +210,9 @@ pub(crate) fn find_matter(
         fronts_face_air: facing == Facing::Outward,
     };
     matter.regions.sort_unstable();
+    if n_pieces > 0 {
+        matter.notes.push(note_on_pieces(n_pieces));
+    }
     let n = doubtful.len();
     if n == 0 {
         return matter;
@@ -184,6 +252,13 @@ fn note_on_shells(n: usize) -> String {
     format!(
         "{n} closed shell{s} without openings {are} the whole scene: treated as rooms, not as solids"
     )
+}
+
+fn note_on_pieces(n: usize) -> String {
+    match n {
+        1 => "the inside of a hollow piece of wall, open at an end, is not a room".to_owned(),
+        _ => format!("the insides of {n} hollow pieces of wall, open at an end, are not rooms"),
+    }
 }
 
 fn note_on_solids(n: usize, facing: Facing) -> String {
@@ -309,6 +384,7 @@ impl Seen {
             walled: self.walled / self.all.max(1.0),
             backs_aside: of_aside(self.back_aside),
             leaving: self.leaving.map(of_aside),
+            between: 0.0,
         }
     }
 }

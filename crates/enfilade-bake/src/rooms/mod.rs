@@ -8,6 +8,7 @@
 
 mod air;
 mod basins;
+mod beside;
 mod candidates;
 mod find;
 mod flooded;
