@@ -215,6 +215,68 @@ fn rooms_of_single_sheets_stay_whichever_way_these_face() {
     }
 }
 
+#[test]
+fn a_suite_of_sheets_without_a_way_out_is_rooms() {
+    // Two rooms joined by a doorway, and beside them one with a window: all of sheets, 2.7 m high.
+    let mut scene = Scene::default();
+    add(&mut scene, Role::Structural, |m| {
+        let window = aabb([7.0, 1.0, 8.0], [9.0, 2.0, 8.0]);
+        let doorway = aabb([2.0, 0.0, 4.0], [3.0, 2.1, 4.0]);
+        m.sheet(aabb([0.0, 0.0, 0.0], [10.0, 0.0, 8.0]), 1, true, &[]);
+        m.sheet(aabb([0.0, 2.7, 0.0], [10.0, 2.7, 8.0]), 1, true, &[]);
+        m.sheet(aabb([0.0, 0.0, 0.0], [10.0, 2.7, 0.0]), 2, true, &[]);
+        m.sheet(aabb([0.0, 0.0, 8.0], [10.0, 2.7, 8.0]), 2, true, &[window]);
+        m.sheet(aabb([0.0, 0.0, 4.0], [6.0, 2.7, 4.0]), 2, true, &[doorway]);
+        for x in [0.0, 6.0, 10.0] {
+            m.sheet(aabb([x, 0.0, 0.0], [x, 2.7, 8.0]), 0, true, &[]);
+        }
+    });
+    let baked = baked(&scene);
+    for p in [[2.0, 1.2, 2.0], [2.0, 1.2, 6.0], [8.0, 1.2, 4.0]] {
+        assert!(is_indoors(&baked, p), "{p:?}: {:?}", baked.notes);
+    }
+    assert_eq!(n_indoors(&baked), 3);
+}
+
+#[test]
+fn a_crate_does_not_turn_the_level_around_it_to_matter() {
+    // Two halls and the doorway between them, as the cavity alone; its surfaces face away from the air.
+    let mut scene = Scene::default();
+    add(&mut scene, Role::Structural, |m| {
+        let cavity = [
+            aabb([0.0, 0.0, 0.0], [7.0, 3.0, 7.0]),
+            aabb([7.0, 0.0, 2.5], [7.5, 2.2, 4.5]),
+            aabb([7.5, 0.0, 0.0], [14.5, 3.0, 7.0]),
+        ];
+        m.carved(&cavity, &[]);
+    });
+    block(&mut scene, [2.0, 0.1, 2.0], [4.0, 2.1, 4.0]);
+    let baked = baked(&scene);
+    assert_eq!(n_indoors(&baked), 2, "{:?}", baked.notes);
+    assert!(is_indoors(&baked, [1.0, 1.5, 1.0]) && is_indoors(&baked, [12.0, 1.5, 1.0]));
+    assert!(!is_indoors(&baked, [3.0, 1.0, 3.0]));
+}
+
+#[test]
+fn a_hollow_piece_of_wall_with_a_hole_in_its_end_is_no_room() {
+    let mut scene = house(&[]);
+    // 0.9 m thick, which leaves no room for a person.
+    add(&mut scene, Role::Structural, |m| {
+        let ([x0, y0, z0], [x1, y1, z1]) = ([20.0, 0.0, 0.0], [24.0, 3.0, 0.9]);
+        let hole = aabb([x0, 1.0, 0.25], [x0, 1.5, 0.65]);
+        for (axis, at) in [(0, x0), (0, x1), (1, y0), (1, y1), (2, z0), (2, z1)] {
+            let (mut min, mut max) = ([x0, y0, z0], [x1, y1, z1]);
+            (min[axis], max[axis]) = (at, at);
+            let holes = if at == x0 { vec![hole] } else { Vec::new() };
+            m.sheet(aabb(min, max), axis, [x1, y1, z1][axis] == at, &holes);
+        }
+    });
+    let baked = baked(&scene);
+    assert_eq!(n_indoors(&baked), 2, "{:?}", baked.notes);
+    let is_said = |n: &String| n.contains("hollow piece of wall");
+    assert!(baked.notes.iter().any(is_said), "{:?}", baked.notes);
+}
+
 /// A hall of 16 m × 10 m under an arched roof: two ends are walls whose tops follow the arch in level
 /// strips, and the sides are panes from post to post.
 fn glazed_hall() -> Scene {
