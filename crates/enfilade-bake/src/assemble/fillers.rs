@@ -296,7 +296,7 @@ mod tests {
             areas(&[left(), window([2.0, 0.0, 4.0, 2.4]), curtain]),
             [960]
         );
-        // Mostly on the wall beside the opening, and a strip that is no plate.
+        // Mostly on the wall beside the opening, and a strip too narrow for a plate.
         assert_eq!(areas(&[left(), window([3.5, 0.0, 6.0, 2.4])]), [960]);
         assert!(Plate::of(block([3.96, 0.0, 4.0, 2.4], 0.02)).is_none());
         // Far from the plane.

@@ -121,15 +121,7 @@ pub(crate) fn find_matter(
     let RegionSamples { points, n_voxels } = sample_points(grid, labels, regions, &wanted);
     let size = |region: &u32| n_voxels.get(region).copied().unwrap_or(0);
     let n_voxels = |of: &[u32]| of.iter().map(size).sum::<usize>();
-    // First hits are enough of air that is open to the outdoors.
-    let rays = |region: u32| match open.binary_search(&region) {
-        Ok(_) => Rays::First,
-        Err(_) => Rays::All,
-    };
-    let look =
-        |(&region, at): (&u32, &Vec<DVec3>)| (region, Seen::from(bvh, at, rays(region), allowance));
-    let seen: Vec<(u32, Seen)> = points.par_iter().map(look).collect();
-    let seen: BTreeMap<u32, Seen> = seen.into_iter().collect();
+    let seen = seen_from(&points, &open, bvh, allowance);
     let view = |group: &[u32]| {
         let of = group.iter().filter_map(|r| seen.get(r));
         of.fold(Seen::default(), Seen::and)
@@ -166,14 +158,7 @@ pub(crate) fn find_matter(
             beside(grid, labels, regions, &c.regions, points, allowance)
         };
         let beside: Vec<Beside> = closed.par_iter().map(beside_of).collect();
-        let is_room = |c: &&Closed| c.facts.why(facing, min_radius).reason == Reason::Enclosed;
-        let rooms = closed.iter().filter(is_room).flat_map(|c| &c.regions);
-        let air = open.iter().chain(rooms).copied().collect();
-        let groups = closed.iter().map(|c| &c.regions[..]).zip(&beside);
-        let between = between(&groups.collect::<Vec<_>>(), air);
-        for (c, between) in closed.iter_mut().zip(between) {
-            c.facts.between = between;
-        }
+        weigh_between(&mut closed, &beside, &open, min_radius);
     }
 
     let (mut doubtful, mut whys, mut spaces) = (Vec::new(), Vec::new(), Vec::new());
@@ -201,7 +186,6 @@ pub(crate) fn find_matter(
         let why = |r: &u32| Some((*r, why_open(seen.get(r)?.backs())));
         whys.extend(indoors.iter().filter_map(why));
     }
-    whys.sort_unstable_by_key(|w| w.0);
     let mut matter = Matter {
         regions: narrow,
         notes: Vec::new(),
@@ -209,32 +193,66 @@ pub(crate) fn find_matter(
         spaces,
         fronts_face_air: facing == Facing::Outward,
     };
-    matter.regions.sort_unstable();
     if n_pieces > 0 {
         matter.notes.push(note_on_pieces(n_pieces));
     }
-    let n = doubtful.len();
-    if n == 0 {
-        return matter;
-    }
     // The evidence that surfaces face inward must hold more voxels than would be lost by it: beside a cave it may be a
     // crevice of the outside.
-    let lost: Vec<u32> = doubtful.iter().flatten().copied().collect();
-    let is_outvoted = facing == Facing::Inward && n_voxels(&lost) > n_voxels(&indoors);
-    if is_outvoted
-        || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance)
-    {
-        matter.notes.push(note_on_shells(n));
-        matter.spaces.retain(|s| s.why.reason != Reason::Solid);
-        let shell = |region| (region, Why::given(Reason::Shell));
-        matter.whys.extend(lost.into_iter().map(shell));
-        matter.whys.sort_unstable_by_key(|w| w.0);
-    } else {
-        matter.notes.push(note_on_solids(n, facing));
-        matter.regions.extend(doubtful.into_iter().flatten());
-    }
-    matter.regions.sort_unstable();
+    let lost: usize = doubtful.iter().map(|group| n_voxels(group)).sum();
+    let are_shells = facing == Facing::Inward && lost > n_voxels(&indoors)
+        || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance);
+    matter.add_solids(doubtful, are_shells, facing);
     matter
+}
+
+impl Matter {
+    /// Adds closed groups that look like the insides of solids, or `are_shells`, which are rooms.
+    fn add_solids(&mut self, solids: Vec<Vec<u32>>, are_shells: bool, facing: Facing) {
+        let n = solids.len();
+        let regions = solids.into_iter().flatten();
+        if n == 0 {
+        } else if are_shells {
+            self.notes.push(note_on_shells(n));
+            self.spaces.retain(|s| s.why.reason != Reason::Solid);
+            let shell = |region| (region, Why::given(Reason::Shell));
+            self.whys.extend(regions.map(shell));
+        } else {
+            self.notes.push(note_on_solids(n, facing));
+            self.regions.extend(regions);
+        }
+        self.whys.sort_unstable_by_key(|w| w.0);
+        self.regions.sort_unstable();
+    }
+}
+
+/// Looks around from points of regions, of which some are `open` to the outdoors.
+fn seen_from(
+    points: &BTreeMap<u32, Vec<DVec3>>,
+    open: &[u32],
+    bvh: &Bvh,
+    allowance: &Allowance,
+) -> BTreeMap<u32, Seen> {
+    // First hits are enough of air that is open to the outdoors.
+    let rays = |region: u32| match open.binary_search(&region) {
+        Ok(_) => Rays::First,
+        Err(_) => Rays::All,
+    };
+    let look =
+        |(&region, at): (&u32, &Vec<DVec3>)| (region, Seen::from(bvh, at, rays(region), allowance));
+    let seen: Vec<(u32, Seen)> = points.par_iter().map(look).collect();
+    seen.into_iter().collect()
+}
+
+/// Weighs which of the closed groups lie between spaces, given the regions beside each, and the regions that are open.
+fn weigh_between(closed: &mut [Closed], beside: &[Beside], open: &[u32], min_radius: f64) {
+    let is_room = |c: &&Closed| c.facts.why(Facing::Anyhow, min_radius).reason == Reason::Enclosed;
+    let rooms = closed.iter().filter(is_room).flat_map(|c| &c.regions);
+    let air = open.iter().chain(rooms).copied().collect();
+    let groups = closed.iter().map(|c| &c.regions[..]).zip(beside);
+    let between = between(&groups.collect::<Vec<_>>(), air);
+    for (c, between) in closed.iter_mut().zip(between) {
+        c.facts.between = between;
+    }
 }
 
 /// Returns the radius of the largest ball in each region. [Units: vx]
