@@ -79,10 +79,10 @@ struct Closed {
 
 /// Returns the mean share of backs that regions of these sizes see: a hundred hollow pieces of wall are less air than three
 /// halls. `None` if they see nothing.
-fn mean_backs<'s>(regions: impl Iterator<Item = (&'s Seen, f64)>) -> Option<f64> {
+fn mean_backs<'s>(regions: impl Iterator<Item = (&'s Seen, usize)>) -> Option<f64> {
     let seen = regions.filter(|r| r.0.all > 0.0);
     let (backs, all) = seen.fold((0.0, 0.0), |(backs, all), (seen, size)| {
-        (backs + size * seen.backs(), all + size)
+        (backs + size as f64 * seen.backs(), all + size as f64)
     });
     (all > 0.0).then(|| backs / all)
 }
@@ -139,10 +139,8 @@ pub(crate) fn find_matter(
     };
     let mut closed: Vec<Closed> = enclosed.into_iter().map(closed_of).collect();
     let indoors: Vec<u32> = open.iter().copied().filter(|&r| r != OUTDOORS).collect();
-    let sized = indoors
-        .iter()
-        .filter_map(|r| Some((seen.get(r)?, size(r) as f64)));
-    let mut facing = Facing::of(mean_backs(sized), view(&[OUTDOORS]).backs());
+    let seen_indoors = indoors.iter().filter_map(|r| Some((seen.get(r)?, size(r))));
+    let mut facing = Facing::of(mean_backs(seen_indoors), view(&[OUTDOORS]).backs());
     if indoors.is_empty() && facing == Facing::Outward && are_inside_out(&closed, min_radius) {
         facing = Facing::Inward;
     }
