@@ -240,7 +240,7 @@ fn a_suite_of_sheets_without_a_way_out_is_rooms() {
 
 #[test]
 fn a_crate_does_not_turn_the_level_around_it_to_matter() {
-    // Two halls and the doorway between them, as the cavity alone; its surfaces face away from the air.
+    // Two halls and the doorway between them, as the cavity alone.
     let mut scene = Scene::default();
     add(&mut scene, Role::Structural, |m| {
         let cavity = [
@@ -250,7 +250,10 @@ fn a_crate_does_not_turn_the_level_around_it_to_matter() {
         ];
         m.carved(&cavity, &[]);
     });
+    let mut scene = turned(scene, |_| true);
     block(&mut scene, [2.0, 0.1, 2.0], [4.0, 2.1, 4.0]);
+    // All surfaces face away from the air.
+    let scene = turned(scene, |_| true);
     let baked = baked(&scene);
     assert_eq!(n_indoors(&baked), 2, "{:?}", baked.notes);
     assert!(is_indoors(&baked, [1.0, 1.5, 1.0]) && is_indoors(&baked, [12.0, 1.5, 1.0]));

@@ -197,7 +197,8 @@ pub(crate) fn find_matter(
     // The evidence that surfaces face inward must hold more voxels than would be lost by it: beside a cave it may be a
     // crevice of the outside.
     let lost: usize = doubtful.iter().map(|group| n_voxels(group)).sum();
-    let are_shells = facing == Facing::Inward && lost > n_voxels(&indoors)
+    let is_known = facing == Facing::Inward && !indoors.is_empty();
+    let are_shells = is_known && lost > n_voxels(&indoors)
         || !any_room && are_all_there_is(grid, labels, regions, &doubtful, facing, allowance);
     matter.add_solids(doubtful, are_shells, facing);
     matter

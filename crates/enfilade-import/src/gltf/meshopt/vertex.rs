@@ -215,10 +215,12 @@ mod tests {
         ) {
             let vertices: Vec<[u32; 3]> = (0..300u32).map(|i| [i, i / 7, i * 99]).collect();
             let mut bytes = packed(&vertices, version);
-            let place = at.index(bytes.len());
+            let (place, cut) = (at.index(bytes.len()), cut.index(bytes.len()));
+            prop_assert!(decode(&bytes[..cut], 300, 12).is_err());
+            // A changed width may ask for just the bytes that the cut leaves: no error is owed then.
             bytes[place] = with;
+            let _ = decode(&bytes[..cut], 300, 12);
             let _ = decode(&bytes, 300, 12);
-            prop_assert!(decode(&bytes[..cut.index(bytes.len())], 300, 12).is_err());
         }
     }
 
