@@ -8,8 +8,6 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
-use super::OUTDOORS;
-
 /// Two cells that touch.
 pub(crate) type Pair = (u32, u32);
 
@@ -34,8 +32,7 @@ pub(crate) trait Mergeable: Sync {
 /// Number of pairs that are weighed again side by side.
 const BATCH: usize = 64;
 
-/// A pair waiting to be joined; the most open comes first, ties by number, and pairs with the outdoors last: a space above a room
-/// without a ceiling belongs to it before it belongs to the air around.
+/// A pair waiting to be joined; the most open comes first, ties by number.
 struct Waiting {
     openness: f64,
     pair: Pair,
@@ -55,15 +52,14 @@ impl PartialOrd for Waiting {
 }
 impl Ord for Waiting {
     fn cmp(&self, other: &Self) -> Ordering {
-        let is_out = |waiting: &Self| waiting.pair.0 == OUTDOORS;
-        (is_out(other).cmp(&is_out(self)))
-            .then_with(|| self.openness.total_cmp(&other.openness))
+        self.openness
+            .total_cmp(&other.openness)
             .then_with(|| other.pair.cmp(&self.pair))
             .then_with(|| other.ages.cmp(&self.ages))
     }
 }
 
-/// Joins cells across openings that are not a pinch, the most open first and those to the outdoors last, until only pinches are left.
+/// Joins cells across openings that are not a pinch, the most open first, until only pinches are left.
 ///
 /// Pairs whose opening a join changes are weighed again at once. The other pairs now compare with a larger cell, which
 /// can only lower their openness: they are weighed again when their turn comes.
