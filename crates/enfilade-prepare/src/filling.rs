@@ -83,6 +83,7 @@ mod tests {
             "IfcDoorStandardCase/0a$",
             "Door.003",
             "garage_doors",
+            "wall_door",
         ] {
             assert_eq!(of(name), door, "{name}");
         }
@@ -93,7 +94,7 @@ mod tests {
         for name in [
             "IfcPlate/window",
             "window curtain",
-            "wall_door",
+            "door_wall",
             "object-7",
             "",
         ] {
