@@ -89,13 +89,18 @@ fn a_niche_open_at_full_height_is_part_of_its_room(method: Method) {
     assert_ne!(at(&graph, [3.0, 1.2, 2.5]), at(&graph, [7.4, 1.2, 3.8]));
 }
 
-fn a_beam_across_a_hall_parts_nothing(method: Method) {
-    let graph = baked(
-        method,
-        &[([0.0, 0.0, 0.0], [16.0, 3.8, 9.0])],
-        vec![union(&[([7.8, 3.2, -0.1], [8.2, 3.9, 9.1])])],
-    );
-    assert_eq!(n_indoors(&graph), 1);
+fn beams_across_a_hall_part_nothing(method: Method) {
+    // One leaves 3.2 of 3.8 m; three leave 1.6 of 2.35 m, in bays narrower than the hall is deep.
+    let beam = |x: f64, low: f64| ([x, low, -0.1], [x + 0.2, 4.0, 9.1]);
+    let halls = [
+        (3.8, vec![beam(7.8, 3.2)]),
+        (2.35, [3.9, 7.9, 11.9].map(|x| beam(x, 1.6)).to_vec()),
+    ];
+    for (height, beams) in halls {
+        let hall = ([0.0, 0.0, 0.0], [16.0, height, 9.0]);
+        let graph = baked(method, &[hall], vec![union(&beams)]);
+        assert_eq!(n_indoors(&graph), 1, "{height}");
+    }
 }
 
 /// A hall of 9 m x 12 m, 3.7 m high, with a beam across its middle that leaves 3.2 m, and a wall of `jamb` m on both sides
@@ -290,14 +295,14 @@ macro_rules! by {
 by! {
     watershed Watershed:
         a_niche_open_at_full_height_is_part_of_its_room,
-        a_beam_across_a_hall_parts_nothing,
+        beams_across_a_hall_part_nothing,
         a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
         the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
     bsp Bsp:
         a_niche_open_at_full_height_is_part_of_its_room,
-        a_beam_across_a_hall_parts_nothing,
+        beams_across_a_hall_part_nothing,
         a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
         the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits,
         cellars_with_doorways_stay_rooms,
@@ -305,7 +310,7 @@ by! {
     // Tetrahedra have no headroom, so nothing tells a plenum from rooms; and a hole of two thirds of the width is a room's.
     delaunay Delaunay:
         a_niche_open_at_full_height_is_part_of_its_room,
-        a_beam_across_a_hall_parts_nothing,
+        beams_across_a_hall_part_nothing,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;
 }

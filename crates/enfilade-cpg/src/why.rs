@@ -57,7 +57,7 @@ pub enum Reason {
     Asked,
     /// One cell: the opening is as wide as the space beside it.
     Wide,
-    /// One cell: the opening has neither a lintel nor two jambs.
+    /// One cell: the opening has neither two jambs nor a lintel and a jamb.
     Unframed,
     /// One cell, though an opening parts it: to keep a bound of cost, or as asked for.
     Merged,
@@ -99,7 +99,7 @@ pub enum Fact {
     Balls,
     /// Share of the rim of an opening that is wall.
     Wall,
-    /// Share of the lintel of an opening that is there, or of the lesser of its two jambs, whichever is more.
+    /// Share of the lesser jamb of an opening that is there, or of a jamb and its lintel, whichever is more.
     Frame,
     /// Share of an opening that leaves and panes fill.
     Closed,
@@ -330,7 +330,7 @@ impl Reason {
             Self::Border => "two cells: the border of open land",
             Self::Asked => "two cells: as asked for",
             Self::Wide => "one cell: the opening is as wide as the space beside it",
-            Self::Unframed => "one cell: the opening has neither a lintel nor two jambs",
+            Self::Unframed => "one cell: the opening has neither two jambs nor a lintel and a jamb",
             Self::Merged => {
                 "one cell, though an opening parts it: to keep a bound of cost, or as asked for"
             }
@@ -404,7 +404,10 @@ impl Fact {
             Self::Share => ("share of the space beside it that is open", ""),
             Self::Balls => ("radius that passes, as a share of that beside it", ""),
             Self::Wall => ("share of its rim that is wall", ""),
-            Self::Frame => ("share of its lintel, or of both jambs, that is there", ""),
+            Self::Frame => (
+                "share of both jambs, or of a jamb and its lintel, that is there",
+                "",
+            ),
             Self::Closed => ("share that leaves and panes fill", ""),
             Self::Area => ("area", " m²"),
             Self::Length => ("length of the corridor in widths", ""),

@@ -50,6 +50,12 @@ pub fn faces(normal: DVec3, direction: DVec3) -> bool {
     normal.dot(direction).abs() > RATHER * normal.length()
 }
 
+/// Returns `true` for a surface meant to be along a direction, of unit length, given its normal.
+#[must_use]
+pub fn lies_along(normal: DVec3, direction: DVec3) -> bool {
+    normal.dot(direction).abs() < NEARLY * normal.length()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,6 +83,7 @@ mod tests {
             let normal = tilted(degrees);
             assert_eq!(Attitude::of(normal), attitude, "{degrees}");
             assert_eq!(is_rather_level(normal), is_level, "{degrees}");
+            assert_eq!(lies_along(normal, DVec3::Y), attitude == Upright);
         }
         assert_eq!(Attitude::of(DVec3::ZERO), Oblique);
         assert!(!is_rather_level(DVec3::ZERO));

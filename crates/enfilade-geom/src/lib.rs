@@ -26,7 +26,7 @@ mod winding;
 
 pub use aabb::Aabb;
 pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse, Tab};
-pub use attitude::{Attitude, faces, is_rather_level};
+pub use attitude::{Attitude, faces, is_rather_level, lies_along};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use flight::{MOST_FLIGHT_PLAN, are_treads, is_flight};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};

@@ -74,6 +74,8 @@ struct Shape {
     shadow: DVec3,
     /// No rule decides its role.
     is_open: bool,
+    /// … or its name is that of a wall and of a door: it may fill an opening.
+    may_fill: bool,
 }
 
 impl Shape {
@@ -119,7 +121,7 @@ pub fn judge(scene: &mut Scene) {
         sources,
     } = structure_of(scene);
     let shapes = merged::join_bars(shapes);
-    let n_open = shapes.iter().filter(|s| s.is_open).count();
+    let n_open = shapes.iter().filter(|s| s.may_fill).count();
     let n_structural = shapes.len();
     if n_open == 0 || n_structural < 3 {
         return;
@@ -313,8 +315,8 @@ fn filler_reasons(shapes: &[Shape], triangles: &[Triangle], bvh: &Bvh) -> Vec<Op
         triangles,
         unit_of: &unit_of,
     };
-    let is_open = |unit: &Unit| shapes[unit.object as usize].is_open;
-    let found = fillers::fillers(&units, &is_open, &around);
+    let may_fill = |unit: &Unit| shapes[unit.object as usize].may_fill;
+    let found = fillers::fillers(&units, &may_fill, &around);
     let mut reasons = vec![None; units.len()];
     for (unit, reason) in found {
         reasons[unit as usize] = Some(reason);
@@ -357,6 +359,11 @@ fn is_open(object: &enfilade_geom::scene::Object) -> bool {
     object.role == Role::Structural && object.reason == DEFAULT
 }
 
+/// Returns `true` if an object's name is that of structure and of what fills an opening, the latter last: its filling is known.
+fn may_fill(object: &enfilade_geom::scene::Object) -> bool {
+    object.role == Role::Structural && is_by_name(&object.reason) && object.filling.is_some()
+}
+
 /// Returns the shapes of structural objects, and of the parts of merged ones.
 fn structure_of(scene: &Scene) -> Structure {
     let mut all = Structure {
@@ -394,6 +401,7 @@ fn structure_of(scene: &Scene) -> Structure {
                 shadow: normals.map(DVec3::abs).sum(),
                 triangles: vec![range],
                 is_open,
+                may_fill: is_open || may_fill(&scene.objects[object]),
             });
         }
     }

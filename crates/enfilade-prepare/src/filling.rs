@@ -4,7 +4,7 @@
 
 use enfilade_geom::scene::Filling;
 
-use crate::roles::{RoleFacts, has_word, ifc_class, is_opening_word, judge_words, words};
+use crate::roles::{RoleFacts, ends_in_opening_word, has_word, ifc_class, judge_words, words};
 
 /// Words for doors and for windows.
 const WORDS: [(Filling, &[&str]); 2] = [
@@ -21,8 +21,8 @@ impl RoleFacts<'_> {
         if let Some(class) = names().find_map(ifc_class) {
             return by_class(class);
         }
-        // A window's curtain is a curtain, and a wall with a door is a wall.
-        let is_other = |n: &str| judge_words(n).is_some_and(|(_, word)| !is_opening_word(&word));
+        // A window's curtain is a curtain, and a door's wall is a wall.
+        let is_other = |n: &str| judge_words(n).is_some() && !ends_in_opening_word(n);
         if names().any(is_other) {
             return None;
         }
@@ -83,6 +83,7 @@ mod tests {
             "IfcDoorStandardCase/0a$",
             "Door.003",
             "garage_doors",
+            "wall_door",
         ] {
             assert_eq!(of(name), door, "{name}");
         }
@@ -93,7 +94,7 @@ mod tests {
         for name in [
             "IfcPlate/window",
             "window curtain",
-            "wall_door",
+            "door_wall",
             "object-7",
             "",
         ] {

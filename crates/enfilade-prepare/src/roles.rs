@@ -241,11 +241,6 @@ pub fn marked_portal(name: &str) -> Option<&str> {
         .then_some(name.trim())
 }
 
-/// Returns `true` for a word for things that fill an opening.
-pub(crate) fn is_opening_word(word: &str) -> bool {
-    has_word(&OPENING_WORDS, word)
-}
-
 fn judge_ifc(name: &str) -> Option<RoleVerdict> {
     let class = ifc_class(name)?;
     let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
@@ -296,6 +291,18 @@ fn suffix(name: &str) -> Option<(&'static str, &'static Suffix)> {
         .iter()
         .find(|(word, _)| ending.eq_ignore_ascii_case(word))
         .map(|(word, meaning)| (*word, meaning))
+}
+
+/// Returns `true` if the last word of a name that tells anything is one for things that fill an opening: `wall_door` may be a
+/// wall with a hole or its leaf, which only the shape tells.
+pub(crate) fn ends_in_opening_word(name: &str) -> bool {
+    let tells = |w: &&String| {
+        let lists: [&[&str]; 3] = [&STRUCTURAL_WORDS, &DETAIL_WORDS, &OPENING_WORDS];
+        lists.iter().any(|list| has_word(list, w))
+    };
+    let words = words(name);
+    let last = words.iter().rev().find(tells);
+    last.is_some_and(|w| has_word(&OPENING_WORDS, w))
 }
 
 /// Decides between furniture and structure: the last word of either kind names the thing (a floor lamp is a lamp, the

@@ -25,7 +25,7 @@ pub(crate) struct OpeningSection {
     pub(crate) ratio: f64,
     /// Share of the rim that is wall. 0 below the threshold.
     pub(crate) wall: f64,
-    /// Share of its lintel that is there, or of the lesser of its two jambs; 1 where it is not upright or leaves hang in it.
+    /// Share of the lesser of its two jambs that is there, or of its lintel and a jamb; 1 where it is not upright or leaves hang in it.
     pub(crate) frame: f64,
 }
 
@@ -42,7 +42,7 @@ pub(crate) enum OpeningKind {
     Neck,
     /// Hardly narrower than the space on one side.
     Wide,
-    /// Without a lintel or two jambs: a bend, an alcove, an arm of a room.
+    /// Without two jambs, or a jamb and a lintel: a bend, an alcove, an arm of a room, a room below a beam.
     Unframed,
 }
 
@@ -189,7 +189,7 @@ impl OpeningVerdict {
     }
 }
 
-/// Least share of one side of an opening's rim at which the space beside it must reach farther, for a lintel or jamb.
+/// Least share of one side of an opening's rim at which the space beside it must reach farther, for a lintel or jamb to be there.
 pub(crate) const FRAMED: f64 = 0.5;
 
 #[cfg(test)]

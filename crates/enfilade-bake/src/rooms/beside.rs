@@ -17,7 +17,7 @@ use crate::voxel::{Grid, Labels};
 /// Spaces farther than this behind a surface are not beside it. [Units: wu]
 const REACH: f64 = 0.5;
 
-/// Number of level walks out of a space that end in each region beside it.
+/// Number of level walks out of a region that end in each region beside it, on the other side of a surface.
 pub(super) type Beside = BTreeMap<u32, usize>;
 
 /// Walks from points of a group of regions, ascending, in the axes of the grid, level and both ways.
@@ -37,7 +37,7 @@ pub(super) fn beside<'p>(
             let Some(mut at) = grid.voxel_at(*p) else {
                 continue;
             };
-            let mut n_solid = 0;
+            let (mut n_solid, mut own) = (0, region_at(at));
             while n_solid <= reach && allowance.spend(1) {
                 let next = if forward {
                     Some(at[axis] + 1).filter(|&c| c < grid.dims[axis])
@@ -49,8 +49,8 @@ pub(super) fn beside<'p>(
                 let region = region_at(at);
                 if region == 0 {
                     n_solid += 1;
-                } else if group.binary_search(&region).is_ok() {
-                    n_solid = 0;
+                } else if group.binary_search(&region).is_ok() && (n_solid == 0 || region == own) {
+                    (n_solid, own) = (0, region);
                 } else {
                     *beside.entry(region).or_default() += 1;
                     break;
@@ -61,9 +61,11 @@ pub(super) fn beside<'p>(
     beside
 }
 
-/// Returns the share of the walks that do not end where most do, of those that end in known air.
-fn others(beside: &Beside, air: &BTreeSet<u32>) -> f64 {
-    let known = beside.iter().filter(|b| air.contains(b.0)).map(|b| *b.1);
+/// Returns the share of the walks that do not end where most do, of those that end in known air, or in another region of the
+/// group itself: a wall with an opening is in no solid.
+fn others(group: &[u32], beside: &Beside, air: &BTreeSet<u32>) -> f64 {
+    let is_known = |region: &u32| air.contains(region) || group.binary_search(region).is_ok();
+    let known = beside.iter().filter(|b| is_known(b.0)).map(|b| *b.1);
     let (all, most) = known.fold((0, 0), |(all, most), n| (all + n, most.max(n)));
     (all - most) as f64 / all.max(1) as f64
 }
@@ -76,7 +78,7 @@ pub(super) fn between(groups: &[(&[u32], &Beside)], mut air: BTreeSet<u32>) -> V
         let mut found: Vec<u32> = Vec::new();
         for (of, (group, beside)) in share.iter_mut().zip(groups) {
             if *of < BETWEEN {
-                *of = others(beside, &air);
+                *of = others(group, beside, &air);
                 if *of >= BETWEEN {
                     found.extend(*group);
                 }
@@ -96,7 +98,7 @@ mod tests {
     #[test]
     fn suites_between_known_spaces_make_those_beyond_them_known() {
         // A corridor (2) and the outdoors (1) are air. A suite lies between them, the next between it and the outdoors; a crate
-        // stands in the corridor, and another in the first crate.
+        // stands in the corridor, and another in the first crate. Below, two rooms with a doorway have but the outdoors around them.
         let walks = |of: &[(u32, usize)]| of.iter().copied().collect::<Beside>();
         let beside = [
             walks(&[(1, 60), (2, 20)]),
@@ -105,14 +107,15 @@ mod tests {
             walks(&[(5, 40)]),
             walks(&[(1, 92), (2, 8)]),
             walks(&[]),
+            walks(&[(1, 60), (9, 12), (10, 12)]),
         ];
-        let regions: [&[u32]; 6] = [&[3], &[4], &[5], &[6], &[7], &[8]];
+        let regions: [&[u32]; 7] = [&[3], &[4], &[5], &[6], &[7], &[8], &[9, 10]];
         let groups: Vec<_> = regions.into_iter().zip(&beside).collect();
         let share = between(&groups, BTreeSet::from([1, 2]));
         let are_between: Vec<bool> = share.iter().map(|s| *s >= BETWEEN).collect();
         assert_eq!(
             are_between,
-            [true, true, false, false, false, false],
+            [true, true, false, false, false, false, true],
             "{share:?}"
         );
     }

@@ -15,9 +15,6 @@ const LEAVES: f64 = 0.2;
 /// An opening lies away from the flood's front if it is narrower there by this factor.
 const PINCHED: f64 = 0.9;
 
-/// Jambs that take a smaller part of the width of the space are pilasters.
-const PILASTERS: f64 = 0.125;
-
 /// Lattice steps around an opening's rim within which most pinches show: a pass over the full surround costs ten
 /// times as much around a small opening.
 const CLOSE: f64 = 3.0;
@@ -146,7 +143,7 @@ fn measured(
     let jambs = slices.jambs(&sides);
     let is_wall = |k: usize| sides.iter().all(|side| side.beside[k]);
     // A beam across the whole room does not make a wall, and neither do pilasters.
-    let has_wall = is_level || jambs.both() >= FRAMED && jambs.share >= PILASTERS;
+    let has_wall = is_level || jambs.both() >= FRAMED;
     OpeningSection {
         ratio: match smaller(&sides, a) {
             0 => 1.0,

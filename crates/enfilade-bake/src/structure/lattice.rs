@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+/// Jambs that take a smaller part of the width of the space are pilasters, and what spans it between them is a beam.
+const PILASTERS: f64 = 0.125;
+
 /// Returns the share of the rim of `mask` (points within two steps of it) where `is_wall` holds.
 pub(crate) fn rim_share(mask: &[bool], side: [usize; 2], is_wall: impl Fn(usize) -> bool) -> f64 {
     let (mut rim, mut wall) = (0_usize, 0_usize);
@@ -38,15 +41,24 @@ pub(crate) struct Jambs {
 }
 
 impl Jambs {
-    /// Returns the share of the lintel, or of the lesser jamb, whichever is more: high for an opening in a wall, low for a bend, an
-    /// alcove, an arm of a room.
+    /// Returns the share of the lesser jamb, or of a jamb and the lintel, whichever is more: high for an opening in a wall, low for a
+    /// bend, an alcove, an arm of a room, and for a beam across one, with or without pilasters.
     pub(crate) fn frame(self) -> f64 {
-        self.lintel.max(self.both())
+        let jamb = if self.share < PILASTERS {
+            0.0
+        } else {
+            self.left.max(self.right)
+        };
+        self.left.min(self.right).max(jamb.min(self.lintel))
     }
 
-    /// Returns the share of the lesser jamb.
+    /// Returns the share of the lesser jamb, if the two are more than pilasters.
     pub(crate) fn both(self) -> f64 {
-        self.left.min(self.right)
+        if self.share < PILASTERS {
+            0.0
+        } else {
+            self.left.min(self.right)
+        }
     }
 
     /// Measures the opening `mask`; `is_beside` holds where there is space beside it. `up` is the height gained with each
@@ -217,16 +229,19 @@ mod tests {
     }
 
     #[test]
-    fn an_opening_has_a_frame_with_a_lintel_or_two_jambs() {
-        for bits in 0..8 {
+    fn an_opening_has_a_frame_with_two_jambs_or_a_lintel_and_a_jamb_that_is_no_pilaster() {
+        for bits in 0..8_u32 {
             let [left, right, lintel] = [1, 2, 4].map(|bit| f64::from(u8::from(bits & bit != 0)));
-            let jambs = Jambs {
-                left,
-                right,
-                lintel,
-                share: 0.0,
-            };
-            assert_eq!(jambs.frame() >= FRAMED, bits >= 3, "{jambs:?}");
+            for (share, is_wide) in [(0.13, true), (0.12, false)] {
+                let jambs = Jambs {
+                    left,
+                    right,
+                    lintel,
+                    share,
+                };
+                let is_framed = bits & 3 == 3 || is_wide && bits.count_ones() >= 2;
+                assert_eq!(jambs.frame() >= FRAMED, is_framed, "{jambs:?}");
+            }
         }
     }
 }

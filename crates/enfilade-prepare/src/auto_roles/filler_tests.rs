@@ -1,6 +1,7 @@
 //! Walls with holes, their fillers, and things that only seem to fill them.
 
 use super::tests::Build;
+use enfilade_geom::scene::Filling;
 
 /// Six slabs around 6 x 2.6 x 6 m, and a wall of 24 cm across the space, at z 3 to 3.24: one mesh with a hole
 /// for a door (x 1 to 2, up to 2.1) and one for a window (x 3.5 to 5, y 0.9 to 2.1).
@@ -80,6 +81,44 @@ fn a_block_as_thick_as_the_wall_fills_a_hole_that_one_wall_goes_round() {
         [5.0, 2.1, 3.24],
     );
     assert_eq!(b.details(), ["door", "window"]);
+}
+
+// Pieces of a kit: `wall_doorway`, and below it `wall_doorway_door`.
+#[test]
+fn of_what_is_named_as_a_wall_and_a_door_the_shape_tells() {
+    for (filling, leaf) in [(Some(Filling::Door), vec!["leaf"]), (None, vec![])] {
+        let mut b = two_rooms();
+        b.by_name(filling)
+            .block("leaf", [1.0, 0.0, 3.1], [2.0, 2.1, 3.14])
+            .by_name(filling)
+            .block("wall piece", [3.5, 0.9, 3.0], [5.0, 2.1, 3.24])
+            .by_name(None);
+        assert_eq!(b.details(), leaf);
+    }
+}
+
+#[test]
+fn jambs_with_beveled_edges_hold_a_leaf() {
+    // To 4 cm, over 9 cm: steeper than 45 degrees.
+    let beveled = |p: [f32; 3]| {
+        let is_edge = p[0] == 1.0 || p[0] == 2.0;
+        let z = if is_edge { p[2].clamp(3.1, 3.14) } else { p[2] };
+        [p[0], p[1], z]
+    };
+    let mut b = shell();
+    b.blocks(
+        "wall",
+        &[
+            ([0.0, 0.0, 3.0], [0.91, 2.6, 3.24]),
+            ([0.91, 0.0, 3.0], [1.0, 2.1, 3.24]),
+            ([2.0, 0.0, 3.0], [2.09, 2.1, 3.24]),
+            ([2.09, 0.0, 3.0], [6.0, 2.6, 3.24]),
+            ([0.91, 2.1, 3.0], [2.09, 2.6, 3.24]),
+        ],
+    )
+    .bent(beveled)
+    .block("leaf", [1.0, 0.0, 3.07], [2.0, 2.1, 3.17]);
+    assert_eq!(b.details(), ["leaf"]);
 }
 
 #[test]

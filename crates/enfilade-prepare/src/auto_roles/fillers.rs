@@ -1,4 +1,5 @@
-//! Door leaves and panes among objects that no rule decides: things that fill a hole in a wall.
+//! Door leaves and panes among objects that no rule decides, or that are named as a wall and a door: things that fill a hole in
+//! a wall.
 //!
 //! The test is about the wall, not the leaf: *does the wall continue, in the plane of the thing, on three of
 //! its four sides, with air before and behind both?* A lintel has the wall on two sides, a wall between two
@@ -10,7 +11,7 @@
 use super::units::Unit;
 use enfilade_geom::filler::{FillsHole, HELD, HoleFacts};
 use enfilade_geom::{
-    Bvh, DVec3, Ray, Sets, Triangle, faces, is_rather_level, triangle_area_normal,
+    Bvh, DVec3, Ray, Sets, Triangle, is_rather_level, lies_along, triangle_area_normal,
 };
 
 /// Largest reach of a wall before and behind the thing: no wall with an opening is thicker. [Units: wu]
@@ -60,11 +61,11 @@ struct Candidate {
 /// Returns units that fill openings, each with the reason.
 pub(super) fn fillers(
     units: &[Unit],
-    is_open: &dyn Fn(&Unit) -> bool,
+    may_fill: &dyn Fn(&Unit) -> bool,
     around: &Surroundings<'_>,
 ) -> Vec<(u32, String)> {
     let candidates: Vec<Candidate> = (0..units.len() as u32)
-        .filter(|&i| is_open(&units[i as usize]))
+        .filter(|&i| may_fill(&units[i as usize]))
         .filter_map(|i| candidate(units, i, around))
         .collect();
     let mut candidate_of = vec![None; units.len()];
@@ -235,7 +236,7 @@ struct Crossing {
     unit: u32,
     /// Distance from the unit's middle plane. [Units: wu]
     at: f64,
-    /// The surface is nearly parallel to the unit's plane.
+    /// The surface faces across the unit, if only as the bevel of a jamb does.
     is_facing: bool,
 }
 
@@ -257,7 +258,7 @@ fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> 
         found.push(Crossing {
             unit: around.unit_of[h.triangle as usize],
             at: (2.0 * h.t - 1.0) * reach,
-            is_facing: faces(n, across),
+            is_facing: !lies_along(n, across),
         });
     });
     found.sort_by(|a, b| a.unit.cmp(&b.unit).then(a.at.total_cmp(&b.at)));
@@ -265,7 +266,7 @@ fn crossings(unit: &Unit, p: DVec3, around: &Surroundings<'_>) -> Vec<Crossing> 
     found
 }
 
-/// Returns the matter of all units but one, between surfaces that face along the line.
+/// Returns the matter of all units but one, between surfaces that the line goes through.
 fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
     let facing: Vec<Crossing> = crossings
         .iter()

@@ -2,7 +2,7 @@
 
 use super::*;
 use enfilade_geom::DMat4;
-use enfilade_geom::scene::{Mesh, Object, Primitive};
+use enfilade_geom::scene::{Filling, Mesh, Object, Primitive};
 use proptest::prelude::*;
 
 #[derive(Debug, Default)]
@@ -47,6 +47,23 @@ impl Build {
             name: String::new(),
             primitives: vec![p],
         });
+        self
+    }
+
+    /// Gives the last object the role that a name decides, and what it fills by its name.
+    pub(super) fn by_name(&mut self, filling: Option<Filling>) -> &mut Self {
+        let object = self.0.objects.last_mut().unwrap();
+        object.reason = format!("name: '{}'", object.name);
+        object.filling = filling;
+        self
+    }
+
+    /// Moves the corners of the last object.
+    pub(super) fn bent(&mut self, moved: impl Fn([f32; 3]) -> [f32; 3]) -> &mut Self {
+        let primitives = &mut self.0.meshes.last_mut().unwrap().primitives;
+        for p in primitives.iter_mut().flat_map(|p| &mut p.positions) {
+            *p = moved(*p);
+        }
         self
     }
 
