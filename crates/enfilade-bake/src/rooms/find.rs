@@ -16,7 +16,7 @@ use super::limb_rule::LimbRule;
 use super::limbs::split_limbs;
 use super::low::join_low;
 use super::regions::Regions;
-use super::sheltered::sheltered;
+use super::sheltered::{Surfaces, sheltered};
 use super::voids::{inside_stairs, shallow_voids};
 use super::votes::{Ballots, inside_of};
 use crate::proposal::{FoundPlace, Proposal};
@@ -71,7 +71,11 @@ pub(crate) fn propose(
     let (bvh, least) = (&structure.bvh, config.merge.min_radius);
     let matter = find_matter(&grid, &labels, &regions, &peaks, bvh, least, allowance);
     notes.extend_from_slice(&matter.notes);
-    let sheltered = sheltered(&grid, &labels, &regions, bvh, allowance);
+    let surfaces = Surfaces {
+        bvh,
+        face_air: matter.fronts_face_air,
+    };
+    let sheltered = sheltered(&grid, &labels, &regions, surfaces, allowance);
 
     context.begin(Stage::Candidates)?;
     let openings = Openings {

@@ -28,7 +28,7 @@ pub(super) fn sheltered(
     grid: &Grid,
     labels: &Labels,
     regions: &Regions,
-    bvh: &Bvh,
+    surfaces: Surfaces<'_>,
     allowance: &Allowance,
 ) -> Vec<FoundPlace> {
     let step = ((SPACING / grid.voxel).round() as usize).max(1);
@@ -39,8 +39,9 @@ pub(super) fn sheltered(
         let [x, y, z] = voxel(i);
         let is_out = regions.region_of_basin[labels.at([x, y, z]) as usize] == OUTDOORS;
         let p = grid.center(x, y, z);
-        let is_around = is_out && bvh.bounds().contains(p) && allowance.spend(2 * WORK_A_LOOK);
-        (is_around && is_covered(bvh, p)).then(|| walls_around(bvh, p))
+        let is_around =
+            is_out && surfaces.bvh.bounds().contains(p) && allowance.spend(2 * WORK_A_LOOK);
+        (is_around && surfaces.cover(p)).then(|| surfaces.share_around(p))
     };
     let found: Vec<Option<f64>> = (0..nx * ny * nz).into_par_iter().map(shelter).collect();
     let is_in = |i: usize| found[i].is_some_and(|share| share >= LEAST_SHELTER);
@@ -74,28 +75,60 @@ pub(super) fn sheltered(
     spaces.map(place).collect()
 }
 
-fn meets(bvh: &Bvh, origin: DVec3, direction: DVec3) -> bool {
-    let ray = Ray {
-        origin,
-        direction,
-        t_max: REACH,
-    };
-    bvh.closest_hit(&ray, |_| false).is_some()
+/// The surfaces of the structure.
+#[derive(Clone, Copy)]
+pub(super) struct Surfaces<'a> {
+    pub(super) bvh: &'a Bvh,
+    /// They face the air, so that what shows its back bounds matter.
+    pub(super) face_air: bool,
 }
 
-/// Returns `true` if something is above and below.
-fn is_covered(bvh: &Bvh, p: DVec3) -> bool {
-    // Slightly off, so that rays do not run along edges.
-    let up = DVec3::new(0.013, 1.0, 0.007);
-    meets(bvh, p, up) && meets(bvh, p, -up)
+impl Surfaces<'_> {
+    /// Returns `true` if something is above and below.
+    fn cover(self, p: DVec3) -> bool {
+        // Slightly off, so that rays do not run along edges.
+        let up = DVec3::new(0.013, 1.0, 0.007);
+        self.bound(p, up) && self.bound(p, -up)
+    }
+
+    /// Returns the share of the rays in the horizontal that meet something.
+    fn share_around(self, p: DVec3) -> f64 {
+        let direction = |k: usize| {
+            let (sin, cos) = (0.1 + k as f64 * std::f64::consts::TAU / ASIDE as f64).sin_cos();
+            DVec3::new(cos, 0.01, sin)
+        };
+        let n = (0..ASIDE).filter(|&k| self.bound(p, direction(k))).count();
+        n as f64 / ASIDE as f64
+    }
+
+    /// Returns `true` if the ray from a point meets a surface that faces it, or may.
+    fn bound(self, origin: DVec3, direction: DVec3) -> bool {
+        let ray = Ray {
+            origin,
+            direction,
+            t_max: REACH,
+        };
+        let hit = self.bvh.closest_hit(&ray, |_| false);
+        hit.is_some_and(|h| h.front || !self.face_air)
+    }
 }
 
-/// Returns the share of the rays in the horizontal that meet something.
-fn walls_around(bvh: &Bvh, p: DVec3) -> f64 {
-    let direction = |k: usize| {
-        let (sin, cos) = (0.1 + k as f64 * std::f64::consts::TAU / ASIDE as f64).sin_cos();
-        DVec3::new(cos, 0.01, sin)
-    };
-    let n = (0..ASIDE).filter(|&k| meets(bvh, p, direction(k))).count();
-    n as f64 / ASIDE as f64
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::Aabb;
+
+    #[test]
+    fn the_inside_of_a_piece_of_wall_is_no_shelter_where_surfaces_face_the_air() {
+        let wall = Aabb::new(DVec3::ZERO, DVec3::new(4.0, 3.0, 0.5));
+        let bvh = Bvh::build(&wall.triangles());
+        for (face_air, share) in [(true, 0.0), (false, 1.0)] {
+            let surfaces = Surfaces {
+                bvh: &bvh,
+                face_air,
+            };
+            assert_eq!(surfaces.cover(wall.center()), !face_air);
+            assert_eq!(surfaces.share_around(wall.center()), share);
+        }
+    }
 }

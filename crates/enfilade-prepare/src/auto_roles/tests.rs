@@ -58,7 +58,7 @@ impl Build {
         self
     }
 
-    /// Moves the corners of the last object.
+    /// Moves the vertices of the last object.
     pub(super) fn bent(&mut self, moved: impl Fn([f32; 3]) -> [f32; 3]) -> &mut Self {
         let primitives = &mut self.0.meshes.last_mut().unwrap().primitives;
         for p in primitives.iter_mut().flat_map(|p| &mut p.positions) {
