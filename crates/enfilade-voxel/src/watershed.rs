@@ -25,6 +25,7 @@
 //! | ascents and contacts, by slabs | `slabs` |
 //! | shallow basins joined, labels | `join` |
 //! | the widest places, in blocks | `blocks` |
+//! | the widest places where basins touch | `touching` |
 
 mod basins;
 mod blocks;
@@ -33,6 +34,7 @@ mod join;
 mod levels;
 mod shape;
 mod slabs;
+mod touching;
 
 use enfilade_geom::Allowance;
 use rayon::prelude::*;
@@ -45,6 +47,7 @@ use shape::Shape;
 
 pub use basins::{Basin, Saddle, Watershed};
 pub use blocks::WidestOfBlocks;
+pub use touching::Touching;
 
 /// Options of [`watershed`].
 #[derive(Clone, Debug, Default)]
@@ -108,7 +111,7 @@ fn watershed_by(
         return Watershed::unflooded(dims);
     }
     let shape = Shape { dims };
-    let first_outdoors = outdoors.map(|o| o.iter_set().find(|&v| squared[v] != 0).unwrap_or(0));
+    let first_outdoors = outdoors.map(|o| first_outdoors_of(o, &squared));
     let outdoors = outdoors.map_or(Outdoors::Nothing, Outdoors::Only);
     let levels = Levels::of(shape, squared, &outdoors);
     flood(shape, &levels, thick, first_outdoors, options.h, allowance)
@@ -162,6 +165,24 @@ impl DistanceField {
         }
     }
 
+    /// Takes squared distances, as [`distance_squared`](super::distance_squared) measures them; the free voxels of `outdoors`
+    /// are there.
+    ///
+    /// # Panics
+    /// If one of them is not of size `dims`.
+    #[must_use]
+    pub fn of_squared(dims: [usize; 3], squared: Vec<u16>, outdoors: &BitVolume) -> Self {
+        assert_eq!(dims, outdoors.dims(), "boxes of one size");
+        let n: usize = dims.iter().product();
+        assert_eq!(squared.len(), n, "a distance for each of {dims:?} voxels");
+        let shape = Shape { dims };
+        Self {
+            shape,
+            first_outdoors: first_outdoors_of(outdoors, &squared),
+            levels: Levels::of(shape, squared, &Outdoors::Only(outdoors)),
+        }
+    }
+
     /// Divides the field among the basins around its peaks, as [`watershed`] does, with what is known to be outdoors as one
     /// basin. Basins with dynamics below `h` join a deeper one. [Units: vx]
     #[must_use]
@@ -173,6 +194,11 @@ impl DistanceField {
         let first = Some(self.first_outdoors);
         flood(self.shape, &self.levels, thick, first, h, allowance)
     }
+}
+
+/// Returns the first voxel of `outdoors` that is free, 0 if there is none.
+fn first_outdoors_of(outdoors: &BitVolume, squared: &[u16]) -> usize {
+    outdoors.iter_set().find(|&v| squared[v] != 0).unwrap_or(0)
 }
 
 /// Returns the first voxel outdoors that is not blocked, 0 if there is none.

@@ -13,10 +13,9 @@ use crate::assemble::{Cut, SealPart, portals_of};
 use crate::complex::{ComplexInput, Label, Partition, TriangleCells, Vote, build_complex_within};
 use crate::proposal::Proposal;
 use crate::realize::{Divided, part, places_of};
-use crate::rooms::{self, VoxelRange};
+use crate::rooms::{self, Basins, VoxelRange};
 use crate::structure::{Candidate, OUTDOORS, Structure};
-use crate::voxel::{BitVolume, Grid};
-use crate::watershed::flood_part;
+use crate::voxel::{BitVolume, DistanceField, Grid};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// Distance of a part's faces from the border of its voxels, so that they do not lie in walls. [Units: vx]
@@ -57,7 +56,9 @@ pub(super) fn bake_part(
     let (air, distances) = ground.air.part(range, allowance);
     context.begin(Stage::Flood)?;
     let outdoors = outdoors_at_border(&air.grid, &distances, ground, old);
-    let basins = flood_part(&air.grid, distances, outdoors, config, allowance);
+    let field = DistanceField::of_squared(air.grid.dims, distances, &outdoors);
+    let basins = Basins::flooded(&air, &field, config, allowance);
+    drop(field);
     context.check()?;
     let grid = air.grid;
     let of_part = structure_in(ground, &grid.aabb().expanded(config.merge.surround));

@@ -7,13 +7,13 @@ use enfilade_geom::{Allowance, DVec3};
 use rayon::prelude::*;
 
 use super::air::VoxelAir;
-use super::flooded::{Flooded, contact_faces};
+use super::flooded::Flooded;
 use super::refill::flood_closures;
 use super::regions::{Regions, merge_basins};
 use super::slabs::cut_at_slabs;
 use crate::BakeConfig;
 use crate::structure::OUTDOORS;
-use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, border};
+use crate::voxel::{BitVolume, DistanceField, Grid, Labels, SparseVolume, border};
 
 /// Marks a voxel that has a part, but no basin yet; the other bits are the part.
 const WAITING: u32 = 1 << 31;
@@ -56,45 +56,75 @@ impl Basins {
         let mut labels: Vec<u32> = (0..distances.len()).into_par_iter().map(part_of).collect();
         let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
         let n = number_parts(dims, &mut labels, outer);
-        let mut peaks = vec![0_u16; n];
-        for (&label, &distance) in labels.iter().zip(&distances) {
-            let peak = &mut peaks[label as usize];
-            *peak = distance.max(*peak);
-        }
-        let radius = |squared: u16| f32::from(squared).sqrt();
-        let mut peaks: Vec<f32> = peaks.into_iter().map(radius).collect();
-        peaks[OUTDOORS as usize] = f32::INFINITY;
-        let labels = Labels::of(dims, &labels);
-        let [nx, ny, _] = dims;
-        let saddle = |faces: &Vec<u64>| {
-            let distance = |&face: &u64| {
-                let (i, axis) = ((face / 4) as usize, (face % 4) as usize);
-                distances[i].min(distances[i + [1, nx, nx * ny][axis]])
-            };
-            radius(faces.iter().map(distance).max().unwrap_or(0))
-        };
-        let contacts = contact_faces(&labels);
-        Self {
-            saddles: contacts
-                .iter()
-                .map(|(&pair, f)| (pair, saddle(f)))
-                .collect(),
+        let field = DistanceField::of_squared(dims, distances, &outdoors);
+        let mut basins = Self {
+            labels: Labels::of(dims, &labels),
+            peaks: vec![0.0; n],
+            saddles: BTreeMap::new(),
             n_basins: n - 1,
-            labels,
-            peaks,
+        };
+        basins.measure(&field, |_| true, allowance);
+        basins.cut(&air.grid, &air.slabs, &field, allowance);
+        basins
+    }
+
+    /// Takes the basins of a flood of the air, and cuts them where a slab ends a storey.
+    pub(crate) fn flooded(
+        air: &VoxelAir,
+        field: &DistanceField,
+        config: &BakeConfig,
+        allowance: &Allowance,
+    ) -> Self {
+        let flood = field.watershed(config.noise / air.grid.voxel, allowance);
+        let peaks = flood.basins.iter().map(|b| b.peak as f32);
+        let saddles = flood.saddles.iter();
+        let mut basins = Self {
+            peaks: std::iter::once(0.0).chain(peaks).collect(),
+            saddles: saddles.map(|s| ((s.a, s.b), s.distance as f32)).collect(),
+            n_basins: flood.basins.len(),
+            labels: flood.labels,
+        };
+        basins.cut(&air.grid, &air.slabs, field, allowance);
+        basins
+    }
+
+    /// Cuts basins where a slab ends a storey. What the flood knew of them holds for no part of them, so it is measured.
+    fn cut(&mut self, grid: &Grid, slabs: &[f64], field: &DistanceField, allowance: &Allowance) {
+        let n = self.peaks.len();
+        let parents = cut_at_slabs(grid, &mut self.labels, n, slabs);
+        if parents.is_empty() {
+            return;
         }
+        self.peaks.resize(n + parents.len(), 0.0);
+        let mut is_cut = vec![false; n];
+        for parent in parents {
+            is_cut[parent as usize] = true;
+        }
+        let is_part = |label: u32| is_cut.get(label as usize).is_none_or(|&is| is);
+        self.saddles.retain(|&(a, b), _| !is_part(a) && !is_part(b));
+        self.measure(field, is_part, allowance);
+    }
+
+    /// Measures the peaks of `wanted` basins, and their saddles with any.
+    fn measure(
+        &mut self,
+        field: &DistanceField,
+        wanted: impl Fn(u32) -> bool + Sync,
+        allowance: &Allowance,
+    ) {
+        let found = field.touching(&self.labels, wanted, allowance);
+        for (label, peak) in found.peaks {
+            self.peaks[label as usize] = peak as f32;
+        }
+        self.peaks[OUTDOORS as usize] = f32::INFINITY;
+        let saddles = found.saddles.into_iter();
+        self.saddles
+            .extend(saddles.map(|(pair, d)| (pair, d as f32)));
     }
 
     /// Gives the air inside closures to the basins beside it.
     pub(super) fn refill(&mut self, occupied: &BitVolume) {
         flood_closures(&mut self.labels, occupied);
-    }
-
-    /// Cuts basins where a slab ends a storey.
-    pub(super) fn cut(&mut self, grid: &Grid, slabs: &[f64]) {
-        for parent in cut_at_slabs(grid, &mut self.labels, self.peaks.len(), slabs) {
-            self.peaks.push(self.peaks[parent as usize]);
-        }
     }
 
     pub(super) fn merge(

@@ -47,7 +47,6 @@ pub(crate) fn propose(
     } = air;
     let field = is_curved(&framed(structure)).then(|| solid.field(allowance));
     basins.refill(&solid.occupied);
-    basins.cut(&grid, &slabs);
     let n_occupied = solid.occupied.count();
     let mut notes = solid.lids.notes(&grid);
     let Solid {

@@ -7,4 +7,4 @@
 
 mod propose;
 
-pub(crate) use propose::{flood_part, propose, propose_site, sites_of};
+pub(crate) use propose::{propose, propose_site, sites_of};

@@ -1,12 +1,9 @@
 //! The stages of the watershed builder: structure → voxels → basins, and from there as all builders do.
 
-use enfilade_geom::Allowance;
-
 use crate::pieces::{Kept, PieceKind};
 use crate::proposal::Proposal;
 use crate::rooms::{self, Basins, Plot};
 use crate::structure::Structure;
-use crate::voxel::{BitVolume, DistanceField, Grid, Watershed, WatershedOptions, watershed};
 use crate::{BakeConfig, BakeContext, BakeError, Outdoors, Stage};
 
 /// Finds rooms by a flood of the distance field.
@@ -75,7 +72,7 @@ pub(crate) fn propose_site(
         let basins = kept.or_make(PieceKind::Basins, &plot, || {
             let field = air.solid.field(context.allowance());
             context.begin(Stage::Flood)?;
-            let basins = flood(&air.grid, &field, config, context.allowance());
+            let basins = Basins::flooded(&air, &field, config, context.allowance());
             context.check()?;
             Ok(basins)
         })?;
@@ -88,35 +85,4 @@ pub(crate) fn propose_site(
         resolution: plot.resolution,
         ..found
     })
-}
-
-/// Floods the air.
-fn flood(grid: &Grid, field: &DistanceField, config: &BakeConfig, allowance: &Allowance) -> Basins {
-    basins_of(field.watershed(config.noise / grid.voxel, allowance))
-}
-
-/// Floods a part of the air, with the squared distances of its voxels. Those of `outdoors` are known to be there. [Units: vx²]
-pub(crate) fn flood_part(
-    grid: &Grid,
-    distances: Vec<u16>,
-    outdoors: BitVolume,
-    config: &BakeConfig,
-    allowance: &Allowance,
-) -> Basins {
-    let options = WatershedOptions {
-        h: config.noise / grid.voxel,
-        outdoors: Some(outdoors),
-    };
-    basins_of(watershed(grid.dims, distances, &options, allowance))
-}
-
-fn basins_of(flood: Watershed) -> Basins {
-    let peaks = flood.basins.iter().map(|b| b.peak as f32);
-    let saddles = flood.saddles.iter();
-    Basins {
-        peaks: std::iter::once(0.0).chain(peaks).collect(),
-        saddles: saddles.map(|s| ((s.a, s.b), s.distance as f32)).collect(),
-        n_basins: flood.basins.len(),
-        labels: flood.labels,
-    }
 }
