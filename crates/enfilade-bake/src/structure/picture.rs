@@ -13,6 +13,9 @@ const MAX_SIDE: usize = 320;
 /// Finest lattice spacing. [Units: wu]
 const FINEST: f64 = 0.02;
 
+/// Vertices so near to a plane lie in it: planes are fitted to surfaces whose vertices are rounded. [Units: wu]
+const IN_PLANE: f64 = 1e-3;
+
 /// A lattice of cells in a plane around an opening.
 #[derive(Clone, Copy)]
 pub(super) struct Picture {
@@ -57,12 +60,13 @@ impl Picture {
         [self.u, self.v].map(|d| d.dot(p - self.origin) / self.step)
     }
 
-    /// Returns the cells that triangles lie in or cross.
+    /// Returns the cells that triangles lie in, cross, or touch with an edge: a floor of sheets may end in the plane of a wall.
     pub(super) fn blocked(&self, plane: &Plane, around: &[Triangle]) -> BitVolume {
         let mut blocked = BitVolume::new([self.side[0], self.side[1], 1]);
         for t in around {
             let d = t.map(|p| plane.signed_distance(p));
-            if d.iter().all(|d| d.abs() < 1e-3) {
+            let d = d.map(|d| if d.abs() < IN_PLANE { 0.0 } else { d });
+            if d == [0.0; 3] {
                 fill_triangle(&mut blocked, self.side, t.map(|p| self.place(p)));
             } else if let Some([p, q]) = crossing(t, d) {
                 draw_segment(&mut blocked, self.side, self.place(p), self.place(q));
@@ -182,24 +186,18 @@ fn run_around(row: &[u64], at: usize) -> Range<usize> {
     start..end
 }
 
-/// Returns the segment in which a triangle crosses a plane, given the distances `d` of its vertices.
+/// Returns the segment in which a triangle crosses a plane, or touches it, given the distances `d` of its vertices.
 fn crossing(t: &Triangle, d: [f64; 3]) -> Option<[DVec3; 2]> {
-    if !(d.iter().any(|&d| d <= 0.0) && d.iter().any(|&d| d >= 0.0)) {
-        return None;
-    }
-    let mut ends: [Option<DVec3>; 2] = [None, None];
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if (d[i] < 0.0) != (d[j] < 0.0) {
+    let mut ends = (0..3).filter(|&i| d[i] == 0.0).map(|i| t[i]);
+    let mut ends = [ends.next(), ends.next()];
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        if d[i] * d[j] < 0.0 {
             let cut = t[i] + (t[j] - t[i]) * (d[i] / (d[i] - d[j]));
             let slot = usize::from(ends[0].is_some());
             ends[slot] = Some(cut);
         }
     }
-    match ends {
-        [Some(p), Some(q)] => Some([p, q]),
-        _ => None,
-    }
+    Some([ends[0]?, ends[1]?])
 }
 
 /// Marks the lattice cells along a segment, so that no step between edge neighbors crosses it.
@@ -252,6 +250,28 @@ fn fill_triangle(blocked: &mut BitVolume, side: [usize; 2], t: [[f64; 2]; 3]) {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_triangle_with_an_edge_in_the_plane_touches_it_from_either_side() {
+        let [a, b] = [DVec3::ZERO, DVec3::new(0.0, 0.0, 2.0)];
+        // Not quite in the plane x = 0: within rounding.
+        let off = DVec3::X * 1e-6;
+        for side in [-1.0, 1.0] {
+            for along in [0.0, 2.0] {
+                let t = [a + off, b - off, DVec3::new(side, 0.0, along)];
+                let plane = Plane::through(DVec3::ZERO, DVec3::X);
+                let picture = Picture::around(&plane, &[a, b], 0.5);
+                assert!(
+                    picture.blocked(&plane, &[t]).count() >= 100,
+                    "{side} {along}"
+                );
+            }
+        }
+        // With a vertex alone, it does not; across the plane, it crosses it.
+        let point = [a, DVec3::new(1.0, 0.0, 0.0), DVec3::new(1.0, 1.0, 0.0)];
+        assert_eq!(crossing(&point, [0.0, 1.0, 1.0]), None);
+        assert_eq!(crossing(&point, [0.0, -1.0, 1.0]).map(|s| s[0]), Some(a));
+    }
 
     proptest! {
         /// Wide enough for several words a row.

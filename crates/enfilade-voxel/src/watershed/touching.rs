@@ -102,7 +102,7 @@ mod tests {
             let is_shell = [0, 20].contains(&x) || [0, 10].contains(&y) || [0, 21].contains(&z);
             let is_wall = x == 10 && !(8..13).contains(&z);
             if is_shell || is_wall {
-                occupied.set(x, y, z);
+                occupied.set(x, y, z, true);
             }
         }
         let outdoors = BitVolume::new(dims);
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn touching_measures_what_a_flood_finds() {
         let (occupied, outdoors) = two_rooms();
-        let allowance = Allowance::endless();
+        let allowance = Allowance::default();
         let squared = distance_squared(&occupied, &allowance);
         let options = WatershedOptions {
             h: 1.0,
