@@ -71,7 +71,8 @@ const WALLED: f64 = 0.5;
 /// space than most do. All around a thing that stands in a hall is the hall. Higher, and suites beside one corridor are solid
 /// (bristol-house); lower, and a column that touches a second room is a room.
 pub(crate) const BETWEEN: f64 = 0.1;
-/// A space that fits no ball of this radius is matter if most rays hit back faces: it is thinner than a person. [Units: wu]
+/// A space that fits no ball of this radius is matter if most rays hit back faces, where that is all that is known of it, or if it
+/// is open to the outdoors. [Units: wu]
 pub(crate) const NARROW: f64 = 0.5;
 
 /// Least share of level rays that meet something in a room: one of eight may leave by its door.
@@ -118,19 +119,10 @@ impl Facing {
     }
 }
 
-/// Returns `true` if a closed-off space is too narrow for a room. `widest` is the radius of the largest ball that fits,
-/// `min_radius` that of the smallest room, `backs` the share of back faces seen from the space.
+/// Returns `true` if a closed-off space of which no more is known than its size and the share of `backs` seen from it is too narrow
+/// for a room. `widest` is the radius of the largest ball that fits, `min_radius` that of the smallest room.
 pub(crate) fn is_crevice(widest: f64, min_radius: f64, backs: f64) -> bool {
-    widest < least_radius(min_radius, backs)
-}
-
-/// Returns the least radius of a room, which is greater where most rays meet backs.
-fn least_radius(min_radius: f64, backs: f64) -> f64 {
-    if backs > BACKS {
-        min_radius.max(NARROW)
-    } else {
-        min_radius
-    }
+    widest < min_radius || backs > BACKS && widest < NARROW
 }
 
 /// Returns `true` if a space open to the outdoors is the inside of a piece of wall without an end: surfaces `facing` outward turn
@@ -161,11 +153,11 @@ impl EnclosedFacts {
             Facing::Inward => of(self.leaving[1], 1.0 - self.backs_aside),
             Facing::Anyhow => (self.backs / ASTRAY)
                 .min((1.0 - self.walled) / (1.0 - WALLED))
-                .min((NARROW / self.radius).max(BETWEEN / self.between)),
+                .min(BETWEEN / self.between),
         }
     }
 
-    /// Decides if a closed space is a room, and why.
+    /// Decides if a closed space is a room, and why. A shaft between others that a person fits into is one.
     pub(crate) fn why(&self, facing: Facing, min_radius: f64) -> Why {
         let inside = self.evidence(facing);
         let facts = [
@@ -175,12 +167,8 @@ impl EnclosedFacts {
             (Fact::Between, self.between),
             (Fact::Inside, inside),
         ];
-        if is_crevice(self.radius, min_radius, self.backs) {
-            Why::compared(
-                Reason::Crevice,
-                least_radius(min_radius, self.backs),
-                &facts,
-            )
+        if self.radius < min_radius {
+            Why::compared(Reason::Crevice, min_radius, &facts)
         } else if inside > 1.0 {
             Why::compared(Reason::Solid, 1.0, &facts)
         } else {
@@ -307,7 +295,7 @@ mod tests {
                     between: 0.5,
                     ..room
                 },
-                Reason::Solid,
+                Reason::Enclosed,
             ),
             (
                 "walls of two faces",
@@ -354,7 +342,7 @@ mod tests {
                     radius: 0.4,
                     ..inside
                 },
-                Reason::Crevice,
+                Reason::Solid,
             ),
         ] {
             let why = facts.why(facing, 0.3);
