@@ -11,7 +11,7 @@ use crate::score::{inspect, list};
 use super::Verdict;
 
 /// A small input and its right answer.
-pub(crate) struct Case {
+pub(crate) struct SmallCase {
     /// Its path below `cases` beside the real scenes.
     pub(crate) file: &'static str,
     /// Unit and axes of a file that does not say them.
@@ -25,8 +25,8 @@ pub(crate) struct Case {
 }
 
 /// Returns a case by its rooms.
-const fn rooms(file: &'static str, n: usize) -> Case {
-    Case {
+const fn rooms(file: &'static str, n: usize) -> SmallCase {
+    SmallCase {
         file,
         given: &[],
         rooms: Some(n),
@@ -36,19 +36,19 @@ const fn rooms(file: &'static str, n: usize) -> Case {
 }
 
 /// Returns a level of two rooms.
-const fn two(file: &'static str) -> Case {
+const fn two(file: &'static str) -> SmallCase {
     rooms(file, 2)
 }
 
 /// Returns a case that must be refused.
-const fn refused(file: &'static str, words: &'static [&'static str]) -> Case {
-    Case {
+const fn refused(file: &'static str, words: &'static [&'static str]) -> SmallCase {
+    SmallCase {
         rooms: None,
         ..two(file).told(words)
     }
 }
 
-impl Case {
+impl SmallCase {
     const fn with(mut self, kind: &'static str, n: usize) -> Self {
         self.portals = Some((kind, n));
         self
@@ -84,7 +84,7 @@ impl Case {
 }
 
 /// The cases of the verdict.
-const JUDGED: [Case; 20] = [
+const JUDGED: [SmallCase; 20] = [
     rooms("buildings/inner_suite.obj", 3)
         .given(&["--unit", "m", "--up", "y"])
         .with("portal", 2),
@@ -110,15 +110,15 @@ const JUDGED: [Case; 20] = [
 ];
 
 /// The others.
-const OTHERS: [Case; 17] = [
+const OTHERS: [SmallCase; 17] = [
     two("levels/d3-visportal.map").with("portal", 1),
     two("levels/ent-func_door.map").with("door", 1),
-    Case::shut("levels/fill-hl_null.map"),
+    SmallCase::shut("levels/fill-hl_null.map"),
     two("levels/fill-q1_skip.map").with("portal", 1),
-    Case::shut("levels/fill-q3_caulk.map"),
+    SmallCase::shut("levels/fill-q3_caulk.map"),
     two("levels/fill-src_trigger.map").with("portal", 1),
     two("levels/fill-tdm_aassolid.map").with("portal", 1),
-    Case::shut("levels/layer-hidden.map"),
+    SmallCase::shut("levels/layer-hidden.map"),
     two("levels/layer-omitted.map").with("portal", 1),
     refused("levels/level-in-second-scene.glb", &["--scene"]),
     // 32 units a meter, as exported from a map.
@@ -142,31 +142,32 @@ fn folder() -> Option<PathBuf> {
 }
 
 /// Returns the cases of a list that are there, and their files.
-fn there(all: &'static [Case]) -> impl Iterator<Item = (&'static Case, PathBuf)> {
+fn there(all: &'static [SmallCase]) -> impl Iterator<Item = (&'static SmallCase, PathBuf)> {
     let dir = folder();
-    let file = move |case: &'static Case| Some((case, dir.as_ref()?.join(case.file)));
+    let file = move |case: &'static SmallCase| Some((case, dir.as_ref()?.join(case.file)));
     all.iter().filter_map(file).filter(|(_, f)| f.is_file())
 }
 
 /// Returns all cases that are there, and their files.
-pub(crate) fn cases() -> impl Iterator<Item = (&'static Case, PathBuf)> {
+pub(crate) fn cases() -> impl Iterator<Item = (&'static SmallCase, PathBuf)> {
     there(&JUDGED).chain(there(&OTHERS))
 }
 
-/// What a case gave.
+/// The answer to a case.
 pub(crate) struct Found {
     /// The path of the world; `None` if it was refused.
     pub(crate) world: Option<PathBuf>,
     rooms: usize,
     portals: Vec<String>,
-    /// What `bake --json` prints, and all that it says.
+    /// The output of `bake --json`.
     report: Value,
+    /// All words of the bake.
     said: String,
 }
 
 impl Found {
     /// Bakes a case.
-    pub(crate) fn of(case: &Case, file: &Path) -> anyhow::Result<Self> {
+    pub(crate) fn of(case: &SmallCase, file: &Path) -> anyhow::Result<Self> {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let world = target_dir().join(format!("judge-case-{name}.glb"));
         let mut baking = Command::new(binary("enfilade"));
@@ -197,7 +198,7 @@ impl Found {
     }
 
     /// Returns `true` if this is the right answer, and says what was found.
-    pub(crate) fn judged(&self, case: &Case) -> (bool, String) {
+    pub(crate) fn judged(&self, case: &SmallCase) -> (bool, String) {
         let is_refusal = case.rooms.is_none() && case.portals.is_none();
         let of_kind = |kind: &str| {
             let counted = |p: &&String| kind == "portal" || *p == kind;
@@ -220,7 +221,7 @@ impl Found {
 
 /// Bakes all cases of the verdict that are there. One that is refused has no room, and all doubt.
 pub(super) fn verdicts() -> anyhow::Result<Vec<Verdict>> {
-    let verdict = |(case, file): (&Case, PathBuf)| {
+    let verdict = |(case, file): (&SmallCase, PathBuf)| {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let found = Found::of(case, &file)?;
         let (n, n_found) = (case.rooms.unwrap_or(0), found.rooms);

@@ -23,7 +23,7 @@ const STEP: f64 = 0.02;
 const ACROSS: f64 = 200.0;
 
 /// An opening's rectangle in its wall.
-pub(super) struct Place {
+pub(super) struct HolePlace {
     pub(super) center: V3,
     pub(super) normal: V3,
     /// Directions of its sides.
@@ -32,7 +32,7 @@ pub(super) struct Place {
     pub(super) thickness: f64,
 }
 
-impl Place {
+impl HolePlace {
     /// Returns the place of an opening of the truth: the rectangle around its outline.
     pub(super) fn of(opening: &Value) -> Option<Self> {
         let outline = list(&opening["corners"]).iter();
@@ -93,12 +93,12 @@ pub(super) struct Hole {
     n: [usize; 2],
     /// Rays that hit something, or belong to another opening.
     is_shut: Vec<bool>,
-    /// Whether something parts a ray from the next one along each side.
+    /// True where something parts a ray from the next one along each side.
     is_parted: [Vec<bool>; 2],
 }
 
 impl Hole {
-    pub(super) fn of(place: &Place, others: &[&Place], triangles: &[[V3; 3]]) -> Self {
+    pub(super) fn of(place: &HolePlace, others: &[&HolePlace], triangles: &[[V3; 3]]) -> Self {
         let step = (2.0 * place.half[0].min(place.half[1]) / ACROSS).min(STEP);
         let reach = place.half.map(|h| h + AROUND);
         let n = reach.map(|r| (2.0 * r / step).ceil() as usize);
@@ -187,14 +187,14 @@ impl Hole {
     }
 
     /// Shuts rays that are nearer to another opening in this wall.
-    fn leave(&mut self, place: &Place, others: &[&Place]) {
-        let size = |p: &Place| p.half[0].hypot(p.half[1]) + AROUND;
-        let is_near = |o: &&&Place| {
+    fn leave(&mut self, place: &HolePlace, others: &[&HolePlace]) {
+        let size = |p: &HolePlace| p.half[0].hypot(p.half[1]) + AROUND;
+        let is_near = |o: &&&HolePlace| {
             let off = place.local(sub(o.center, place.center));
             let is_flat = off[2].abs() <= place.thickness + BEYOND;
             is_flat && dot(off, off).sqrt() < size(place) + size(o)
         };
-        let near: Vec<&Place> = others.iter().filter(is_near).copied().collect();
+        let near: Vec<&HolePlace> = others.iter().filter(is_near).copied().collect();
         if near.is_empty() {
             return;
         }
@@ -260,7 +260,7 @@ mod tests {
             [-0.4, 1.8, 0.0]
         ]);
         let door = json!({"centre": [0.0, 1.0, 0.0], "normal": [0.0, 0.0, 1.0], "thickness": 0.2, "corners": outline});
-        let place = Place::of(&door).unwrap();
+        let place = HolePlace::of(&door).unwrap();
         let mut wall = Vec::new();
         let mut face = |a: V3, b: V3, c: V3, d: V3| wall.extend([[a, b, c], [a, c, d]]);
         for z in [-0.1, 0.1] {

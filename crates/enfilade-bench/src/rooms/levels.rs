@@ -17,7 +17,7 @@ use super::bars::Bar;
 use super::worlds::Worlds;
 
 /// A level, and what its page says.
-struct Level {
+struct GameLevel {
     file: &'static str,
     rooms: Bar,
     /// Door objects with a portal at their place.
@@ -26,14 +26,14 @@ struct Level {
     largest: Option<Bar>,
 }
 
-const LEVELS: [Level; 2] = [
-    Level {
+const LEVELS: [GameLevel; 2] = [
+    GameLevel {
         file: "freedoom-e1m1.glb",
         rooms: Bar::Least(10.0),
         doors: Some(Bar::Least(17.0)),
         largest: None,
     },
-    Level {
+    GameLevel {
         file: "dive.glb",
         rooms: Bar::Least(10.0),
         doors: None,
@@ -81,7 +81,7 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) -> anyhow::Resu
     Ok(())
 }
 
-impl Level {
+impl GameLevel {
     fn print(&self, file: &Path, graph: &Value, out: &mut RowPrinter) -> anyhow::Result<()> {
         let mut print = |row: &str, value: f64, bar: Bar, note: &str| {
             let ok = Some(bar.passes(value));

@@ -9,7 +9,7 @@ use crate::measure::{self, files_of};
 use crate::rows::RowPrinter;
 use crate::score::{Match, V3, dot, list, sub, unit, vec3};
 
-use super::hole::{Hole, Place};
+use super::hole::{Hole, HolePlace};
 use super::levels::objects_of;
 use super::worlds::{Form, Worlds};
 
@@ -30,9 +30,9 @@ const SWING: f64 = 0.3;
 
 /// Openings of which the portal has the area and the normal of the hole, the others, and those that rays cannot measure.
 #[derive(Default)]
-struct Measured {
+struct MeasuredOpenings {
     n: usize,
-    /// By how much each other one is off, and what is told of it.
+    /// The others: by how much each is off, and its description.
     off: Vec<(f64, String)>,
     unbounded: Vec<String>,
 }
@@ -42,13 +42,14 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) -> anyhow::Resu
     if !worlds.chosen.has_row("openings") {
         return Ok(());
     }
-    let mut all = Measured::default();
+    let mut all = MeasuredOpenings::default();
     for dir in worlds.buildings() {
         let name = measure::name(&dir);
         let baked = worlds.building(&dir, Form::Clean);
         match (&baked.graph, &baked.score) {
             (Ok(graph), Some(score)) => {
-                let measured = Measured::of(&dir, graph, &score.matches).context(name.clone())?;
+                let measured =
+                    MeasuredOpenings::of(&dir, graph, &score.matches).context(name.clone())?;
                 measured.print(&name, out);
                 all.n += measured.n;
                 all.off.extend(measured.off);
@@ -66,15 +67,15 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) -> anyhow::Resu
     Ok(())
 }
 
-impl Measured {
+impl MeasuredOpenings {
     fn of(dir: &Path, graph: &Value, matches: &[Match]) -> anyhow::Result<Self> {
         let truth = std::fs::read_to_string(dir.join("truth.json"))?;
         let truth: Value = serde_json::from_str(&truth)?;
         let openings = list(&truth["openings"]);
         let is_usable = |o: &Value| o["usable"] != false && o["kind"] != "virtual";
-        let places: Vec<Option<Place>> = openings
+        let places: Vec<Option<HolePlace>> = openings
             .iter()
-            .map(|o| Place::of(o).filter(|_| is_usable(o)))
+            .map(|o| HolePlace::of(o).filter(|_| is_usable(o)))
             .collect();
         let structure = structure(dir, &places)?;
         let mut out = Self::default();
@@ -83,7 +84,7 @@ impl Measured {
                 continue;
             };
             let others = places.iter().enumerate().filter(|(i, _)| *i != m.opening);
-            let others: Vec<&Place> = others.filter_map(|(_, p)| p.as_ref()).collect();
+            let others: Vec<&HolePlace> = others.filter_map(|(_, p)| p.as_ref()).collect();
             let mut portals = list(&graph["portals"]).iter();
             let portal = portals.find(|p| p["id"] == m.portal);
             let portal = portal.context("a match without a portal")?;
@@ -96,7 +97,7 @@ impl Measured {
         Ok(out)
     }
 
-    fn add(&mut self, place: &Place, portal: &Value, by_rays: f64, told: &str) {
+    fn add(&mut self, place: &HolePlace, portal: &Value, by_rays: f64, told: &str) {
         let area = portal["area"].as_f64().unwrap_or(0.0);
         let normal = vec3(&portal["normal"]).map_or([0.0; 3], unit);
         let angle = dot(normal, place.normal).abs().min(1.0).acos().to_degrees();
@@ -140,7 +141,7 @@ impl Measured {
 
 /// Returns the triangles of a building without leaves and panes: those of the structure's file. Where that is the only one, objects
 /// within an opening of the truth are left out.
-fn structure(dir: &Path, places: &[Option<Place>]) -> anyhow::Result<Vec<[V3; 3]>> {
+fn structure(dir: &Path, places: &[Option<HolePlace>]) -> anyhow::Result<Vec<[V3; 3]>> {
     let (files, details) = files_of(dir);
     let scene = objects_of(files.first().context("a scene without a file")?)?;
     let mut all = Vec::new();
@@ -149,7 +150,7 @@ fn structure(dir: &Path, places: &[Option<Place>]) -> anyhow::Result<Vec<[V3; 3]
         let triangles = mesh.primitives.iter();
         let triangles = triangles.flat_map(|p| p.placed_triangles(object.transform));
         let triangles: Vec<[V3; 3]> = triangles.map(|t| t.map(|p| p.to_array())).collect();
-        let is_within = |place: &Place| {
+        let is_within = |place: &HolePlace| {
             let mut points = triangles.iter().flatten();
             points.all(|&p| {
                 let [x, y, z] = place.local(sub(p, place.center));

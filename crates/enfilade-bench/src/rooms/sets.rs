@@ -73,57 +73,38 @@ const OF_ONE: [(&str, &str, Bar); 5] = [
 ];
 
 /// A figure of a building, and what it counts in that of its set.
-struct Figure {
+struct SetFigure {
     name: &'static str,
     of: fn(&Score) -> Option<f64>,
     /// `None` if the set has no such figure.
     weight: Option<fn(&Score) -> usize>,
 }
 
-const FIGURES: [Figure; 7] = [
-    Figure {
-        name: "rooms",
-        of: |s| s.figures[0],
-        weight: Some(|s| s.n_rooms),
-    },
-    Figure {
-        name: "doors",
-        of: |s| s.figures[1],
-        weight: Some(|s| s.n_doors),
-    },
-    Figure {
-        name: "windows",
-        of: |s| s.figures[2],
-        weight: Some(|s| s.n_windows),
-    },
-    Figure {
-        name: "extra",
-        of: |s| s.figures[4],
-        weight: Some(|s| s.n_rooms),
-    },
-    Figure {
-        name: "spare",
-        of: |s| s.spare,
-        weight: Some(|s| s.n_rooms),
-    },
-    Figure {
-        name: "cells",
-        of: |s| Some(s.n_cells as f64),
-        weight: None,
-    },
-    Figure {
-        name: "cracks",
-        of: |s| Some(s.n_cracks as f64),
-        weight: None,
-    },
+const fn figure(
+    name: &'static str,
+    of: fn(&Score) -> Option<f64>,
+    weight: Option<fn(&Score) -> usize>,
+) -> SetFigure {
+    SetFigure { name, of, weight }
+}
+
+const FIGURES: [SetFigure; 7] = [
+    figure("rooms", |s| s.figures[0], Some(|s| s.n_rooms)),
+    figure("doors", |s| s.figures[1], Some(|s| s.n_doors)),
+    figure("windows", |s| s.figures[2], Some(|s| s.n_windows)),
+    figure("extra", |s| s.figures[4], Some(|s| s.n_rooms)),
+    figure("spare", |s| s.spare, Some(|s| s.n_rooms)),
+    figure("cells", |s| Some(s.n_cells as f64), None),
+    figure("cracks", |s| Some(s.n_cracks as f64), None),
 ];
 
 /// Prints the rows of each set.
 pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
     let there = worlds.buildings();
     for set in &SETS {
-        let is_wanted = |f: &&Figure| worlds.chosen.has_row(&format!("{}: {}", set.name, f.name));
-        let figures: Vec<&Figure> = FIGURES.iter().filter(is_wanted).collect();
+        let is_wanted =
+            |f: &&SetFigure| worlds.chosen.has_row(&format!("{}: {}", set.name, f.name));
+        let figures: Vec<&SetFigure> = FIGURES.iter().filter(is_wanted).collect();
         if figures.is_empty() {
             continue;
         }
@@ -146,7 +127,7 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
 
 impl Set {
     /// Prints a figure of each building, and that of the set.
-    fn print(&self, figure: &Figure, scores: &[&Score], out: &mut RowPrinter) {
+    fn print(&self, figure: &SetFigure, scores: &[&Score], out: &mut RowPrinter) {
         let row = format!("{}: {}", self.name, figure.name);
         let mut print = |scene: &str, value: f64, bar: Option<Bar>, note: &str| {
             let text = bar.map_or_else(String::new, Bar::text);

@@ -5,7 +5,7 @@ use crate::rows::RowPrinter;
 use crate::score::{Score, list};
 
 use super::bars::Bar;
-use super::worlds::{Baked, Form, Worlds};
+use super::worlds::{Form, TriedBake, Worlds};
 
 /// A way to spoil a building, and how far its rooms and doors may be from those of the clean one.
 pub(super) struct Spoiling {
@@ -63,7 +63,13 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
 
 impl Spoiling {
     /// Prints the rows of one building; returns `true` if all bars are met.
-    fn print(&self, scene: &str, clean: &Baked, spoilt: &Baked, out: &mut RowPrinter) -> bool {
+    fn print(
+        &self,
+        scene: &str,
+        clean: &TriedBake,
+        spoilt: &TriedBake,
+        out: &mut RowPrinter,
+    ) -> bool {
         let row = format!("spoilt: {}", self.form.name());
         let whys = [clean, spoilt].map(|b| b.graph.as_ref().err());
         if let Some(why) = whys.into_iter().flatten().next() {
@@ -72,7 +78,7 @@ impl Spoiling {
         }
         let mut is_good = true;
         let more = |of: fn(&Score) -> Option<f64>| {
-            let of = |b: &Baked| b.score.as_ref().and_then(of);
+            let of = |b: &TriedBake| b.score.as_ref().and_then(of);
             let (before, after) = (of(clean)?, of(spoilt)?);
             Some((after - before, format!("{after:.3} of {before:.3}")))
         };

@@ -9,7 +9,7 @@ use anyhow::Context;
 use serde_json::Value;
 
 use crate::judge::buildings;
-use crate::judge::cases::{Case, Found};
+use crate::judge::cases::{Found, SmallCase};
 use crate::measure;
 use crate::messy::generate;
 use crate::process::{bake_command, output_of, target_dir};
@@ -42,9 +42,9 @@ impl Form {
 const LONGEST: &str = "600";
 
 /// A bake that was tried.
-pub(super) struct Baked {
+pub(super) struct TriedBake {
     pub(super) world: PathBuf,
-    /// What `inspect --json` prints, or why there is no world.
+    /// The output of `inspect --json`, or why there is no world.
     pub(super) graph: Result<Value, String>,
     /// The score of a building; `None` of a level.
     pub(super) score: Option<Score>,
@@ -55,7 +55,7 @@ pub(super) struct Worlds<'a> {
     pub(super) chosen: &'a Chosen,
     is_kept: bool,
     folder: PathBuf,
-    baked: BTreeMap<(Form, String), Rc<Baked>>,
+    baked: BTreeMap<(Form, String), Rc<TriedBake>>,
     cases: BTreeMap<&'static str, Rc<Found>>,
 }
 
@@ -81,7 +81,7 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns a building's bake.
-    pub(super) fn building(&mut self, dir: &Path, form: Form) -> Rc<Baked> {
+    pub(super) fn building(&mut self, dir: &Path, form: Form) -> Rc<TriedBake> {
         let name = measure::name(dir);
         let spoilt = self.folder.join(form.name()).join(&name);
         let mut baked = self.bake(&name, form, |world| {
@@ -104,7 +104,7 @@ impl<'a> Worlds<'a> {
             && let Ok(graph) = &baked.graph
         {
             let score = score_world(dir, &baked.world, graph);
-            let whole = Baked {
+            let whole = TriedBake {
                 world: baked.world.clone(),
                 graph: score.as_ref().map(|_| graph.clone()).map_err(cause),
                 score: score.ok(),
@@ -116,14 +116,14 @@ impl<'a> Worlds<'a> {
     }
 
     /// Returns the bake of a level's file.
-    pub(super) fn level(&mut self, file: &Path) -> Rc<Baked> {
+    pub(super) fn level(&mut self, file: &Path) -> Rc<TriedBake> {
         self.bake(&measure::name(file), Form::Clean, |world| {
             Ok(bake_command(file, world))
         })
     }
 
     /// Returns what a small case gave.
-    pub(super) fn case(&mut self, case: &Case, file: &Path) -> anyhow::Result<Rc<Found>> {
+    pub(super) fn case(&mut self, case: &SmallCase, file: &Path) -> anyhow::Result<Rc<Found>> {
         if !self.cases.contains_key(case.file) {
             let found = Rc::new(Found::of(case, file)?);
             self.cases.insert(case.file, found);
@@ -136,7 +136,7 @@ impl<'a> Worlds<'a> {
         name: &str,
         form: Form,
         command: impl FnOnce(&Path) -> anyhow::Result<Command>,
-    ) -> Rc<Baked> {
+    ) -> Rc<TriedBake> {
         let key = (form, name.to_owned());
         if let Some(baked) = self.baked.get(&key) {
             return Rc::clone(baked);
@@ -151,7 +151,7 @@ impl<'a> Worlds<'a> {
             inspect(&world)
         };
         let graph = made().map_err(|error| cause(&error));
-        let baked = Rc::new(Baked {
+        let baked = Rc::new(TriedBake {
             world,
             graph,
             score: None,
