@@ -91,7 +91,9 @@ impl MeasuredOpenings {
             let told = format!("{} {}", m.kind, m.name);
             match Hole::of(place, &others, &structure).area() {
                 Some(area) => out.add(place, portal, area, &told),
-                None => out.unbounded.push(told),
+                None => out
+                    .unbounded
+                    .push(format!("{told} at {}", shown(place.center))),
             }
         }
         Ok(out)
@@ -104,7 +106,7 @@ impl MeasuredOpenings {
         let off = (area / by_rays - 1.0).abs();
         self.n += 1;
         if off > AREA || angle > ANGLE {
-            let at = place.center.map(|x| format!("{x:.2}")).join(" ");
+            let at = shown(place.center);
             let id = &portal["id"];
             let told = format!(
                 "{told} at {at}: portal {id} {area:.2} m², rays {by_rays:.2} m², {angle:.1}°"
@@ -119,7 +121,8 @@ impl MeasuredOpenings {
         let n_right = self.n - off.len();
         let mut note = format!("{n_right} of {}", self.n);
         if !self.unbounded.is_empty() {
-            note += &format!("; {} that rays do not bound", self.unbounded.len());
+            let names = self.unbounded.join(", ");
+            note += &format!("; {} that rays do not bound: {names}", self.unbounded.len());
         }
         for (_, told) in off.iter().take(LISTED).filter(|o| !o.1.is_empty()) {
             note += &format!("; {told}");
@@ -137,6 +140,10 @@ impl MeasuredOpenings {
             );
         }
     }
+}
+
+fn shown(point: V3) -> String {
+    point.map(|x| format!("{x:.2}")).join(" ")
 }
 
 /// Returns the triangles of a building without leaves and panes: those of the structure's file. Where that is the only one, objects

@@ -3,10 +3,13 @@
 use std::path::Path;
 use std::process::Command;
 
+use serde_json::Value;
+
 use crate::judge::cases::cases;
 use crate::measure;
 use crate::process::binary;
 use crate::rows::RowPrinter;
+use crate::score::{list, text};
 
 use super::levels::files;
 use super::spoilt::SPOILINGS;
@@ -17,6 +20,9 @@ const METHODS: [&str; 2] = ["bsp", "delaunay"];
 
 /// Lines of sight for each view of a frame.
 const RAYS_A_VIEW: u64 = 100;
+
+/// Most broken promises that a row lists.
+const LISTED: usize = 12;
 
 /// Counts of worlds, and of those that passed.
 struct Verified<'a> {
@@ -88,27 +94,25 @@ impl Verified<'_> {
         Ok(())
     }
 
-    /// Returns the exit code of `verify`, and if that is not 0, what it says.
+    /// Returns the exit code of `verify`, and what it finds broken.
     fn verify(&self, world: &Path) -> anyhow::Result<(Option<i32>, String)> {
         let mut command = Command::new(binary("enfilade"));
         let numbers = [self.rays, self.rays / RAYS_A_VIEW].map(|n| n.to_string());
         command.arg("verify").arg(world);
-        command.args(["--rays", &numbers[0], "--sight", &numbers[1], "--list", "4"]);
+        command.args(["--rays", &numbers[0], "--sight", &numbers[1], "--json"]);
         let done = command.output()?;
-        let mut note = String::new();
-        if !done.status.success() {
-            let said = [done.stdout, done.stderr].concat();
-            let said = String::from_utf8_lossy(&said);
-            let lines = said
-                .lines()
-                .filter(|l| !l.contains("% ,") && !l.contains(" gone"));
-            note = lines
-                .collect::<Vec<_>>()
-                .join(" | ")
-                .chars()
-                .take(1200)
-                .collect();
-        }
+        // Where a promise is broken, it exits with 1 after its report.
+        let note = match serde_json::from_slice::<Value>(&done.stdout) {
+            Ok(report) => {
+                let mut broken = vec![("missed in views", &report["sight"]["missed"])];
+                broken.extend(["unsealed", "incomplete", "hidden"].map(|n| (n, &report[n])));
+                let broken = broken.into_iter().filter(|(_, n)| **n != 0);
+                let broken = broken.map(|(name, n)| format!("{name}: {n}"));
+                let all = broken.chain(list(&report["problems"]).iter().map(text));
+                all.take(LISTED).collect::<Vec<_>>().join("; ")
+            }
+            Err(_) => String::from_utf8_lossy(&done.stderr).trim().to_owned(),
+        };
         Ok((done.status.code(), note))
     }
 }
