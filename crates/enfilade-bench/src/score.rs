@@ -24,7 +24,7 @@ pub(crate) fn sub(a: V3, b: V3) -> V3 {
 pub(crate) fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
-fn cross(a: V3, b: V3) -> V3 {
+pub(crate) fn cross(a: V3, b: V3) -> V3 {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -34,7 +34,7 @@ fn cross(a: V3, b: V3) -> V3 {
 pub(crate) fn unit(a: V3) -> V3 {
     a.map(|x| x / dot(a, a).sqrt())
 }
-fn along(a: V3, d: V3, t: f64) -> V3 {
+pub(crate) fn along(a: V3, d: V3, t: f64) -> V3 {
     [a[0] + d[0] * t, a[1] + d[1] * t, a[2] + d[2] * t]
 }
 
@@ -65,6 +65,9 @@ pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
     }
 }
 
+/// The volume from which a cell of kind room that holds no room of the truth counts. [Units: wu³]
+const SPARE: f64 = 1.0;
+
 /// One row of the table; `None` if a scene has nothing of the kind.
 pub(crate) struct Score {
     pub(crate) name: String,
@@ -76,6 +79,10 @@ pub(crate) struct Score {
     pub(crate) n_cells: usize,
     /// In the order of [`COLUMNS`].
     pub(crate) figures: [Option<f64>; 6],
+    /// Indoor rooms of the world larger than [`SPARE`] that hold no point of a room, per room.
+    pub(crate) spare: Option<f64>,
+    /// Portals of kind crack.
+    pub(crate) n_cracks: usize,
     seconds: f64,
     pub(crate) failed: Vec<String>,
     /// Openings of the truth with the portals that match them.
@@ -269,6 +276,8 @@ pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Re
             per_n(extra),
             pair_mcc(&samples.rooms, &samples.groups, &samples.cells),
         ],
+        spare: per_n(samples.n_spare(list(&graph["cells"]))),
+        n_cracks: portals.iter().filter(|p| p.kind == "crack").count(),
         seconds: f64::NAN,
         failed,
         matches: found.matches,
@@ -317,6 +326,17 @@ impl Samples {
             n_cells: with_points.len(),
             cells: located.iter().enumerate().map(cell).collect(),
         })
+    }
+
+    /// Counts indoor rooms of the world that hold no point. A cell without a kind is a room, one without a volume large.
+    fn n_spare(&self, cells: &[Value]) -> usize {
+        let held: BTreeSet<&str> = self.cells.iter().map(String::as_str).collect();
+        let is_spare = |c: &&Value| {
+            let is_room = c["kind"].as_str().is_none_or(|kind| kind == "room");
+            let is_large = c["volume"].as_f64().is_none_or(|v| v > SPARE);
+            c["outdoor"] != true && is_room && is_large && !held.contains(&*c["id"].to_string())
+        };
+        cells.iter().filter(is_spare).count()
     }
 
     /// Counts rooms with nearly all points in one cell that has hardly any points of other groups.
@@ -427,7 +447,9 @@ struct FoundOpenings {
 
 /// An opening of the truth and the portal that matches it.
 pub(crate) struct Match {
-    /// Kind and name of the opening in the truth.
+    /// Place of the opening in the truth's list.
+    pub(crate) opening: usize,
+    /// Its kind and name there.
     pub(crate) kind: String,
     pub(crate) name: String,
     pub(crate) portal: u64,
@@ -452,18 +474,19 @@ fn find_openings(
     locate: &impl Fn(&[V3]) -> anyhow::Result<Vec<String>>,
     failed: &mut Vec<String>,
 ) -> anyhow::Result<FoundOpenings> {
-    let usable: Vec<&Value> = openings
-        .iter()
-        .filter(|o| o.get("usable").is_none_or(|u| u == true) && !list(&o["corners"]).is_empty())
+    let usable: Vec<(usize, &Value)> = (openings.iter().enumerate())
+        .filter(|(_, o)| {
+            o.get("usable").is_none_or(|u| u == true) && !list(&o["corners"]).is_empty()
+        })
         .collect();
     let places = usable
         .iter()
-        .map(|o| OpeningPlace::of(o).context("an opening without place"))
+        .map(|(_, o)| OpeningPlace::of(o).context("an opening without place"))
         .collect::<anyhow::Result<Vec<OpeningPlace>>>()?;
     let probes: Vec<V3> = places.iter().flat_map(OpeningPlace::probes).collect();
     let sides = locate(&probes)?;
     let mut found = FoundOpenings::default();
-    for (k, (o, place)) in usable.iter().zip(&places).enumerate() {
+    for (k, ((index, o), place)) in usable.iter().zip(&places).enumerate() {
         let want: BTreeSet<String> = sides[2 * k..2 * k + 2].iter().cloned().collect();
         let sizes = 0.5 * place.area..=2.0 * place.area;
         let mut hit: Option<&Portal> = None;
@@ -480,6 +503,7 @@ fn find_openings(
         *found.tried.entry(kind.clone()).or_default() += 1;
         if let Some(portal) = hit {
             found.matches.push(Match {
+                opening: *index,
                 kind: kind.clone(),
                 name: text(&o["name"]),
                 portal: portal.id,

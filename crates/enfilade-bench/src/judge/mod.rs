@@ -1,7 +1,7 @@
 //! `bench judge`: rows on the decisions of a bake. How few numbers they need, that each can say why, and that the verdict on a world
 //! doubts the worlds that are wrong.
 
-mod cases;
+pub(crate) mod cases;
 mod facts;
 mod size;
 
@@ -91,7 +91,7 @@ impl JudgedWorld {
 }
 
 /// Returns the folders of all buildings with truth.
-fn buildings() -> Vec<PathBuf> {
+pub(crate) fn buildings() -> Vec<PathBuf> {
     let dir = scenes_dir();
     let beside = ["scenes2", "scenes3"].map(|name| dir.as_ref().map(|d| d.with_file_name(name)));
     let all = dir.iter().chain(beside.iter().flatten());

@@ -51,13 +51,25 @@ pub(super) fn run(chosen: &Chosen, out: &mut RowPrinter) -> anyhow::Result<()> {
 }
 
 /// Returns all objects of a scene, furniture and leaves included.
-fn scene_of(dir: &Path) -> anyhow::Result<Scene> {
+pub(crate) fn scene_of(dir: &Path) -> anyhow::Result<Scene> {
     let (scene, detail) = files_of(dir);
     Ok(import(&scene, &detail, &ImportOptions::default())?.scene)
 }
 
 /// Writes a scene as one mesh, bakes and scores it.
 fn merged_score(dir: &Path, scene: &Scene, name: &str, ending: &str) -> anyhow::Result<Score> {
+    let world = folder()?.join(format!("{name}-merged.glb"));
+    output_of(&mut merged_bake(scene, name, ending, &world)?, None)?;
+    score_world(dir, &world, &inspect(&world)?)
+}
+
+/// Writes a scene as one mesh, and returns its bake.
+pub(crate) fn merged_bake(
+    scene: &Scene,
+    name: &str,
+    ending: &str,
+    world: &Path,
+) -> anyhow::Result<Command> {
     let mesh = Merged::of(scene);
     let path = folder()?.join(format!("{name}-merged.{ending}"));
     let bytes = match ending {
@@ -66,11 +78,10 @@ fn merged_score(dir: &Path, scene: &Scene, name: &str, ending: &str) -> anyhow::
         _ => mesh.obj(scene.objects.first().map_or("", |o| &o.name)),
     };
     std::fs::write(&path, bytes?).with_context(|| path.display().to_string())?;
-    let world = path.with_extension("glb");
     let mut bake = Command::new(binary("enfilade"));
     bake.arg("bake").arg(&path).args(["--up", "y"]);
-    output_of(bake.arg("-o").arg(&world), None)?;
-    score_world(dir, &world, &inspect(&world)?)
+    bake.arg("-o").arg(world);
+    Ok(bake)
 }
 
 /// The triangles of all objects.

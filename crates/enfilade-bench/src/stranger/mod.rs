@@ -10,6 +10,8 @@ mod verdict;
 
 use crate::rows::{Chosen, RowPrinter};
 
+pub(crate) use merged::{merged_bake, scene_of};
+
 /// Prints the rows whose names begin with the first item.
 type RowKind = (
     &'static str,

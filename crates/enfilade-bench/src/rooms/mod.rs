@@ -1,0 +1,39 @@
+//! `bench rooms`: rooms, doors and openings as architects mean them, clean and spoilt, on buildings and levels; each figure with its
+//! bar.
+
+mod bars;
+mod hole;
+mod levels;
+mod openings;
+mod sets;
+mod spoilt;
+mod verified;
+mod worlds;
+
+use crate::rows::{Chosen, RowPrinter};
+use worlds::Worlds;
+
+/// The options of the bench.
+#[derive(clap::Args)]
+pub(crate) struct Rooms {
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Segments that `verify` tries, and as many rays; a hundredth as many views.
+    #[arg(long, default_value_t = 1_000_000)]
+    rays: u64,
+    /// Do not bake again what an earlier run of the same build has baked.
+    #[arg(long)]
+    keep: bool,
+}
+
+/// Measures the rows; an error if a bar is missed.
+pub(crate) fn bench_rooms(options: &Rooms, is_json: bool) -> anyhow::Result<()> {
+    let mut out = RowPrinter::new(is_json);
+    let mut worlds = Worlds::new(&options.chosen, options.keep)?;
+    sets::run(&mut worlds, &mut out);
+    openings::run(&mut worlds, &mut out)?;
+    levels::run(&mut worlds, &mut out)?;
+    spoilt::run(&mut worlds, &mut out);
+    verified::run(&mut worlds, options.rays, &mut out)?;
+    out.finish()
+}
