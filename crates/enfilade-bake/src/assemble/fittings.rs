@@ -10,7 +10,7 @@ mod parts;
 mod split;
 mod swing;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use enfilade_cpg::{CellId, DetailObject, Fitting, FittingPart, Motion, PortalKind, World};
 use enfilade_geom::scene::Mesh;
@@ -113,6 +113,8 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     let still = fitted.still();
     let carried = fitted.carried();
     let numbers = split::take_out(world, &objects, &hung);
+    let mut moving: BTreeSet<u32> = carried.iter().map(|c| c.0).collect();
+    moving.extend(&numbers);
     for ((leaf, number), motion) in hung.iter().zip(numbers).zip(&motions) {
         for &p in &leaf.portals {
             let portal = &mut world.graph.portals[p as usize];
@@ -135,10 +137,9 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
         }
     }
     for (portal, detail, part) in still {
-        let fittings = &mut world.graph.portals[portal as usize].fittings;
-        // An object that is only a leaf has nothing left to be a frame.
-        if fittings.iter().all(|f| f.detail != detail) {
-            fittings.push(Fitting {
+        // An object that is only a leaf, here or in another portal, has nothing left to be a frame.
+        if !moving.contains(&detail) {
+            world.graph.portals[portal as usize].fittings.push(Fitting {
                 detail,
                 part,
                 motion: None,
