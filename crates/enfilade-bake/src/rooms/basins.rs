@@ -97,12 +97,19 @@ impl Basins {
         }
         self.peaks.resize(n + parents.len(), 0.0);
         let mut is_cut = vec![false; n];
-        for parent in parents {
+        for &parent in &parents {
             is_cut[parent as usize] = true;
         }
         let is_part = |label: u32| is_cut.get(label as usize).is_none_or(|&is| is);
         self.saddles.retain(|&(a, b), _| !is_part(a) && !is_part(b));
         self.measure(field, is_part, allowance);
+        // The cut itself is where a slab is, not where the air is narrow.
+        let whole = |label: u32| {
+            *parents
+                .get((label as usize).wrapping_sub(n))
+                .unwrap_or(&label)
+        };
+        self.saddles.retain(|&(a, b), _| whole(a) != whole(b));
     }
 
     /// Measures the peaks of `wanted` basins, and their saddles with any.
