@@ -71,8 +71,8 @@ const WALLED: f64 = 0.5;
 /// space than most do. All around a thing that stands in a hall is the hall. Higher, and suites beside one corridor are solid
 /// (bristol-house); lower, and a column that touches a second room is a room.
 pub(crate) const BETWEEN: f64 = 0.1;
-/// A space that fits no ball of this radius is matter if most rays hit back faces, where that is all that is known of it, or if it
-/// is open to the outdoors. [Units: wu]
+/// A space that fits no ball of this radius is matter if most rays hit back faces and faces can be trusted, or are all that is known:
+/// it is thinner than a person. [Units: wu]
 pub(crate) const NARROW: f64 = 0.5;
 
 /// Least share of level rays that meet something in a room: one of eight may leave by its door.
@@ -125,8 +125,8 @@ pub(crate) fn is_crevice(widest: f64, min_radius: f64, backs: f64) -> bool {
     widest < min_radius || backs > BACKS && widest < NARROW
 }
 
-/// Returns `true` if a space open to the outdoors is the inside of a piece of wall without an end: surfaces `facing` outward turn
-/// their backs to it, and it is thinner than a person.
+/// Returns `true` if a space is the inside of a piece of wall, with an end or without: surfaces `facing` outward turn their backs to
+/// it, and it is thinner than a person.
 pub(crate) fn is_hollow_piece(facing: Facing, widest: f64, backs: f64) -> bool {
     facing == Facing::Outward && backs > BACKS && widest < NARROW
 }
@@ -157,7 +157,8 @@ impl EnclosedFacts {
         }
     }
 
-    /// Decides if a closed space is a room, and why. A shaft between others that a person fits into is one.
+    /// Decides if a closed space is a room, and why. A shaft among sheets that face anyhow is one, if a person fits into it and it lies
+    /// between others.
     pub(crate) fn why(&self, facing: Facing, min_radius: f64) -> Why {
         let inside = self.evidence(facing);
         let facts = [
@@ -167,8 +168,13 @@ impl EnclosedFacts {
             (Fact::Between, self.between),
             (Fact::Inside, inside),
         ];
-        if self.radius < min_radius {
-            Why::compared(Reason::Crevice, min_radius, &facts)
+        let least = if is_hollow_piece(facing, self.radius, self.backs) {
+            NARROW.max(min_radius)
+        } else {
+            min_radius
+        };
+        if self.radius < least {
+            Why::compared(Reason::Crevice, least, &facts)
         } else if inside > 1.0 {
             Why::compared(Reason::Solid, 1.0, &facts)
         } else {
@@ -342,7 +348,7 @@ mod tests {
                     radius: 0.4,
                     ..inside
                 },
-                Reason::Solid,
+                Reason::Crevice,
             ),
         ] {
             let why = facts.why(facing, 0.3);
