@@ -38,7 +38,7 @@ impl Touching {
 }
 
 impl DistanceField {
-    /// Measures the basins that are `wanted`, and their contacts with any. Label 0 is no basin.
+    /// Measures the basins that are `wanted`, and their contacts with any. Label 0 is not a basin.
     ///
     /// Linear in voxels; a layer of bricks of labels at a time in each thread. Incomplete if the allowance is over.
     ///
