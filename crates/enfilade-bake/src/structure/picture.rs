@@ -203,9 +203,22 @@ fn crossing(t: &Triangle, d: [f64; 3]) -> Option<[DVec3; 2]> {
 /// Marks the lattice cells along a segment, so that no step between edge neighbors crosses it.
 fn draw_segment(blocked: &mut BitVolume, side: [usize; 2], p: [f64; 2], q: [f64; 2]) {
     let length = (q[0] - p[0]).abs().max((q[1] - p[1]).abs());
-    let n = ((length * 2.0).ceil() as usize).clamp(1, 4 * MAX_SIDE * 8);
-    for k in 0..=n {
-        let t = k as f64 / n as f64;
+    let n = (length * 2.0).ceil().max(1.0);
+    // Only the steps within the picture, and one more at either end against rounding.
+    let (mut first, mut last) = (0.0, 1.0_f64);
+    for k in 0..2 {
+        let (step, most) = (q[k] - p[k], side[k] as f64);
+        if step != 0.0 {
+            let ends = [-p[k] / step, (most - p[k]) / step];
+            first = ends[0].min(ends[1]).max(first);
+            last = ends[0].max(ends[1]).min(last);
+        } else if p[k] < 0.0 || p[k] >= most {
+            return;
+        }
+    }
+    let (first, last) = ((first * n).floor() - 1.0, (last * n).ceil() + 1.0);
+    for k in first.max(0.0) as u64..=last.clamp(0.0, n) as u64 {
+        let t = k as f64 / n;
         let (x, y) = (p[0] + (q[0] - p[0]) * t, p[1] + (q[1] - p[1]) * t);
         if x >= 0.0 && y >= 0.0 && (x as usize) < side[0] && (y as usize) < side[1] {
             blocked.set(x as usize, y as usize, 0, true);
@@ -215,33 +228,27 @@ fn draw_segment(blocked: &mut BitVolume, side: [usize; 2], p: [f64; 2], q: [f64;
 
 /// Marks the lattice cells whose centers lie in a triangle of the plane.
 fn fill_triangle(blocked: &mut BitVolume, side: [usize; 2], t: [[f64; 2]; 3]) {
-    for i in 0..3 {
-        draw_segment(blocked, side, t[i], t[(i + 1) % 3]);
+    let edges = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+    for (a, b) in edges {
+        draw_segment(blocked, side, a, b);
     }
-    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
-    let range = |k: usize| {
-        let lo = t.iter().map(|p| p[k]).fold(f64::MAX, f64::min).max(0.0);
-        let hi = t
-            .iter()
-            .map(|p| p[k])
-            .fold(f64::MIN, f64::max)
-            .min(side[k] as f64);
-        (lo as usize, hi.max(0.0) as usize)
-    };
-    let ((x0, x1), (y0, y1)) = (range(0), range(1));
-    for y in y0..y1.min(side[1]) {
-        for x in x0..x1.min(side[0]) {
-            let c = [x as f64 + 0.5, y as f64 + 0.5];
-            let s = [
-                cross(t[0], t[1], c),
-                cross(t[1], t[2], c),
-                cross(t[2], t[0], c),
-            ];
-            if s.iter().all(|&s| s >= 0.0) || s.iter().all(|&s| s <= 0.0) {
-                blocked.set(x, y, 0, true);
+    let ys = t.map(|p| p[1]);
+    let lowest = ys[0].min(ys[1]).min(ys[2]).max(0.0) as usize;
+    let highest = ys[0].max(ys[1]).max(ys[2]).max(0.0) as usize;
+    for y in lowest..highest.min(side[1]) {
+        let at = y as f64 + 0.5;
+        let (mut lo, mut hi) = (f64::MAX, f64::MIN);
+        for (a, b) in edges {
+            if (a[1] <= at) != (b[1] <= at) {
+                let x = a[0] + (b[0] - a[0]) * ((at - a[1]) / (b[1] - a[1]));
+                (lo, hi) = (lo.min(x), hi.max(x));
             }
+        }
+        // Cells from the first center at or after `lo` to the last at or before `hi`.
+        let from = (lo - 0.5).ceil().max(0.0) as usize;
+        let to = ((hi - 0.5).floor() + 1.0).max(0.0) as usize;
+        if from < to.min(side[0]) {
+            blocked.fill_row(y, from..to.min(side[0]));
         }
     }
 }
