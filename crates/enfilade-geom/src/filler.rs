@@ -102,7 +102,7 @@ pub struct HoleFacts {
     pub ends: [bool; 2],
     /// Sides that one connected surface holds: walls are built beside each other, and only openings are cut out of one.
     pub n_by_one: usize,
-    /// Thickness of the thinnest of the walls that hold it. [Units: wu]
+    /// Thickness of the thinnest of the walls that hold it; 0 for a sheet. [Units: wu]
     pub wall: f64,
 }
 
@@ -144,7 +144,7 @@ impl HoleFacts {
         let is_hung = is_leaf && self.is_upright && (left && right || is_beside_wall);
         if self.n_sides() < SIDES && !is_hung {
             None
-        } else if is_leaf && self.thickness <= THIN * self.wall {
+        } else if is_leaf && self.thickness < THIN * self.wall {
             Some(FillsHole::Thin)
         } else if self.n_by_one >= SIDES && self.thickness <= self.wall + OUT {
             Some(FillsHole::Surrounded)
@@ -236,6 +236,17 @@ mod tests {
             (
                 HoleFacts {
                     thickness: 0.121,
+                    ..door
+                },
+                None,
+            ),
+            // A sheet among sheets.
+            (
+                HoleFacts {
+                    thickness: 0.0,
+                    leaf: 0.0,
+                    wall: 0.0,
+                    n_by_one: 2,
                     ..door
                 },
                 None,

@@ -83,6 +83,34 @@ fn a_block_as_thick_as_the_wall_fills_a_hole_that_one_wall_goes_round() {
     assert_eq!(b.details(), ["door", "window"]);
 }
 
+// Energy models: walls, leaves and panes are single sheets.
+#[test]
+fn sheets_fill_holes_in_the_plane_of_one_sheet() {
+    let hole = [
+        ([0.0, 0.0, 3.0], [1.0, 2.6, 3.0]),
+        ([1.0, 2.1, 3.0], [2.0, 2.6, 3.0]),
+        ([2.0, 0.0, 3.0], [6.0, 2.6, 3.0]),
+    ];
+    let filled = |wall: &[&[([f64; 3], [f64; 3])]], at: f64| {
+        let mut b = shell();
+        for pieces in wall {
+            b.blocks("wall", pieces);
+        }
+        b.block("leaf", [1.0, 0.0, at], [2.0, 2.1, at]);
+        b.reasons()
+    };
+    let leaf =
+        "leaf: fills an opening: 1.00 x 2.10 m, 0.00 m thick, one wall goes round it on 3 sides";
+    // Welding moves vertices by a millimeter.
+    for at in [3.0, 3.001] {
+        assert_eq!(filled(&[&hole], at), [leaf]);
+    }
+    // Before the wall; and between sheets of which any may be the leaf.
+    assert_eq!(filled(&[&hole], 3.003), [""; 0]);
+    let pieces = hole.each_ref().map(std::slice::from_ref);
+    assert_eq!(filled(&pieces, 3.0), [""; 0]);
+}
+
 // Pieces of a kit: `wall_doorway`, and below it `wall_doorway_door`.
 #[test]
 fn of_what_is_named_as_a_wall_and_a_door_the_shape_tells() {

@@ -32,6 +32,9 @@ const OPEN: f64 = 0.5;
 const OVERLAP: f64 = 0.25;
 /// Hits nearer than this along a line are one hit, on an edge that two triangles share. [Units: wu]
 const SAME: f64 = 1e-4;
+/// Greatest distance of a sheet from the middle of what it holds: vertices are rounded, and moved by welding. A thing before
+/// a wall, such as a board, has more. [Units: wu]
+const SHEET: f64 = 2e-3;
 
 /// The triangles of the scene, for ray queries.
 pub(super) struct Surroundings<'a> {
@@ -128,14 +131,12 @@ fn held(members: &[&Candidate], is_candidate: &dyn Fn(u32) -> bool) -> HoleFacts
         let mut holders: Vec<(u32, usize)> = Vec::new();
         for sample in members.iter().flat_map(|c| &c.sides[side]) {
             let walls_here = sample.iter().filter(|h| !is_candidate(h.unit));
-            let thickness = walls_here.clone().map(|h| h.thickness).fold(0.0, f64::max);
-            if thickness == 0.0 && !sample.is_empty() {
+            let thickest = walls_here.clone().map(|h| h.thickness).reduce(f64::max);
+            if thickest.is_none() && !sample.is_empty() {
                 continue;
             }
             n_outer += 1;
-            if thickness > 0.0 {
-                walls.push(thickness);
-            }
+            walls.extend(thickest);
             for h in walls_here {
                 add_one(&mut holders, h.unit);
             }
@@ -287,10 +288,19 @@ fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
     found
 }
 
-/// Returns the matter of other units through a point that overlaps the unit's depth.
+/// Returns the matter of other units through a point that overlaps the unit's depth; for a sheet, the sheets in its plane, too.
 fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
     let half = unit.half.x;
-    matter(&crossings(unit, p, around), index)
+    let met = crossings(unit, p, around);
+    let alone = met.chunk_by(|a, b| a.unit == b.unit).filter(|own| {
+        let is_other = own[0].unit != index && own.len() == 1;
+        is_other && own[0].is_facing && half.max(own[0].at.abs()) <= SHEET
+    });
+    let sheets = alone.map(|own| Hold {
+        unit: own[0].unit,
+        thickness: 0.0,
+    });
+    let thick = matter(&met, index)
         .into_iter()
         .map(|m| (m.to.min(half) - m.from.max(-half), m))
         // A picture frame only touches its wall.
@@ -298,8 +308,8 @@ fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -
         .map(|(_, m)| Hold {
             unit: m.unit,
             thickness: m.to - m.from,
-        })
-        .collect()
+        });
+    thick.chain(sheets).collect()
 }
 
 /// Returns the unit's own matter along its thin axis, averaged over its face and in the thinnest quarter.
