@@ -49,6 +49,16 @@ pub(crate) struct Candidate {
 const MARGIN: f64 = 0.7;
 /// Largest distance of a candidate from the front's mean plane. [Units: wu]
 const OFFSET: f64 = 0.6;
+/// Cosine of the greatest angle between normals that count as one: a degree.
+const PARALLEL: f64 = 0.9998;
+/// Greatest step within a surface, and distance of a surface that bounds a section from its plane, as a share of the widest gaps
+/// that are closed.
+const ROUNDED: f64 = 0.2;
+
+/// Returns [`ROUNDED`] as a length, where gaps up to `hole` are closed or would be. [Units: wu]
+fn rounding(hole: f64) -> f64 {
+    ROUNDED * hole.max(SmallestHole::LEAST)
+}
 
 /// Fits the polygon of a candidate to an opening, given as points `spacing` apart all over it, among `triangles`, which `bvh` indexes.
 /// Slits narrower than `hole` count as closed: through them a section would extend into the hollow of a wall.
@@ -116,7 +126,7 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
     for (n, area) in faces {
         // Large walls far off count no more than surfaces right at the opening.
         let weight = area.min(opening.area);
-        match normals.iter_mut().find(|(m, _)| m.dot(n) > 0.9998) {
+        match normals.iter_mut().find(|(m, _)| m.dot(n) > PARALLEL) {
             Some((_, w)) => *w += weight,
             None => normals.push((n, weight)),
         }
@@ -132,7 +142,7 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
     // The front is a little ragged: its plane is usually meant to be upright or level.
     let upright = DVec3::new(own.x, 0.0, own.z).normalize_or_zero();
     for n in [upright, DVec3::Y * own.y.signum(), own] {
-        if n.dot(own) > 0.94 && walls.iter().chain(&fronts).all(|m| m.dot(n) < 0.9998) {
+        if n.dot(own) > 0.94 && walls.iter().chain(&fronts).all(|m| m.dot(n) < PARALLEL) {
             fronts.push(n);
         }
     }
@@ -141,45 +151,59 @@ fn candidate_normals(opening: &Opening, around: &[Triangle]) -> [Vec<DVec3>; 3] 
     [walls, fronts, tilted.to_vec()]
 }
 
-/// Returns planes with this normal worth trying: those of walls, those midway between two, and a sweep.
+/// Returns planes with about this normal worth trying: those of walls, those midway between two, and a sweep.
 fn candidate_planes(
     opening: &Opening,
     normal: DVec3,
     around: &[Triangle],
     hole: f64,
 ) -> Vec<Plane> {
-    // Steps within a surface are at most as wide as gaps that are closed anyway, or would be.
-    let step = 0.2 * hole.max(SmallestHole::LEAST);
+    let step = rounding(hole);
     let middle = Plane::through(opening.center, normal);
-    let mut faces: Vec<(f64, f64)> = Vec::new();
+    let at_offset = |t: f64| Plane::through(opening.center + normal * t, normal);
+    // Offset along the normal, area, and plane.
+    let mut faces: Vec<(f64, f64, Plane)> = Vec::new();
     for t in around {
         let d = t.map(|p| middle.signed_distance(p));
         let (lo, hi) = (d[0].min(d[1]).min(d[2]), d[0].max(d[1]).max(d[2]));
-        let area = triangle_area_normal(t).length();
-        if hi - lo < step && hi > -OFFSET && lo < OFFSET && area > 1e-4 {
-            faces.push(((lo + hi) * 0.5, area));
+        let area_normal = triangle_area_normal(t);
+        let area = area_normal.length();
+        if area <= 1e-4 || hi <= -OFFSET || lo >= OFFSET {
+            continue;
         }
+        let own = area_normal * (area_normal.dot(normal).signum() / area);
+        let is_parallel = own.dot(normal) > PARALLEL;
+        // Where the plane of a long wall crosses the normal; of a small triangle, only its place is known well.
+        let at = if hi - lo < step {
+            (lo + hi) * 0.5
+        } else if is_parallel {
+            (t[0] - opening.center).dot(own) / normal.dot(own)
+        } else {
+            continue;
+        };
+        let plane = if is_parallel {
+            Plane::through((t[0] + t[1] + t[2]) / 3.0, own)
+        } else {
+            at_offset(at)
+        };
+        faces.push((at, area, plane));
     }
     faces.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
-    // The largest triangle represents those in about its plane, as in the complex.
-    let mut offsets: Vec<f64> = Vec::new();
-    for sheet in faces.chunk_by(|a, b| b.0 - a.0 < step) {
-        let largest = sheet.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
-        offsets.extend(largest.map(|face| face.0));
-    }
-    let mut tries: Vec<f64> = offsets
-        .windows(2)
-        .filter(|w| w[1] - w[0] > 2.0 * step)
-        .map(|w| (w[0] + w[1]) * 0.5)
-        .collect();
-    tries.extend(&offsets);
+    // The largest triangle represents those in about its plane, as in the complex: all of a long wall lies in its own plane, not
+    // in one that a larger wall elsewhere suggests.
+    let largest = faces.chunk_by(|a, b| b.0 - a.0 < step).filter_map(|sheet| {
+        let all = sheet.iter().rev();
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
+    });
+    let (offsets, sheets): (Vec<f64>, Vec<Plane>) = largest.map(|f| (f.0, f.2)).unzip();
+    let middles = (offsets.windows(2)).filter(|w| w[1] - w[0] > 2.0 * step);
+    let mut tries: Vec<Plane> = middles.map(|w| at_offset((w[0] + w[1]) * 0.5)).collect();
+    tries.extend(sheets);
     // A plane hardly off a wall's would leave a sliver of space between the two.
     let sweep = (-6..=6).map(|i| f64::from(i) * OFFSET / 6.0);
-    tries.extend(sweep.filter(|t| offsets.iter().all(|at| (at - t).abs() >= step)));
+    let sweep = sweep.filter(|t| offsets.iter().all(|at| (at - t).abs() >= step));
+    tries.extend(sweep.map(at_offset));
     tries
-        .iter()
-        .map(|&t| Plane::through(opening.center + normal * t, normal))
-        .collect()
 }
 
 /// The part of a plane that can be reached from the front without crossing a triangle.
@@ -243,7 +267,7 @@ fn free_section(
     [spacing, hole]: [f64; 2],
 ) -> FreeSection {
     let picture = Picture::around(plane, centers, MARGIN + spacing);
-    let blocked = picture.blocked(plane, around);
+    let blocked = picture.blocked(plane, around, rounding(hole));
     // Half a hole from each side, rounded to cells.
     let reach = (0.5 * hole / picture.step).round() as usize;
     let patches = picture.patches(&picture.grown(&blocked, reach), centers);
@@ -358,6 +382,44 @@ mod tests {
         for around in [[wall, small], [small, wall]] {
             let [walls, ..] = candidate_normals(&opening, &around);
             assert_eq!(walls, [DVec3::X]);
+        }
+    }
+
+    // A facade of one sheet, half a degree off the direction of the building.
+    #[test]
+    fn a_wall_bounds_a_long_window_in_its_own_plane() {
+        let lean = 0.5_f64.to_radians().tan();
+        let on = |y: f64, z: f64| DVec3::new(2.0 + lean * z, y, z);
+        let quad = |y: [f64; 2], z: [f64; 2]| -> Vec<Triangle> {
+            let [a, b] = [on(y[0], z[0]), on(y[0], z[1])];
+            let [c, d] = [on(y[1], z[1]), on(y[1], z[0])];
+            vec![[a, b, c], [a, c, d]]
+        };
+        let around = [
+            quad([0.0, 3.0], [0.0, 1.0]),
+            quad([0.0, 3.0], [7.0, 8.0]),
+            quad([0.0, 0.05], [1.0, 7.0]),
+            quad([2.9, 3.0], [1.0, 7.0]),
+            block(DVec3::new(-6.0, 3.0, 0.0), DVec3::new(2.0, 9.0, 8.0)),
+        ];
+        let walls = around.concat();
+        let centers: Vec<DVec3> = (0..60)
+            .flat_map(|j| {
+                (0..28).map(move |i| on(0.1 + 0.1 * f64::from(i), 1.05 + 0.1 * f64::from(j)))
+            })
+            .collect();
+        let opening = Opening {
+            plane: Plane::through(on(1.5, 4.0), DVec3::X),
+            center: on(1.5, 4.0),
+            area: 17.1,
+            closed: 0.0,
+        };
+        let bvh = Bvh::build(&walls);
+        let allowance = Allowance::default();
+        let found = fit_candidate(&centers, 0.1, &opening, &walls, &bvh, 0.01, &allowance);
+        for p in &found.points {
+            assert!((p.x - on(p.y, p.z).x).abs() < 1e-6, "{p}");
+            assert!((0.8..7.2).contains(&p.z), "{p}");
         }
     }
 

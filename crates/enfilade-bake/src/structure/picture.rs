@@ -13,9 +13,6 @@ const MAX_SIDE: usize = 320;
 /// Finest lattice spacing. [Units: wu]
 const FINEST: f64 = 0.02;
 
-/// Vertices so near to a plane lie in it: planes are fitted to surfaces whose vertices are rounded. [Units: wu]
-const IN_PLANE: f64 = 1e-3;
-
 /// A lattice of cells in a plane around an opening.
 #[derive(Clone, Copy)]
 pub(super) struct Picture {
@@ -61,11 +58,12 @@ impl Picture {
     }
 
     /// Returns the cells that triangles lie in, cross, or touch with an edge: a floor of sheets may end in the plane of a wall.
-    pub(super) fn blocked(&self, plane: &Plane, around: &[Triangle]) -> BitVolume {
+    /// Vertices nearer than `rounding` lie in the plane.
+    pub(super) fn blocked(&self, plane: &Plane, around: &[Triangle], rounding: f64) -> BitVolume {
         let mut blocked = BitVolume::new([self.side[0], self.side[1], 1]);
         for t in around {
             let d = t.map(|p| plane.signed_distance(p));
-            let d = d.map(|d| if d.abs() < IN_PLANE { 0.0 } else { d });
+            let d = d.map(|d| if d.abs() < rounding { 0.0 } else { d });
             if d == [0.0; 3] {
                 fill_triangle(&mut blocked, self.side, t.map(|p| self.place(p)));
             } else if let Some([p, q]) = crossing(t, d) {
@@ -269,7 +267,7 @@ mod tests {
                 let plane = Plane::through(DVec3::ZERO, DVec3::X);
                 let picture = Picture::around(&plane, &[a, b], 0.5);
                 assert!(
-                    picture.blocked(&plane, &[t]).count() >= 100,
+                    picture.blocked(&plane, &[t], 1e-5).count() >= 100,
                     "{side} {along}"
                 );
             }
