@@ -17,6 +17,7 @@ use enfilade_geom::scene::Mesh;
 use enfilade_geom::{Aabb, Allowance, Bvh, DMat4, DVec3, NearSeries, Rectangle, Triangle, shells};
 use rayon::prelude::*;
 
+use super::kinds::without_leaf;
 use parts::{Aperture, InShells, Leaf, Pose, Roles, roles};
 use swing::Around;
 
@@ -148,6 +149,11 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     }
     for portal in &mut world.graph.portals {
         portal.fittings.sort_by_key(|f| f.detail);
+        let mut fittings = portal.fittings.iter();
+        // Who opens a door moves its leaf.
+        if portal.kind == PortalKind::Door && !fittings.any(|f| f.part == FittingPart::Leaf) {
+            portal.kind = without_leaf(portal, walls);
+        }
     }
 }
 

@@ -3,10 +3,12 @@
 //! An object that says it is a door or a window is one. Where none does, an opening above a parapet is a window, and a filled
 //! one is a door if it is as high as one and somebody can step through.
 
-use enfilade_cpg::PortalKind;
+use enfilade_cpg::{Portal, PortalKind};
 use enfilade_geom::filler::{DEEPEST, LOWEST_DOOR};
 use enfilade_geom::scene::{Filling, Role};
-use enfilade_geom::{Aabb, DVec3, Ray, Rectangle, Triangle, is_rather_level, shells};
+use enfilade_geom::{
+    Aabb, Bvh, DVec3, Plane, Ray, Rectangle, Triangle, Winding, is_rather_level, shells,
+};
 use rayon::prelude::*;
 
 use super::Cut;
@@ -92,13 +94,7 @@ impl<'a> Judge<'a> {
             None => {}
         }
         if !is_filled {
-            return if p.width < SLIT {
-                PortalKind::Crack
-            } else if is_upright && self.sill(p) > PARAPET {
-                PortalKind::Window
-            } else {
-                PortalKind::Open
-            };
+            return unfilled(p.width, is_upright && self.sill(p) > PARAPET);
         }
         if is_upright && height(p) >= LOWEST_DOOR && self.is_stepped_through(p) {
             PortalKind::Door
@@ -156,30 +152,52 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Returns the height of an upright opening's lower edge over the ground half a meter away, on the higher side.
-    /// [Units: wu]
+    /// Returns the height of an upright opening's lower edge over the ground beside it, as [`sill`] does.
     fn sill(&self, p: &PartitionPortal) -> f64 {
-        let [a, b] = self.drops(p);
-        a.min(b)
+        let foot = p.outline.centroid().with_y(bottom(p));
+        sill(&self.cut.structure.bvh, p.plane.normal, foot)
     }
+}
 
-    /// Returns the heights of an upright opening's lower edge over the ground half a meter away, before and behind it;
-    /// infinite where there is none. [Units: wu]
-    fn drops(&self, p: &PartitionPortal) -> [f64; 2] {
-        let n = p.plane.normal;
-        let center = p.outline.centroid();
-        [1.0, -1.0].map(|side| {
-            let foot = DVec3::new(center.x, bottom(p) + 0.05, center.z)
-                + DVec3::new(n.x, 0.0, n.z).normalize_or_zero() * (0.5 * side);
-            let ray = Ray {
-                origin: foot,
-                direction: -DVec3::Y,
-                t_max: 100.0,
-            };
-            let hit = self.cut.structure.bvh.closest_hit(&ray, |_| false);
-            hit.map_or(f64::INFINITY, |h| h.t - 0.05)
-        })
+/// Returns the kind of an opening that nothing fills.
+fn unfilled(width: f64, has_parapet: bool) -> PortalKind {
+    if width < SLIT {
+        PortalKind::Crack
+    } else if has_parapet {
+        PortalKind::Window
+    } else {
+        PortalKind::Open
     }
+}
+
+/// Returns the kind of a portal that was taken for a door, but has no leaf.
+pub(super) fn without_leaf(p: &Portal, walls: &Bvh) -> PortalKind {
+    let corners = p.pieces.iter().flatten();
+    let corners: Vec<DVec3> = corners.map(|&c| DVec3::from(c.map(f64::from))).collect();
+    let normal = DVec3::from(p.normal.map(f64::from));
+    let Some(&first) = corners.first() else {
+        return p.kind;
+    };
+    let outline = Winding::hull_in_plane(&Plane::through(first, normal), &corners);
+    let low = corners.iter().map(|c| c.y).fold(f64::MAX, f64::min);
+    let foot = outline.centroid().with_y(low);
+    unfilled(f64::INFINITY, sill(walls, normal, foot) > PARAPET)
+}
+
+/// Returns the height of an upright opening's lower edge, with `foot` in its middle, over the ground half a meter before or behind
+/// it, on the higher side; infinite where there is none. [Units: wu]
+fn sill(walls: &Bvh, normal: DVec3, foot: DVec3) -> f64 {
+    let out = DVec3::new(normal.x, 0.0, normal.z).normalize_or_zero();
+    let drops = [0.5, -0.5].map(|side| {
+        let ray = Ray {
+            origin: foot + DVec3::Y * 0.05 + out * side,
+            direction: -DVec3::Y,
+            t_max: 100.0,
+        };
+        let hit = walls.closest_hit(&ray, |_| false);
+        hit.map_or(f64::INFINITY, |h| h.t - 0.05)
+    });
+    drops[0].min(drops[1])
 }
 
 fn is_upright(p: &PartitionPortal) -> bool {

@@ -214,15 +214,19 @@ pub(super) fn roles(opening: &Aperture, object: &InShells<'_>) -> Roles {
     roles
 }
 
-/// Returns the shells of an object near an opening. Reads triangles only if there are any.
+/// Returns the shells of an object near an opening: within it, or for a window without any, those that lie in its wall and reach
+/// beyond it, as one pane of two portals does. Reads triangles only if there are any.
 fn near_shells<'t>(opening: &Aperture, object: &InShells<'t>) -> Vec<Shell<'t>> {
-    let inside = opening.reach().expanded(OFF);
-    let is_near = |b: &Aabb| inside.contains(b.min) && inside.contains(b.max);
-    let mut near: BTreeMap<u32, Vec<&Triangle>> = (0..)
-        .zip(object.bounds)
-        .filter(|(_, bounds)| is_near(bounds))
-        .map(|(shell, _)| (shell, Vec::new()))
-        .collect();
+    let reach = opening.reach().expanded(OFF);
+    let chosen = |is_chosen: &dyn Fn(&Aabb) -> bool| -> BTreeMap<u32, Vec<&'t Triangle>> {
+        let shells = (0..).zip(object.bounds).filter(|(_, b)| is_chosen(b));
+        shells.map(|(shell, _)| (shell, Vec::new())).collect()
+    };
+    let mut near = chosen(&|b| reach.contains(b.min) && reach.contains(b.max));
+    let is_beyond = near.is_empty() && opening.kind == PortalKind::Window;
+    if is_beyond {
+        near = chosen(&|b| b.overlaps(&reach));
+    }
     if near.is_empty() {
         return Vec::new();
     }
@@ -230,6 +234,12 @@ fn near_shells<'t>(opening: &Aperture, object: &InShells<'t>) -> Vec<Shell<'t>> 
         if let Some(own) = near.get_mut(shell) {
             own.push(t);
         }
+    }
+    if is_beyond {
+        let around = &opening.around;
+        let depth = around.low.z - DEEPEST..=around.high.z + DEEPEST;
+        let is_in = |t: &&Triangle| t.iter().all(|p| depth.contains(&around.place(*p).z));
+        near.retain(|_, own| own.iter().all(is_in));
     }
     let near = near.into_iter();
     near.map(|(shell, triangles)| Shell::of(shell, triangles))
