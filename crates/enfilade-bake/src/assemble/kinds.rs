@@ -213,3 +213,36 @@ fn height(p: &PartitionPortal) -> f64 {
     let up = p.outline.points.iter().map(|q| q.y);
     up.fold(f64::MIN, f64::max) - bottom(p)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_cpg::CellId;
+
+    #[test]
+    fn what_was_taken_for_a_door_is_an_opening_or_above_a_parapet_a_window() {
+        let floor = |y: f64| {
+            let [a, b, c] =
+                [(-9.0, -9.0), (9.0, -9.0), (0.0, 9.0)].map(|(x, z)| DVec3::new(x, y, z));
+            Bvh::build(&[[a, b, c]])
+        };
+        let piece = [
+            [0.0, 0.0, 0.0],
+            [0.0, 2.0, 0.0],
+            [0.0, 2.0, 1.0],
+            [0.0, 0.0, 1.0],
+        ];
+        let door = Portal {
+            cells: [CellId(0), CellId(1)],
+            kind: PortalKind::Door,
+            normal: [1.0, 0.0, 0.0],
+            outline: piece.to_vec(),
+            pieces: vec![piece.to_vec()],
+            area: 2.0,
+            fittings: Vec::new(),
+            why: Vec::new(),
+        };
+        assert_eq!(without_leaf(&door, &floor(-0.39)), PortalKind::Open);
+        assert_eq!(without_leaf(&door, &floor(-0.41)), PortalKind::Window);
+    }
+}
