@@ -94,6 +94,16 @@ fn a_map_is_baked_by_partition_verified_simplified_and_edited() {
     };
     // Two rooms, and the space in the doorway.
     assert_eq!(cells(&world), [3, 2]);
+    let by_default = folder.path("default.glb");
+    assert!(
+        enfilade(&["bake", &input, "-o", &by_default])
+            .status
+            .success()
+    );
+    assert_eq!(cells(&by_default), [2, 1]);
+    let merged = enfilade(&["bake", &input, "-o", &by_default, "--min-cost", "50"]);
+    assert!(merged.status.success());
+    assert_eq!(cells(&by_default), [1, 0]);
     let simple = folder.path("simple.glb");
     let out = enfilade(&["simplify", &world, "-o", &simple, "--max-cells", "2"]);
     assert!(out.status.success(), "{}", text(&out.stderr));

@@ -105,7 +105,7 @@ pub(crate) struct BakeOptions {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, num_args = 0..=1, require_equals = true)]
     pub(super) leak_path: Option<Option<DVec3>>,
     /// Merge cells that cost less with neighbors; costs are in triangles if nothing else is set [default: 50 in
-    /// levels of brushes, 0 elsewhere].
+    /// levels of brushes, but across no doorway; 0 elsewhere].
     #[arg(long, value_name = "COST")]
     min_cost: Option<u32>,
     /// Cut cells that cost more, and merge none to more; cells that cannot be cut are reported.
