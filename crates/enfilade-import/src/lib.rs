@@ -30,6 +30,7 @@ mod foreign;
 mod gltf;
 mod ifc;
 mod las_head;
+mod left_out;
 mod map;
 mod marks;
 mod mesh;
@@ -53,7 +54,7 @@ mod textures;
 pub use arrays::{ArrayMesh, import_arrays};
 pub use enfilade_prepare::{
     BadOption, CleaningOptions, CleaningReport, Example, Finding, Glob, GlobState, RepairOptions,
-    RepairReport, RoleRules, ShellCounts, is_match, repair,
+    RepairReport, RoleRules, ShellCounts, TextureMatter, is_match, repair,
 };
 pub use error::ImportError;
 pub use export::export_glb;
@@ -61,7 +62,9 @@ pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
-pub use report::{FileReport, ImportReport, Note, SurfaceReport, UpDoubt, cleaning_report};
+pub use report::{
+    FileReport, ImportReport, LeftOut, Note, SurfaceReport, UpDoubt, cleaning_report,
+};
 
 use builder::Builder;
 pub use caught::is_panic_caught;

@@ -100,8 +100,10 @@ impl Settings {
                 structural: self.structural_names.clone(),
                 detail: self.detail_names.clone(),
                 is_automatic: self.auto_roles.unwrap_or(true),
+                textures: self.textures.clone(),
                 ..RoleRules::default()
             },
+            scene: self.scene.clone(),
             ignores_marks: !self.marks.unwrap_or(true),
             repair: self.repairs(),
             ..ImportOptions::default()
@@ -179,9 +181,9 @@ impl BspTable {
 mod tests {
     use super::*;
     use crate::parse_toml;
+    use enfilade_geom::ConvexSolid;
 
     fn of(text: &str) -> Result<Resolved, SettingsError> {
-    use enfilade_geom::ConvexSolid;
         parse_toml::<Settings>(text)?.resolve()
     }
 
@@ -204,8 +206,6 @@ mod tests {
         let cost = |text| of(text).unwrap().config_for(&scene).costs.min_cost;
         assert_eq!(cost(""), 0.0);
         assert_eq!(cost("[bsp]\nmin_cost = 30"), 30.0);
-    }
-
         let mut level = Scene::default();
         level.solids.push(ConvexSolid {
             planes: Vec::new(),
@@ -215,6 +215,8 @@ mod tests {
         let costs = |text: &str| of(text).unwrap().config_for(&level).costs;
         assert!(costs("").min_cost == 50.0 && costs("").doorway == Some(0.7));
         assert!(costs("[bsp]\nmin_cost = 50").doorway.is_none());
+    }
+
     #[test]
     fn a_plane_needs_a_normal() {
         let flat = of("[bsp]\nplanes = [[0, 0, 0, 0, 0, 0]]").err();

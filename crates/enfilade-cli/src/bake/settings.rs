@@ -38,6 +38,9 @@ pub(crate) struct SceneOptions {
     /// The input's up axis.
     #[arg(long, value_enum)]
     up: Option<Axis>,
+    /// The scene to read of a glTF file with several, by its name or its number from 0 [default: the file's default scene].
+    #[arg(long, value_name = "NAME|N")]
+    scene: Option<String>,
     /// Point of the scene that becomes the origin, in meters with y up.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
@@ -307,6 +310,7 @@ impl SceneOptions {
             Axis::Z => UpAxis::Z,
         });
         settings.up = up.or(settings.up);
+        settings.scene = self.scene.clone().or(settings.scene);
         settings.origin = self.origin.map(|p| p.to_array()).or(settings.origin);
         let on = |switch: Option<Switch>| switch.map(|s| s == Switch::On);
         settings.auto_roles = on(self.auto_roles).or(settings.auto_roles);
