@@ -220,46 +220,57 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
+    if bytes.is_empty() {
+        return Err(ImportError::malformed(
+            path,
+            "start",
+            "the file is empty; export it again",
+        ));
+    }
     // Unambiguous content first, then the name, then a guess.
-    Ok(if bytes.starts_with(b"glTF") {
-        Format::Gltf
-    } else if ply::is_ply(bytes) {
-        Format::Ply
-    } else if ending == "obj" {
-        Format::Obj
-    } else if ending == "map" {
-        Format::Map
-    } else if ending == "stl" {
-        Format::Stl
-    } else if ifc::is_ifc(bytes) {
-        Format::Ifc
-    } else if let Some(error) = foreign::unsupported(bytes, path) {
-        return Err(error);
-    } else if bytes.starts_with(b"ASTM-E57") {
-        Format::E57
-    } else if bytes.starts_with(b"LASF") {
-        Format::Las
-    } else if HeightMap::is_one(bytes) {
-        Format::Heights
-    } else if Volume::is_one(bytes) {
-        Format::Volume
-    } else if ImplicitScene::is_one(bytes) {
-        Format::Implicit
-    } else if FreeformScene::is_one(bytes) {
-        Format::Patches
-    } else if gltf::is_gltf(bytes) {
-        Format::Gltf
-    } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
-        Format::Stl
-    } else if map::is_map(bytes) {
-        Format::Map
-    } else if obj::is_obj(bytes) {
-        Format::Obj
-    } else {
-        return Err(ImportError::UnknownFormat {
-            path: path.to_path_buf(),
-        });
-    })
+    Ok(
+        if let Some(error) = foreign::unsupported_bytes(bytes, path) {
+            return Err(error);
+        } else if bytes.starts_with(b"glTF") {
+            Format::Gltf
+        } else if ply::is_ply(bytes) {
+            Format::Ply
+        } else if ending == "obj" {
+            Format::Obj
+        } else if ending == "map" {
+            Format::Map
+        } else if ending == "stl" {
+            Format::Stl
+        } else if ifc::is_ifc(bytes) {
+            Format::Ifc
+        } else if let Some(error) = foreign::unsupported(bytes, path) {
+            return Err(error);
+        } else if bytes.starts_with(b"ASTM-E57") {
+            Format::E57
+        } else if bytes.starts_with(b"LASF") {
+            Format::Las
+        } else if HeightMap::is_one(bytes) {
+            Format::Heights
+        } else if Volume::is_one(bytes) {
+            Format::Volume
+        } else if ImplicitScene::is_one(bytes) {
+            Format::Implicit
+        } else if FreeformScene::is_one(bytes) {
+            Format::Patches
+        } else if gltf::is_gltf(bytes) {
+            Format::Gltf
+        } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
+            Format::Stl
+        } else if map::is_map(bytes) {
+            Format::Map
+        } else if obj::is_obj(bytes) {
+            Format::Obj
+        } else {
+            return Err(ImportError::UnknownFormat {
+                path: path.to_path_buf(),
+            });
+        },
+    )
 }
 
 /// Reads a glTF or GLB file from memory. It may not refer to other files.
