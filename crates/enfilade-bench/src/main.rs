@@ -92,6 +92,8 @@ enum What {
     /// Rooms and doors as architects mean them: a row per figure, with the value that it must reach.
     /// Rows: first, more, scenes3 (each with rooms, doors, windows, extra, spare, cells, cracks), openings, levels, spoilt, verify.
     Rooms(rooms::Rooms),
+    /// Levels of games and small cases with known answers: a row per figure, with the value that it must reach.
+    Levels(Chosen),
     /// Decisions of a bake: numbers, code, answers to why, and how well the verdict knows which worlds are wrong. Rows: one labelling,
     /// numbers, code, why, verdict.
     Judge(Chosen),
@@ -263,6 +265,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
         What::Constructive(chosen) => return bench_rows(constructive::ROWS, args.json, chosen),
         What::LevelStep { step, scene } => return constructive::run_step(*step, scene),
         What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
+        What::Levels(chosen) => return rooms::bench_levels(chosen, args.json),
         What::Rooms(options) => return rooms::bench_rooms(options, args.json),
         What::Judge(chosen) => return judge::bench_judge(chosen, args.json),
         What::Facts { chosen, csv } => return judge::bench_facts(chosen, *csv),

@@ -6,6 +6,7 @@ mod doorless;
 pub(crate) mod found;
 mod gaps;
 mod leak_path;
+mod leaking;
 mod reasons;
 pub(crate) mod settings;
 
@@ -15,7 +16,6 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::bsp::find_leak;
 use enfilade::bake::delaunay::LEAST_BALL;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
@@ -132,7 +132,7 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     outputs.read(references)?;
     let said = found::doubts(report)?;
     found::report_import(scene, report, options.verbose)?;
-    refuse_leak(scene, config, options)?;
+    leaking::refuse_leak(args, scene, config)?;
     let mut leak_path = match options.leak_path {
         Some(from) => Some(leak_path::look_as_asked(
             scene,
@@ -207,37 +207,6 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     writeln!(out, "{written}")?;
     writeln!(out, "{verdict}")?;
     Ok(())
-}
-
-/// Ends the bake of a map whose inside is open to the void, and reports the way out.
-fn refuse_leak(
-    scene: &Scene,
-    config: &BakeConfig,
-    options: &settings::BakeOptions,
-) -> anyhow::Result<()> {
-    let n_faces = scene.solids.iter().map(|s| s.faces.len()).sum();
-    let allowance = config.budget.allowance(n_faces, Some(held_memory));
-    let leak = find_leak(scene, (&allowance).into());
-    // An exhausted allowance makes the search incomplete; the bake then ends with its own error at once.
-    let Some(leak) = leak.filter(|_| !allowance.is_over()) else {
-        return Ok(());
-    };
-    let lines: String = leak
-        .points
-        .iter()
-        .map(|p| format!("{} {} {}\n", p.x, p.y, p.z))
-        .collect();
-    let mut way = String::new();
-    if let Some(path) = &options.leak {
-        write_whole(path, lines.as_bytes())?;
-        way = format!("; the way is in {}", path.display());
-    }
-    let text = format!("{}{way}", leak.says(scene));
-    if options.allow_leak {
-        writeln!(Warned, "{text}")?;
-        return Ok(());
-    }
-    bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
 }
 
 /// Bakes on its own thread pool, with a progress line; reports the chosen method and the reason.

@@ -117,6 +117,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     };
     outputs.write("-o", format, &args.output)?;
     let settings = SimplifySettings {
+        doorway: None,
         min_cost: args.min_cost.unwrap_or(0.0),
         max_cost: args.max_cost,
         outdoors: args.split_outdoors,

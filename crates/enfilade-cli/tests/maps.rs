@@ -94,6 +94,16 @@ fn a_map_is_baked_by_partition_verified_simplified_and_edited() {
     };
     // Two rooms, and the space in the doorway.
     assert_eq!(cells(&world), [3, 2]);
+    let by_default = folder.path("default.glb");
+    assert!(
+        enfilade(&["bake", &input, "-o", &by_default])
+            .status
+            .success()
+    );
+    assert_eq!(cells(&by_default), [2, 1]);
+    let merged = enfilade(&["bake", &input, "-o", &by_default, "--min-cost", "50"]);
+    assert!(merged.status.success());
+    assert_eq!(cells(&by_default), [1, 0]);
     let simple = folder.path("simple.glb");
     let out = enfilade(&["simplify", &world, "-o", &simple, "--max-cells", "2"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
@@ -119,6 +129,35 @@ fn a_map_is_baked_by_partition_verified_simplified_and_edited() {
     let out = enfilade(&["edit", &world, "-o", &edited, "--delete-portal", "7"]);
     assert_eq!(out.status.code(), Some(1));
     assert!(text(&out.stderr).contains("no portal 7"));
+}
+
+#[test]
+fn walls_of_detail_are_named_with_the_option_that_closes_the_map() {
+    let folder = Folder::new("detail");
+    let (input, world) = (folder.path("detail.map"), folder.path("w.glb"));
+    let below = boxed([-16, -16, -64], [288, 144, -48]);
+    let classes = format!("\"worldspawn\"\n{below}}}\n{{\n\"classname\" \"func_geo\"\n");
+    std::fs::write(&input, map(-16).replacen("\"worldspawn\"\n", &classes, 1)).unwrap();
+    let bake = |more: &[&str]| enfilade(&[&["bake", &input, "-o", &world], more].concat());
+    let refused = text(&bake(&[]).stderr);
+    let option = "--structural-name 'func_geo *'";
+    assert!(
+        refused.contains("the map leaks") && refused.contains(option),
+        "{refused}"
+    );
+    let closed = bake(&["--structural-name", "func_geo *"]);
+    assert!(closed.status.success(), "{}", text(&closed.stderr));
+    let all = format!("\"worldspawn\"\n}}\n{{\n\"classname\" \"func_geo\"\n");
+    std::fs::write(&input, map(-16).replacen("\"worldspawn\"\n", &all, 1)).unwrap();
+    let refused = text(&bake(&[]).stderr);
+    assert!(
+        refused.contains("all brushes are detail") && refused.contains(option),
+        "{refused}"
+    );
+    // A gap that no class closes.
+    std::fs::write(&input, map(64)).unwrap();
+    let refused = text(&bake(&[]).stderr);
+    assert!(!refused.contains("--structural-name"), "{refused}");
 }
 
 #[test]

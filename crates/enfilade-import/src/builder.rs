@@ -3,6 +3,7 @@
 mod naming;
 mod variants;
 
+use crate::left_out::leave_out;
 use crate::order::sort;
 use crate::origins::Origins;
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
@@ -201,6 +202,7 @@ impl<'a> Builder<'a> {
             is_see_through: false,
             moves: None,
             is_detail_file: false,
+            is_plain: false,
         };
         self.charge_memory(name, n_triangles as u64, TRIANGLE_BYTES)?;
         self.scene.objects.push(Object {
@@ -434,6 +436,13 @@ impl<'a> Builder<'a> {
         let (verdict, filling, is_mixed) = self.judge(placement, mesh);
         let (role, reason) = match verdict {
             RoleVerdict::Ignore(reason) => {
+                let [own, of_mesh] = placement.names;
+                let name = if own.is_empty() { of_mesh } else { own };
+                self.report.leave_out(&reason, name, n_placed);
+                self.note(placement.place, format!("left out: {reason}"));
+                return Ok(());
+            }
+            RoleVerdict::Void(reason) => {
                 self.note(placement.place, format!("left out: {reason}"));
                 return Ok(());
             }
@@ -512,6 +521,7 @@ impl<'a> Builder<'a> {
             is_see_through: is_clear.iter().all(|&c| c),
             moves: placement.moves,
             is_detail_file: self.is_detail_file,
+            is_plain: drawn().map(|p| p.indices.len() / 3).sum::<usize>() <= BOX_TRIANGLES,
         };
         let verdict = self.options.roles.judge(&facts);
         (verdict, facts.filling(), is_mixed)
@@ -524,8 +534,11 @@ impl<'a> Builder<'a> {
             .is_some_and(|m| m.transparent || self.options.roles.is_clear_material(&m.name))
     }
 
-    /// Ends the import: drops unplaced meshes, sorts the scene, and joins vertices that quantization separated.
+    /// Ends the import: leaves out skies and copies, drops unplaced meshes, sorts the scene, and joins vertices that quantization separated.
     pub(crate) fn finish(mut self) -> (Scene, ImportReport) {
+        if !self.options.roles.is_manual {
+            leave_out(&mut self.scene, &mut self.report);
+        }
         let mut remap = vec![u32::MAX; self.scene.meshes.len()];
         let mut kept = Vec::new();
         for object in &mut self.scene.objects {
@@ -556,6 +569,8 @@ impl<'a> Builder<'a> {
 /// Largest ratio of unpacked to packed bytes that counts as read. Triangles of buildings take 18 bytes or more
 /// uncompressed, and one or two compressed.
 const MAX_UNPACKING: u64 = 16;
+/// Most triangles of a plain object.
+const BOX_TRIANGLES: usize = 12;
 /// Memory of an object without its texts.
 const OBJECT_BYTES: u64 = 2 * size_of::<Object>() as u64;
 /// Memory of a world-space triangle in the decomposition.

@@ -13,7 +13,7 @@ struct Foreign {
     advice: &'static str,
 }
 
-const FOREIGN: [Foreign; 9] = [
+const FOREIGN: [Foreign; 22] = [
     Foreign {
         name: "FBX",
         magic: &[b"Kaydara FBX Binary", b"; FBX"],
@@ -69,29 +69,116 @@ const FOREIGN: [Foreign; 9] = [
         endings: &["blend"],
         advice: "convert it: blender -b {in} --python-expr \"import bpy; bpy.ops.export_scene.gltf(filepath='{out}.glb')\"",
     },
+    Foreign {
+        name: "a level of Doom (WAD)",
+        magic: &[b"IWAD", b"PWAD"],
+        endings: &["wad"],
+        advice: "open the level in Ultimate Doom Builder, and File > Export > Wavefront .obj",
+    },
+    Foreign {
+        name: "textures of Quake or Half-Life (WAD)",
+        magic: &[b"WAD2", b"WAD3"],
+        endings: &[],
+        advice: "give the level, its .map",
+    },
+    Foreign {
+        name: "an archive of a game",
+        magic: &[b"PACK"],
+        endings: &["pk3", "pk4", "pak"],
+        advice: "unpack it, e.g. unzip {in}, and give a .map of its folder maps",
+    },
+    Foreign {
+        name: "a map of Source (VMF)",
+        magic: &[b"versioninfo"],
+        endings: &["vmf"],
+        advice: "open it in J.A.C.K. and save it as .map, or in Blender with the add-on Plumber and export it as glTF",
+    },
+    Foreign {
+        name: "a level of the Unreal Engine",
+        magic: &[b"\xC1\x83\x2A\x9E", b"Begin Map"],
+        endings: &["umap", "uasset", "t3d"],
+        advice: "in the Unreal Editor, with the plugin glTF Exporter: File > Export All, as .glb",
+    },
+    Foreign {
+        name: "a scene of Godot",
+        magic: &[b"[gd_scene"],
+        endings: &["tscn", "escn"],
+        advice: "in Godot: Scene > Export As > glTF 2.0 Scene",
+    },
+    Foreign {
+        name: "a scene of Unity",
+        magic: &[b"%YAML 1.1\n%TAG !u!", b"%YAML 1.1\r\n%TAG !u!"],
+        endings: &["unity", "prefab"],
+        advice: "in Unity, with the package glTFast: File > Export Scene > glTF-Binary (glb)",
+    },
+    Foreign {
+        name: "a build of Minecraft",
+        magic: &[],
+        endings: &["schem", "schematic", "litematic"],
+        advice: "export it as OBJ, e.g. with Mineways",
+    },
+    Foreign {
+        name: "a model of MagicaVoxel",
+        magic: &[b"VOX "],
+        endings: &["vox"],
+        advice: "in MagicaVoxel: Export > obj",
+    },
+    Foreign {
+        name: "a model of SketchUp",
+        magic: &[b"\xFF\xFE\xFF\x0E"],
+        endings: &["skp"],
+        advice: "in SketchUp: File > Export > 3D Model, as .glb",
+    },
+    Foreign {
+        name: "a model of Revit",
+        magic: &[],
+        endings: &["rvt", "rfa"],
+        advice: "in Revit: File > Export > IFC",
+    },
+    Foreign {
+        name: "a model of Rhino",
+        magic: &[b"3D Geometry File Format"],
+        endings: &["3dm"],
+        advice: "in Rhino: File > Export Selected, as .glb",
+    },
+    Foreign {
+        name: "an energy model (HBJSON)",
+        magic: &[],
+        endings: &["hbjson"],
+        advice: "export its geometry from the program that made it, as IFC or OBJ",
+    },
 ];
 
-/// Returns the error for a known format that is not supported.
+/// Returns the error for a known format that is not supported, by its first bytes alone, whatever it is called.
+pub(crate) fn unsupported_bytes(bytes: &[u8], path: &Path) -> Option<ImportError> {
+    FOREIGN.iter().find(|f| f.has(bytes)).map(|f| f.error(path))
+}
+
+/// Returns the error for a known format that is not supported. Its bytes take precedence over its name.
 pub(crate) fn unsupported(bytes: &[u8], path: &Path) -> Option<ImportError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let is_of = |f: &&Foreign| {
-        f.magic.iter().any(|m| bytes.starts_with(m))
-            || f.endings.iter().any(|e| ending.eq_ignore_ascii_case(e))
-    };
-    // Unambiguous bytes take precedence over the name.
-    let by_magic = |f: &&Foreign| f.magic.iter().any(|m| bytes.starts_with(m));
-    let found = FOREIGN.iter().find(by_magic);
-    let found = found.or_else(|| FOREIGN.iter().find(is_of))?;
-    let input = path.display().to_string();
-    let output = path.with_extension("").display().to_string();
-    Some(ImportError::Unsupported {
-        path: path.to_path_buf(),
-        feature: found.name.into(),
-        advice: found
-            .advice
-            .replace("{out}", &output)
-            .replace("{in}", &input),
-    })
+    let is_of = |f: &&Foreign| f.endings.iter().any(|e| ending.eq_ignore_ascii_case(e));
+    let by_name = || FOREIGN.iter().find(is_of).map(|f| f.error(path));
+    unsupported_bytes(bytes, path).or_else(by_name)
+}
+
+impl Foreign {
+    fn has(&self, bytes: &[u8]) -> bool {
+        self.magic.iter().any(|m| bytes.starts_with(m))
+    }
+
+    fn error(&self, path: &Path) -> ImportError {
+        let input = path.display().to_string();
+        let output = path.with_extension("").display().to_string();
+        ImportError::Unsupported {
+            path: path.to_path_buf(),
+            feature: self.name.into(),
+            advice: self
+                .advice
+                .replace("{out}", &output)
+                .replace("{in}", &input),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -126,6 +213,16 @@ mod tests {
             (b"\x1d\0\0\0", "a.bsp", "BSP", "bsputil --decompile a.bsp"),
             (b"AC1032", "a.dwg", "DWG", "STLOUT"),
             (b"BLENDER", "a.blend", "Blender", "blender -b a.blend"),
+            (b"PWAD\x01", "a.txt", "Doom", "Wavefront .obj"),
+            (b"WAD3", "a.wad", "Half-Life", ".map"),
+            (b"PK\x03\x04", "a.pk3", "archive", "unzip a.pk3"),
+            (b"versioninfo\n{", "a.txt", "VMF", ".map"),
+            (b"\xC1\x83\x2A\x9E", "a.umap", "Unreal", "glTF Exporter"),
+            (b"[gd_scene load_steps=2", "a.txt", "Godot", "Export As"),
+            (b"%YAML 1.1\n%TAG !u! tag", "a.txt", "Unity", "glTFast"),
+            (b"\x1f\x8b", "a.schem", "Minecraft", "Mineways"),
+            (b"VOX \x96", "a.bin", "MagicaVoxel", "Export > obj"),
+            (b"{", "a.hbjson", "HBJSON", "IFC or OBJ"),
         ] {
             let error = unsupported(bytes, Path::new(path)).unwrap().to_string();
             assert!(error.contains(name) && error.contains(command), "{error}");

@@ -30,6 +30,7 @@ mod foreign;
 mod gltf;
 mod ifc;
 mod las_head;
+mod left_out;
 mod map;
 mod marks;
 mod mesh;
@@ -53,7 +54,7 @@ mod textures;
 pub use arrays::{ArrayMesh, import_arrays};
 pub use enfilade_prepare::{
     BadOption, CleaningOptions, CleaningReport, Example, Finding, Glob, GlobState, RepairOptions,
-    RepairReport, RoleRules, ShellCounts, is_match, repair,
+    RepairReport, RoleRules, ShellCounts, TextureMatter, is_match, repair,
 };
 pub use error::ImportError;
 pub use export::export_glb;
@@ -61,7 +62,9 @@ pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
 pub use pvs_text::{PvsText, read_pvs_text, write_pvs_text};
-pub use report::{FileReport, ImportReport, Note, SurfaceReport, UpDoubt, cleaning_report};
+pub use report::{
+    FileReport, ImportReport, LeftOut, Note, SurfaceReport, UpDoubt, cleaning_report,
+};
 
 use builder::Builder;
 pub use caught::is_panic_caught;
@@ -217,46 +220,57 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
         .unwrap_or_default()
         .to_string_lossy()
         .to_ascii_lowercase();
+    if bytes.is_empty() {
+        return Err(ImportError::malformed(
+            path,
+            "start",
+            "the file is empty; export it again",
+        ));
+    }
     // Unambiguous content first, then the name, then a guess.
-    Ok(if bytes.starts_with(b"glTF") {
-        Format::Gltf
-    } else if ply::is_ply(bytes) {
-        Format::Ply
-    } else if ending == "obj" {
-        Format::Obj
-    } else if ending == "map" {
-        Format::Map
-    } else if ending == "stl" {
-        Format::Stl
-    } else if ifc::is_ifc(bytes) {
-        Format::Ifc
-    } else if let Some(error) = foreign::unsupported(bytes, path) {
-        return Err(error);
-    } else if bytes.starts_with(b"ASTM-E57") {
-        Format::E57
-    } else if bytes.starts_with(b"LASF") {
-        Format::Las
-    } else if HeightMap::is_one(bytes) {
-        Format::Heights
-    } else if Volume::is_one(bytes) {
-        Format::Volume
-    } else if ImplicitScene::is_one(bytes) {
-        Format::Implicit
-    } else if FreeformScene::is_one(bytes) {
-        Format::Patches
-    } else if gltf::is_gltf(bytes) {
-        Format::Gltf
-    } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
-        Format::Stl
-    } else if map::is_map(bytes) {
-        Format::Map
-    } else if obj::is_obj(bytes) {
-        Format::Obj
-    } else {
-        return Err(ImportError::UnknownFormat {
-            path: path.to_path_buf(),
-        });
-    })
+    Ok(
+        if let Some(error) = foreign::unsupported_bytes(bytes, path) {
+            return Err(error);
+        } else if bytes.starts_with(b"glTF") {
+            Format::Gltf
+        } else if ply::is_ply(bytes) {
+            Format::Ply
+        } else if ending == "obj" {
+            Format::Obj
+        } else if ending == "map" {
+            Format::Map
+        } else if ending == "stl" {
+            Format::Stl
+        } else if ifc::is_ifc(bytes) {
+            Format::Ifc
+        } else if let Some(error) = foreign::unsupported(bytes, path) {
+            return Err(error);
+        } else if bytes.starts_with(b"ASTM-E57") {
+            Format::E57
+        } else if bytes.starts_with(b"LASF") {
+            Format::Las
+        } else if HeightMap::is_one(bytes) {
+            Format::Heights
+        } else if Volume::is_one(bytes) {
+            Format::Volume
+        } else if ImplicitScene::is_one(bytes) {
+            Format::Implicit
+        } else if FreeformScene::is_one(bytes) {
+            Format::Patches
+        } else if gltf::is_gltf(bytes) {
+            Format::Gltf
+        } else if stl::is_stl(bytes) || stl::may_go_on(bytes, most) {
+            Format::Stl
+        } else if map::is_map(bytes) {
+            Format::Map
+        } else if obj::is_obj(bytes) {
+            Format::Obj
+        } else {
+            return Err(ImportError::UnknownFormat {
+                path: path.to_path_buf(),
+            });
+        },
+    )
 }
 
 /// Reads a glTF or GLB file from memory. It may not refer to other files.

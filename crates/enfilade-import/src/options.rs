@@ -56,6 +56,8 @@ pub struct ImportOptions {
     pub limits: Limits,
     /// Rules that decide between structure and detail.
     pub roles: RoleRules,
+    /// The scene to read of a glTF file with several, by its name, or else by its number from 0; `None` is the file's default.
+    pub scene: Option<String>,
     /// Allows references to files outside the scene's own folder, such as `../textures/wall.png`.
     ///
     /// Without it, a scene from elsewhere cannot bring a file of the reader's disk into the output.

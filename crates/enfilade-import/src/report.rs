@@ -18,6 +18,9 @@ pub struct ImportReport {
     pub files: Vec<FileReport>,
     /// Everything skipped, assumed or repaired; equal texts of one file are merged.
     pub notes: Vec<Note>,
+    /// Objects left out, by reason: helpers of engines, skies, coarser levels of detail. Those without matter by their format are
+    /// only notes.
+    pub left_out: Vec<LeftOut>,
     /// Notes left out because there were too many distinct ones.
     pub n_notes_dropped: u64,
     /// Vertices with a coordinate that is not finite; their triangles are dropped.
@@ -90,6 +93,39 @@ pub struct SurfaceReport {
     pub text: String,
 }
 
+/// Objects left out for one reason.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// The reason.
+    pub reason: String,
+    /// The first few distinct names; a mesh placed many times has one.
+    pub names: Vec<String>,
+    /// Number of objects.
+    pub n: u64,
+}
+
+/// Most names kept of objects left out for one reason, and most reasons.
+const MAX_LEFT_OUT: usize = 5;
+const MAX_REASONS: usize = 100;
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<String> = self.names.iter().map(|n| format!("'{n}'")).collect();
+        let more = if self.n as usize > names.len() {
+            ", …"
+        } else {
+            ""
+        };
+        let names = names.join(", ");
+        write!(
+            f,
+            "left out: {}{more}: {}",
+            shown(names),
+            shown(&self.reason)
+        )
+    }
+}
+
 /// One observation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
@@ -142,6 +178,26 @@ impl ImportReport {
             said.join("; and "),
             as_is.join(" ")
         ))
+    }
+
+    /// Counts `n` objects of one name that are left out.
+    pub(crate) fn leave_out(&mut self, reason: &str, name: &str, n: u64) {
+        let known = self.left_out.iter().position(|l| l.reason == reason);
+        if known.is_none() && self.left_out.len() == MAX_REASONS {
+            return;
+        }
+        let at = known.unwrap_or(self.left_out.len());
+        if known.is_none() {
+            self.left_out.push(LeftOut {
+                reason: reason.to_owned(),
+                ..LeftOut::default()
+            });
+        }
+        let own = &mut self.left_out[at];
+        own.n += n;
+        if own.names.len() < MAX_LEFT_OUT && !own.names.iter().any(|known| known == name) {
+            own.names.push(name.to_owned());
+        }
     }
 
     pub(crate) fn note(&mut self, path: &Path, place: impl Into<String>, text: impl Into<String>) {

@@ -358,3 +358,59 @@ fn a_hundred_thousand_brushes_are_read_in_linear_memory() {
     let scene = read(&map(&world, "")).scene;
     assert_eq!(scene.solids.len(), 100_000);
 }
+
+/// Returns the names of the objects of a wall and a brush with one texture on a side, others elsewhere.
+fn objects_beside_a_wall(texture: &str, others: &str) -> Vec<String> {
+    let brush = boxed([64, 0, 0], [96, 32, 32], others).replacen(others, texture, 1);
+    let wall = boxed([0, 0, 0], [32, 32, 32], "stone");
+    let scene = read(&map(&(wall + &brush), "")).scene;
+    let size = scene.solids.len();
+    let names = scene.objects.into_iter().map(|o| o.name);
+    names.chain([format!("{size} solids")]).collect()
+}
+
+#[test]
+fn tool_textures_are_walls_or_nothing_as_their_games_have_it() {
+    let alone = ["worldspawn 0", "1 solids"];
+    let walls = ["worldspawn 0", "2 solids"];
+    assert_eq!(
+        objects_beside_a_wall("textures/editor/visportal", "textures/common/nodraw"),
+        alone
+    );
+    assert_eq!(objects_beside_a_wall("trigger", "stone"), alone);
+    assert_eq!(objects_beside_a_wall("skip", "skip"), alone);
+    assert_eq!(objects_beside_a_wall("hint", "skip"), alone);
+    assert_eq!(objects_beside_a_wall("skip", "stone"), walls);
+    assert_eq!(objects_beside_a_wall("null", "null"), walls);
+    assert_eq!(objects_beside_a_wall("common/caulk", "common/caulk"), walls);
+}
+
+#[test]
+fn layers_omitted_from_export_are_left_out_with_their_groups() {
+    let entity = |keys: &str, at: i32| {
+        let brush = boxed([at, 0, 0], [at + 32, 32, 32], "stone");
+        format!("{{\n\"classname\" \"func_group\"\n{keys}{brush}}}\n")
+    };
+    let layer = |omit: &str| {
+        let keys = "\"_tb_type\" \"_tb_layer\"\n\"_tb_name\" \"Draft\"\n\"_tb_id\" \"3\"\n";
+        entity(&format!("{keys}{omit}"), 64)
+    };
+    let inner = entity(
+        "\"_tb_type\" \"_tb_group\"\n\"_tb_id\" \"5\"\n\"_tb_group\" \"4\"\n",
+        128,
+    );
+    let outer = entity(
+        "\"_tb_type\" \"_tb_group\"\n\"_tb_id\" \"4\"\n\"_tb_layer\" \"3\"\n",
+        192,
+    );
+    let of = |omit: &str| {
+        let others = format!("{inner}{outer}{}", layer(omit));
+        read(&map(&boxed([0, 0, 0], [32, 32, 32], "stone"), &others))
+    };
+    let omitted = of("\"_tb_layer_omit_from_export\" \"1\"\n");
+    assert_eq!(omitted.scene.solids.len(), 1);
+    assert_eq!(omitted.report.left_out[0].names, ["Draft"]);
+    let hidden = of("\"_tb_layer_hidden\" \"1\"\n");
+    assert_eq!(hidden.scene.solids.len(), 4);
+    assert_eq!(hidden.report.left_out, []);
+}

@@ -4,7 +4,8 @@
 
 use enfilade_geom::scene::Filling;
 
-use crate::roles::{RoleFacts, ends_in_opening_word, has_word, ifc_class, judge_words, words};
+use crate::roles::{RoleFacts, ends_in_opening_word, has_word, ifc_class, judge_words};
+use crate::words::words;
 
 /// Words for doors and for windows.
 const WORDS: [(Filling, &[&str]); 2] = [
@@ -70,6 +71,7 @@ mod tests {
             is_see_through: false,
             moves: None,
             is_detail_file: false,
+            is_plain: false,
         };
         facts.filling()
     }

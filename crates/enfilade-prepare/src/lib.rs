@@ -3,24 +3,31 @@
 
 mod auto_roles;
 mod clean;
+mod copies;
 mod crossing;
 mod error;
 mod filling;
 mod finding;
 mod glob;
+mod helpers;
 mod repair;
 mod roles;
 mod shells;
+mod sky;
 mod tjunction;
+mod tools;
 mod upward;
+mod words;
 
 pub use auto_roles::judge as judge_undecided;
 pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
+pub use copies::{collision_copies, lower_levels};
 pub use error::BadOption;
 pub use finding::{Example, Finding};
 pub use glob::{Glob, GlobState, is_match};
 pub use repair::{GridSteps, RepairOptions, RepairReport, repair, weld_quantized};
-pub use roles::{
-    RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal, words,
-};
+pub use roles::{RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal};
+pub use sky::skies;
+pub use tools::{TextureMatter, texture_matter};
 pub use upward::{Upward, judge_up};
+pub use words::words;

@@ -6,7 +6,11 @@
 
 use crate::auto_roles::DEFAULT;
 use crate::glob::is_match;
+use crate::helpers;
+use crate::tools::{TextureMatter, texture_matter};
+use crate::words::words;
 use enfilade_geom::scene::Role;
+use std::collections::BTreeMap;
 
 /// The user's own rules, which come before all others.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +24,8 @@ pub struct RoleRules {
     pub is_manual: bool,
     /// Decide by size and occlusion where no rule matches, unless `is_manual`.
     pub is_automatic: bool,
+    /// The matter of surfaces, by globs of their textures or materials, before the tables of games ([`texture_matter`]).
+    pub textures: BTreeMap<String, TextureMatter>,
 }
 
 impl Default for RoleRules {
@@ -29,6 +35,7 @@ impl Default for RoleRules {
             detail: Vec::new(),
             is_manual: false,
             is_automatic: true,
+            textures: BTreeMap::new(),
         }
     }
 }
@@ -47,6 +54,8 @@ pub struct RoleFacts<'n> {
     pub moves: Option<&'static str>,
     /// Its file was given as one of detail.
     pub is_detail_file: bool,
+    /// It has no more triangles than a box.
+    pub is_plain: bool,
 }
 
 /// The role of an object, or its removal.
@@ -56,6 +65,8 @@ pub enum RoleVerdict {
     Keep(Role, String),
     /// Left out, as a helper of some engine; with the reason.
     Ignore(String),
+    /// Left out, as its format gives it no matter; with the reason.
+    Void(String),
 }
 
 /// Meaning of a name's ending, after Godot's "Node type customization using name suffixes".
@@ -210,6 +221,18 @@ impl RoleRules {
         if let Some(verdict) = facts.names.iter().find_map(|name| judge_suffix(name)) {
             return verdict;
         }
+        let is_nothing = |m: &&str| {
+            let matter = texture_matter(&self.textures, m);
+            matter.is_some_and(TextureMatter::is_nothing)
+        };
+        if !facts.materials.is_empty() && facts.materials.iter().all(|m| is_nothing(&m)) {
+            let texture = facts.materials[0];
+            return RoleVerdict::Ignore(format!("nothing but the tool texture '{texture}'"));
+        }
+        let mut names = (facts.names.iter()).filter(|n| marked_portal(n).is_none());
+        if let Some(helper) = names.find_map(|name| helpers::of_name(name, facts.is_plain)) {
+            return RoleVerdict::Ignore(format!("{helper}, by its name"));
+        }
         if let Some(why) = facts.moves {
             return detail(format!("moves: {why}"));
         }
@@ -245,7 +268,7 @@ fn judge_ifc(name: &str) -> Option<RoleVerdict> {
     let class = ifc_class(name)?;
     let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
     Some(if starts(&IFC_VOID) {
-        RoleVerdict::Ignore(format!("{class} has no physical matter"))
+        RoleVerdict::Void(format!("{class} has no physical matter"))
     } else if starts(&IFC_DETAIL) {
         RoleVerdict::Keep(Role::Detail, format!("IFC class {class}"))
     } else {
@@ -343,28 +366,6 @@ pub(crate) fn has_word(list: &[&str], word: &str) -> bool {
             .is_some_and(|one| list.contains(&one))
 }
 
-/// Returns lower-case words, split at characters other than letters and between a small letter and a capital.
-#[must_use]
-pub fn words(name: &str) -> Vec<String> {
-    let mut words = Vec::new();
-    let mut word = String::new();
-    let mut was_lower = false;
-    for c in name.chars() {
-        let is_cut = !c.is_alphabetic() || (was_lower && c.is_uppercase());
-        if is_cut && !word.is_empty() {
-            words.push(std::mem::take(&mut word));
-        }
-        was_lower = c.is_lowercase();
-        if c.is_alphabetic() {
-            word.extend(c.to_lowercase());
-        }
-    }
-    if !word.is_empty() {
-        words.push(word);
-    }
-    words
-}
-
 /// Returns the first glob that matches the object's names, its groups' names or all of its materials.
 fn matching<'g>(globs: &'g [String], facts: &RoleFacts<'_>) -> Option<&'g str> {
     globs.iter().map(String::as_str).find(|glob| {
@@ -401,6 +402,7 @@ mod tests {
             is_see_through: false,
             moves: None,
             is_detail_file: false,
+            is_plain: false,
         };
         change(&mut facts);
         rules.judge(&facts)
@@ -419,7 +421,7 @@ mod tests {
     fn role(name: &str) -> Option<Role> {
         match judge(name) {
             RoleVerdict::Keep(role, _) => Some(role),
-            RoleVerdict::Ignore(_) => None,
+            RoleVerdict::Ignore(_) | RoleVerdict::Void(_) => None,
         }
     }
 
@@ -493,6 +495,29 @@ mod tests {
     }
 
     #[test]
+    fn helper_volumes_and_tool_textures_are_left_out_unless_a_rule_keeps_them() {
+        let portal =
+            |is_plain: bool| judge_with(&RoleRules::default(), "Portal", |f| f.is_plain = is_plain);
+        assert!(matches!(portal(true), RoleVerdict::Ignore(_)));
+        assert!(matches!(portal(false), RoleVerdict::Keep(..)));
+        let skip = judge_with(&RoleRules::default(), "x", |f| {
+            f.materials = &["skip", "clip"]
+        });
+        assert!(matches!(skip, RoleVerdict::Ignore(_)));
+        let wall = judge_with(&RoleRules::default(), "x", |f| f.materials = &["skip", "a"]);
+        assert!(matches!(wall, RoleVerdict::Keep(Role::Structural, _)));
+        let rules = RoleRules {
+            structural: vec!["Trigger*".into()],
+            textures: BTreeMap::from([("skip".to_owned(), TextureMatter::Wall)]),
+            ..RoleRules::default()
+        };
+        let kept = judge_with(&rules, "TriggerVolume", |_| {});
+        assert!(matches!(kept, RoleVerdict::Keep(Role::Structural, _)));
+        let skip = judge_with(&rules, "x", |f| f.materials = &["skip"]);
+        assert!(matches!(skip, RoleVerdict::Keep(..)));
+    }
+
+    #[test]
     fn the_first_rule_that_fits_decides() {
         let rules = RoleRules {
             structural: vec!["*keep*".into()],
@@ -502,7 +527,7 @@ mod tests {
         };
         let reason = |verdict| match verdict {
             RoleVerdict::Keep(role, reason) => (role, reason),
-            RoleVerdict::Ignore(reason) => panic!("{reason}"),
+            RoleVerdict::Ignore(reason) | RoleVerdict::Void(reason) => panic!("{reason}"),
         };
         let of = |name: &str| reason(judge_with(&rules, name, |_| {})).0;
         assert_eq!(of("wall KEEP"), Role::Structural);

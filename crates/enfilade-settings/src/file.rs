@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::values::{amount, amounts, hole, length, named_points, unit, voxels, weld};
+use enfilade_import::TextureMatter;
+
+use crate::values::{amount, amounts, hole, length, matters, named_points, unit, voxels, weld};
 
 /// Settings by their names in the settings file, `docs/settings.md`. Options of a command overwrite its fields.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -30,6 +32,8 @@ pub struct Settings {
     pub unit: Option<f64>,
     /// The input's up axis.
     pub up: Option<UpAxis>,
+    /// The scene to read of a file with several, by name or number.
+    pub scene: Option<String>,
     /// Point of the scene that becomes the origin. [Units: wu]
     pub origin: Option<[f64; 3]>,
     /// `true` if small free-standing objects are detail.
@@ -46,6 +50,9 @@ pub struct Settings {
     pub detail_names: Vec<String>,
     /// Patterns of names of structure.
     pub structural_names: Vec<String>,
+    /// Matter of surfaces, by patterns of their textures or materials.
+    #[serde(deserialize_with = "matters")]
+    pub textures: BTreeMap<String, TextureMatter>,
     /// The table `[merge]`.
     pub merge: MergeTable,
     /// The table `[bsp]`.
@@ -175,6 +182,8 @@ mod tests {
         of_line("unit = \"feet\"", 1, "ft");
         of_line("up = \"x\"", 1, "up");
         of_line("origin = [1, 2]", 1, "origin");
+        of_line("[textures]\nnull = \"stone\"", 2, "portal");
+        of_line("scene = 1", 1, "scene");
         of_line("[names]\nHall = [1, 2]", 2, "three numbers");
         of_line("[names]\nHall = [1, 2, inf]", 2, "finite");
         of_line("[names]\nHall = \"1,2,3\"", 2, "three numbers");
@@ -192,7 +201,7 @@ mod tests {
             let problem = problem.unwrap().to_string();
             let (_, known) = problem.split_once("expected one of").unwrap();
             for key in known.split('`').skip(1).step_by(2) {
-                let is_table = ["merge", "bsp", "names"].contains(&key);
+                let is_table = ["merge", "bsp", "names", "textures"].contains(&key);
                 let name = if is_table {
                     format!("`[{key}]`")
                 } else {
@@ -202,7 +211,7 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 41);
+        assert_eq!(n, 43);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: Settings = parse_toml(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));

@@ -25,14 +25,17 @@ pub struct Resolved {
 
 impl Resolved {
     /// Returns the settings for a scene. A room of a building has few triangles, and the shape of its openings shows
-    /// that it is a room: by default, small cells are merged only in a partition of brushes.
+    /// that it is a room: by default, small cells are merged only in a partition of brushes, and no rooms.
     #[must_use]
     pub fn config_for(&self, scene: &Scene) -> BakeConfig {
         let mut config = self.config.clone();
         let is_of_brushes =
             !scene.solids.is_empty() && config.method.is_none_or(|m| m == Method::Bsp);
-        if self.merges_brushes_only && !is_of_brushes {
-            config.costs.min_cost = 0.0;
+        if self.merges_brushes_only {
+            config.costs.doorway = is_of_brushes.then_some(config.merge.threshold);
+            if !is_of_brushes {
+                config.costs.min_cost = 0.0;
+            }
         }
         config
     }
@@ -97,8 +100,10 @@ impl Settings {
                 structural: self.structural_names.clone(),
                 detail: self.detail_names.clone(),
                 is_automatic: self.auto_roles.unwrap_or(true),
+                textures: self.textures.clone(),
                 ..RoleRules::default()
             },
+            scene: self.scene.clone(),
             ignores_marks: !self.marks.unwrap_or(true),
             repair: self.repairs(),
             ..ImportOptions::default()
@@ -176,6 +181,7 @@ impl BspTable {
 mod tests {
     use super::*;
     use crate::parse_toml;
+    use enfilade_geom::ConvexSolid;
 
     fn of(text: &str) -> Result<Resolved, SettingsError> {
         parse_toml::<Settings>(text)?.resolve()
@@ -200,6 +206,15 @@ mod tests {
         let cost = |text| of(text).unwrap().config_for(&scene).costs.min_cost;
         assert_eq!(cost(""), 0.0);
         assert_eq!(cost("[bsp]\nmin_cost = 30"), 30.0);
+        let mut level = Scene::default();
+        level.solids.push(ConvexSolid {
+            planes: Vec::new(),
+            faces: Vec::new(),
+            sources: Vec::new(),
+        });
+        let costs = |text: &str| of(text).unwrap().config_for(&level).costs;
+        assert!(costs("").min_cost == 50.0 && costs("").doorway == Some(0.7));
+        assert!(costs("[bsp]\nmin_cost = 50").doorway.is_none());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use enfilade_geom::DVec3;
+use enfilade_import::TextureMatter;
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error, SeqAccess, Visitor};
 
 use crate::SettingsError;
@@ -190,6 +191,23 @@ pub(crate) fn voxels<'de, D: Deserializer<'de>>(from: D) -> Result<Option<usize>
             ))
         }
     })
+}
+
+/// Reads what textures are made of, with serde.
+pub(crate) fn matters<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<BTreeMap<String, TextureMatter>, D::Error> {
+    /// Read by itself, so that an error has its line.
+    struct SettingsMatter(TextureMatter);
+    impl<'de> Deserialize<'de> for SettingsMatter {
+        fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+            let name = String::deserialize(from)?;
+            let matter = TextureMatter::of_name(&name).map_err(D::Error::custom)?;
+            Ok(Self(matter))
+        }
+    }
+    let read = BTreeMap::<String, SettingsMatter>::deserialize(from)?.into_iter();
+    Ok(read.map(|(glob, SettingsMatter(m))| (glob, m)).collect())
 }
 
 /// Reads points by name, with serde. [Units: wu]

@@ -100,7 +100,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
 }
 
 /// Adds a cell to another of its group, all but its lists and counts.
-fn absorb(cell: &mut Cell, from: &Cell) {
+pub(super) fn absorb(cell: &mut Cell, from: &Cell) {
     for k in 0..3 {
         cell.aabb[0][k] = cell.aabb[0][k].min(from.aabb[0][k]);
         cell.aabb[1][k] = cell.aabb[1][k].max(from.aabb[1][k]);

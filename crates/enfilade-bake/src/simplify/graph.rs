@@ -90,6 +90,7 @@ pub fn simplify_graph(
         pairs: pairs.clone(),
         aloof: vec![false; n],
         alone: Vec::new(),
+        doorways: None,
     };
     let into = merge(whole, &bounds, &mut Openness(areas));
     let mut cell_of = vec![0; n];

@@ -6,6 +6,8 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
+use super::doorways::Doorways;
+
 /// A graph as the simplifier sees it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CostGraph {
@@ -19,6 +21,8 @@ pub(super) struct CostGraph {
     pub(super) aloof: Vec<bool>,
     /// Cells that merge with none, ascending: one of their doorways shows something else than the cell behind it.
     pub(super) alone: Vec<u32>,
+    /// Doorways that the lower bound of costs may not take; `None` to let it take all.
+    pub(super) doorways: Option<Doorways>,
 }
 
 /// Limits that the result should meet.
@@ -102,6 +106,7 @@ impl CostGraph {
             aloof,
             // They keep their numbers.
             alone: self.alone.clone(),
+            doorways: None,
         }
     }
 
@@ -157,7 +162,7 @@ pub(super) fn merge(graph: CostGraph, bounds: &Bounds, badness: &mut dyn Badness
                 } else {
                     usize::MAX
                 };
-                let worst = merger.worst(cell, most, badness);
+                let worst = merger.worst(cell, most, is_small, badness);
                 if worst.is_none() && is_for_portals {
                     waiting.push(cell);
                 }
@@ -242,11 +247,21 @@ impl<'a> Merger<'a> {
             })
     }
 
-    /// Returns the neighbor with the worst portals, among merges that remove at most `most` portals.
-    fn worst(&self, cell: u32, most: usize, badness: &mut dyn Badness) -> Option<u32> {
+    /// Returns the neighbor with the worst portals, among merges that remove at most `most` portals, and no doorway if these
+    /// are kept from merges of small cells.
+    fn worst(
+        &self,
+        cell: u32,
+        most: usize,
+        is_small: bool,
+        badness: &mut dyn Badness,
+    ) -> Option<u32> {
         let aloof = &self.graph.aloof;
+        let kept = self.graph.doorways.as_ref().filter(|_| is_small);
+        let is_kept = |other| kept.is_some_and(|d| d.part(cell, other));
         let mut best: Option<((bool, f64), u32)> = None;
-        for (other, _) in self.partners(cell).filter(|p| p.1 <= most) {
+        let partners = self.partners(cell);
+        for (other, _) in partners.filter(|p| p.1 <= most && !is_kept(p.0)) {
             let is_room = !aloof[cell as usize] && !aloof[other as usize];
             let is_first = is_room || !self.prefers_rooms;
             let key = (is_first, badness.of(&self.graph, cell, other));
@@ -271,6 +286,9 @@ impl<'a> Merger<'a> {
 
     fn join(&mut self, kept: u32, gone: u32) {
         self.into[gone as usize] = kept;
+        if let Some(doorways) = &mut self.graph.doorways {
+            doorways.merged(kept, gone);
+        }
         self.graph.items[kept as usize] = self.graph.union(kept, gone);
         self.graph.items[gone as usize] = Vec::new();
         self.graph.aloof[kept as usize] |= self.graph.aloof[gone as usize];
@@ -376,6 +394,7 @@ pub(super) mod tests {
                     pairs,
                     aloof,
                     alone: Vec::new(),
+                    doorways: None,
                 })
         })
     }
@@ -405,6 +424,7 @@ pub(super) mod tests {
             pairs: pairs.collect(),
             aloof: vec![false; 7],
             alone: Vec::new(),
+            doorways: None,
         };
         let scores = |[a, b]: [u32; 2]| ([a, b], if a == 0 { 9.0 } else { 1.0 });
         let n_left = |max_portals| {

@@ -10,6 +10,7 @@
 
 mod apply;
 mod cost;
+mod doorways;
 mod graph;
 mod judge;
 mod merge;

@@ -3,6 +3,7 @@
 use enfilade_cpg::{CellId, PortalId, World};
 
 use super::cost::{CostModel, cost_graph};
+use super::doorways::Doorways;
 use super::merge::{self, Bounds};
 use super::settings::{Metric, SimplifySettings};
 use super::{apply, metric, views};
@@ -27,7 +28,8 @@ const EYES: usize = 512;
 /// Deterministic for any number of threads. Time: the metric's rays, about 100,000, and the merges.
 #[must_use]
 pub fn simplify(world: &World, settings: &SimplifySettings) -> Simplified {
-    let graph = cost_graph(world, &settings.cost);
+    let mut graph = cost_graph(world, &settings.cost);
+    graph.doorways = settings.doorway.map(|d| Doorways::of(&world.graph, d));
     let bounds = Bounds {
         min_cost: settings.min_cost,
         max_cost: settings.max_cost.unwrap_or(f64::INFINITY),

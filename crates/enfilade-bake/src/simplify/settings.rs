@@ -20,6 +20,9 @@ pub struct SimplifySettings {
     /// Merges cheaper cells with neighbors, where that keeps the upper bound. An item that reaches through
     /// several cells counts in each in part: no portal between them hides it.
     pub min_cost: f64,
+    /// No merge for `min_cost` takes an opening between two rooms that is below this share of the space beside it. A default sets
+    /// this, for costs bound what is asked for. [Limit: 0 to 1]
+    pub doorway: Option<f64>,
     /// No merge makes a cell that costs more; [`keep_bounds`](crate::bound::keep_bounds) cuts cells that do.
     pub max_cost: Option<f64>,
     /// Cuts the outdoors, too, if it costs more.
@@ -60,6 +63,9 @@ impl SimplifySettings {
         ]
         .map(|(k, v)| (k.to_owned(), v))
         .into();
+        if let Some(share) = self.doorway {
+            out.insert("simplify.doorway".to_owned(), share.to_string());
+        }
         if self.outdoors {
             out.insert("simplify.outdoors".to_owned(), "true".to_owned());
         }

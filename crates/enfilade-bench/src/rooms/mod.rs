@@ -1,5 +1,5 @@
 //! `bench rooms`: rooms, doors and openings as architects mean them, clean and spoilt, on buildings and levels; each figure with its
-//! bar.
+//! bar. `bench levels`: those of levels of games alone.
 
 mod bars;
 mod hole;
@@ -24,6 +24,13 @@ pub(crate) struct Rooms {
     /// Do not bake again what an earlier run of the same build has baked.
     #[arg(long)]
     keep: bool,
+}
+
+/// Measures the rows of levels alone, each baked anew; an error if a bar is missed.
+pub(crate) fn bench_levels(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> {
+    let mut out = RowPrinter::new(is_json);
+    levels::run(&mut Worlds::new(chosen, false)?, &mut out)?;
+    out.finish()
 }
 
 /// Measures the rows; an error if a bar is missed.

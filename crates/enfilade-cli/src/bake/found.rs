@@ -38,6 +38,9 @@ pub(crate) fn report_import(
             )?;
         }
     }
+    for left_out in &report.left_out {
+        writeln!(err, "{left_out}")?;
+    }
     if verbose {
         write_lines(&mut err, report)?;
         write_lines(&mut err, &roles(scene))?;

@@ -38,6 +38,9 @@ pub(crate) struct SceneOptions {
     /// The input's up axis.
     #[arg(long, value_enum)]
     up: Option<Axis>,
+    /// The scene to read of a glTF file with several, by its name or its number from 0 [default: the file's default scene].
+    #[arg(long, value_name = "NAME|N")]
+    scene: Option<String>,
     /// Point of the scene that becomes the origin, in meters with y up.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
@@ -105,7 +108,7 @@ pub(crate) struct BakeOptions {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, num_args = 0..=1, require_equals = true)]
     pub(super) leak_path: Option<Option<DVec3>>,
     /// Merge cells that cost less with neighbors; costs are in triangles if nothing else is set [default: 50 in
-    /// levels of brushes, 0 elsewhere].
+    /// levels of brushes, but across no doorway; 0 elsewhere].
     #[arg(long, value_name = "COST")]
     min_cost: Option<u32>,
     /// Cut cells that cost more, and merge none to more; cells that cannot be cut are reported.
@@ -307,6 +310,7 @@ impl SceneOptions {
             Axis::Z => UpAxis::Z,
         });
         settings.up = up.or(settings.up);
+        settings.scene = self.scene.clone().or(settings.scene);
         settings.origin = self.origin.map(|p| p.to_array()).or(settings.origin);
         let on = |switch: Option<Switch>| switch.map(|s| s == Switch::On);
         settings.auto_roles = on(self.auto_roles).or(settings.auto_roles);

@@ -118,6 +118,7 @@ pub(super) struct Skin {
 
 #[derive(serde::Deserialize)]
 pub(super) struct SceneDef {
+    pub(super) name: Option<Box<str>>,
     #[serde(default)]
     pub(super) nodes: List<usize>,
     pub(super) extras: Option<Box<RawValue>>,

@@ -341,21 +341,49 @@ impl GltfReader<'_, '_, '_> {
     /// Returns the root nodes of the scene.
     fn starts(&mut self, parents: &[u32]) -> Result<Vec<usize>, ImportError> {
         let root = &self.document.root;
-        if root.scenes.is_empty() {
+        let wanted = self.builder.options.scene.as_deref();
+        if root.scenes.is_empty() && wanted.is_none() {
             let tops = (0..parents.len()).filter(|&i| parents[i] == u32::MAX);
             return Ok(tops.collect());
         }
-        let index = root.scene.unwrap_or(0);
-        let Some(scene) = root.scenes.get(index) else {
-            return Err(self.builder.malformed("scene", format!("no scene {index}")));
+        let named = |wanted: &str| {
+            let mut scenes = root.scenes.iter();
+            let by_name = scenes.position(|s| s.name.as_deref() == Some(wanted));
+            by_name.or_else(|| wanted.parse().ok())
         };
-        if root.scenes.len() > 1 {
+        let index = wanted.map_or_else(|| Some(root.scene.unwrap_or(0)), named);
+        let Some((index, scene)) = index.and_then(|i| Some((i, root.scenes.get(i)?))) else {
+            let problem = match wanted {
+                None => format!("no scene {}", root.scene.unwrap_or(0)),
+                Some(wanted) => format!("no scene '{wanted}'; it has {}", self.scene_names()),
+            };
+            return Err(self.builder.malformed("scene", problem));
+        };
+        if root.scenes.len() > 1 && wanted.is_none() {
+            let all = self.scene_names();
             self.builder.note(
                 format!("scene {index}"),
-                "several scenes; only the default one is read",
+                format!("several scenes, of which only the default one is read: {all}; --scene NAME or --scene N reads another"),
             );
         }
         Ok(scene.nodes.to_vec())
+    }
+
+    /// Returns the first few scenes by number and name, for messages.
+    fn scene_names(&self) -> String {
+        const TOLD: usize = 10;
+        let scenes = self.document.root.scenes.iter();
+        let told = scenes.enumerate().map(|(i, scene)| match &scene.name {
+            Some(name) => format!("{i} '{name}'"),
+            None => i.to_string(),
+        });
+        let mut told: Vec<String> = told.take(TOLD + 1).collect();
+        if told.len() > TOLD {
+            told[TOLD] = "…".to_owned();
+        } else if told.is_empty() {
+            return "none".to_owned();
+        }
+        told.join(", ")
     }
 
     /// Marks the node as visited; an error at a cycle, and at too great a depth.

@@ -5,12 +5,13 @@
 //! inwards, or that leave a way to infinity) is an error with line and column. World and `func_group` brushes are
 //! structural. Detail are `func_detail*` and all other brush entities, brushes with the detail flag of Quake 2 and 3,
 //! and patches, which close nothing for their compilers either. Sky is structural even as detail; liquids are
-//! see-through detail; triggers, clips and hints are left out, and so are structural faces that other structural
-//! brushes hide altogether.
+//! see-through detail; what has no matter by its texture ([`texture_matter`]) or its class is left out, and so are structural
+//! faces that other structural brushes hide altogether.
 //!
 //! A unit is 1/32 m by default: a player of 56 units is 1.75 m tall, and coordinates stay exact. Up is z. Texture
 //! sizes are in WAD files, which are not read, so maps have no texture coordinates.
 
+mod layers;
 mod order;
 mod parse;
 mod patch;
@@ -20,6 +21,7 @@ use std::collections::BTreeMap;
 use enfilade_geom::scene::{Entity, Material, Mesh, Primitive, Role};
 use enfilade_geom::solid::exposed_faces;
 use enfilade_geom::{ConvexSolid, DMat3, DMat4, DVec3, Plane, SolidError};
+use enfilade_prepare::{TextureMatter, texture_matter};
 use serde_json::json;
 
 use crate::builder::Builder;
@@ -57,10 +59,22 @@ enum Kind {
     Nothing,
 }
 
+/// Beginnings of classes of brush entities that have no matter: they act on players, or mark openings and areas for compilers.
+const NOTHING: [&str; 8] = [
+    "trigger_",
+    "info_",
+    "func_areaportal",
+    "func_occluder",
+    "func_viscluster",
+    "func_clip_",
+    "func_buyzone",
+    "func_bomb_target",
+];
+
 fn kind_of_class(class: &str) -> Kind {
     match class {
         "worldspawn" | "func_group" => Kind::Structural,
-        _ if class.starts_with("trigger_") || class.starts_with("info_") => Kind::Nothing,
+        _ if NOTHING.iter().any(|start| class.starts_with(start)) => Kind::Nothing,
         _ => Kind::Detail,
     }
 }
@@ -76,35 +90,25 @@ enum BrushMatter {
     Tool,
 }
 
-fn matter_of(brush: &Brush<'_>) -> BrushMatter {
-    // All names that end in "clip" count, too: Quake 3 has them for players, monsters, weapons.
-    const TOOLS: [&str; 8] = [
-        "hint",
-        "hintskip",
-        "trigger",
-        "origin",
-        "areaportal",
-        "clusterportal",
-        "donotenter",
-        "lightgrid",
-    ];
-    let is = |s: &str| TOOLS.iter().any(|t| s.eq_ignore_ascii_case(t));
-    fn name(texture: &str) -> &str {
-        texture.rsplit('/').next().unwrap_or(texture)
-    }
-    let is_tool = |t: &str| is(t) || t.to_ascii_lowercase().ends_with("clip");
-    if brush.sides.iter().any(|s| is_tool(name(s.texture))) {
-        BrushMatter::Tool
-    } else if brush
-        .sides
-        .iter()
-        .any(|s| name(s.texture).starts_with(['*', '!', '#']) || s.texture.starts_with("liquids/"))
+fn matter_of(brush: &Brush<'_>, own: &BTreeMap<String, TextureMatter>) -> BrushMatter {
+    let matters: Vec<Option<TextureMatter>> = (brush.sides.iter())
+        .map(|side| texture_matter(own, side.texture))
+        .collect();
+    let has = |wanted: TextureMatter| matters.contains(&Some(wanted));
+    let is_nothing = |m: &Option<TextureMatter>| m.is_some_and(TextureMatter::is_nothing);
+    if [
+        TextureMatter::Air,
+        TextureMatter::Portal,
+        TextureMatter::Hint,
+    ]
+    .map(has)
+    .contains(&true)
+        || !matters.is_empty() && matters.iter().all(is_nothing)
     {
+        BrushMatter::Tool
+    } else if has(TextureMatter::Water) {
         BrushMatter::Liquid
-    } else if brush.sides.iter().any(|s| {
-        let head = name(s.texture).get(..3);
-        head.is_some_and(|h| h.eq_ignore_ascii_case("sky"))
-    }) {
+    } else if has(TextureMatter::Sky) {
         BrushMatter::Sky
     } else {
         BrushMatter::Solid
@@ -140,6 +144,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     let failed =
         |builder: &Builder<'_>, p: parse::Problem| builder.malformed(p.place.to_string(), p.text);
     let mut entities = parse::parse(&text).map_err(|p| failed(builder, p))?;
+    layers::leave_out_omitted(&mut entities, builder);
     order::sort(&mut entities);
     if !entities
         .iter()
@@ -164,7 +169,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
             continue;
         }
         for brush in &entity.brushes {
-            let matter = matter_of(brush);
+            let matter = matter_of(brush, &builder.options.roles.textures);
             if matter == BrushMatter::Tool {
                 continue;
             }
