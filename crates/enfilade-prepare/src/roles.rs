@@ -225,7 +225,7 @@ impl RoleRules {
             let matter = texture_matter(&self.textures, m);
             matter.is_some_and(TextureMatter::is_nothing)
         };
-        if !facts.materials.is_empty() && facts.materials.iter().all(|m| is_nothing(&m)) {
+        if !facts.materials.is_empty() && facts.materials.iter().all(is_nothing) {
             let texture = facts.materials[0];
             return RoleVerdict::Ignore(format!("nothing but the tool texture '{texture}'"));
         }
