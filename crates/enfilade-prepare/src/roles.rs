@@ -225,7 +225,7 @@ impl RoleRules {
             let matter = texture_matter(&self.textures, m);
             matter.is_some_and(TextureMatter::is_nothing)
         };
-        if !facts.materials.is_empty() && facts.materials.iter().all(|m| is_nothing(&m)) {
+        if !facts.materials.is_empty() && facts.materials.iter().all(is_nothing) {
             let texture = facts.materials[0];
             return RoleVerdict::Ignore(format!("nothing but the tool texture '{texture}'"));
         }
@@ -496,15 +496,20 @@ mod tests {
 
     #[test]
     fn helper_volumes_and_tool_textures_are_left_out_unless_a_rule_keeps_them() {
-        let portal =
-            |is_plain: bool| judge_with(&RoleRules::default(), "Portal", |f| f.is_plain = is_plain);
+        let portal = |is_plain: bool| {
+            judge_with(&RoleRules::default(), "Portal", |f| {
+                f.is_plain = is_plain;
+            })
+        };
         assert!(matches!(portal(true), RoleVerdict::Ignore(_)));
         assert!(matches!(portal(false), RoleVerdict::Keep(..)));
         let skip = judge_with(&RoleRules::default(), "x", |f| {
-            f.materials = &["skip", "clip"]
+            f.materials = &["skip", "clip"];
         });
         assert!(matches!(skip, RoleVerdict::Ignore(_)));
-        let wall = judge_with(&RoleRules::default(), "x", |f| f.materials = &["skip", "a"]);
+        let wall = judge_with(&RoleRules::default(), "x", |f| {
+            f.materials = &["skip", "a"];
+        });
         assert!(matches!(wall, RoleVerdict::Keep(Role::Structural, _)));
         let rules = RoleRules {
             structural: vec!["Trigger*".into()],
@@ -513,7 +518,9 @@ mod tests {
         };
         let kept = judge_with(&rules, "TriggerVolume", |_| {});
         assert!(matches!(kept, RoleVerdict::Keep(Role::Structural, _)));
-        let skip = judge_with(&rules, "x", |f| f.materials = &["skip"]);
+        let skip = judge_with(&rules, "x", |f| {
+            f.materials = &["skip"];
+        });
         assert!(matches!(skip, RoleVerdict::Keep(..)));
     }
 
