@@ -147,7 +147,7 @@ fn walls_of_detail_are_named_with_the_option_that_closes_the_map() {
     );
     let closed = bake(&["--structural-name", "func_geo *"]);
     assert!(closed.status.success(), "{}", text(&closed.stderr));
-    let all = format!("\"worldspawn\"\n}}\n{{\n\"classname\" \"func_geo\"\n");
+    let all = String::from("\"worldspawn\"\n}\n{\n\"classname\" \"func_geo\"\n");
     std::fs::write(&input, map(-16).replacen("\"worldspawn\"\n", &all, 1)).unwrap();
     let refused = text(&bake(&[]).stderr);
     assert!(
