@@ -150,7 +150,7 @@ pub(super) fn fit(world: &mut World, walls: &Bvh, allowance: &Allowance) {
     for portal in &mut world.graph.portals {
         portal.fittings.sort_by_key(|f| f.detail);
         let mut fittings = portal.fittings.iter();
-        // Who opens a door moves its leaf.
+        // A door that one opens has a leaf that moves.
         if portal.kind == PortalKind::Door && !fittings.any(|f| f.part == FittingPart::Leaf) {
             portal.kind = without_leaf(portal, walls);
         }
