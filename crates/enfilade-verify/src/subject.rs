@@ -335,26 +335,10 @@ impl<'a> Subject<'a> {
         self.edge_clearance(a, b, 2.0 * self.eps) < 2.0 * self.eps || self.runs_along_portal(a, b)
     }
 
-    /// Returns `true` if the segment lies in the plane of a portal that it touches, or ends on one, within `2 eps`: rounding
-    /// decides on which side of the portal its points are.
+    /// Returns `true` if the segment lies in the plane of a portal that it touches, within `2 eps`: rounding decides on
+    /// which side of the portal each of its points is.
     fn runs_along_portal(&self, a: DVec3, b: DVec3) -> bool {
         let reach = 2.0 * self.eps;
-        let is_on = |p: DVec3| {
-            let met = self
-                .portal_bvh
-                .for_each_around_segment(p, p, reach, |_, t| {
-                    let near = |plane: Plane| plane.signed_distance(p).abs() <= reach;
-                    if Plane::of_triangle(t).is_some_and(near) {
-                        ControlFlow::Break(())
-                    } else {
-                        ControlFlow::Continue(())
-                    }
-                });
-            met.is_break()
-        };
-        if is_on(a) || is_on(b) {
-            return true;
-        }
         let along = self
             .portal_bvh
             .for_each_around_segment(a, b, reach, |_, t| {
