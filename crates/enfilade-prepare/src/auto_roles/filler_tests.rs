@@ -111,6 +111,35 @@ fn sheets_fill_holes_in_the_plane_of_one_sheet() {
     assert_eq!(filled(&pieces, 3.0), [""; 0]);
 }
 
+// A floor of sheets with a carpet in it, a room above and one below.
+#[test]
+fn a_sheet_that_lies_in_a_sheet_is_no_pane() {
+    let mut b = shell();
+    b.blocks(
+        "storey",
+        &[
+            ([0.0, 1.3, 0.0], [2.0, 1.3, 6.0]),
+            ([2.0, 1.3, 0.0], [5.0, 1.3, 2.0]),
+            ([2.0, 1.3, 4.0], [5.0, 1.3, 6.0]),
+            ([5.0, 1.3, 0.0], [6.0, 1.3, 6.0]),
+        ],
+    )
+    .block("carpet", [2.0, 1.3, 2.0], [5.0, 1.3, 4.0]);
+    assert_eq!(b.details(), [""; 0]);
+}
+
+// Beside the thick wall that holds it, a thick leaf may meet sheets, as pieces of kits open at their ends are.
+#[test]
+fn a_sheet_beside_a_thick_leaf_does_not_make_its_wall_thin() {
+    let mut b = shell();
+    b.block("jamb", [0.0, 0.0, 3.0], [1.0, 2.6, 3.24])
+        .block("jamb", [2.0, 0.0, 3.0], [6.0, 2.6, 3.24])
+        .block("lintel", [1.0, 2.1, 3.0], [2.0, 2.6, 3.24])
+        .block("leaf", [1.0, 0.0, 3.11], [2.0, 2.1, 3.15])
+        .block("sheet", [0.0, -0.15, 3.13], [6.0, 0.0, 3.13]);
+    assert_eq!(b.details(), ["leaf"]);
+}
+
 // Pieces of a kit: `wall_doorway`, and below it `wall_doorway_door`.
 #[test]
 fn of_what_is_named_as_a_wall_and_a_door_the_shape_tells() {

@@ -288,13 +288,15 @@ fn matter(crossings: &[Crossing], but: u32) -> Vec<Matter> {
     found
 }
 
-/// Returns the matter of other units through a point that overlaps the unit's depth; for a sheet, the sheets in its plane, too.
+/// Returns the matter of other units through a point that overlaps the unit's depth; for a sheet that stands, the sheets in its
+/// plane, too. One that lies is rather a floor of its own material than a skylight.
 fn matter_across(unit: &Unit, index: u32, p: DVec3, around: &Surroundings<'_>) -> Vec<Hold> {
     let half = unit.half.x;
     let met = crossings(unit, p, around);
+    let stands = !is_rather_level(unit.axes[0]);
     let alone = met.chunk_by(|a, b| a.unit == b.unit).filter(|own| {
         let is_other = own[0].unit != index && own.len() == 1;
-        is_other && own[0].is_facing && half.max(own[0].at.abs()) <= SHEET
+        is_other && stands && own[0].is_facing && half.max(own[0].at.abs()) <= SHEET
     });
     let sheets = alone.map(|own| Hold {
         unit: own[0].unit,
