@@ -168,3 +168,33 @@ fn a_slit_is_a_gap_and_no_window() {
         );
     }
 }
+
+/// Two halls of 10 × 8 m and 4 m height with a doorway 4 m wide and nearly as high as they are, through a wall of 1.4 m, and a gate in it as
+/// thick as `gate`. The widest ball in a hall passes the doorway, so that only the gate parts them.
+#[test]
+fn a_gate_as_thick_as_a_wall_is_one_door() {
+    for (gate, n_doors) in [(0.3, 1), (1.0, 1), (1.3, 0)] {
+        let mut scene = Scene::default();
+        let walls = [
+            ([-0.2, -0.2, -8.2], [10.2, 0.0, 9.6]),
+            ([-0.2, 4.0, -8.2], [10.2, 4.2, 9.6]),
+            ([-0.2, 0.0, -8.2], [10.2, 4.0, -8.0]),
+            ([-0.2, 0.0, 9.4], [10.2, 4.0, 9.6]),
+            ([-0.2, 0.0, -8.0], [0.0, 4.0, 9.4]),
+            ([10.0, 0.0, -8.0], [10.2, 4.0, 9.4]),
+            ([0.0, 0.0, 0.0], [3.0, 4.0, 1.4]),
+            ([7.0, 0.0, 0.0], [10.0, 4.0, 1.4]),
+            ([3.0, 3.9, 0.0], [7.0, 4.0, 1.4]),
+        ];
+        add_boxes(&mut scene, Role::Structural, None, &walls);
+        let leaf = ([3.0, 0.0, 0.7 - gate / 2.0], [7.0, 3.9, 0.7 + gate / 2.0]);
+        add_boxes(&mut scene, Role::Detail, Some(Filling::Door), &[leaf]);
+        let world = baked(&scene, None);
+        let doors = world.graph.portals.iter();
+        let doors = doors.filter(|p| p.kind == PortalKind::Door).count();
+        assert_eq!(doors, n_doors, "{gate} m");
+        if n_doors == 1 {
+            assert_eq!(world.graph.indoor_cells().count(), 2, "{gate} m");
+        }
+    }
+}

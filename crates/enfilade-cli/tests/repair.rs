@@ -51,3 +51,36 @@ fn a_bake_repairs_on_request_and_says_what_it_changed() {
     let done = enfilade(&["bake", "--repair=5", &obj, "-o", &better]);
     assert_eq!(done.status.code(), Some(2));
 }
+
+#[test]
+fn a_missing_triangle_is_put_back_and_told_unless_refused() {
+    let (obj, out) = (place("gap.obj"), place("gap.glb"));
+    let whole = ROOM.replace("0.0005", "0").replace("5.0005", "5");
+    fs::write(
+        &obj,
+        whole.replace("f 4 3 1\n", "").replace("f 1 4 3\n", ""),
+    )
+    .unwrap();
+    let text = |p: &Path| p.to_str().unwrap().to_owned();
+    let (obj, out) = (text(&obj), text(&out));
+    for (switch, is_told) in [(None, true), (Some("off"), false)] {
+        let switch = switch.map(|s| ["--put-back", s]);
+        let put_back = switch.as_ref().map_or(&[][..], |s| &s[..]);
+        let done = enfilade(&[&["bake", &obj, "-o", &out], put_back].concat());
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(
+            said.contains("missing triangles put back: 1"),
+            is_told,
+            "{said}"
+        );
+        assert_eq!(
+            said.contains("triangles are missing in 1"),
+            !is_told,
+            "{said}"
+        );
+        if is_told {
+            let verified = enfilade(&["verify", &out, "--source", &obj, "--rays", "20000"]);
+            assert!(verified.status.success(), "{verified:?}");
+        }
+    }
+}

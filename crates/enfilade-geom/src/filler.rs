@@ -8,6 +8,9 @@ use crate::{DVec3, Mask, Rectangle, is_rather_level};
 /// Greatest depth of a filler with its frame and handles, and its greatest distance from the plane of an opening in a wall.
 /// Higher, and cupboards shut openings; a door with its frame and handles has about 0.3. [Units: wu]
 pub const DEEPEST: f64 = 0.4;
+/// Greatest depth of an upright thing as high as a door that may be a leaf, ÷ its lesser side: gates of levels are 0.5 to 1 m thick and up to
+/// 4 m wide. Higher, and wardrobes between walls shut rooms.
+pub const STOUTEST: f64 = 0.3;
 /// Least edge of a leaf or pane. Higher, and one of two narrow leaves is lost; lower, and boards fill openings. [Units: wu]
 pub const NARROWEST: f64 = 0.35;
 /// Least height of a door. Higher, and hatches and the doors of cellars are windows; lower, and windows are doors.
@@ -42,6 +45,12 @@ pub struct FillerFacts {
     pub covered: f64,
 }
 
+/// Returns the greatest depth of a leaf as wide and high as this, with its frame and handles. [Units: wu]
+#[must_use]
+pub fn deepest_leaf(size: DVec3) -> f64 {
+    DEEPEST.max(STOUTEST * size.x.min(size.y))
+}
+
 /// Kind of a thing by its shape alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filler {
@@ -72,13 +81,19 @@ impl FillerFacts {
     #[must_use]
     pub fn judge(&self) -> Filler {
         let [width, height, depth] = self.size.to_array();
-        if depth > DEEPEST {
+        let is_high = self.is_upright && height >= LOWEST_DOOR;
+        let deepest = if is_high {
+            deepest_leaf(self.size)
+        } else {
+            DEEPEST
+        };
+        if depth > deepest {
             Filler::Deep
         } else if width.min(height) < NARROWEST {
             Filler::Narrow
         } else if self.covered < FILLED {
             Filler::Ring
-        } else if self.is_upright && height >= LOWEST_DOOR {
+        } else if is_high {
             Filler::Leaf
         } else {
             Filler::Pane
@@ -176,6 +191,10 @@ mod tests {
             (FillerFacts { is_upright, ..leaf }, Filler::Pane),
             (sized(0.9, 2.0, 0.39), Filler::Leaf),
             (sized(0.9, 2.0, 0.41), Filler::Deep),
+            (sized(4.0, 2.0, 0.59), Filler::Leaf),
+            (sized(4.0, 2.0, 0.61), Filler::Deep),
+            (sized(1.6, 4.0, 0.49), Filler::Deep),
+            (sized(4.0, 1.45, 0.42), Filler::Deep),
             (sized(0.36, 2.0, 0.05), Filler::Leaf),
             (sized(0.34, 2.0, 0.05), Filler::Narrow),
             (sized(0.9, 0.34, 0.05), Filler::Narrow),

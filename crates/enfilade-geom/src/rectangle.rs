@@ -120,8 +120,8 @@ impl Rectangle {
         points.fold(Aabb::EMPTY, |b, p| b.including(self.place(*p)))
     }
 
-    /// Returns points along its rim in the middle of its depth, `n` on each side.
-    pub fn rim(&self, n: usize) -> impl Iterator<Item = DVec3> + '_ {
+    /// Returns its vertices in the middle of its depth, in order around it.
+    fn vertices(&self) -> [DVec3; 4] {
         let (low, high) = (self.low, self.high);
         let vertices = [
             (low.x, low.y),
@@ -129,7 +129,19 @@ impl Rectangle {
             (high.x, high.y),
             (low.x, high.y),
         ];
-        let vertices = vertices.map(|(x, y)| self.point(DVec3::new(x, y, 0.5 * (low.z + high.z))));
+        vertices.map(|(x, y)| self.point(DVec3::new(x, y, 0.5 * (low.z + high.z))))
+    }
+
+    /// Returns the two triangles that are the rectangle in the middle of its depth.
+    #[must_use]
+    pub fn middle(&self) -> [Triangle; 2] {
+        let [a, b, c, d] = self.vertices();
+        [[a, b, c], [a, c, d]]
+    }
+
+    /// Returns points along its rim in the middle of its depth, `n` on each side.
+    pub fn rim(&self, n: usize) -> impl Iterator<Item = DVec3> + '_ {
+        let vertices = self.vertices();
         (0..4 * n).map(move |i| {
             let along = ((i % n) as f64 + 0.5) / n as f64;
             vertices[i / n].lerp(vertices[(i / n + 1) % 4], along)

@@ -405,6 +405,9 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     if options.roles.is_automatic && !options.roles.is_manual {
         enfilade_prepare::judge_undecided(&mut scene);
     }
+    if !options.leaves_missing {
+        report.put_back = enfilade_prepare::put_back(&mut scene);
+    }
     if let Some(wanted) = &options.repair {
         report.repair = Some(repair(&mut scene, wanted)?);
     }

@@ -75,6 +75,8 @@ pub struct ImportOptions {
     pub patch_tolerance: Option<f64>,
     /// Places of the scanner, for clouds of points that do not tell them; in meters, +Y up. [Units: wu]
     pub stations: Vec<DVec3>,
+    /// Leaves out the triangles that [`put_back`](enfilade_prepare::put_back) finds missing.
+    pub leaves_missing: bool,
     /// Repairs of structural triangles; `None` repairs nothing.
     pub repair: Option<RepairOptions>,
     /// Time and memory, shared with whoever goes on with the scene; `None` limits neither, so that work out of proportion to a source

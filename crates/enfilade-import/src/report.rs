@@ -45,6 +45,8 @@ pub struct ImportReport {
     /// The reason why the axis taken for up probably is not, and the remedy; `None` without evidence, and if the options
     /// give an axis.
     pub up_doubt: Option<UpDoubt>,
+    /// Places where a single missing triangle was put back, the largest first.
+    pub put_back: Finding,
     /// Changes of the repair, if one was requested.
     pub repair: Option<RepairReport>,
 }

@@ -9,9 +9,10 @@ use common::{box_primitive, scene_of, world};
 use enfilade_geom::scene::{Object, Primitive, Role, Scene};
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Plane, Triangle};
 use enfilade_import::{
-    BadOption, CleaningOptions, ImportOptions, RepairOptions, RepairReport, cleaning_report,
-    decode_obj, export_glb, repair,
+    BadOption, CleaningOptions, Finding, ImportOptions, RepairOptions, RepairReport,
+    cleaning_report, decode_obj, export_glb, repair,
 };
+use enfilade_prepare::put_back;
 use enfilade_testkit::oracle::{n_open_edges, object_triangles, signed_volume};
 use enfilade_testkit::{Disturbance, Fault, Rng, disturb, furnished_house};
 use proptest::prelude::*;
@@ -264,6 +265,42 @@ fn rims_of_sheets_and_large_openings_are_no_holes() {
     assert_eq!((report.filled_holes, report.filling_triangles), (1, 2));
     assert_eq!(n_open_edges(&world(&out)), 0);
     assert!((signed_volume(&world(&out)) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn single_missing_triangles_are_put_back_and_told() {
+    let whole = box_primitive([1.0, 1.0, 4.0]);
+    let n_whole = world(&alone(whole.clone())).len();
+    for missing in [0, 5, 11] {
+        let mut torn = whole.clone();
+        torn.indices.drain(3 * missing..3 * missing + 3);
+        let mut scene = alone(torn);
+        let found = put_back(&mut scene);
+        assert_eq!((found.n, found.examples.len()), (1, 1), "{missing}");
+        assert_eq!(world(&scene).len(), n_whole);
+        assert_eq!(n_open_edges(&world(&scene)), 0);
+        assert_eq!(put_back(&mut scene), Finding::default());
+    }
+}
+
+#[test]
+fn openings_of_four_corners_rims_and_steep_caps_are_not_put_back() {
+    // A box without a face, a sheet of one triangle, and a tetrahedron without its base: its faces stand too steep to go on into it.
+    let mut open = box_primitive([1.0; 3]);
+    open.indices.drain(18..24);
+    let mut sheet = box_primitive([1.0; 3]);
+    sheet.indices.truncate(3);
+    let tent = Primitive {
+        positions: vec![[0.; 3], [1., 0., 0.], [0.5, 0., 0.8], [0.5, 1.0, 0.3]],
+        indices: vec![0, 3, 1, 1, 3, 2, 2, 3, 0],
+        ..Primitive::default()
+    };
+    for primitive in [open, sheet, tent] {
+        let mut scene = alone(primitive);
+        let before = world(&scene);
+        assert_eq!(put_back(&mut scene), Finding::default());
+        assert_eq!(world(&scene), before);
+    }
 }
 
 #[test]

@@ -40,6 +40,8 @@ pub struct Settings {
     pub auto_roles: Option<bool>,
     /// `true` if objects called `mirror` or `portal:NAME` become mirrors and links.
     pub marks: Option<bool>,
+    /// `true` if triangles that are missing one by one are put back.
+    pub put_back: Option<bool>,
     /// Distance within which a repair welds vertices. [Units: wu]
     #[serde(deserialize_with = "weld")]
     pub repair: Option<f64>,
@@ -211,7 +213,7 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 43);
+        assert_eq!(n, 44);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: Settings = parse_toml(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));

@@ -105,6 +105,7 @@ impl Settings {
             },
             scene: self.scene.clone(),
             ignores_marks: !self.marks.unwrap_or(true),
+            leaves_missing: !self.put_back.unwrap_or(true),
             repair: self.repairs(),
             ..ImportOptions::default()
         }

@@ -4,7 +4,7 @@
 //! one is a door if it is as high as one and somebody can step through.
 
 use enfilade_cpg::{Portal, PortalKind};
-use enfilade_geom::filler::{DEEPEST, LOWEST_DOOR};
+use enfilade_geom::filler::{LOWEST_DOOR, deepest_leaf};
 use enfilade_geom::scene::{Filling, Role};
 use enfilade_geom::{
     Aabb, Bvh, DVec3, Plane, Ray, Rectangle, Triangle, Winding, is_rather_level, shells,
@@ -118,8 +118,9 @@ impl<'a> Judge<'a> {
         }
         let corners: Vec<DVec3> = p.pieces.iter().flat_map(|w| w.points.clone()).collect();
         let opening = Rectangle::around(p.plane.normal, &corners);
-        let reach = Aabb::of_points(&corners).expanded(DEEPEST + REBATE);
-        let out = DVec3::new(REBATE, REBATE, DEEPEST);
+        let deepest = deepest_leaf(opening.size());
+        let reach = Aabb::of_points(&corners).expanded(deepest + REBATE);
+        let out = DVec3::new(REBATE, REBATE, deepest);
         let limits = Aabb::new(opening.low - out, opening.high + out);
         let is_in = |b: &Aabb| limits.contains(b.min) && limits.contains(b.max);
         let near: Vec<&NamedShell> = (self.named.iter())

@@ -23,6 +23,7 @@ const MOST: f64 = 0.5;
 
 /// A detail object flat enough to close an opening, or the leaf in one that reaches farther.
 pub(crate) struct Plate {
+    /// Its triangles, or the rectangle in the middle of a gate so thick that its inside would be a room.
     pub(crate) triangles: Vec<Triangle>,
     pub(crate) aabb: Aabb,
     /// Along its own faces.
@@ -38,10 +39,15 @@ impl Plate {
         let around = Rectangle::around(facing(&triangles), triangles.as_flattened());
         let facts = FillerFacts::of(&around, &around.mask(triangles.iter().copied()));
         let shape = facts.judge();
+        let is_stout = around.size().z > DEEPEST;
         (!matches!(shape, Filler::Deep | Filler::Narrow)).then(|| Self {
             aabb: Aabb::of_points(triangles.as_flattened()),
             is_leaf: shape == Filler::Leaf,
-            triangles,
+            triangles: if is_stout {
+                around.middle().to_vec()
+            } else {
+                triangles
+            },
             around,
         })
     }
@@ -56,7 +62,11 @@ pub(crate) fn plates(scene: &Scene) -> Vec<Plate> {
     let plates = objects.filter_map(|own| {
         let own: Vec<Triangle> = own.iter().map(|&s| scene.world_triangle(s)).collect();
         let leaf = leaf_among(&own);
-        Plate::of(own).or(leaf)
+        let whole = Plate::of(own);
+        match leaf {
+            Some(leaf) if whole.as_ref().is_none_or(|w| w.around.size().z > DEEPEST) => Some(leaf),
+            _ => whole,
+        }
     });
     plates.collect()
 }
@@ -161,6 +171,17 @@ mod tests {
         assert!(is_flat(box_triangles(DVec3::new(0.9, 2.0, 0.04))));
         assert!(!is_flat(box_triangles(DVec3::new(0.9, 2.0, 0.6))));
         assert!(!is_flat(box_triangles(DVec3::new(0.05, 2.0, 0.04))));
+    }
+
+    #[test]
+    fn a_thick_gate_is_the_rectangle_in_its_middle() {
+        let gate = Plate::of(box_triangles(DVec3::new(4.0, 3.9, 1.0))).unwrap();
+        assert!(gate.is_leaf);
+        let middle = gate.triangles.as_flattened();
+        assert!(middle.iter().all(|p| (p.z - 0.5).abs() < 1e-9));
+        assert_eq!(gate.aabb.size(), DVec3::new(4.0, 3.9, 1.0));
+        let door = Plate::of(box_triangles(DVec3::new(4.0, 3.9, 0.3))).unwrap();
+        assert_eq!(door.triangles.len(), 12);
     }
 
     #[test]

@@ -45,6 +45,15 @@ pub(crate) fn report_import(
         write_lines(&mut err, report)?;
         write_lines(&mut err, &roles(scene))?;
     }
+    if let Some(hole) = report.put_back.examples.first() {
+        writeln!(
+            err,
+            "missing triangles put back: {}, the largest at {} in '{}' (--put-back off leaves them out)",
+            report.put_back.n,
+            At(hole.position.to_array()),
+            shown(&hole.name)
+        )?;
+    }
     let title = if let Some(repair) = &report.repair {
         writeln!(
             err,
@@ -53,7 +62,10 @@ pub(crate) fn report_import(
         write_lines(&mut err, repair)?;
         "remaining faults of the model"
     } else {
-        "the model as found (nothing was changed)"
+        match report.put_back.n {
+            0 => "the model as found (nothing was changed)",
+            _ => "remaining faults of the model",
+        }
     };
     let cleaning = cleaning_report(scene, Some(report), &CleaningOptions::default())?;
     if cleaning.findings().iter().any(|(_, f)| f.n > 0) {

@@ -71,6 +71,9 @@ pub(crate) struct SceneOptions {
     /// first of these that is installed].
     #[arg(long, value_name = "PATH")]
     ifc_convert: Option<PathBuf>,
+    /// Put back triangles that are missing one by one [default: on].
+    #[arg(long, value_enum)]
+    put_back: Option<Switch>,
     /// Repair structural triangles: weld vertices along open edges within METERS (0.001 if not given), split
     /// T-junctions, orient shells consistently, drop duplicates, fill small holes; each change is counted.
     #[arg(long, value_name = "METERS", num_args = 0..=1, require_equals = true,
@@ -315,6 +318,7 @@ impl SceneOptions {
         let on = |switch: Option<Switch>| switch.map(|s| s == Switch::On);
         settings.auto_roles = on(self.auto_roles).or(settings.auto_roles);
         settings.marks = on(self.marks).or(settings.marks);
+        settings.put_back = on(self.put_back).or(settings.put_back);
         settings.repair = self.repair.or(settings.repair);
         settings.repair_holes = self.repair_holes.or(settings.repair_holes);
         let names = &mut settings.detail_names;

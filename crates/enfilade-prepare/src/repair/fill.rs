@@ -12,8 +12,38 @@ use enfilade_geom::{Aabb, DVec3, Sets, triangle_area_normal};
 use super::surface::{Face, Surface, Use, open_of, unit};
 use super::weld::ONE_POINT;
 
-/// Longest loop filled; the time grows with its cube.
-const MAX_CORNERS: usize = 128;
+/// Loops to fill.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    /// Largest diagonal of their box. [Units: wu]
+    size: f64,
+    /// Most vertices.
+    corners: usize,
+    /// Fills only where the surface continues straight, see [`Hole::is_torn`].
+    is_torn_only: bool,
+    /// Steps for all loops together; a loop of n vertices takes n³.
+    steps: u64,
+}
+
+impl Limits {
+    /// Loops of up to 128 vertices, as the time grows with the cube of their number.
+    pub(super) fn up_to(size: f64, steps: u64) -> Self {
+        Self {
+            size,
+            corners: 128,
+            is_torn_only: false,
+            steps,
+        }
+    }
+
+    /// Loops that one triangle closes, as its neighbor beside it does: it was there.
+    pub(super) const ONE_TRIANGLE: Self = Self {
+        size: f64::INFINITY,
+        corners: 3,
+        is_torn_only: true,
+        steps: u64::MAX,
+    };
+}
 
 /// Cosine of 45 degrees, the angle below which triangles at an edge count as folded on each other.
 const FOLDED: f64 = 0.7;
@@ -50,11 +80,11 @@ struct Loop {
     edges: Vec<Use>,
 }
 
-/// Fills each loop of open edges whose box has a diagonal of at most `size` [Units: wu], as long as `steps` are left:
-/// a loop of n vertices takes n³.
+/// Fills each loop of open edges within the limits, as long as steps are left.
 ///
-/// Time: `n log n` for all triangles, plus the cube of each loop's vertices, at most 128.
-pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Filled {
+/// Time: `n log n` for all triangles, plus the cube of each loop's vertices.
+pub(super) fn fill_holes(surface: &mut Surface, limits: Limits) -> Filled {
+    let mut steps = limits.steps;
     let uses = surface.uses();
     let loops = loops(&uses, &open_of(&uses));
     let mut filled = Filled {
@@ -74,7 +104,7 @@ pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Fi
             .points
             .iter()
             .fold(Aabb::EMPTY, |b, p| b.including(at(p)));
-        let is_small = bounds.size().length() <= size && rim.points.len() <= MAX_CORNERS;
+        let is_small = bounds.size().length() <= limits.size && rim.points.len() <= limits.corners;
         if is_small {
             match steps.checked_sub((rim.points.len() as u64).pow(3)) {
                 Some(left) => steps = left,
@@ -93,7 +123,9 @@ pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Fi
                 t.iter()
                     .all(|t| !known.contains(&sorted(t.map(|i| rim.points[i]))))
             });
-        let Some(triangles) = triangles else {
+        let filling = triangles.map(|t| (hole_of(surface, &rim, &t), t));
+        let wanted = filling.filter(|(hole, _)| hole.is_torn || !limits.is_torn_only);
+        let Some((hole, triangles)) = wanted else {
             filled.n_left += 1;
             continue;
         };
@@ -107,7 +139,7 @@ pub(super) fn fill_holes(surface: &mut Surface, size: f64, mut steps: u64) -> Fi
         }
         filled.n_holes += 1;
         filled.n_triangles += triangles.len() as u64;
-        filled.holes.push(hole_of(surface, &rim, &triangles));
+        filled.holes.push(hole);
         add(surface, &rim, &triangles);
     }
     filled
@@ -441,9 +473,9 @@ mod tests {
 
     #[test]
     fn a_search_without_steps_left_ends_and_says_so() {
-        let all = fill_holes(&mut open_tetrahedron(), 10.0, 27);
+        let all = fill_holes(&mut open_tetrahedron(), Limits::up_to(10.0, 27));
         assert_eq!((all.n_holes, all.is_complete), (1, true));
-        let none = fill_holes(&mut open_tetrahedron(), 10.0, 26);
+        let none = fill_holes(&mut open_tetrahedron(), Limits::up_to(10.0, 26));
         assert_eq!((none.n_holes, none.is_complete), (0, false));
     }
 }

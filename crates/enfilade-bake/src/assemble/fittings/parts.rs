@@ -7,7 +7,9 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{Portal, PortalKind};
-use enfilade_geom::filler::{DEEPEST, FILLED, Filler, FillerFacts, LEAF, LOWEST_DOOR};
+use enfilade_geom::filler::{
+    DEEPEST, FILLED, Filler, FillerFacts, LEAF, LOWEST_DOOR, deepest_leaf,
+};
 use enfilade_geom::{Aabb, DVec3, Mask, Rectangle, Triangle};
 
 /// Height of a leaf over that of its opening; less if a light is above the door, more if it overlaps the frame.
@@ -186,9 +188,10 @@ pub(super) fn roles(opening: &Aperture, object: &InShells<'_>) -> Roles {
     let bounds = all()
         .flatten()
         .fold(Aabb::EMPTY, |b, p| b.including(around.place(p)));
-    let is_within_wall = bounds.min.z >= around.low.z - DEEPEST
-        && bounds.max.z <= around.high.z + DEEPEST
-        && bounds.size().z <= 2.0 * DEEPEST;
+    let deepest = deepest_leaf(around.size());
+    let is_within_wall = bounds.min.z >= around.low.z - deepest
+        && bounds.max.z <= around.high.z + deepest
+        && bounds.size().z <= 2.0 * deepest;
     let covered = opening.open.share_in(&around.mask(all()));
     if opening.takes_door() && opening.kind != PortalKind::Window {
         roles.leaves = leaves(opening, &near);
