@@ -103,23 +103,30 @@ fn beams_across_a_hall_part_nothing(method: Method) {
     }
 }
 
-/// A hall of 9 m x 12 m, 3.7 m high, with a beam across its middle that leaves 3.2 m, and a wall of `jamb` m on both sides
+/// A hall of 9 m x 12 m, 3.7 m high, with a beam across its middle that leaves `head` m, and a wall of the given lengths on either side
 /// below it.
-fn hall_with_beam(method: Method, jamb: f64) -> CellPortalGraph {
+fn hall_with_beam(method: Method, jambs: [f64; 2], head: f64) -> CellPortalGraph {
     baked(
         method,
         &[
             ([0.0, 0.0, 0.0], [9.0, 3.7, 6.0]),
             ([0.0, 0.0, 6.3], [9.0, 3.7, 12.3]),
-            ([jamb, 0.0, 6.0], [9.0 - jamb, 3.2, 6.3]),
+            ([jambs[0], 0.0, 6.0], [9.0 - jambs[1], head, 6.3]),
         ],
         Vec::new(),
     )
 }
 
 fn a_beam_on_pilasters_parts_nothing_and_walls_below_it_do(method: Method) {
-    assert_eq!(n_indoors(&hall_with_beam(method, 0.3)), 1);
-    assert_eq!(n_indoors(&hall_with_beam(method, 1.5)), 2);
+    assert_eq!(n_indoors(&hall_with_beam(method, [0.3; 2], 3.2)), 1);
+    assert_eq!(n_indoors(&hall_with_beam(method, [1.5; 2], 3.2)), 2);
+}
+
+fn a_deep_beam_beside_a_wall_parts_what_the_wall_parts_below_it(method: Method) {
+    // The opening has half of the hall's section, but people below the beam have more than three quarters of its width; and of 1.5 m
+    // beside it and itself, a narrow one has two thirds.
+    assert_eq!(n_indoors(&hall_with_beam(method, [0.0, 2.0], 2.35)), 1);
+    assert_eq!(n_indoors(&hall_with_beam(method, [0.0, 6.0], 2.35)), 2);
 }
 
 /// Returns two rooms with a door between them below one plenum, which three beams in each room divide. Above each beam is
@@ -297,6 +304,7 @@ by! {
         a_niche_open_at_full_height_is_part_of_its_room,
         beams_across_a_hall_part_nothing,
         a_beam_on_pilasters_parts_nothing_and_walls_below_it_do,
+        a_deep_beam_beside_a_wall_parts_what_the_wall_parts_below_it,
         the_space_above_hung_ceilings_is_one_cell_between_beams_with_slits,
         cellars_with_doorways_stay_rooms,
         the_inside_of_a_massive_flight_belongs_to_its_room;

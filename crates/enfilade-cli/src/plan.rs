@@ -37,6 +37,10 @@ pub(crate) struct Plan {
     /// Height of the cut above each floor, in meters.
     #[arg(long, default_value_t = 1.2, value_name = "METERS", value_parser = height)]
     height: f64,
+    /// Draw a numbered ring where the bake decided, and list the reasons: the closest decisions first, then spaces as large as a room that
+    /// are none, and openings that parted none; 40 at most.
+    #[arg(long)]
+    why: bool,
     /// Width of a .png in pixels; 2400 if not given.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(enfilade_report::MAX_PIXELS)))]
     width: Option<u32>,
@@ -103,6 +107,7 @@ pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
     }
     let options = PlanOptions {
         cut_height: args.height,
+        has_reasons: args.why,
     };
     let plans = Plans::new(&world, &options);
     let which = chosen(args, &plans)?;

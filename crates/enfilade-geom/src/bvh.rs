@@ -70,6 +70,17 @@ impl Bvh {
         }
     }
 
+    /// Returns the triangles in the order that it was built from, with points in one place for those that it ignores. Linear.
+    #[must_use]
+    pub fn to_triangles(&self) -> Vec<Triangle> {
+        let n = self.ids.iter().map(|&id| id as usize + 1).max();
+        let mut triangles = vec![[DVec3::ZERO; 3]; n.unwrap_or(0)];
+        for (&id, corners) in self.ids.iter().zip(&self.triangles) {
+            triangles[id as usize] = corners.map(DVec3::from_array);
+        }
+        triangles
+    }
+
     /// Returns the box around all triangles.
     #[must_use]
     pub fn bounds(&self) -> Aabb {

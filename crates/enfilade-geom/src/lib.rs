@@ -35,7 +35,7 @@ pub use plane::Plane;
 pub use ray::{Ray, RayHit, closest_point_on_segment, closest_point_on_triangle};
 pub use rectangle::{Mask, Rectangle, facing};
 pub use sets::Sets;
-pub use shells::shells;
+pub use shells::{in_closed_shells, shells};
 pub use shown::{Shown, is_hidden, shown};
 pub use similarity::Similarity;
 pub use solid::{BoxTree, ConvexSolid, SolidError};

@@ -1,6 +1,5 @@
 //! Shells: an object's separate surfaces, such as leaf, frame and handles of a door modeled in one piece.
 
-use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
@@ -22,14 +21,34 @@ const COINCIDE: f64 = 20.0;
 /// between them, so that a leaf that touches its frame stays separate. `O(n log n)`, as long as few vertices lie in one place.
 #[must_use]
 pub fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
-    let tries = WELDS.map(|weld| (weld, OnceCell::new()));
-    let sides_of = |k: usize| {
-        tries[k]
-            .1
-            .get_or_init(|| Welded::new(triangles, tries[k].0))
-    };
-    let fits = (0..WELDS.len() - 1).find(|&k| sides_of(k).paired_share() >= PAIRED);
-    let welded = sides_of(fits.unwrap_or(WELDS.len() - 1));
+    let (_, shells, n) = joined(triangles);
+    (shells, n)
+}
+
+/// Returns `true` for each triangle of a closed shell: each of its edges has two triangles of its shell. `O(n log n)` as [`shells`].
+#[must_use]
+pub fn in_closed_shells(triangles: &[Triangle]) -> Vec<bool> {
+    let (welded, shell_of, n) = joined(triangles);
+    let mut is_closed = vec![true; n];
+    for at_edge in welded.sides.chunk_by(|a, b| a.edge == b.edge) {
+        let of = |s: &HalfEdge| shell_of[s.triangle as usize];
+        for side in at_edge {
+            let own = at_edge.iter().filter(|s| of(s) == of(side)).count();
+            is_closed[of(side) as usize] &= own == 2;
+        }
+    }
+    shell_of.iter().map(|&s| is_closed[s as usize]).collect()
+}
+
+/// Returns the triangles welded so that they fit, the shell of each, and the number of shells.
+fn joined(triangles: &[Triangle]) -> (Welded, Vec<u32>, usize) {
+    let [least, larger @ ..] = WELDS;
+    let mut welded = Welded::new(triangles, least);
+    for weld in larger {
+        if welded.paired_share() < PAIRED {
+            welded = Welded::new(triangles, weld);
+        }
+    }
     let mut sets = Sets::new(triangles.len());
     let edges = || welded.sides.chunk_by(|a, b| a.edge == b.edge);
     for at_edge in edges() {
@@ -49,7 +68,7 @@ pub fn shells(triangles: &[Triangle]) -> (Vec<u32>, usize) {
             *shell_of_least.entry(*l).or_insert(next)
         })
         .collect();
-    (shells, shell_of_least.len())
+    (welded, shells, shell_of_least.len())
 }
 
 /// A triangle at one of its edges.
@@ -336,5 +355,20 @@ mod tests {
         all.retain(|t| !t.iter().all(inner));
         let (shells, n) = shells(&all);
         assert_eq!(n, 1, "{shells:?}");
+    }
+
+    #[test]
+    fn a_box_is_closed_and_a_partition_in_it_and_a_box_without_a_face_are_not() {
+        let a_box = Aabb::new(DVec3::ZERO, DVec3::new(4.0, 2.5, 3.0)).triangles();
+        assert!(in_closed_shells(&a_box).iter().all(|&is| is));
+        assert!(!in_closed_shells(&a_box[2..]).iter().any(|&is| is));
+        // It runs through the box, and shares no edge with it; a second box beside the first shares four.
+        let at = |y: f64, z: f64| DVec3::new(2.0, y, z);
+        let [p, q, r, s] = [at(0.0, 0.0), at(2.5, 0.0), at(2.5, 3.0), at(0.0, 3.0)];
+        let beside = Aabb::new(DVec3::new(4.0, 0.0, 0.0), DVec3::new(6.0, 2.5, 3.0));
+        let all = [&a_box[..], &[[p, q, r], [p, r, s]], &beside.triangles()].concat();
+        let is_closed = in_closed_shells(&all);
+        let n_closed = is_closed.iter().filter(|is| **is).count();
+        assert_eq!((n_closed, is_closed[12], is_closed[13]), (24, false, false));
     }
 }

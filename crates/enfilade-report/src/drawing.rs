@@ -86,9 +86,10 @@ pub(crate) enum Class {
     Stair,
     Bar,
     Gap,
+    Doubt,
 }
 
-pub(crate) const CLASSES: [Class; 17] = [
+pub(crate) const CLASSES: [Class; 18] = [
     Class::Cell,
     Class::Beyond,
     Class::Thin,
@@ -106,6 +107,7 @@ pub(crate) const CLASSES: [Class; 17] = [
     Class::Stair,
     Class::Bar,
     Class::Gap,
+    Class::Doubt,
 ];
 
 /// The look of a class.
@@ -151,6 +153,7 @@ impl Class {
             Self::Crack => line("crack", [0xd6, 0x24, 0x9f], 2.0, &[]),
             Self::Low => line("low", orange, 3.0, &[10.0, 8.0]),
             Self::Stair => line("stair", orange, 4.0, &[16.0, 10.0]),
+            Self::Doubt => line("doubt", [0x7b, 0x2c, 0xbf], 4.0, &[]),
             Self::Bar => filled("bar", BLACK, 1.0),
             Self::Gap => Look {
                 stroke: Some((BLACK, 1.0)),

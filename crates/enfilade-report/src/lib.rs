@@ -13,6 +13,7 @@
 
 mod borders;
 mod clip;
+mod doubts;
 mod drawing;
 mod floors;
 #[cfg(feature = "print")]

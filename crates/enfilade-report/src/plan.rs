@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use enfilade_cpg::{CellId, World, cell_color};
 use enfilade_geom::{DVec2, shown};
 
+use crate::doubts::{Doubt, doubts, rings};
 use crate::drawing::{Class, Drawing, Item, Path, Words};
 use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
 use crate::marks::View;
@@ -24,12 +25,17 @@ const LEGIBLE: f64 = 0.004;
 pub struct PlanOptions {
     /// Height of the cut above each floor. [Units: wu] [Limit: above 0]
     pub cut_height: f64,
+    /// Draws rings where the bake decided, and lists the reasons.
+    pub has_reasons: bool,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
         // The usual height in architectural plans: above sills, below lintels.
-        Self { cut_height: 1.2 }
+        Self {
+            cut_height: 1.2,
+            has_reasons: false,
+        }
     }
 }
 
@@ -45,6 +51,7 @@ pub struct Plans<'a> {
     /// Cells that plans show only as a box.
     thin: BTreeSet<CellId>,
     voids: Vec<CellId>,
+    doubts: Vec<Doubt>,
     min: DVec2,
     max: DVec2,
 }
@@ -162,8 +169,14 @@ impl<'a> Plans<'a> {
                 *drawn = draw(page);
             }
         }
+        let doubts = if options.has_reasons {
+            doubts(world, pages.iter().map(|p| &p.page.storey))
+        } else {
+            Vec::new()
+        };
         Self {
             world,
+            doubts,
             cut_height: options.cut_height,
             thin: hidden_cells(world, &pages),
             pages,
@@ -219,6 +232,7 @@ impl<'a> Plans<'a> {
             items: items.collect(),
             zoom,
             numbered: BTreeSet::new(),
+            doubts: Vec::new(),
             title: 0.0,
             sizes: Sizes {
                 least: 0.0,
@@ -249,6 +263,7 @@ impl<'a> Plans<'a> {
             items: Vec::new(),
             zoom,
             numbered: BTreeSet::new(),
+            doubts: Vec::new(),
             title: 0.45 * zoom,
             sizes: Sizes {
                 least: LEGIBLE * (size.x * columns as f64).max(size.y * rows as f64),
@@ -356,6 +371,7 @@ impl<'a> Plans<'a> {
                 }
             }
         }
+        rings(&self.doubts, index, sheet);
         for &cell in self.thin.iter().filter(|c| storey.cells.contains(c)) {
             self.draw_thin(cell, sheet);
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use enfilade_cpg::{CellId, World, cell_color};
 use enfilade_geom::{DVec2, shown};
 
+use crate::doubts::list;
 use crate::drawing::{Class, Item, Path, Words};
 use crate::label::{Sizes, shortened, width};
 
@@ -24,6 +25,8 @@ pub(crate) struct Sheet {
     pub(crate) title: f64,
     /// Cells that are labeled only by a number somewhere on the sheet.
     pub(crate) numbered: BTreeSet<CellId>,
+    /// Numbers and reasons of the rings on the sheet whose reasons are not written yet.
+    pub(crate) doubts: Vec<(usize, String)>,
 }
 
 impl Sheet {
@@ -77,6 +80,7 @@ impl Sheet {
             (Class::Beyond, "pale: floor on another plan"),
             (Class::Void, "void: nobody can stand there"),
             (Class::Thin, "too thin to draw"),
+            (Class::Doubt, "a decision, ?1 most in doubt"),
         ]
         .into_iter()
         .filter(|(class, _)| is_there(*class))
@@ -118,12 +122,18 @@ impl Sheet {
         at.y + self.numbers(world, below, room)
     }
 
-    /// Draws the names that numbers stand for, in columns. Returns the y of their end, `below` without any. [Units: wu]
+    /// Draws what numbers stand for: the names of cells, in columns, and the reasons of rings. Returns the y of their end, `below`
+    /// without any. [Units: wu]
     pub(crate) fn numbers(&mut self, world: &World, below: f64, room: f64) -> f64 {
+        let size = SMALL * self.legend();
+        let below = self.names(world, below, room, size);
+        list(self, below, room, size)
+    }
+
+    fn names(&mut self, world: &World, below: f64, room: f64, size: f64) -> f64 {
         if self.numbered.is_empty() {
             return below;
         }
-        let size = SMALL * self.legend();
         let mut rows: Vec<String> = Vec::new();
         for &cell in &self.numbered {
             let name = &world.graph[cell].name;

@@ -4,7 +4,9 @@
 mod common;
 
 use common::{batch, cell, house, locator_of_boxes, moved, portal, wall};
-use enfilade_cpg::{CellId, CellPortalGraph, DetailObject, PortalKind, World};
+use enfilade_cpg::{
+    CellId, CellPortalGraph, DetailObject, Fact, Place, PortalKind, Reason, Why, World,
+};
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 use enfilade_report::{
@@ -174,13 +176,25 @@ fn pieces_of_a_portal_are_one_line_and_gaps_stay_gaps() {
 #[test]
 fn a_window_above_the_cut_is_drawn_and_a_hatch_below_it_too() {
     let mut world = house();
-    let svg = plan_svg(&world, &PlanOptions { cut_height: 0.5 });
+    let svg = plan_svg(
+        &world,
+        &PlanOptions {
+            cut_height: 0.5,
+            ..PlanOptions::default()
+        },
+    );
     assert_eq!(
         paths(&svg, "window").iter().map(|l| length(l)).sum::<f64>(),
         100.0
     );
     world.graph.portals[1].kind = PortalKind::Open;
-    let svg = plan_svg(&world, &PlanOptions { cut_height: 0.5 });
+    let svg = plan_svg(
+        &world,
+        &PlanOptions {
+            cut_height: 0.5,
+            ..PlanOptions::default()
+        },
+    );
     assert_eq!(
         paths(&svg, "low").iter().map(|l| length(l)).sum::<f64>(),
         100.0
@@ -312,4 +326,32 @@ fn names_that_are_too_long_are_cut() {
     for (long, usual) in sizes(&world).into_iter().zip(usual) {
         assert!(long < usual + 20_000, "{long} {usual}");
     }
+}
+
+#[test]
+fn reasons_are_rings_with_numbers_and_a_list_only_if_asked_for() {
+    let mut world = house();
+    let place = |at: [f32; 3], inside: f64| Place {
+        at,
+        why: Why::compared(
+            Reason::Solid,
+            1.0,
+            &[(Fact::Inside, inside), (Fact::Volume, 30.0)],
+        ),
+    };
+    // The second is closer to its limit, and so comes first.
+    world.graph.places = vec![place([1.0, 1.0, 1.0], 3.0), place([5.0, 1.0, 2.0], 1.05)];
+    let plain = plan(&world);
+    assert!(paths(&plain, "doubt").is_empty());
+    let options = PlanOptions {
+        has_reasons: true,
+        ..PlanOptions::default()
+    };
+    let svg = plan_svg(&world, &options);
+    let rings = paths(&svg, "doubt");
+    let middle = |ring: &[[f64; 2]]| ring.iter().map(|p| p[0]).sum::<f64>() / ring.len() as f64;
+    let middles: Vec<f64> = rings.iter().map(|r| middle(r).round()).collect();
+    assert_eq!(middles, [500.0, 100.0]);
+    assert!(svg.contains("?1 no cell: the inside of a solid"), "{svg}");
+    assert!(svg.contains("30 m³"), "{svg}");
 }

@@ -79,7 +79,11 @@ impl World {
             let text = format!("height is {height}: a length above 0 and below 100 is needed");
             return Err(PyValueError::new_err(text));
         }
-        Ok(Plans::new(&self.world, &PlanOptions { cut_height: height }))
+        let options = PlanOptions {
+            cut_height: height,
+            ..PlanOptions::default()
+        };
+        Ok(Plans::new(&self.world, &options))
     }
 }
 

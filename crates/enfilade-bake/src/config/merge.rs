@@ -35,7 +35,8 @@ impl Default for MergeSettings {
     fn default() -> Self {
         Self {
             threshold: 0.7,
-            wall_threshold: 0.9,
+            // Higher, and lobbies are cut where they bend (janesville, 0.81); lower, and air shafts join rooms (edu-school, 0.76).
+            wall_threshold: 0.8,
             wall_rim: 0.3,
             radius_gain: 1.15,
             reach: 0.6,

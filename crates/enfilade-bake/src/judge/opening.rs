@@ -20,7 +20,7 @@ pub(crate) struct OpeningFacts {
 /// Measures of an opening and the space beside it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OpeningSection {
-    /// Area of the opening ÷ the smaller of the largest cross-sections of its two cells. Below the threshold of the
+    /// Area of the opening ÷ the smaller of the largest cross-sections of its two cells, up to the height of its head. Below the threshold of the
     /// settings, the first sections found to be large enough are taken.
     pub(crate) ratio: f64,
     /// Share of the rim that is wall. 0 below the threshold.
@@ -219,13 +219,13 @@ mod tests {
             ("two thirds", |_, s| s.ratio = 0.65, Narrow),
             ("three quarters", |_, s| s.ratio = 0.75, Wide),
             (
-                "three quarters, in a wall",
-                |_, s| (s.ratio, s.wall) = (0.75, 0.3),
+                "less than four fifths, in a wall",
+                |_, s| (s.ratio, s.wall) = (0.78, 0.3),
                 Narrow,
             ),
             (
-                "nine tenths, in a wall",
-                |_, s| (s.ratio, s.wall) = (0.92, 0.3),
+                "more than four fifths, in a wall",
+                |_, s| (s.ratio, s.wall) = (0.82, 0.3),
                 Wide,
             ),
             (

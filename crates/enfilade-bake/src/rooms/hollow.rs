@@ -25,13 +25,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use enfilade_cpg::{Fact, Reason, Why};
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets, in_closed_shells};
 use rayon::prelude::*;
 
 use crate::budget::WORK_A_LOOK;
 use crate::voxel::{Grid, Labels};
 
-use super::beside::{Beside, beside, between};
+use super::beside::{Beside, Known, Sheets, beside, between};
 use super::regions::{CloseJoin, Regions};
 use super::slabs::LAYERS;
 use crate::judge::{EnclosedFacts, Facing, NARROW, is_hollow_piece, why_open};
@@ -151,9 +151,15 @@ pub(crate) fn find_matter(
     let (mut narrow, indoors): (Vec<u32>, Vec<u32>) = indoors.into_iter().partition(is_hollow);
     let n_pieces = narrow.len();
     if facing == Facing::Anyhow {
+        let sheets = Sheets {
+            bvh,
+            is_closed: in_closed_shells(&bvh.to_triangles()),
+        };
         let beside_of = |c: &Closed| {
             let points = c.regions.iter().filter_map(|r| points.get(r)).flatten();
-            beside(grid, labels, regions, &c.regions, points, allowance)
+            beside(
+                grid, labels, &sheets, regions, &c.regions, points, allowance,
+            )
         };
         let beside: Vec<Beside> = closed.par_iter().map(beside_of).collect();
         weigh_between(&mut closed, &beside, &open, min_radius);
@@ -246,9 +252,13 @@ fn seen_from(
 fn weigh_between(closed: &mut [Closed], beside: &[Beside], open: &[u32], min_radius: f64) {
     let is_room = |c: &&Closed| c.facts.why(Facing::Anyhow, min_radius).reason == Reason::Enclosed;
     let rooms = closed.iter().filter(is_room).flat_map(|c| &c.regions);
-    let air = open.iter().chain(rooms).copied().collect();
+    let sized = closed.iter().filter(|c| c.facts.radius >= NARROW);
+    let known = Known {
+        air: open.iter().chain(rooms).copied().collect(),
+        sized: sized.flat_map(|c| &c.regions).copied().collect(),
+    };
     let groups = closed.iter().map(|c| &c.regions[..]).zip(beside);
-    let between = between(&groups.collect::<Vec<_>>(), air);
+    let between = between(&groups.collect::<Vec<_>>(), known);
     for (c, between) in closed.iter_mut().zip(between) {
         c.facts.between = between;
     }

@@ -203,8 +203,12 @@ impl Side {
             in_b[k] = cell == cells[1];
         });
         for (c, inside) in self.inside.iter_mut().enumerate() {
-            let mark = |k: usize| self.beside[k] |= c == own;
-            let n = connected_count(inside, slices.side, &slices.seeds, &mut self.stack, mark);
+            let mut n = 0;
+            let mark = |k: usize| {
+                self.beside[k] |= c == own;
+                n += usize::from(!slices.above[k]);
+            };
+            connected_count(inside, slices.side, &slices.seeds, &mut self.stack, mark);
             self.largest[c] = self.largest[c].max(n);
         }
     }
@@ -229,6 +233,8 @@ struct Slices<'a, F> {
     side: [usize; 2],
     /// Points that lie in the opening.
     seeds: Vec<bool>,
+    /// Points above the head of an upright opening: people are below it, so a beam or a lower ceiling alone makes no opening narrow.
+    above: Vec<bool>,
 }
 
 impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
@@ -257,7 +263,13 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             let at = [x - start[0], y - start[1]].map(|t| (t / step).round() as usize);
             seeds[at[0].min(side[0] - 1) + at[1].min(side[1] - 1) * side[0]] = true;
         }
+        let up = |i: usize| u.y * (i % side[0]) as f64 + v.y * (i / side[0]) as f64;
+        let is_level = is_rather_level(opening.plane.normal);
+        let head = (0..seeds.len()).filter(|&i| is_level || seeds[i]).map(up);
+        let head = head.fold(f64::NEG_INFINITY, f64::max) + 0.5;
+        let above = (0..seeds.len()).map(|i| up(i) > head).collect();
         Self {
+            above,
             flooded,
             cell_of,
             step,
