@@ -57,6 +57,10 @@ impl Method {
                 Self::Watershed,
                 "the structure is triangles, which may have cracks".to_owned(),
             ),
+            None if scene.is_open_world => (
+                Self::Watershed,
+                "the structure is made of brushes in an open world".to_owned(),
+            ),
             None => (
                 Self::Bsp,
                 format!("the structure is made of {} brushes", scene.solids.len()),

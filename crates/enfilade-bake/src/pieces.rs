@@ -95,9 +95,12 @@ fn fingerprint(scene: &Scene, config: &BakeConfig) -> u128 {
         textures,
         images,
         solids,
+        is_open_world,
         rooms,
         marks,
         // Carried through, and of no influence on rooms.
+        sky: _,
+        given_portals: _,
         entities: _,
         nodes: _,
         fixtures: _,
@@ -107,7 +110,7 @@ fn fingerprint(scene: &Scene, config: &BakeConfig) -> u128 {
     // Numbers are written so that different ones differ.
     let written = write!(
         hashed,
-        "{version} {config:?} {objects:?} {materials:?} {textures:?} {solids:?} {rooms:?} {marks:?}"
+        "{version} {config:?} {objects:?} {materials:?} {textures:?} {solids:?} {is_open_world} {rooms:?} {marks:?}"
     );
     debug_assert!(written.is_ok(), "hashing does not fail");
     for image in images {

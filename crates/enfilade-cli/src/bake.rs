@@ -1,10 +1,12 @@
 //! `enfilade bake`: makes a world from a scene.
 
+mod advice;
 mod cracks;
 pub(crate) mod delaunay;
 mod doorless;
 pub(crate) mod found;
 mod gaps;
+mod given;
 mod leak_path;
 mod leaking;
 mod reasons;
@@ -37,10 +39,10 @@ use crate::specials::described;
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::{import_scene, is_stream, names_of};
 use enfilade_cli::memory::held_memory;
-use enfilade_report::{Verdict, is_empty, why_empty};
+use enfilade_report::{Verdict, is_empty};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub(crate) struct Bake {
     /// Scene files: GLB, glTF, OBJ, PLY, STL, Quake MAP, implicit scenes in JSON, volumes (NIfTI, NRRD), scans (E57, PLY), or IFC, which needs ifcopenshell (`pip install ifcopenshell`) or
     /// web-ifc (`npm install web-ifc`). Several become one scene; `-` is standard input.
@@ -87,6 +89,9 @@ pub(crate) struct Readied {
 }
 
 /// Reads the scene and the settings.
+///
+/// # Errors
+/// If they cannot be read, or a map leaks that should be sealed.
 pub(crate) fn readied(args: &Bake) -> anyhow::Result<Readied> {
     let began = Instant::now();
     let settings = settings::resolve(&args.options)?;
@@ -96,6 +101,8 @@ pub(crate) fn readied(args: &Bake) -> anyhow::Result<Readied> {
     bar.finish();
     let (mut scene, report) = (imported.scene, imported.report);
     scene.rooms.extend_from_slice(&settings.bake.names);
+    let config = settings.bake.config_for(&scene);
+    scene.is_open_world |= leaking::is_open_world(args, &scene, &config)?;
     let mut config = settings.bake.config_for(&scene);
     config.budget.began = Some(began);
     config.costs.cost.check(&scene.materials)?;
@@ -122,17 +129,17 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     if let Some(path) = &options.leak {
         outputs.write("--leak", Format::Leak, path)?;
     }
+    let readied = &readied(args)?;
     let Readied {
         scene,
         config,
         references,
         report,
         repair,
-    } = &readied(args)?;
+    } = readied;
     outputs.read(references)?;
-    let said = found::doubts(report)?;
+    found::refuse(report)?;
     found::report_import(scene, report, options.verbose)?;
-    leaking::refuse_leak(args, scene, config)?;
     let mut leak_path = match options.leak_path {
         Some(from) => Some(leak_path::look_as_asked(
             scene,
@@ -145,6 +152,7 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     let own = args.checkpoint.clone().map(PieceFolder::at);
     let pieces = kept.or(own.as_ref());
     let name = || names_of(&args.inputs);
+    let began = Instant::now();
     let baked = bake_scene(scene, config, options.threads, pieces);
     let mut baked = baked.with_context(name)?;
     if let Some(path) = &leak_path {
@@ -154,8 +162,9 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     }
     let told = &mut baked.world.graph.provenance.settings;
     told.extend(found::settings_of(report, *repair));
+    let verdict = advice::verdict(args, readied, &baked.world, began.elapsed())?;
     if is_empty(&baked.world) {
-        let why = why_empty(&baked.world);
+        let why = verdict.why();
         // Whoever asks for the way out wants to see it.
         if !args.allow_empty && options.leak_path.is_none() {
             report_bake(&baked, config, options.verbose)?;
@@ -169,7 +178,6 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
         }
         writeln!(Warned, "no room was found: {why}")?;
     }
-    let verdict = Verdict::of(&baked.world, &said);
     let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;
     if args.walk {
@@ -189,14 +197,9 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     if let Some(path) = &leak_path {
         path.write(&mut path.says())?;
     }
-    if baked.world.graph.statistics.counts.get("separators") == Some(&0.0)
-        && baked.world.graph.cells.len() > 1
-    {
-        writeln!(
-            Warned,
-            "no separator divides the scene: if it has rooms, their openings do not lie in planes of its surfaces; \
-             --method watershed or delaunay does not need planes"
-        )?;
+    warn_of_separators(&baked.world)?;
+    if options.given.is_some() {
+        given::tell(&mut Told, scene, &baked.world)?;
     }
     let mut out = outputs.printed();
     let written = Written::new(&args.output, &bytes);
@@ -206,6 +209,18 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     print_summary(&mut out, &baked.world)?;
     writeln!(out, "{written}")?;
     writeln!(out, "{verdict}")?;
+    Ok(())
+}
+
+fn warn_of_separators(world: &World) -> io::Result<()> {
+    if world.graph.statistics.counts.get("separators") == Some(&0.0) && world.graph.cells.len() > 1
+    {
+        writeln!(
+            Warned,
+            "no separator divides the scene: if it has rooms, their openings do not lie in planes of its surfaces; \
+             --method watershed or delaunay does not need planes"
+        )?;
+    }
     Ok(())
 }
 

@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Rebake) -> anyhow::Result<()> {
     imported.scene.rooms.extend_from_slice(&settings.bake.names);
     bar.finish();
     outputs.read(&imported.report.references)?;
-    found::doubts(&imported.report)?;
+    found::refuse(&imported.report)?;
     found::report_import(&imported.scene, &imported.report, options.verbose)?;
     let scene = &imported.scene;
     let mut config = settings.bake.config_for(scene);

@@ -89,7 +89,9 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         walk: walk.as_deref().map(walk_page::address_of_page),
         ..ReportParts::default()
     };
-    parts.notes.push(Verdict::of(&world, &[]).sentence());
+    parts
+        .notes
+        .push(Verdict::of(&world, &[]).untried().sentence());
     parts.visible = visible(&world, &mut parts.notes)?;
     let sight = Sight::build(&world).with_context(|| name_of(&args.world))?;
     let steps = measured(&world, &sight, args.views as usize);

@@ -254,6 +254,112 @@ fn a_leak_ends_the_bake_with_the_way_out_and_writes_no_world() {
     );
 }
 
+/// Two houses of 8 by 8 m on a street, each with a doorway, and a player in the first or on the street.
+fn street(player: [i32; 3]) -> String {
+    let mut brushes = boxed([-512, -512, -16], [1024, 1024, 0]);
+    for (z, door_at) in [(0, 240), (512, 512)] {
+        let far = if door_at == z { z + 240 } else { z };
+        for (min, max) in [
+            ([0, z, 96], [256, z + 256, 112]),
+            ([0, z, 0], [16, z + 256, 96]),
+            ([240, z, 0], [256, z + 256, 96]),
+            ([16, far, 0], [240, far + 16, 96]),
+            ([16, door_at, 0], [104, door_at + 16, 96]),
+            ([152, door_at, 0], [240, door_at + 16, 96]),
+            ([104, door_at, 72], [152, door_at + 16, 96]),
+        ] {
+            brushes += &boxed(min, max);
+        }
+    }
+    let [x, y, z] = player;
+    format!(
+        "{{\n\"classname\" \"worldspawn\"\n{brushes}}}\n{{\n\"classname\" \"info_player_start\"\n\"origin\" \"{x} {y} {z}\"\n}}\n"
+    )
+}
+
+#[test]
+fn a_world_without_a_lid_is_open_and_a_sealed_one_with_a_hole_is_not() {
+    let folder = Folder::new("open");
+    let (input, world) = (folder.path("open.map"), folder.path("w.glb"));
+    let bake = |text: &str, more: &[&str]| {
+        std::fs::write(&input, text).unwrap();
+        let _ = std::fs::remove_file(&world);
+        enfilade(&[&["bake", &input, "-o", &world], more].concat())
+    };
+    let cells = || {
+        let json = text(&enfilade(&["inspect", &world, "--json"]).stdout);
+        let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let cells = value["cells"].as_array().unwrap().clone();
+        let n_out = cells.iter().filter(|c| c["outdoor"] == true).count();
+        (cells.len() - n_out, n_out)
+    };
+    for player in [[128, 128, 24], [128, 384, 24]] {
+        let out = bake(&street(player), &[]);
+        let said = text(&out.stderr);
+        assert!(out.status.success(), "{said}");
+        assert!(
+            said.contains("the map leaks") && said.contains("open world"),
+            "{said}"
+        );
+        assert_eq!(cells(), (2, 1));
+        assert!(
+            enfilade(&["verify", &world, "--source", &input, "--rays", "20000"])
+                .status
+                .success()
+        );
+    }
+    let refused = bake(&street([128, 128, 24]), &["--world", "sealed"]);
+    assert_eq!(refused.status.code(), Some(1));
+    // The outer walls of a sealed level in turn.
+    let sealed = map(-16);
+    let brushes: Vec<&str> = sealed.split_inclusive("}\n").collect();
+    for gone in 2..6 {
+        let holed = [&brushes[..gone], &brushes[gone + 1..]].concat().concat();
+        let out = bake(&holed, &[]);
+        let said = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{gone}: {said}");
+        assert!(said.contains("the map leaks"), "{gone}: {said}");
+    }
+    let out = bake(&map(16), &["--world", "open"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+}
+
+#[test]
+fn inside_a_box_of_sky_is_outdoors() {
+    let folder = Folder::new("sky");
+    let (input, world) = (folder.path("sky.map"), folder.path("w.glb"));
+    let sky: String = [
+        ([-528, -528, -16], [-512, 1040, 512]),
+        ([1024, -528, -16], [1040, 1040, 512]),
+        ([-512, -528, -16], [1024, -512, 512]),
+        ([-512, 1024, -16], [1024, 1040, 512]),
+        ([-528, -528, 512], [1040, 1040, 528]),
+    ]
+    .map(|(min, max)| boxed(min, max).replace("wall", "sky1"))
+    .concat();
+    let text_of = street([128, 128, 24]);
+    let below = text_of.replacen("\"worldspawn\"\n", &format!("\"worldspawn\"\n{sky}"), 1);
+    let bake = |text: &str| {
+        std::fs::write(&input, text).unwrap();
+        enfilade(&["bake", &input, "-o", &world, "--json"])
+    };
+    let out = bake(&below);
+    let said = text(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    assert!(said.contains("sky") && !said.contains("leaks"), "{said}");
+    let json = text(&enfilade(&["inspect", &world, "--json"]).stdout);
+    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let cells = value["cells"].as_array().unwrap();
+    assert_eq!(cells.len(), 3);
+    assert!(cells[0]["outdoor"] == true, "{json}");
+    // A hole in the sky is a hole in a sealed world.
+    let sides: Vec<&str> = sky.split_inclusive("}\n").collect();
+    let holed = below.replacen(sides[1], "", 1);
+    assert_ne!(holed, below);
+    let said = text(&bake(&holed).stderr);
+    assert!(said.contains("the map leaks"), "{said}");
+}
+
 #[test]
 fn a_broken_map_is_refused_with_its_place() {
     let folder = Folder::new("broken");

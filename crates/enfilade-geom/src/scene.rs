@@ -20,6 +20,10 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Convex solids of structural objects in world space, if the input is made of them (brushes).
     pub solids: Vec<ConvexSolid>,
+    /// Solids of a sky around an open world: its compiler takes them for walls, but they bound no rooms.
+    pub sky: Vec<ConvexSolid>,
+    /// The solids bound no sealed level, but stand below an open sky.
+    pub is_open_world: bool,
     /// Named things without a mesh, as in the input.
     pub entities: Vec<Entity>,
     /// The input's tree of names. Each node comes after its parent.
@@ -32,6 +36,21 @@ pub struct Scene {
     pub marks: Vec<Mark>,
     /// Names of rooms, as in the input.
     pub rooms: Vec<RoomName>,
+    /// Openings that a designer marked.
+    pub given_portals: Vec<GivenPortal>,
+}
+
+/// An opening that the input marks as a portal between rooms.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GivenPortal {
+    /// Kind and number: `visportal 3`.
+    pub name: String,
+    /// Its outline in the plane of the opening. [Units: wu]
+    pub outline: Vec<DVec3>,
+    /// Unit normal of the plane.
+    pub normal: DVec3,
+    /// Thickness of the solid that marks it. [Units: wu]
+    pub thickness: f64,
 }
 
 /// A name of a room, and where it holds.

@@ -8,7 +8,7 @@ use crate::order::sort;
 use crate::origins::Origins;
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
-    Entity, Filling, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
+    Entity, Filling, GivenPortal, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
 use enfilade_prepare::{GridSteps, RoleFacts, RoleVerdict, weld_quantized};
@@ -224,6 +224,17 @@ impl<'a> Builder<'a> {
     /// Keeps the solids that structural objects are made of.
     pub(crate) fn add_solids(&mut self, solids: impl Iterator<Item = ConvexSolid>) {
         self.scene.solids.extend(solids);
+    }
+
+    /// Keeps the solids of a sky around an open world.
+    pub(crate) fn add_sky(&mut self, solids: Vec<ConvexSolid>) {
+        self.scene.sky.extend(solids);
+        self.scene.is_open_world = true;
+    }
+
+    /// Keeps openings that a designer marked.
+    pub(crate) fn add_given_portals(&mut self, portals: Vec<GivenPortal>) {
+        self.scene.given_portals.extend(portals);
     }
 
     /// Keeps an entity.

@@ -4,6 +4,7 @@ use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, DVec3, MOST_FLIGHT_PLAN, Triangle, is_flight, triangle_area_normal};
 use enfilade_prepare::{Upward, judge_up};
 
+use crate::map::MAPS;
 use crate::report::UpDoubt;
 use crate::{FileReport, ImportError, ImportOptions, ImportReport, Up};
 
@@ -230,7 +231,7 @@ pub(crate) fn unit_doubt(
     report: &ImportReport,
     options: &ImportOptions,
 ) -> Option<String> {
-    if options.unit.is_some() || report.files.iter().any(|f| f.format == MAP) {
+    if options.unit.is_some() || report.files.iter().any(|f| MAPS.contains(&f.format)) {
         return None;
     }
     let structural = |i: &usize| scene.objects[*i].role == Role::Structural;
@@ -269,7 +270,7 @@ pub(crate) fn feet_hint(
     report: &ImportReport,
     options: &ImportOptions,
 ) -> Option<String> {
-    let tells_nothing = |f: &FileReport| f.format == MAP || f.surface.is_some();
+    let tells_nothing = |f: &FileReport| MAPS.contains(&f.format) || f.surface.is_some();
     let is_known = options.unit.is_some() || report.files.iter().any(tells_nothing);
     if is_known || report.unit_doubt.is_some() {
         return None;
@@ -308,9 +309,6 @@ fn is_flight_at(scene: &Scene, object: usize, factors: DVec3) -> bool {
     is_flight(&scaled)
 }
 
-/// Format whose unit is known, and whose z axis points up.
-const MAP: &str = "Quake map";
-
 /// Returns the reason to doubt that the axis which was taken to point up does so; only if none was given.
 pub(crate) fn up_doubt(
     scene: &Scene,
@@ -326,7 +324,7 @@ pub(crate) fn up_doubt(
         Upward::Unknown => return None,
     };
     // Maps are read with z up, so that across z here is across y there.
-    let (other, turned) = match report.files.iter().any(|f| f.format == MAP) {
+    let (other, turned) = match report.files.iter().any(|f| MAPS.contains(&f.format)) {
         false => ("z", Up::Z),
         true => ("y", Up::Y),
     };

@@ -13,7 +13,7 @@ struct Foreign {
     advice: &'static str,
 }
 
-const FOREIGN: [Foreign; 22] = [
+const FOREIGN: [Foreign; 21] = [
     Foreign {
         name: "FBX",
         magic: &[b"Kaydara FBX Binary", b"; FBX"],
@@ -86,12 +86,6 @@ const FOREIGN: [Foreign; 22] = [
         magic: &[b"PACK"],
         endings: &["pk3", "pk4", "pak"],
         advice: "unpack it, e.g. unzip {in}, and give a .map of its folder maps",
-    },
-    Foreign {
-        name: "a map of Source (VMF)",
-        magic: &[b"versioninfo"],
-        endings: &["vmf"],
-        advice: "open it in J.A.C.K. and save it as .map, or in Blender with the add-on Plumber and export it as glTF",
     },
     Foreign {
         name: "a level of the Unreal Engine",
@@ -216,7 +210,6 @@ mod tests {
             (b"PWAD\x01", "a.txt", "Doom", "Wavefront .obj"),
             (b"WAD3", "a.wad", "Half-Life", ".map"),
             (b"PK\x03\x04", "a.pk3", "archive", "unzip a.pk3"),
-            (b"versioninfo\n{", "a.txt", "VMF", ".map"),
             (b"\xC1\x83\x2A\x9E", "a.umap", "Unreal", "glTF Exporter"),
             (b"[gd_scene load_steps=2", "a.txt", "Godot", "Export As"),
             (b"%YAML 1.1\n%TAG !u! tag", "a.txt", "Unity", "glTFast"),

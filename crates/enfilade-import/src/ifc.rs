@@ -44,6 +44,17 @@ fn is_whole(bytes: &[u8]) -> bool {
         .any(|w| w.eq_ignore_ascii_case(LAST))
 }
 
+/// Returns the file with the schema IFC2X3 if it has that of a draft, which has the same entities, and which the packages do not know.
+fn with_known_schema(bytes: &[u8]) -> Option<Vec<u8>> {
+    const DRAFT: &[u8] = b"'IFC2X_FINAL'";
+    const HEAD: usize = 1 << 16;
+    let head = &bytes[..bytes.len().min(HEAD)];
+    let at = head
+        .windows(DRAFT.len())
+        .position(|w| w.eq_ignore_ascii_case(DRAFT))?;
+    Some([&bytes[..at], b"'IFC2X3'", &bytes[at + DRAFT.len()..]].concat())
+}
+
 /// Converts the file and reads the result.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
     // The packages read what there is of a cut file, and say nothing.
@@ -58,6 +69,11 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         path: converter.folder.clone(),
         reason,
     })?;
+    let mut input = builder.path.clone();
+    if let Some(known) = with_known_schema(bytes) {
+        input = folder.path.join("in.ifc");
+        fs::write(&input, known).map_err(|e| builder.malformed("schema", e.to_string()))?;
+    }
     for program in &converter.programs {
         let kind = IfcProgram::of(program);
         let run = Run {
@@ -67,7 +83,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
             folder: &folder.path,
             most: builder.limits().max_file_bytes,
         };
-        let ran = run.convert(&builder.path);
+        let ran = run.convert(&input);
         let ran = ran.map_err(|what| builder.malformed(program.display().to_string(), what))?;
         let Ran::Made(glb) = ran else { continue };
         let glb = files::read_file(&glb, run.most)?;
@@ -241,6 +257,14 @@ mod tests {
     fn files_of_another_schema_are_no_ifc() {
         assert!(is_ifc(b"ISO-10303-21;HEADER;FILE_SCHEMA(('IFC4'));"));
         assert!(!is_ifc(b"ISO-10303-21; AP214"));
+    }
+
+    #[test]
+    fn the_schema_of_a_draft_is_read_as_the_one_that_followed() {
+        let draft = b"ISO-10303-21;HEADER;FILE_SCHEMA(('IFC2X_FINAL'));DATA;";
+        let known = b"ISO-10303-21;HEADER;FILE_SCHEMA(('IFC2X3'));DATA;";
+        assert_eq!(with_known_schema(draft).as_deref(), Some(&known[..]));
+        assert_eq!(with_known_schema(known), None);
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub(crate) fn sort(scene: &mut Scene, steps: &mut GridSteps) {
     sort_meshes(scene, steps);
     sort_objects(scene);
     scene.solids.sort_by(solids);
+    scene.sky.sort_by(solids);
     scene.entities.sort_by(entities);
     scene.fixtures.sort_by(fixtures);
     scene.rooms.sort_by(rooms);

@@ -414,3 +414,102 @@ fn layers_omitted_from_export_are_left_out_with_their_groups() {
     assert_eq!(hidden.scene.solids.len(), 4);
     assert_eq!(hidden.report.left_out, []);
 }
+
+/// The text of a map of Source: a box as a solid of the world, and another as an entity.
+fn vmf(extra: &str) -> String {
+    let solid = |at: i32, material: &str| {
+        let mut sides = String::new();
+        for (k, [a, b, c]) in [
+            [[0, 64, 64], [64, 64, 64], [64, 0, 64]],
+            [[0, 0, 0], [64, 0, 0], [64, 64, 0]],
+            [[0, 64, 64], [0, 0, 64], [0, 0, 0]],
+            [[64, 64, 0], [64, 0, 0], [64, 0, 64]],
+            [[64, 64, 64], [0, 64, 64], [0, 64, 0]],
+            [[64, 0, 0], [0, 0, 0], [0, 0, 64]],
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let point = |[x, y, z]: [i32; 3]| format!("({} {y} {z})", x + at);
+            writeln!(
+                sides,
+                "side\n{{\n\"id\" \"{k}\"\n\"plane\" \"{} {} {}\"\n\"material\" \"{material}\"\ndispinfo\n{{\nnormals\n{{\n\"row0\" \"0 0 1\"\n}}\n}}\n}}",
+                point(a), point(b), point(c)
+            )
+            .unwrap();
+        }
+        format!("solid\n{{\n\"id\" \"2\"\n{sides}editor\n{{\n\"color\" \"0 1 2\"\n}}\n}}\n")
+    };
+    let (wall, detail) = (solid(0, "BRICK/WALL"), solid(128, "BRICK/TRIM"));
+    let clip = solid(256, "TOOLS/TOOLSPLAYERCLIP");
+    let hidden = solid(512, "BRICK/WALL");
+    format!(
+        "versioninfo\n{{\n\"editorversion\" \"400\"\n}}\nvisgroups\n{{\n}}\nworld\n{{\n\"id\" \"1\"\n\"classname\" \"worldspawn\"\n{wall}{clip}hidden\n{{\n{hidden}}}\n}}\nentity\n{{\n\"classname\" \"func_detail\"\n{detail}}}\nentity\n{{\n\"classname\" \"info_player_start\"\n\"origin\" \"10 20 30\"\n}}\n{extra}"
+    )
+}
+
+#[test]
+fn a_map_of_source_has_brushes_in_three_quarters_of_an_inch() {
+    let imported = read(&vmf(""));
+    let scene = &imported.scene;
+    assert_eq!(imported.report.files[0].format, "VMF");
+    assert_eq!(scene.solids.len(), 1);
+    let names: Vec<(&str, Role)> = (scene.objects.iter())
+        .map(|o| (o.name.as_str(), o.role))
+        .collect();
+    assert_eq!(
+        names,
+        [
+            ("func_detail 1", Role::Detail),
+            ("worldspawn 0", Role::Structural)
+        ]
+    );
+    let size = scene.object_aabb(0).size();
+    assert!((size - 64.0 * 0.01905).abs().max_element() < 1e-6, "{size}");
+    let player = scene
+        .entities
+        .iter()
+        .find(|e| e.class == "info_player_start");
+    let at = player.unwrap().position.unwrap() / 0.01905;
+    assert!(
+        (at.x - 10.0).abs() < 1e-6 && (at.y - 30.0).abs() < 1e-6,
+        "{at}"
+    );
+}
+
+#[test]
+fn what_is_wrong_in_a_map_of_source_is_said_with_its_line() {
+    assert!(problem(&vmf("entity\n{\n")).contains("no '}'"));
+    assert!(problem(&vmf("entity\n{\n\"a\" b\n}")).contains("without a quoted value"));
+    let bad = vmf("").replacen("(0 64 64)", "(0 64)", 1);
+    assert!(problem(&bad).contains("not three points"));
+    let text = vmf("");
+    for end in (0..text.len()).step_by(7) {
+        let _ = decode_map(&text.as_bytes()[..end], &ImportOptions::default());
+    }
+}
+
+#[test]
+fn marked_openings_are_kept_with_their_planes() {
+    let one_side = boxed([0, 0, 0], [8, 64, 96], "common/nodraw");
+    let one_side = one_side.replacen("common/nodraw", "editor/visportal", 1);
+    let door = boxed([100, 0, 0], [108, 64, 96], "common/trigger");
+    let others = format!("{{\n\"classname\" \"func_areaportal\"\n{door}}}\n");
+    let world = one_side + &boxed([200, 0, 0], [208, 64, 96], "stone");
+    let scene = read(&map(&world, &others)).scene;
+    let given: Vec<(&str, f64)> = (scene.given_portals.iter())
+        .map(|g| (g.name.as_str(), g.thickness * 32.0))
+        .collect();
+    assert_eq!(given, [("visportal 1", 8.0), ("areaportal 2", 8.0)]);
+    // In the first side of the one, in the middle of the other.
+    for (given, x) in scene.given_portals.iter().zip([0.0, 104.0]) {
+        assert!(given.normal.x.abs() > 0.999);
+        assert!(given.outline.iter().all(|p| (p.x * 32.0 - x).abs() < 1e-6));
+    }
+    assert!(
+        read(&map(&boxed([0, 0, 0], [8, 64, 96], "stone"), ""))
+            .scene
+            .given_portals
+            .is_empty()
+    );
+}

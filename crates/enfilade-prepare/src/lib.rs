@@ -27,7 +27,7 @@ pub use finding::{Example, Finding};
 pub use glob::{Glob, GlobState, is_match};
 pub use repair::{GridSteps, RepairOptions, RepairReport, put_back, repair, weld_quantized};
 pub use roles::{RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal};
-pub use sky::skies;
+pub use sky::{is_sky_around, skies};
 pub use tools::{TextureMatter, texture_matter};
 pub use upward::{Upward, judge_up};
 pub use words::words;

@@ -4,7 +4,7 @@
 //! stands on or near what is in it, and a valley has no ceiling.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, Bvh, DVec3, Ray, Triangle};
+use enfilade_geom::{Aabb, Bvh, ConvexSolid, DVec3, Ray, Triangle};
 
 /// A sky is at least this many times as wide as what it surrounds: a hall around a hut may be wider than the hut, too, but then the
 /// hut stands on its floor.
@@ -41,6 +41,47 @@ pub fn skies(scene: &Scene) -> Vec<usize> {
     found
 }
 
+/// Returns `true` if the solids of a sky lie beyond all others on four sides and overhead. Level ground may run to them, or farther.
+#[must_use]
+pub fn is_sky_around(sky: &[ConvexSolid], others: &[ConvexSolid]) -> bool {
+    let of = |all: &[ConvexSolid]| all.iter().map(ConvexSolid::aabb).collect::<Vec<Aabb>>();
+    let [sky, others] = [sky, others].map(of);
+    let union =
+        |all: &mut dyn Iterator<Item = &Aabb>| all.fold(Aabb::EMPTY, |sum, b| sum.union(*b));
+    let width = wide(&union(&mut sky.iter()));
+    let bounds = union(&mut others.iter().filter(|b| !is_ground(b, width)));
+    let middle = bounds.center();
+    let is_beyond = |axis: usize, side: f64| {
+        let is_past = |b: &&Aabb| {
+            let near = if side < 0.0 {
+                -b.max[axis]
+            } else {
+                b.min[axis]
+            };
+            let end = if side < 0.0 {
+                -bounds.min[axis]
+            } else {
+                bounds.max[axis]
+            };
+            near >= end - NEAR
+        };
+        let across = if axis == 0 { 2 } else { 0 };
+        let is_there = |b: &Aabb| b.min[across] < middle[across] && b.max[across] > middle[across];
+        sky.iter().filter(is_past).any(is_there)
+    };
+    let sides = [(0, -1.0), (0, 1.0), (2, -1.0), (2, 1.0), (1, 1.0)];
+    !bounds.is_empty() && sides.into_iter().all(|(axis, side)| is_beyond(axis, side))
+}
+
+fn wide(b: &Aabb) -> f64 {
+    b.size().x.max(b.size().z)
+}
+
+/// Returns `true` for level ground below a sky of this width.
+fn is_ground(b: &Aabb, sky: f64) -> bool {
+    b.size().y < FLAT * wide(b) && wide(b) > GROUND * sky
+}
+
 fn largest(all: &[usize], boxes: &[Aabb]) -> Option<usize> {
     let volume = |i: &&usize| boxes[**i].volume();
     let largest = all
@@ -51,12 +92,8 @@ fn largest(all: &[usize], boxes: &[Aabb]) -> Option<usize> {
 
 fn is_sky(scene: &Scene, sky: usize, others: &[usize], boxes: &[Aabb]) -> bool {
     let own = boxes[sky];
-    let wide = |b: &Aabb| b.size().x.max(b.size().z);
-    let is_ground = |i: &usize| {
-        let b = &boxes[*i];
-        b.size().y < FLAT * wide(b) && wide(b) > GROUND * wide(&own)
-    };
-    let inside: Vec<usize> = others.iter().copied().filter(|i| !is_ground(i)).collect();
+    let is_inside = |i: &usize| !is_ground(&boxes[*i], wide(&own));
+    let inside: Vec<usize> = others.iter().copied().filter(is_inside).collect();
     let bounds = inside
         .iter()
         .fold(Aabb::EMPTY, |all, &i| all.union(boxes[i]));
@@ -100,8 +137,8 @@ fn triangles_of(scene: &Scene, objects: &[usize]) -> Vec<Triangle> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade_geom::DMat4;
     use enfilade_geom::scene::{Mesh, Object, Primitive};
+    use enfilade_geom::{DMat4, Plane};
 
     /// Returns a scene of boxes.
     fn scene(boxes: &[[[f64; 3]; 2]]) -> Scene {
@@ -162,5 +199,51 @@ mod tests {
         ];
         assert_eq!(skies(&scene(&lamp)), none);
         assert_eq!(skies(&scene(&[HOUSE])), none);
+    }
+
+    fn boxed([min, max]: [[f64; 3]; 2]) -> ConvexSolid {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+        let sides = |k: usize| {
+            let high = Plane::through(DVec3::from(max), axes[k]);
+            [high, Plane::through(DVec3::from(min), -axes[k])]
+        };
+        let planes: Vec<Plane> = (0..3).flat_map(sides).collect();
+        ConvexSolid::from_planes(&planes, 1e4, 1e-6).unwrap()
+    }
+
+    /// Four walls and a lid of sky around a square of this half width, from a height on.
+    fn box_of_sky(half: f64, low: f64, high: f64) -> Vec<ConvexSolid> {
+        let far = half + 1.0;
+        let boxes = [
+            [[-far, low, -far], [-half, high, far]],
+            [[half, low, -far], [far, high, far]],
+            [[-half, low, -far], [half, high, -half]],
+            [[-half, low, half], [half, high, far]],
+            [[-far, high, -far], [far, high + 1.0, far]],
+        ];
+        boxes.into_iter().map(boxed).collect()
+    }
+
+    #[test]
+    fn brushes_of_sky_on_four_sides_and_above_are_around_a_world_and_a_lid_is_not() {
+        let sky = box_of_sky(40.0, -1.0, 20.0);
+        let house = boxed(HOUSE);
+        let ground = boxed([[-60.0, -1.0, -60.0], [60.0, -0.2, 60.0]]);
+        let tower = boxed([[50.0, 0.0, 0.0], [55.0, 30.0, 5.0]]);
+        assert!(is_sky_around(&sky, &[house.clone(), ground.clone()]));
+        assert!(!is_sky_around(&sky, &[house.clone(), tower]));
+        assert!(!is_sky_around(&sky, &[ground]));
+        for gone in 0..5 {
+            let mut open = sky.clone();
+            open.remove(gone);
+            assert!(
+                !is_sky_around(&open, std::slice::from_ref(&house)),
+                "{gone}"
+            );
+        }
+        // A court below a lid of sky, whose walls are a level's.
+        let walls = box_of_sky(30.0, 0.0, 20.0)[..4].to_vec();
+        assert!(!is_sky_around(&sky[4..], &walls));
+        assert!(!is_sky_around(&[], &walls));
     }
 }

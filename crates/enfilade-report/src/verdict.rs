@@ -15,6 +15,8 @@ const DOOR: [f32; 2] = [1.8, 3.0];
 const GOOD: f32 = 0.1;
 /// … and from which it is probably not the building that was meant.
 const LOW: f32 = 0.4;
+/// Options that are tried before they are proposed.
+const TRIED: [&str; 3] = ["--unit", "--up", "--min-cost"];
 /// Close decisions that are named.
 const NAMED: usize = 3;
 
@@ -29,6 +31,8 @@ pub struct Verdict {
     /// The places most in doubt.
     close: Vec<Close>,
     reasons: Vec<Reason>,
+    #[serde(skip)]
+    n_rooms: usize,
 }
 
 /// A place most in doubt.
@@ -49,7 +53,8 @@ pub struct InputDoubt {
     pub is_about_up: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Serialize)]
+/// Trust, the most first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Trust {
     /// Nothing speaks against it.
@@ -68,7 +73,7 @@ struct Reason {
     /// The sign, and the usual cause.
     text: String,
     /// Options to try.
-    options: Vec<&'static str>,
+    options: Vec<String>,
 }
 
 impl Verdict {
@@ -110,6 +115,7 @@ impl Verdict {
         Self {
             trust,
             summary: found(world),
+            n_rooms: world.graph.rooms().count(),
             doubt: of_rooms.share,
             close: close.collect(),
             reasons: of_input
@@ -121,6 +127,41 @@ impl Verdict {
 }
 
 impl Verdict {
+    /// Replaces each option that is proposed by the one that `tried` makes of it, and takes back those of which it makes nothing.
+    pub fn advise(&mut self, mut tried: impl FnMut(&str) -> Option<String>) {
+        for reason in &mut self.reasons {
+            let options = reason.options.iter().filter_map(|option| tried(option));
+            reason.options = options.collect();
+        }
+    }
+
+    /// Returns it without options that read the input in another way, for callers that do not try them.
+    #[must_use]
+    pub fn untried(mut self) -> Self {
+        let is_tried = |option: &str| TRIED.iter().any(|name| option.starts_with(name));
+        self.advise(|option| (!is_tried(option)).then(|| option.to_owned()));
+        self
+    }
+
+    /// Returns `true` if a world deserves more trust than another one of the same input; of equal trust, if fewer of its rooms are in
+    /// doubt.
+    #[must_use]
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        self.trust < other.trust || self.trust == other.trust && self.doubt < other.doubt
+    }
+
+    /// Number of its rooms.
+    #[must_use]
+    pub fn n_rooms(&self) -> usize {
+        self.n_rooms
+    }
+
+    /// Returns the reasons for less trust, with the options to try.
+    #[must_use]
+    pub fn why(&self) -> String {
+        Reason::all(&self.reasons)
+    }
+
     /// Returns the verdict as a sentence of a page.
     #[must_use]
     pub fn sentence(&self) -> String {
@@ -140,7 +181,7 @@ pub fn is_empty(world: &World) -> bool {
 /// Returns the reasons why a world has no room, with the options to try.
 #[must_use]
 pub fn why_empty(world: &World) -> String {
-    Reason::all(&Verdict::of(world, &[]).reasons)
+    Verdict::of(world, &[]).untried().why()
 }
 
 impl Reason {
@@ -249,7 +290,10 @@ fn taken(graph: &CellPortalGraph) -> Option<Reason> {
     let is_merged = taken.iter().any(|p| p.why.reason == Decision::Merged);
     Some(Reason {
         text,
-        options: is_merged.then_some("--min-cost 0").into_iter().collect(),
+        options: is_merged
+            .then(|| "--min-cost 0".to_owned())
+            .into_iter()
+            .collect(),
     })
 }
 
@@ -328,7 +372,7 @@ fn reason(doubt: &Doubt) -> Reason {
     };
     Reason {
         text,
-        options: options.to_vec(),
+        options: options.iter().map(|&option| option.to_owned()).collect(),
     }
 }
 
@@ -370,5 +414,36 @@ mod tests {
             let reason = reason(&Doubt::DoorHeight(height));
             assert_eq!(reason.options, [option], "{height}");
         }
+    }
+
+    #[test]
+    fn advice_is_what_was_tried_and_a_verdict_is_better_by_trust_then_by_doubt() {
+        let verdict = |trust, doubt| Verdict {
+            trust,
+            summary: String::new(),
+            doubt,
+            close: Vec::new(),
+            reasons: vec![reason(&Doubt::NoFloors(1, 2))],
+            n_rooms: 2,
+        };
+        let mut low = verdict(Trust::Low, 0.2);
+        low.advise(|option| (option == "--up z").then(|| "--up y".to_owned()));
+        assert!(
+            low.why().ends_with("have no floor (try --up y)"),
+            "{}",
+            low.why()
+        );
+        assert!(
+            verdict(Trust::Low, 0.2)
+                .untried()
+                .why()
+                .ends_with("(try --structural-name 'PATTERN')")
+        );
+        low.advise(|_| None);
+        assert!(low.why().ends_with("have no floor"), "{}", low.why());
+        assert!(verdict(Trust::Fair, 0.5).is_better_than(&low));
+        assert!(verdict(Trust::Low, 0.1).is_better_than(&low));
+        assert!(!verdict(Trust::Low, 0.2).is_better_than(&low));
+        assert!(!verdict(Trust::None, 0.0).is_better_than(&low));
     }
 }

@@ -29,8 +29,8 @@ impl Resolved {
     #[must_use]
     pub fn config_for(&self, scene: &Scene) -> BakeConfig {
         let mut config = self.config.clone();
-        let is_of_brushes =
-            !scene.solids.is_empty() && config.method.is_none_or(|m| m == Method::Bsp);
+        let is_level = !scene.solids.is_empty() && !scene.is_open_world;
+        let is_of_brushes = is_level && config.method.is_none_or(|m| m == Method::Bsp);
         if self.merges_brushes_only {
             config.costs.doorway = is_of_brushes.then_some(config.merge.threshold);
             if !is_of_brushes {

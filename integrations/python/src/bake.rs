@@ -128,18 +128,23 @@ fn work(
 ) -> PyResult<(World, Vec<String>)> {
     let mut imported = read()?;
     imported.scene.rooms.extend_from_slice(&resolved.names);
-    let report = &imported.report;
-    if let Some(why) = report.refusal() {
+    if let Some(why) = imported.report.refusal() {
         return Err(SceneError::new_err(why));
     }
+    let config = resolved.config_for(&imported.scene);
+    let leak = if allow.leak {
+        None
+    } else {
+        leak_of_open_world(&imported.scene, &config, watcher)?
+    };
+    imported.scene.is_open_world |= leak.is_some();
+    let config = resolved.config_for(&imported.scene);
+    let report = &imported.report;
     let said = report.doubts();
     let mut warnings = said.clone();
+    warnings.extend(leak);
     let unclear = report.up_doubt.as_ref().filter(|doubt| !doubt.is_clear);
     warnings.extend(unclear.map(|doubt| doubt.text.clone()));
-    let config = resolved.config_for(&imported.scene);
-    if !allow.leak {
-        refuse_leak(&imported.scene, &config, watcher)?;
-    }
     let told = Told::new(watcher, &config);
     let context = BakeContext::new(&told, Some(watcher.cancel.clone()));
     let mut baked = bake(&imported.scene, &config, &context).map_err(|e| match e {
@@ -158,7 +163,8 @@ fn work(
         }
         warnings.push(why);
     } else if !baked.world.doubts().is_empty() {
-        warnings.push(Verdict::of(&baked.world, &doubted(&said, report)).to_string());
+        let verdict = Verdict::of(&baked.world, &doubted(&said, report)).untried();
+        warnings.push(verdict.to_string());
     }
     // As readers of its file get it: rounded.
     let bug = |e| BakeError::new_err(format!("the baked world breaks an invariant (a bug): {e}"));
@@ -167,15 +173,23 @@ fn work(
     Ok((World::new(decode_glb(&bytes).map_err(bug)?), warnings))
 }
 
-/// Ends the bake of a map whose inside is open to the void.
-fn refuse_leak(scene: &Scene, config: &BakeConfig, watcher: &Watcher) -> PyResult<()> {
+/// Returns the leak of a map whose world is open to the sky; ends the bake of one whose inside is open to the void through a gap.
+fn leak_of_open_world(
+    scene: &Scene,
+    config: &BakeConfig,
+    watcher: &Watcher,
+) -> PyResult<Option<String>> {
     let n_faces = scene.solids.iter().map(|s| s.faces.len()).sum();
     let allowance = config.budget.allowance(n_faces, None);
     let allowance = allowance.unless(Some(watcher.cancel.clone()));
     let leak = find_leak(scene, (&allowance).into());
     // An exhausted allowance makes the search incomplete; the bake then ends with its own error at once.
     match leak.filter(|_| !allowance.is_over()) {
-        None => Ok(()),
+        None => Ok(None),
+        Some(leak) if leak.is_open_world() => Ok(Some(format!(
+            "{}; it is read as an open world",
+            leak.says(scene)
+        ))),
         Some(leak) => Err(BakeError::new_err(format!(
             "{}; close the gap, or go on with --allow-leak",
             leak.says(scene)
@@ -205,6 +219,7 @@ impl Options {
         let given = of_json(&self.arguments)?;
         settings.unit = given.unit.or(settings.unit);
         settings.up = given.up.or(settings.up);
+        settings.scene = given.scene.or(settings.scene);
         settings.min_opening = given.min_opening.or(settings.min_opening);
         settings.smallest_hole = given.smallest_hole.or(settings.smallest_hole);
         settings.voxel = given.voxel.or(settings.voxel);

@@ -206,7 +206,7 @@ impl World {
 
     /// Returns the verdict as a sentence.
     fn verdict(&self) -> String {
-        Verdict::of(&self.world, &[]).to_string()
+        Verdict::of(&self.world, &[]).untried().to_string()
     }
 
     /// Returns counts of the bake by name, and its provenance.

@@ -184,7 +184,7 @@ def test_wrong_arrays_are_refused_with_the_row():
 
 def test_scenes_that_hold_no_rooms_are_errors_that_name_arguments():
     vertices, faces = box((0, 0, 0), (4, 3, 5))
-    with pytest.raises(enfilade.BakeError, match=r"no room was found: .*unit=UNIT.*; allow_empty=True returns"):
+    with pytest.raises(enfilade.BakeError, match=r"no room was found: .*structural_names=\['PATTERN'\].*; allow_empty=True returns"):
         enfilade.bake(vertices, faces[:2])
     with pytest.warns(enfilade.BakeWarning, match="no room was found"):
         world = enfilade.bake(vertices, faces[:2], allow_empty=True)
@@ -333,7 +333,7 @@ def test_a_map_that_leaks_is_an_error_of_the_command(command, tmp_path):
         brush((-8, -8, 0), (0, 136, 136)),
         brush((128, -8, 0), (136, 136, 136)),
         brush((0, -8, 0), (128, 0, 136)),
-        brush((0, 128, 0), (128, 136, 136)),
+        brush((-8, -8, 136), (136, 136, 144)),
     ]
     path = tmp_path / "open.map"
     path.write_text(LEAKING_MAP % "\n".join(walls))

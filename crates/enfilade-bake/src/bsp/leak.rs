@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use enfilade_geom::scene::{Entity, Scene};
-use enfilade_geom::{ConvexSolid, DVec3, Purse};
+use enfilade_geom::{ConvexSolid, DVec3, OPEN_WORLD, Purse, open_floor};
 
 use crate::config::{Guide, Heuristic};
 
@@ -16,6 +16,12 @@ use super::tree::Content;
 const SHOWN: usize = 8;
 
 impl LeakPath {
+    /// Returns `true` if the world is open to the sky, so that the way out is a street, not a gap.
+    #[must_use]
+    pub fn is_open_world(&self) -> bool {
+        self.open_floor >= OPEN_WORLD
+    }
+
     /// Returns a sentence about it, without a remedy: the class of the entity in the scene, and the first points.
     #[must_use]
     pub fn says(&self, scene: &Scene) -> String {
@@ -114,7 +120,11 @@ fn way_to(
     let mut end = last;
     end[axis] = to;
     points.push(end);
-    LeakPath { from, points }
+    LeakPath {
+        from,
+        points,
+        open_floor: 0.0,
+    }
 }
 
 /// Returns the entities that have a position but no shape, which are known to be inside.
@@ -132,7 +142,7 @@ pub(super) fn inside_of(scene: &Scene) -> Vec<DVec3> {
 /// scenes that are not made of solids or have no entities.
 #[must_use]
 pub fn find_leak(scene: &Scene, purse: Purse<'_>) -> Option<LeakPath> {
-    let solids: &[ConvexSolid] = &scene.solids;
+    let solids: &[ConvexSolid] = &[&scene.solids[..], &scene.sky].concat();
     let inside = inside_of(scene);
     if solids.is_empty() || inside.is_empty() {
         return None;
@@ -144,5 +154,7 @@ pub fn find_leak(scene: &Scene, purse: Purse<'_>) -> Option<LeakPath> {
         inside: &inside,
     };
     let guide = Guide::default();
-    Bsp::build_of(&input, Heuristic::Default, &guide, true, purse).leak
+    let mut leak = Bsp::build_of(&input, Heuristic::Default, &guide, true, purse).leak?;
+    leak.open_floor = open_floor(&scene.solids, &inside, purse);
+    Some(leak)
 }

@@ -34,6 +34,8 @@ pub struct LeakPath {
     pub from: usize,
     /// Its vertices, from that point to beyond the outermost surface. [Units: wu]
     pub points: Vec<DVec3>,
+    /// Share of the floor below the open sky, of what people reach on foot ([`open_floor`](enfilade_geom::open_floor)).
+    pub open_floor: f64,
 }
 
 /// Counts of a tree.

@@ -18,6 +18,7 @@
 use enfilade_cpg::{Reason, Why};
 use enfilade_geom::{Allowance, DVec3, Plane, Winding};
 
+use crate::judge::NARROW;
 use crate::voxel::{BitVolume, Grid};
 
 use crate::structure::Candidate;
@@ -32,8 +33,8 @@ const MAX_GAP: f64 = 0.6;
 const MAX_ROOFED: f64 = 0.05;
 /// … or if a larger share is filled to less than [`MIN_WALL`] below the lid (a terrace, a flat roof).
 const MAX_SHALLOW: f64 = 0.25;
-/// Columns this near to a wall may be the hollow of a wall of two sheets, not a roof. [Units: wu]
-const MAX_HOLLOW: f64 = 0.25;
+/// Columns this near to a wall may be the hollow of a wall of two sheets, not a roof: it is thinner than a person. [Units: wu]
+const MAX_HOLLOW: f64 = NARROW;
 /// Least area of a lid. [Units: wu²]
 const MIN_AREA: f64 = 1.0;
 
@@ -449,6 +450,28 @@ mod tests {
         assert!((inner..=inner + 18).contains(&lids.count()));
         let rows: Vec<usize> = lids.iter_set().map(|i| grid().coords(i)[1]).collect();
         assert!(rows.iter().all(|&y| y == 34));
+    }
+
+    #[test]
+    fn hollow_walls_are_no_roof_until_a_person_fits_into_them() {
+        // Kits have walls of two sheets and a cap.
+        let hollow = |thick: usize| {
+            let mut v = BitVolume::new(N);
+            let ring = |v: &mut BitVolume, at: usize, rows: [usize; 2]| {
+                let (low, high) = (10 + at, [110 - at, 90 - at]);
+                fill(v, [low, rows[0], low], [high[0], rows[1], low + 1]);
+                fill(v, [low, rows[0], high[1] - 1], [high[0], rows[1], high[1]]);
+                fill(v, [low, rows[0], low], [low + 1, rows[1], high[1]]);
+                fill(v, [high[0] - 1, rows[0], low], [high[0], rows[1], high[1]]);
+            };
+            fill(&mut v, [10, 10, 10], [110, 11, 90]);
+            ring(&mut v, 0, [11, 36]);
+            ring(&mut v, thick - 1, [11, 36]);
+            (1..thick).for_each(|k| ring(&mut v, k, [35, 36]));
+            lidded(&v)
+        };
+        assert_eq!(hollow(10), 80 * 60);
+        assert_eq!(hollow(14), 0);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! `bench rooms`: rooms, doors and openings as architects mean them, clean and spoilt, on buildings and levels; each figure with its
 //! bar. `bench levels`: those of levels of games alone.
 
+mod advice;
 mod bars;
 mod hole;
 mod levels;
@@ -30,6 +31,7 @@ pub(crate) struct Rooms {
 pub(crate) fn bench_levels(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> {
     let mut out = RowPrinter::new(is_json);
     levels::run(&mut Worlds::new(chosen, false)?, &mut out)?;
+    advice::run(chosen, &mut out)?;
     out.finish()
 }
 

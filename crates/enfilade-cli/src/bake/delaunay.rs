@@ -10,7 +10,7 @@ use enfilade_cli::input::{name_of, read_text};
 
 use enfilade_settings::parse_toml;
 
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub(crate) struct DelaunayOptions {
     /// With the Delaunay builder: weight of a portal.
     #[arg(long, value_enum, default_value_t = WeightName::ScaleFree)]

@@ -96,25 +96,28 @@ pub(crate) fn settings_of(
     told
 }
 
-/// Returns the doubts about unit and axis, for the verdict. They are reported; the bake ends if the files state neither,
-/// as their numbers alone then speak.
-pub(crate) fn doubts(report: &ImportReport) -> anyhow::Result<Vec<InputDoubt>> {
-    if let Some(why) = report.refusal() {
-        bail!("{why}");
+/// Ends the bake if the files state neither unit nor axis, and their numbers speak against those that are assumed.
+pub(crate) fn refuse(report: &ImportReport) -> anyhow::Result<()> {
+    match report.refusal() {
+        Some(why) => bail!("{why}"),
+        None => Ok(()),
     }
-    let said = report.doubts();
-    for text in &said {
-        writeln!(Warned, "{text}")?;
-    }
-    if let Some(doubt) = report.up_doubt.as_ref().filter(|doubt| !doubt.is_clear) {
-        writeln!(Warned, "{}", doubt.text)?;
-    }
+}
+
+/// Returns what seems to point up, if it is another axis and the evidence is weak.
+pub(super) fn hint(report: &ImportReport) -> Option<String> {
+    let unclear = report.up_doubt.as_ref().filter(|doubt| !doubt.is_clear);
+    unclear.map(|doubt| doubt.text.clone())
+}
+
+/// Returns the doubts about unit and axis, for the verdict.
+pub(super) fn input_doubts(report: &ImportReport) -> Vec<InputDoubt> {
     let up = report.up_doubt.as_ref().map(|doubt| &doubt.text);
     let doubt = |text: String| InputDoubt {
         is_about_up: Some(&text) == up,
         text,
     };
-    Ok(said.into_iter().map(doubt).collect())
+    report.doubts().into_iter().map(doubt).collect()
 }
 
 /// Most names listed for one reason.

@@ -10,12 +10,18 @@ use enfilade::geom::scene::{Role, Scene};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
 
-use super::{Bake, settings};
+use super::Bake;
+use super::settings::{self, WorldName};
 use crate::screen::Warned;
 use enfilade::whole::write as write_whole;
 
-/// Ends the bake of a map that has no wall, or whose inside is open to the void, and reports the way out.
-pub(super) fn refuse_leak(args: &Bake, scene: &Scene, config: &BakeConfig) -> anyhow::Result<()> {
+/// Returns `true` for a map whose world is open to the sky. Ends the bake of one that has no wall, or whose inside is open to the
+/// void through a gap, and reports the way out.
+pub(super) fn is_open_world(
+    args: &Bake,
+    scene: &Scene,
+    config: &BakeConfig,
+) -> anyhow::Result<bool> {
     let options = &args.options;
     let classes = classes_of_detail(scene);
     if !classes.is_empty() && scene.objects.iter().all(|o| o.role == Role::Detail) {
@@ -30,7 +36,7 @@ pub(super) fn refuse_leak(args: &Bake, scene: &Scene, config: &BakeConfig) -> an
     let leak = find_leak(scene, (&allowance).into());
     // An exhausted allowance makes the search incomplete; the bake then ends with its own error at once.
     let Some(leak) = leak.filter(|_| !allowance.is_over()) else {
-        return Ok(());
+        return Ok(options.world == WorldName::Open && !scene.solids.is_empty());
     };
     let lines: String = leak
         .points
@@ -45,12 +51,28 @@ pub(super) fn refuse_leak(args: &Bake, scene: &Scene, config: &BakeConfig) -> an
     let text = format!("{}{way}", leak.says(scene));
     if options.allow_leak {
         writeln!(Warned, "{text}")?;
-        return Ok(());
+        return Ok(options.world == WorldName::Open);
     }
     if let Some(cause) = walls_of_detail(args, scene, config) {
         bail!("{text}; {cause}");
     }
-    bail!("{text}; close the gap, write the way with --leak FILE.pts, or go on with --allow-leak")
+    let is_open = match options.world {
+        WorldName::Auto => leak.is_open_world(),
+        WorldName::Open => true,
+        WorldName::Sealed => false,
+    };
+    let share = 100.0 * leak.open_floor;
+    if is_open {
+        writeln!(
+            Warned,
+            "{text}; {share:.0} % of its floor lies below the open sky: it is read as an open world, not as a sealed one (--world sealed)"
+        )?;
+        return Ok(true);
+    }
+    bail!(
+        "{text}; {share:.0} % of its floor lies below the open sky: close the gap, write the way with --leak FILE.pts, go on with \
+         --allow-leak, or with --world open if an engine draws the sky"
+    )
 }
 
 /// Returns the classes of detail brushes that would close the map as structure, if some do, and the option: tried before it is

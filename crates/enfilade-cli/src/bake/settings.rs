@@ -18,7 +18,7 @@ use enfilade_cli::input::{name_of, read_text};
 use enfilade_cli::memory::held_memory;
 
 /// Options for reading scenes, shared by the baked scene and the scene that a world is compared with.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub(crate) struct SceneOptions {
     /// Objects whose object, mesh or material name matches this pattern (`*`, `?`) are detail.
     #[arg(long, value_name = "PATTERN")]
@@ -87,7 +87,7 @@ pub(crate) struct SceneOptions {
     pub(crate) config: Option<PathBuf>,
 }
 
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub(crate) struct BakeOptions {
     /// Files whose objects are all detail: furniture, door leaves, plants.
     #[arg(long, value_name = "FILE")]
@@ -105,6 +105,12 @@ pub(crate) struct BakeOptions {
     /// Continue although the map leaks.
     #[arg(long)]
     pub(super) allow_leak: bool,
+    /// Maps: a sealed level, which must not leak, or an open world, whose sky an engine draws.
+    #[arg(long, value_enum, default_value_t = WorldName::Auto)]
+    pub(super) world: WorldName,
+    /// Tell for each opening that a map marks (visportals, areaportals) which portal it is, or how far away the next one is.
+    #[arg(long, value_enum)]
+    pub(super) given: Option<GivenName>,
     /// Report the narrowest place on the widest way from a room to the outdoors, and write the way into the world as
     /// a line: from the middle of the largest air with walls around, or from a point of the world that should be in a
     /// room.
@@ -184,6 +190,24 @@ enum OutdoorsName {
     Split,
 }
 
+/// Marks of designers.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum GivenName {
+    /// Openings between rooms or areas.
+    Portals,
+}
+
+/// Worlds that maps are of.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum WorldName {
+    /// Open if it leaks and half or more of the floor that people reach lies below nothing.
+    Auto,
+    /// Open, whether it leaks or not.
+    Open,
+    /// Sealed: it must not leak.
+    Sealed,
+}
+
 fn parse_place(text: &str) -> Result<[f64; 2], String> {
     let number = |n: &str| n.trim().parse().ok().filter(|n: &f64| n.is_finite());
     let place = text.split_once(',').map(|(x, z)| [number(x), number(z)]);
@@ -217,9 +241,33 @@ impl BakeOptions {
         let given = [
             (self.leak.is_some(), "--leak"),
             (self.allow_leak, "--allow-leak"),
+            (self.world != WorldName::Auto, "--world"),
+            (self.given.is_some(), "--given"),
             (self.leak_path.is_some(), "--leak-path"),
         ];
         given.into_iter().find(|(is, _)| *is).map(|(_, name)| name)
+    }
+
+    /// Returns the axis that is not taken to point up.
+    pub(super) fn other_axis(&self) -> &'static str {
+        match self.scene.up {
+            Some(Axis::Z) => "y",
+            _ => "z",
+        }
+    }
+
+    /// Returns the options with one more, in words; `None` for one that only a person can fill in.
+    pub(super) fn with(&self, option: &str) -> Option<Self> {
+        let mut options = self.clone();
+        let (name, value) = option.split_once(' ')?;
+        match (name, value) {
+            ("--unit", _) => options.scene.unit = Some(parse_unit(value).ok()?),
+            ("--up", "y") => options.scene.up = Some(Axis::Y),
+            ("--up", "z") => options.scene.up = Some(Axis::Z),
+            ("--min-cost", _) => options.min_cost = Some(value.parse().ok()?),
+            _ => return None,
+        }
+        Some(options)
     }
 
     /// All files to read, including `scene`.

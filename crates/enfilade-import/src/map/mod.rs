@@ -1,4 +1,4 @@
-//! Reads Quake `.map` files: Standard and Valve 220, Quake 3 (brush primitives, patches) and Doom 3. Brushes become
+//! Reads Quake `.map` files: Standard and Valve 220, Quake 3 (brush primitives, patches), Doom 3, and Valve's `.vmf`. Brushes become
 //! solids and their faces; entities are kept.
 //!
 //! A brush is the space behind all of its planes, so it is always convex; an impossible brush (planes that face
@@ -8,20 +8,22 @@
 //! see-through detail; what has no matter by its texture ([`texture_matter`]) or its class is left out, and so are structural
 //! faces that other structural brushes hide altogether.
 //!
-//! A unit is 1/32 m by default: a player of 56 units is 1.75 m tall, and coordinates stay exact. Up is z. Texture
+//! A unit is 1/32 m by default (19.05 mm in `.vmf`): a player of 56 units is 1.75 m tall, and coordinates stay exact. Up is z. Texture
 //! sizes are in WAD files, which are not read, so maps have no texture coordinates.
 
+mod given;
 mod layers;
 mod order;
 mod parse;
 mod patch;
+mod vmf;
 
 use std::collections::BTreeMap;
 
 use enfilade_geom::scene::{Entity, Material, Mesh, Primitive, Role};
 use enfilade_geom::solid::exposed_faces;
 use enfilade_geom::{ConvexSolid, DMat3, DMat4, DVec3, Plane, SolidError};
-use enfilade_prepare::{TextureMatter, texture_matter};
+use enfilade_prepare::{TextureMatter, is_sky_around, texture_matter};
 use serde_json::json;
 
 use crate::builder::Builder;
@@ -30,8 +32,12 @@ use parse::Place;
 use parse::{Brush, MAX_COORDINATE, RawEntity};
 use patch::Tessellation;
 
+/// Formats read here, all with a known unit and axis.
+pub(crate) const MAPS: [&str; 2] = ["Quake map", "VMF"];
 /// Default length of a map's unit. [Units: m]
 const UNIT: f64 = 1.0 / 32.0;
+/// … and of that of Source: three quarters of an inch, so that 16 are a foot. [Units: m]
+const SOURCE_UNIT: f64 = 0.01905;
 /// Vertices nearer than this are one. [Units: those of the map]
 const WELD: f64 = 1e-3;
 /// Most sides of a brush; clipping takes quadratic time. Editors make a few dozen at most.
@@ -44,6 +50,9 @@ pub(crate) fn is_map(bytes: &[u8]) -> bool {
         .split(|&b| b == b'\n')
         .map(<[u8]>::trim_ascii)
         .filter(|l| !l.is_empty() && !l.starts_with(b"//"));
+    if std::str::from_utf8(&head[..head.len().min(64)]).is_ok_and(vmf::is_vmf) {
+        return true;
+    }
     let second = |rest: &[u8]| rest.trim_ascii().starts_with(b"\"");
     match lines.next() {
         Some(b"{") => lines.next().is_some_and(second),
@@ -138,12 +147,14 @@ struct Shaped<'t> {
 
 /// Reads one file into the builder.
 pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
-    builder.set_format("Quake map");
     // Maps are Latin-1 or UTF-8; only names and texts depend on it.
     let text = String::from_utf8_lossy(bytes);
+    let is_vmf = vmf::is_vmf(&text);
+    builder.set_format(if is_vmf { MAPS[1] } else { MAPS[0] });
     let failed =
         |builder: &Builder<'_>, p: parse::Problem| builder.malformed(p.place.to_string(), p.text);
-    let mut entities = parse::parse(&text).map_err(|p| failed(builder, p))?;
+    let parse = if is_vmf { vmf::parse_vmf } else { parse::parse };
+    let mut entities = parse(&text).map_err(|p| failed(builder, p))?;
     layers::leave_out_omitted(&mut entities, builder);
     order::sort(&mut entities);
     if !entities
@@ -194,7 +205,8 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
             });
         }
     }
-    build(&entities, &shaped, builder)
+    let unit = if is_vmf { SOURCE_UNIT } else { UNIT };
+    build(&entities, &shaped, unit, builder)
 }
 
 /// Returns the brush as a solid.
@@ -268,37 +280,55 @@ type Faces<'t> = BTreeMap<(usize, EntityPart), BTreeMap<&'t str, Primitive>>;
 fn build(
     entities: &[RawEntity<'_>],
     shaped: &[Shaped<'_>],
+    unit: f64,
     builder: &mut Builder<'_>,
 ) -> Result<(), ImportError> {
     let mut options = builder.options.clone();
-    options.unit = options.unit.or(Some(UNIT));
+    options.unit = options.unit.or(Some(unit));
     options.up = options.up.or(Some(Up::Z));
     let base = options.base_transform()?;
-    let scale = options.unit.unwrap_or(UNIT);
+    let scale = options.unit.unwrap_or(unit);
     let rotation = DMat3::from_mat4(base) * (1.0 / scale);
     let offset = base.w_axis.truncate();
-    let brushwork = Brushwork {
+    let origin_of = |e: &RawEntity<'_>| {
+        let mut numbers = e
+            .get("origin")?
+            .split_ascii_whitespace()
+            .map(str::parse::<f64>);
+        let mut next = || numbers.next()?.ok().filter(|v| v.is_finite());
+        Some(base.transform_point3(DVec3::new(next()?, next()?, next()?)))
+    };
+    let placed = |s: &ConvexSolid| s.placed(scale, &rotation, offset);
+    let solid = |brush: &Brush<'_>| Some(placed(&solid_of(brush).ok()?));
+    let given = given::portals(entities, &builder.options.roles, solid);
+    builder.add_given_portals(given);
+    let mut brushwork = Brushwork {
         entities,
         shaped,
         roles: roles_of(entities, builder),
+        is_open: false,
     };
+    let (sky, walls): (Vec<&Shaped<'_>>, _) =
+        (shaped.iter().filter(|s| brushwork.is_structural(s)))
+            .partition(|s| s.matter == BrushMatter::Sky);
+    let [walls, sky] =
+        [walls, sky].map(|of| of.iter().map(|s| placed(&s.solid)).collect::<Vec<_>>());
+    brushwork.is_open = is_sky_around(&sky, &walls);
+    if brushwork.is_open {
+        let reason = "a sky around everything else: outdoors to its end";
+        builder
+            .report
+            .leave_out(reason, "brushes of the sky", sky.len() as u64);
+        builder.add_sky(sky);
+    }
     let structural = brushwork.structural();
     let faces = brushwork.visible_faces(&structural, builder)?;
     let object_of = brushwork.place(faces, base, builder)?;
-    builder.add_solids(
-        structural
-            .iter()
-            .map(|s| s.placed(scale, &rotation, offset)),
-    );
+    builder.add_solids(structural.iter().map(|s| placed(s)));
     for (i, e) in entities.iter().enumerate() {
-        let position = e.get("origin").and_then(|text| {
-            let mut numbers = text.split_ascii_whitespace().map(str::parse::<f64>);
-            let mut next = || numbers.next()?.ok().filter(|v| v.is_finite());
-            Some(base.transform_point3(DVec3::new(next()?, next()?, next()?)))
-        });
         builder.add_entity(Entity {
             class: e.get("classname").unwrap_or("").to_owned(),
-            position,
+            position: origin_of(e),
             properties: e
                 .properties
                 .iter()
@@ -338,6 +368,8 @@ struct Brushwork<'s, 't> {
     shaped: &'s [Shaped<'t>],
     /// Role of each entity, with the reason.
     roles: Vec<(Role, String)>,
+    /// The sky is around an open world, and left out.
+    is_open: bool,
 }
 
 impl<'s, 't> Brushwork<'s, 't> {
@@ -347,9 +379,14 @@ impl<'s, 't> Brushwork<'s, 't> {
         s.matter == BrushMatter::Sky && (class.starts_with("func_detail") || s.is_detail)
     }
 
+    /// Returns `true` for the sky of an open world.
+    fn is_gone(&self, s: &Shaped<'_>) -> bool {
+        self.is_open && s.matter == BrushMatter::Sky
+    }
+
     fn is_structural(&self, s: &Shaped<'_>) -> bool {
         let is_of_structure = self.roles[s.entity].0 == Role::Structural && !s.is_detail;
-        s.matter != BrushMatter::Liquid && (is_of_structure || self.seals(s))
+        s.matter != BrushMatter::Liquid && !self.is_gone(s) && (is_of_structure || self.seals(s))
     }
 
     fn structural(&self) -> Vec<&'s ConvexSolid> {
@@ -366,7 +403,7 @@ impl<'s, 't> Brushwork<'s, 't> {
         let exposed = exposed_faces(structural, WELD, enfilade_geom::Purse::endless());
         let mut exposed = exposed.iter();
         let mut faces = Faces::new();
-        for s in self.shaped {
+        for s in self.shaped.iter().filter(|s| !self.is_gone(s)) {
             let visible = self.is_structural(s).then(|| exposed.next()).flatten();
             let part = match s.matter {
                 BrushMatter::Liquid => EntityPart::Liquid,

@@ -72,12 +72,7 @@ impl<'t> RawEntity<'t> {
 
 /// Reads all entities. Time and memory are linear in the text.
 pub(super) fn parse(text: &str) -> Result<Vec<RawEntity<'_>>, Problem> {
-    let mut words = Words {
-        text,
-        at: 0,
-        line: 1,
-        line_start: 0,
-    };
+    let mut words = Words::of(text);
     let mut entities = Vec::new();
     while let Some((place, word)) = words.next()? {
         if word == "Version" && entities.is_empty() {
@@ -333,7 +328,7 @@ fn patch<'t>(words: &mut Words<'t>, place: Place) -> Result<Patch<'t>, Problem> 
 /// Most rows or columns of a patch; Quake 3 takes 31.
 const MAX_PATCH: usize = 1023;
 
-fn problem(place: Place, text: String) -> Problem {
+pub(super) fn problem(place: Place, text: String) -> Problem {
     Problem { place, text }
 }
 
@@ -343,7 +338,7 @@ fn shown(word: &str) -> String {
 }
 
 /// Splits a text into words, brackets and quoted texts (with their opening quote).
-struct Words<'t> {
+pub(super) struct Words<'t> {
     text: &'t str,
     at: usize,
     line: u32,
@@ -351,6 +346,15 @@ struct Words<'t> {
 }
 
 impl<'t> Words<'t> {
+    pub(super) fn of(text: &'t str) -> Self {
+        Self {
+            text,
+            at: 0,
+            line: 1,
+            line_start: 0,
+        }
+    }
+
     fn place(&self) -> Place {
         Place {
             line: self.line,
@@ -377,7 +381,7 @@ impl<'t> Words<'t> {
         }
     }
 
-    fn next(&mut self) -> Result<Option<(Place, &'t str)>, Problem> {
+    pub(super) fn next(&mut self) -> Result<Option<(Place, &'t str)>, Problem> {
         self.skip();
         let place = self.place();
         let rest = &self.text[self.at..];
@@ -439,7 +443,7 @@ impl<'t> Words<'t> {
         Ok(word.map(|w| w.1))
     }
 
-    fn expect(&mut self, bracket: &str, what: &str) -> Result<(), Problem> {
+    pub(super) fn expect(&mut self, bracket: &str, what: &str) -> Result<(), Problem> {
         self.skip();
         let end = self.place();
         match self.next()? {

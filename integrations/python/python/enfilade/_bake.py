@@ -125,6 +125,7 @@ def bake_file(
     voxel: Optional[float] = None,
     detail_names: Sequence[str] = (),
     structural_names: Sequence[str] = (),
+    scene: Union[None, str, int] = None,
     method: str = "auto",
     settings: Optional[Settings] = None,
     threads: Optional[int] = None,
@@ -140,6 +141,7 @@ def bake_file(
     files: a path, or several that make one scene: GLB, glTF, OBJ, PLY, STL, Quake ``.map``, or IFC, which needs the
     package ifcopenshell.
     detail: files whose objects bound no room.
+    scene: the scene to read of a glTF file with several, by its name or its number from 0; its default scene if not given.
     allow_leak: go on with a map whose inside is open to the void, rather than raise ``BakeError``.
     allow_outside: also read files outside the scene's folder that it refers to; unsafe for scenes from strangers.
 
@@ -161,6 +163,7 @@ def bake_file(
         voxel=voxel,
         detail_names=detail_names,
         structural_names=structural_names,
+        scene=None if scene is None else str(scene),
     )
     return _told(_native.bake_files, _paths(files), _paths(detail), options, progress)
 
@@ -184,6 +187,7 @@ _ARGUMENTS = {
     "voxel": "voxel",
     "detail-name": "detail_names",
     "structural-name": "structural_names",
+    "scene": "scene",
     "max-memory": "max_memory",
     "max-time": "max_time",
     "allow-empty": "allow_empty",
