@@ -4,7 +4,7 @@ use enfilade_cpg::{Fact, World};
 use enfilade_geom::DVec2;
 
 use crate::drawing::{Class, Item, Path, Words};
-use crate::label::{line_height, width};
+use crate::label::width;
 use crate::sheet::Sheet;
 use crate::storeys::Storey;
 
@@ -25,23 +25,19 @@ pub(crate) struct Doubt {
 
 /// Returns the close decisions, the closest first, and then the spaces as large as a room and the openings that parted none, however clear.
 /// Each is on the plan of the highest storey whose floor it is not below, else on the lowest.
-pub(crate) fn doubts<'s>(
-    world: &World,
-    storeys: impl ExactSizeIterator<Item = &'s Storey> + Clone,
-) -> Vec<Doubt> {
-    if storeys.len() == 0 {
-        return Vec::new();
-    }
+pub(crate) fn doubts<'s>(world: &World, storeys: impl Iterator<Item = &'s Storey>) -> Vec<Doubt> {
+    let floors: Vec<(usize, f64)> = (storeys.enumerate())
+        .filter(|s| !s.1.is_between)
+        .map(|(page, storey)| (page, storey.range[0] - RING))
+        .collect();
     let of_rooms = world.graph.room_doubt();
     let close = of_rooms.close.iter().map(|c| (c.at, &c.why));
     let clear = world.graph.places.iter().filter(|p| p.why.chance() == 0.0);
     let all = close.chain(clear.map(|p| (p.at, &p.why)));
     let page_of = |y: f32| {
-        let floors = storeys.clone().enumerate().filter(|s| !s.1.is_between);
-        let low = |s: &Storey| s.range[0] - RING;
-        let under = floors.filter(|s| low(s.1) <= f64::from(y));
-        let top = under.max_by(|a, b| low(a.1).total_cmp(&low(b.1)));
-        top.map_or(0, |s| s.0)
+        let under = floors.iter().filter(|(_, low)| *low <= f64::from(y));
+        let top = under.max_by(|a, b| a.1.total_cmp(&b.1));
+        top.map_or(0, |floor| floor.0)
     };
     all.take(MOST)
         .map(|(at, why)| {
@@ -84,25 +80,4 @@ pub(crate) fn rings(doubts: &[Doubt], page: usize, sheet: &mut Sheet) {
         }));
         sheet.doubts.push((number, doubt.text.clone()));
     }
-}
-
-/// Writes the reasons of the rings on a sheet, within `room`. Returns the y of their end. [Units: wu]
-pub(crate) fn list(sheet: &mut Sheet, below: f64, room: f64, size: f64) -> f64 {
-    let mut y = below;
-    sheet.doubts.sort_unstable();
-    for (number, text) in std::mem::take(&mut sheet.doubts) {
-        let mut line = format!("?{number}");
-        for word in text.split(' ') {
-            if width(&line) * size + (width(word) + 1.0) * size > room {
-                y += line_height() * size;
-                let full = std::mem::replace(&mut line, "    ".to_owned());
-                sheet.words(DVec2::new(0.0, y), size, false, full);
-            }
-            line.push(' ');
-            line.push_str(word);
-        }
-        y += 1.3 * line_height() * size;
-        sheet.words(DVec2::new(0.0, y), size, false, line);
-    }
-    y
 }

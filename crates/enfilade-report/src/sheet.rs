@@ -5,9 +5,8 @@ use std::collections::BTreeSet;
 use enfilade_cpg::{CellId, World, cell_color};
 use enfilade_geom::{DVec2, shown};
 
-use crate::doubts::list;
 use crate::drawing::{Class, Item, Path, Words};
-use crate::label::{Sizes, shortened, width};
+use crate::label::{Sizes, line_height, shortened, width};
 
 /// Space around each plan, for its title. [Units: wu]
 pub(crate) const MARGIN: f64 = 0.9;
@@ -127,7 +126,7 @@ impl Sheet {
     pub(crate) fn numbers(&mut self, world: &World, below: f64, room: f64) -> f64 {
         let size = SMALL * self.legend();
         let below = self.names(world, below, room, size);
-        list(self, below, room, size)
+        self.reasons(below, room, size)
     }
 
     fn names(&mut self, world: &World, below: f64, room: f64, size: f64) -> f64 {
@@ -159,5 +158,26 @@ impl Sheet {
             self.words(DVec2::new(x, z), size, false, row.clone());
         }
         start + 1.5 * size * rows.len().div_ceil(columns) as f64
+    }
+
+    /// Writes the reasons of the rings, within `room`. Returns the y of their end. [Units: wu]
+    fn reasons(&mut self, below: f64, room: f64, size: f64) -> f64 {
+        let mut y = below;
+        self.doubts.sort_unstable();
+        for (number, text) in std::mem::take(&mut self.doubts) {
+            let mut line = format!("?{number}");
+            for word in text.split(' ') {
+                if width(&line) * size + (width(word) + 1.0) * size > room {
+                    y += line_height() * size;
+                    let full = std::mem::replace(&mut line, "    ".to_owned());
+                    self.words(DVec2::new(0.0, y), size, false, full);
+                }
+                line.push(' ');
+                line.push_str(word);
+            }
+            y += 1.3 * line_height() * size;
+            self.words(DVec2::new(0.0, y), size, false, line);
+        }
+        y
     }
 }

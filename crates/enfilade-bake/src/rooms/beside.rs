@@ -10,7 +10,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_geom::{Allowance, Bvh, DVec3, Ray};
+use enfilade_geom::{Allowance, Bvh, DVec3, Ray, in_closed_shells};
 
 use super::regions::Regions;
 use crate::judge::BETWEEN;
@@ -20,10 +20,18 @@ use crate::voxel::{Grid, Labels};
 const REACH: f64 = 0.5;
 
 /// The surfaces of a scene.
-pub(super) struct Sheets<'a> {
-    pub(super) bvh: &'a Bvh,
+pub(super) struct SheetTree<'a> {
+    bvh: &'a Bvh,
     /// Triangles of closed shells.
-    pub(super) is_closed: Vec<bool>,
+    is_closed: Vec<bool>,
+}
+
+impl<'a> SheetTree<'a> {
+    /// Tells closed shells from sheets. `n log n`.
+    pub(super) fn of(bvh: &'a Bvh) -> Self {
+        let is_closed = in_closed_shells(&bvh.to_triangles());
+        Self { bvh, is_closed }
+    }
 }
 
 /// Level walks out of a region that end in a region beside it, on the other side of a surface.
@@ -41,7 +49,7 @@ pub(super) type Beside = BTreeMap<u32, Walks>;
 pub(super) fn beside<'p>(
     grid: &Grid,
     labels: &Labels,
-    Sheets { bvh, is_closed }: &Sheets<'_>,
+    SheetTree { bvh, is_closed }: &SheetTree<'_>,
     regions: &Regions,
     group: &[u32],
     points: impl Iterator<Item = &'p DVec3>,

@@ -25,13 +25,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use enfilade_cpg::{Fact, Reason, Why};
-use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets, in_closed_shells};
+use enfilade_geom::{Aabb, Allowance, Bvh, DVec3, Sets};
 use rayon::prelude::*;
 
 use crate::budget::WORK_A_LOOK;
 use crate::voxel::{Grid, Labels};
 
-use super::beside::{Beside, Known, Sheets, beside, between};
+use super::beside::{Beside, Known, SheetTree, beside, between};
 use super::regions::{CloseJoin, Regions};
 use super::slabs::LAYERS;
 use crate::judge::{EnclosedFacts, Facing, NARROW, is_hollow_piece, why_open};
@@ -151,18 +151,12 @@ pub(crate) fn find_matter(
     let (mut narrow, indoors): (Vec<u32>, Vec<u32>) = indoors.into_iter().partition(is_hollow);
     let n_pieces = narrow.len();
     if facing == Facing::Anyhow {
-        let sheets = Sheets {
-            bvh,
-            is_closed: in_closed_shells(&bvh.to_triangles()),
+        let sheets = SheetTree::of(bvh);
+        let walks = |group: &[u32]| {
+            let points = group.iter().filter_map(|r| points.get(r)).flatten();
+            beside(grid, labels, &sheets, regions, group, points, allowance)
         };
-        let beside_of = |c: &Closed| {
-            let points = c.regions.iter().filter_map(|r| points.get(r)).flatten();
-            beside(
-                grid, labels, &sheets, regions, &c.regions, points, allowance,
-            )
-        };
-        let beside: Vec<Beside> = closed.par_iter().map(beside_of).collect();
-        weigh_between(&mut closed, &beside, &open, min_radius);
+        weigh_between(&mut closed, walks, &open, min_radius);
     }
 
     let (mut doubtful, mut whys, mut spaces) = (Vec::new(), Vec::new(), Vec::new());
@@ -249,7 +243,13 @@ fn seen_from(
 }
 
 /// Weighs which of the closed groups lie between spaces, given the regions beside each, and the regions that are open.
-fn weigh_between(closed: &mut [Closed], beside: &[Beside], open: &[u32], min_radius: f64) {
+fn weigh_between(
+    closed: &mut [Closed],
+    beside: impl Fn(&[u32]) -> Beside + Sync,
+    open: &[u32],
+    min_radius: f64,
+) {
+    let beside: Vec<Beside> = closed.par_iter().map(|c| beside(&c.regions)).collect();
     let is_room = |c: &&Closed| c.facts.why(Facing::Anyhow, min_radius).reason == Reason::Enclosed;
     let rooms = closed.iter().filter(is_room).flat_map(|c| &c.regions);
     let sized = closed.iter().filter(|c| c.facts.radius >= NARROW);
@@ -257,7 +257,7 @@ fn weigh_between(closed: &mut [Closed], beside: &[Beside], open: &[u32], min_rad
         air: open.iter().chain(rooms).copied().collect(),
         sized: sized.flat_map(|c| &c.regions).copied().collect(),
     };
-    let groups = closed.iter().map(|c| &c.regions[..]).zip(beside);
+    let groups = closed.iter().map(|c| &c.regions[..]).zip(&beside);
     let between = between(&groups.collect::<Vec<_>>(), known);
     for (c, between) in closed.iter_mut().zip(between) {
         c.facts.between = between;

@@ -130,7 +130,7 @@ impl<'a> Trials<'a> {
         }
     }
 
-    /// Returns `true` if a bake with the option deserves more trust, and a unit loses no room.
+    /// Returns `true` if a bake with the option deserves more trust, and loses no room if it only reads the input in another way.
     fn helps(&mut self, option: &str, than: &Verdict) -> bool {
         let is_reading = option.starts_with("--unit") || option.starts_with("--up");
         if self.is_known && is_reading || self.args.inputs.iter().any(|p| is_stream(p)) {
@@ -141,7 +141,7 @@ impl<'a> Trials<'a> {
             self.tried.insert(option.to_owned(), verdict);
         }
         let tried = self.tried[option].as_ref();
-        let keeps = |v: &&Verdict| !option.starts_with("--unit") || v.n_rooms() >= than.n_rooms();
+        let keeps = |v: &&Verdict| !is_reading || v.n_rooms() >= than.n_rooms();
         tried.filter(keeps).is_some_and(|v| v.is_better_than(than))
     }
 

@@ -203,7 +203,7 @@ const MOST_TO_PUT_BACK: usize = 2_000_000;
 /// Puts back structural triangles that are missing one by one, and returns their places, the largest first.
 ///
 /// Three open edges that meet are closed by one triangle if the surface continues straight into it, within 45 degrees, across one of them.
-/// An exporter that drops triangles leaves such holes; a hole meant as one has a wall's thickness, or more corners. Brushes and scenes
+/// An exporter that drops triangles leaves such holes; a hole meant as one has a wall's thickness, or more vertices. Brushes and scenes
 /// of more than two million structural triangles stay as they are.
 ///
 /// Time: `n log n` for `n` triangles; memory: about 300 bytes per triangle.
