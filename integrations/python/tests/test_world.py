@@ -195,7 +195,8 @@ def test_answers_are_those_of_the_command(command, worlds):
         located = command.json("locate", path, stdin=lines)["cells"]
         expected = [-1 if c is None else c for c in located]
         assert world.locate(points).tolist() == expected, path
-        assert len(set(expected)) > 3
+        # In more than three cells, solid among them, or in all of a world of one room.
+        assert len(set(expected)) > min(3, len(world.cells))
 
         told = command.json("inspect", path)
         assert [c["name"] for c in told["cells"]] == world.cells.names
