@@ -8,6 +8,7 @@ use enfilade_geom::scene::Scene;
 use crate::bound::keep_costs;
 use crate::budget::n_structural;
 use crate::delaunay::Session;
+use crate::given::keep_given;
 use crate::marked::make_marked;
 use crate::names::name_cells;
 use crate::realize::realize;
@@ -58,9 +59,7 @@ pub fn bake(
             "no pieces kept: only the watershed makes any, and a bake that is killed begins anew";
         baked.notes.push(note.to_owned());
     }
-    keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
-    name_cells(&mut baked.world, &mut baked.notes, &scene.rooms);
-    make_marked(&mut baked.world, &mut baked.notes, scene);
+    finish(&mut baked, scene, config);
     Ok(baked)
 }
 
@@ -81,10 +80,22 @@ pub fn bake_session(
     let mut proposal = delaunay::propose_of(&structure, session, n_steps, config, context)?;
     land::split(&structure, config, context, &mut proposal)?;
     let mut baked = realize(structure, method, proposal, config, context)?;
-    keep_costs(&mut baked.world, &mut baked.notes, &config.costs);
-    name_cells(&mut baked.world, &mut baked.notes, &scene.rooms);
-    make_marked(&mut baked.world, &mut baked.notes, scene);
+    finish(&mut baked, scene, config);
     Ok(baked)
+}
+
+/// Takes into a world what the scene and its maker say about it: costs, given portals, names, mirrors and links.
+fn finish(baked: &mut BakeOutput, scene: &Scene, config: &BakeConfig) {
+    let (world, notes) = (&mut baked.world, &mut baked.notes);
+    keep_costs(world, notes, &config.costs);
+    let given = config.keeps_given.then(|| keep_given(world, scene));
+    name_cells(world, notes, &scene.rooms);
+    if let Some(given) = given {
+        given.tell(world, scene, notes);
+        let settings = &mut world.graph.provenance.settings;
+        settings.insert("given".to_owned(), "portals".to_owned());
+    }
+    make_marked(world, notes, scene);
 }
 
 /// Bakes with one method.

@@ -31,6 +31,8 @@ pub struct BakeConfig {
     pub merge: MergeSettings,
     /// Cells outdoors: one, or several.
     pub outdoors: Outdoors,
+    /// Openings that the scene marks become portals where they are marked ([`Scene::given_portals`](enfilade_geom::scene::Scene::given_portals)).
+    pub keeps_given: bool,
     /// Bounds on the cost of cells, and the model of costs; no bounds by default.
     pub costs: SimplifySettings,
     /// Watershed, and BSP in buildings: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. An edge
@@ -57,6 +59,7 @@ impl Default for BakeConfig {
             smallest_hole: SmallestHole::default(),
             merge: MergeSettings::default(),
             outdoors: Outdoors::default(),
+            keeps_given: false,
             costs: SimplifySettings::default(),
             voxel: None,
             max_voxels: 1_600_000_000,

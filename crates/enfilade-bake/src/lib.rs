@@ -27,6 +27,7 @@ mod context;
 pub mod delaunay;
 pub mod edit;
 mod error;
+mod given;
 mod join;
 mod judge;
 mod land;

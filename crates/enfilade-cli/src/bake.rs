@@ -6,7 +6,6 @@ pub(crate) mod delaunay;
 mod doorless;
 pub(crate) mod found;
 mod gaps;
-mod given;
 mod leak_path;
 mod leaking;
 mod reasons;
@@ -151,6 +150,13 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
     };
     let own = args.checkpoint.clone().map(PieceFolder::at);
     let pieces = kept.or(own.as_ref());
+    if !scene.given_portals.is_empty() && !config.keeps_given {
+        let n = scene.given_portals.len();
+        writeln!(
+            Told,
+            "openings that a designer marked: {n} (--given portals puts portals there)"
+        )?;
+    }
     let name = || names_of(&args.inputs);
     let began = Instant::now();
     let baked = bake_scene(scene, config, options.threads, pieces);
@@ -198,9 +204,6 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
         path.write(&mut path.says())?;
     }
     warn_of_separators(&baked.world)?;
-    if options.given.is_some() {
-        given::tell(&mut Told, scene, &baked.world)?;
-    }
     let mut out = outputs.printed();
     let written = Written::new(&args.output, &bytes);
     if args.json {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use enfilade_geom::scene::Scene;
+use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::mixed;
 
 fn folder(name: &str) -> PathBuf {
@@ -150,4 +151,50 @@ fn another_scene_is_told_before_anything_is_counted() {
     assert!(!said(&done).contains("breaks a promise"), "{}", said(&done));
     let done = run(&dir, "verify a.glb --source a.obj --rays 1000 --sight 0");
     assert!(done.status.success(), "{}", said(&done));
+}
+
+/// Adds boxes of a material of their own to an OBJ.
+fn with_boxes(text: &str, boxes: &[[[f64; 3]; 2]]) -> String {
+    let mut text = format!("usemtl stone\n{text}");
+    let mut first = 1 + text.lines().filter(|l| l.starts_with("v ")).count();
+    for (i, [min, max]) in boxes.iter().enumerate() {
+        writeln!(text, "o Cube.{i:03}\nusemtl blue").unwrap();
+        for t in Aabb::new(DVec3::from(*min), DVec3::from(*max)).triangles() {
+            for p in t {
+                writeln!(text, "v {} {} {}", p.x, p.y, p.z).unwrap();
+            }
+            writeln!(text, "f {first} {} {}", first + 1, first + 2).unwrap();
+            first += 3;
+        }
+    }
+    text
+}
+
+#[test]
+fn boxes_that_may_be_volumes_of_an_engine_are_named_if_rooms_are_better_without_them() {
+    let dir = folder("volumes");
+    let told = |boxes: &[[[f64; 3]; 2]]| {
+        fs::write(dir.join("a.obj"), with_boxes(&rooms(|p| p), boxes)).unwrap();
+        said(&run(&dir, "bake a.obj -o a.glb --allow-empty"))
+    };
+    let world = enfilade::open(&{
+        fs::write(dir.join("b.obj"), rooms(|p| p)).unwrap();
+        run(&dir, "bake b.obj -o b.glb");
+        dir.join("b.glb")
+    });
+    let world = world.unwrap();
+    let within = world.graph.rooms().map(|(_, c)| {
+        let [min, max] = c.aabb.map(|p| DVec3::from(p.map(f64::from)));
+        [(min + 0.15).to_array(), (max - 0.15).to_array()]
+    });
+    let within: Vec<_> = within.collect();
+    let text = told(&within);
+    assert!(
+        text.contains("--detail-name 'Cube.000' --detail-name 'Cube.001'"),
+        "{text}"
+    );
+    let [min, _] = within[0];
+    let pillar = [min, [min[0] + 0.4, min[1] + 2.0, min[2] + 0.4]];
+    let text = told(&[pillar]);
+    assert!(!text.contains("volumes of an engine"), "{text}");
 }

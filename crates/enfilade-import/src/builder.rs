@@ -1,14 +1,17 @@
 //! Fills one [`Scene`] from several files: merging, limits, mirrored placements, roles.
 
 mod naming;
+mod openings;
 mod variants;
 
+use crate::groups::name_groups;
 use crate::left_out::leave_out;
 use crate::order::sort;
 use crate::origins::Origins;
+
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
-    Entity, Filling, GivenPortal, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
+    Entity, Filling, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
 use enfilade_prepare::{GridSteps, RoleFacts, RoleVerdict, weld_quantized};
@@ -232,9 +235,9 @@ impl<'a> Builder<'a> {
         self.scene.is_open_world = true;
     }
 
-    /// Keeps openings that a designer marked.
-    pub(crate) fn add_given_portals(&mut self, portals: Vec<GivenPortal>) {
-        self.scene.given_portals.extend(portals);
+    /// Puts an object at a node of the tree of names.
+    pub(crate) fn put_at(&mut self, object: u32, node: Option<u32>) {
+        self.scene.objects[object as usize].node = node;
     }
 
     /// Keeps an entity.
@@ -445,8 +448,12 @@ impl<'a> Builder<'a> {
         }
         let mesh = &self.scene.meshes[placement.mesh as usize];
         let (verdict, filling, is_mixed) = self.judge(placement, mesh);
+        let is_mark = matches!(verdict, RoleVerdict::Mark(_));
         let (role, reason) = match verdict {
-            RoleVerdict::Ignore(reason) => {
+            RoleVerdict::Ignore(reason) | RoleVerdict::Mark(reason) => {
+                if is_mark {
+                    self.mark_openings(placement)?;
+                }
                 let [own, of_mesh] = placement.names;
                 let name = if own.is_empty() { of_mesh } else { own };
                 self.report.leave_out(&reason, name, n_placed);
@@ -565,6 +572,9 @@ impl<'a> Builder<'a> {
         let steps = steps.map(|(mesh, steps)| (remap[mesh as usize], steps));
         let mut steps = steps.collect();
         self.origins.move_into(&mut self.scene);
+        if !self.options.ignores_marks {
+            name_groups(&mut self.scene);
+        }
         sort(&mut self.scene, &mut steps);
         let n_welded = weld_quantized(&mut self.scene, &steps);
         if n_welded > 0 {

@@ -28,6 +28,7 @@ mod extent;
 mod files;
 mod foreign;
 mod gltf;
+mod groups;
 mod ifc;
 mod las_head;
 mod left_out;
@@ -54,7 +55,7 @@ mod textures;
 pub use arrays::{ArrayMesh, import_arrays};
 pub use enfilade_prepare::{
     BadOption, CleaningOptions, CleaningReport, Example, Finding, Glob, GlobState, RepairOptions,
-    RepairReport, RoleRules, ShellCounts, TextureMatter, is_match, repair,
+    RepairReport, RoleRules, ShellCounts, TextureMatter, is_match, repair, unnamed_helpers,
 };
 pub use error::ImportError;
 pub use export::export_glb;

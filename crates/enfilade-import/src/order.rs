@@ -9,7 +9,8 @@ use std::cmp::Ordering;
 use std::mem::take;
 
 use enfilade_geom::scene::{
-    Entity, Fixture, Image, Material, Mesh, Object, Primitive, RoomName, Scene, SourceNode, Texture,
+    Entity, Fixture, GivenPortal, Image, Material, Mesh, Object, Primitive, RoomName, Scene,
+    SourceNode, Texture,
 };
 use enfilade_geom::{ConvexSolid, DMat4, DVec3};
 use enfilade_prepare::GridSteps;
@@ -41,6 +42,7 @@ pub(crate) fn sort(scene: &mut Scene, steps: &mut GridSteps) {
     scene.entities.sort_by(entities);
     scene.fixtures.sort_by(fixtures);
     scene.rooms.sort_by(rooms);
+    scene.given_portals.sort_by(given_portals);
 }
 
 /// Makes pictures, textures and materials unique, and sorts them.
@@ -387,6 +389,19 @@ fn entities(a: &Entity, b: &Entity) -> Ordering {
     (&a.class, &a.properties, a.object)
         .cmp(&(&b.class, &b.properties, b.object))
         .then_with(|| all(&place(a), &place(b), f64::total_cmp))
+}
+
+fn given_portals(a: &GivenPortal, b: &GivenPortal) -> Ordering {
+    let numbers = |g: &GivenPortal| {
+        g.outline
+            .iter()
+            .flat_map(DVec3::to_array)
+            .collect::<Vec<_>>()
+    };
+    // Numbered names with fewer digits come first.
+    (a.name.len(), &a.name)
+        .cmp(&(b.name.len(), &b.name))
+        .then_with(|| all(&numbers(a), &numbers(b), f64::total_cmp))
 }
 
 fn rooms(a: &RoomName, b: &RoomName) -> Ordering {

@@ -116,7 +116,7 @@ impl Origins {
 }
 
 /// Returns an entity's properties as a JSON object.
-fn extras_of(entity: &Entity) -> String {
+pub(crate) fn extras_of(entity: &Entity) -> String {
     let properties = entity.properties.iter();
     let all: Map<String, Value> = properties
         .map(|(key, value)| (key.clone(), value.as_str().into()))

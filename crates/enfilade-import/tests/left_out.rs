@@ -106,3 +106,50 @@ fn a_scene_is_chosen_by_name_or_number() {
         "{unknown}"
     );
 }
+
+#[test]
+fn marks_of_openings_and_groups_of_rooms_are_read_by_the_names_of_engines() {
+    let sheet = [[4.0, 0.0, 1.0], [4.2, 2.1, 2.0]];
+    for (name, is_mark) in [
+        ("Portal_kitchen", true),
+        ("hall-portal", true),
+        ("OcclusionPortal.002", true),
+        ("Portal frame", false),
+        ("TriggerVolume", false),
+    ] {
+        let text = boxes(&[
+            ("Cube", "stone", SHELL[0], SHELL[1]),
+            (name, "stone", sheet[0], sheet[1]),
+        ]);
+        let scene = decode_obj(text.as_bytes(), &ImportOptions::default())
+            .unwrap()
+            .scene;
+        let marks = &scene.given_portals;
+        assert_eq!(marks.len(), usize::from(is_mark), "{name}");
+        if let [mark] = &marks[..] {
+            assert_eq!(
+                mark.name.trim_end_matches(".002"),
+                name.trim_end_matches(".002")
+            );
+            assert!(mark.outline.iter().all(|p| (p.x - 4.1).abs() < 1e-6));
+            assert!(mark.outline.len() == 4 && (mark.thickness - 0.2).abs() < 1e-6);
+        }
+    }
+    let json = |group: &str| {
+        triangle_json(&format!(
+            r#""scenes":[{{"nodes":[0,2]}}],"nodes":[{{"name":"{group}","children":[1]}},
+            {{"mesh":0,"name":"Floor"}},{{"mesh":0,"name":"Other-room","translation":[9,0,0]}}]"#
+        ))
+    };
+    for (group, name) in [
+        ("hall-room", "hall"),
+        ("Room_hall.001", "hall"),
+        ("Rooms", ""),
+    ] {
+        let bytes = glb(&json(group), &triangle_bin());
+        let read = decode_gltf(&bytes, &ImportOptions::default()).unwrap();
+        // A mesh of such a name is not a group.
+        let named: Vec<&str> = read.scene.rooms.iter().map(|r| &*r.name).collect();
+        assert_eq!(named.join(" "), name, "{group}");
+    }
+}

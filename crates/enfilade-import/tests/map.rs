@@ -495,14 +495,17 @@ fn marked_openings_are_kept_with_their_planes() {
     let one_side = one_side.replacen("common/nodraw", "editor/visportal", 1);
     let door = boxed([100, 0, 0], [108, 64, 96], "common/trigger");
     let others = format!("{{\n\"classname\" \"func_areaportal\"\n{door}}}\n");
-    let world = one_side + &boxed([200, 0, 0], [208, 64, 96], "stone");
+    // The other sides of a hint only close it.
+    let hint = boxed([300, 0, 0], [308, 64, 96], "hintskip").replacen("hintskip", "hint", 1);
+    let world = one_side + &hint + &boxed([200, 0, 0], [208, 64, 96], "stone");
     let scene = read(&map(&world, &others)).scene;
     let given: Vec<(&str, f64)> = (scene.given_portals.iter())
         .map(|g| (g.name.as_str(), g.thickness * 32.0))
         .collect();
-    assert_eq!(given, [("visportal 1", 8.0), ("areaportal 2", 8.0)]);
+    let all = [("hint 2", 8.0), ("visportal 1", 8.0), ("areaportal 3", 8.0)];
+    assert_eq!(given, all);
     // In the first side of the one, in the middle of the other.
-    for (given, x) in scene.given_portals.iter().zip([0.0, 104.0]) {
+    for (given, x) in scene.given_portals.iter().zip([300.0, 0.0, 104.0]) {
         assert!(given.normal.x.abs() > 0.999);
         assert!(given.outline.iter().all(|p| (p.x * 32.0 - x).abs() < 1e-6));
     }
@@ -512,4 +515,47 @@ fn marked_openings_are_kept_with_their_planes() {
             .given_portals
             .is_empty()
     );
+}
+
+#[test]
+fn groups_and_layers_are_nodes_above_what_they_hold() {
+    let layer = "{\n\"classname\" \"func_group\"\n\"_tb_type\" \"_tb_layer\"\n\"_tb_name\" \"Cellar\"\n\"_tb_id\" \"2\"\n";
+    let group = "{\n\"classname\" \"func_group\"\n\"_tb_type\" \"_tb_group\"\n\"_tb_name\" \"Stairs\"\n\"_tb_id\" \"3\"\n\"_tb_layer\" \"2\"\n";
+    let light = "{\n\"classname\" \"func_door\"\n\"_tb_group\" \"3\"\n";
+    let [a, b, c] = [0, 100, 200].map(|x| boxed([x, 0, 0], [x + 8, 64, 96], "stone"));
+    let world = boxed([300, 0, 0], [308, 64, 96], "stone");
+    let text = map(
+        &world,
+        &format!("{layer}{a}}}\n{group}{b}}}\n{light}{c}}}\n"),
+    );
+    let scene = read(&text).scene;
+    let path = |class: &str, x: f64| {
+        let is_at = |o: &&enfilade_geom::scene::Object| {
+            let primitive = &scene.meshes[o.mesh as usize].primitives[0];
+            let mut points = primitive.placed_triangles(o.transform).flatten();
+            o.name.starts_with(class) && points.any(|p| (p.x * 32.0 - x).abs() < 1e-6)
+        };
+        let object = scene.objects.iter().find(is_at).unwrap();
+        let first = object.node.map(|n| &scene.nodes[n as usize]);
+        let parent =
+            |n: &&enfilade_geom::scene::SourceNode| n.parent.map(|p| &scene.nodes[p as usize]);
+        let names = std::iter::successors(first, |n| parent(n)).skip(1);
+        names
+            .map(|n| n.name.as_str())
+            .collect::<Vec<_>>()
+            .join(" in ")
+    };
+    assert_eq!(path("func_group", 0.0), "Cellar");
+    assert_eq!(path("func_group", 100.0), "Stairs in Cellar");
+    assert_eq!(path("func_door", 200.0), "Stairs in Cellar");
+    assert_eq!(path("worldspawn", 300.0), "");
+    // Rules of names reach what is in a layer.
+    let mut options = ImportOptions::default();
+    options.roles.detail = vec!["Cellar".to_owned()];
+    let scene = decode_map(text.as_bytes(), &options).unwrap().scene;
+    let details = scene
+        .objects
+        .iter()
+        .filter(|o| o.role == enfilade_geom::scene::Role::Detail);
+    assert_eq!(details.count(), 3);
 }

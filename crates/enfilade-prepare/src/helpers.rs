@@ -1,6 +1,15 @@
-//! Names of volumes that engines use and never draw: triggers, probes, zones, collision shapes.
+//! Volumes that engines use and never draw: triggers, probes, zones, collision shapes, by name and by shape.
 
+use std::collections::BTreeMap;
+
+use enfilade_geom::scene::{Role, Scene};
+use enfilade_geom::{Rectangle, Triangle, facing, triangle_area_normal};
+
+use crate::auto_roles::DEFAULT;
 use crate::words::words;
+
+/// A mark of an opening.
+pub(crate) const OPENING: &str = "a mark of an opening";
 
 /// A phrase, in words, and the thing that it names.
 type Phrase = (&'static [&'static str], &'static str);
@@ -31,7 +40,7 @@ const ALWAYS: [Phrase; 32] = [
     (&["reverb", "volume"], "a zone of sound"),
     (&["occlusion", "volume"], "a volume of occlusion"),
     (&["occlusion", "area"], "a volume of occlusion"),
-    (&["occlusion", "portal"], "a mark of an opening"),
+    (&["occlusion", "portal"], OPENING),
     (&["cull", "volume"], "a volume of occlusion"),
     (&["culling", "volume"], "a volume of occlusion"),
     (&["visibility", "volume"], "a volume of occlusion"),
@@ -43,15 +52,19 @@ const ALWAYS: [Phrase; 32] = [
 
 /// Phrases that name a helper at the end of the name of a plain box or sheet: anything else may be a thing called so, such as
 /// an arch.
-const PLAIN: [Phrase; 7] = [
+const PLAIN: [Phrase; 8] = [
     (&["trigger"], "a trigger volume"),
     (&["bounds"], "bounds"),
+    (&["bound"], "bounds"),
     (&["collision"], "a collision shape"),
     (&["hitbox"], "a collision shape"),
-    (&["portal"], "a mark of an opening"),
-    (&["visportal"], "a mark of an opening"),
-    (&["areaportal"], "a mark of an opening"),
+    (&["portal"], OPENING),
+    (&["visportal"], OPENING),
+    (&["areaportal"], OPENING),
 ];
+
+/// The beginning of the name of a portal of Godot, before that of the room to which it leads.
+const PORTAL_TO: &str = "Portal_";
 
 /// The last word of a collision shape made beside the mesh that is drawn: `Wall_collision`.
 const BESIDE: &str = "collision";
@@ -65,9 +78,58 @@ pub(crate) fn of_name(name: &str, is_plain: bool) -> Option<&'static str> {
         .find(|(phrase, _)| words.windows(phrase.len()).any(|w| w == *phrase));
     let at_end = || PLAIN.iter().find(|(phrase, _)| words.ends_with(phrase));
     let plain = || at_end().filter(|_| is_plain);
-    let found = always.or_else(plain).map(|(_, thing)| *thing);
+    let leads = || (is_plain && name.starts_with(PORTAL_TO)).then_some(OPENING);
+    let found = (always.or_else(plain).map(|(_, thing)| *thing)).or_else(leads);
     let is_beside = words.len() > 1 && words.last() == Some(&BESIDE);
     found.or(is_beside.then_some("a collision shape"))
+}
+
+/// Triangles of a box.
+const BOX_TRIANGLES: usize = 12;
+/// Greatest difference of an object's surface from that of the box around it, relative to it.
+const BOX_SURFACE: f64 = 0.01;
+
+/// Returns the objects that may be helpers by their shape, ascending: boxes that are structure for want of a rule, with materials that
+/// nothing but such boxes has. A pillar may be one, too: whether rooms are better without them, only a bake tells.
+///
+/// Linear in triangles.
+#[must_use]
+pub fn unnamed_helpers(scene: &Scene) -> Vec<usize> {
+    let mut has_others: BTreeMap<Option<u32>, bool> = BTreeMap::new();
+    let mut boxes = Vec::new();
+    let structural = scene.objects.iter().enumerate();
+    for (i, object) in structural.filter(|(_, o)| o.role == Role::Structural) {
+        let primitives = &scene.meshes[object.mesh as usize].primitives;
+        let placed = primitives
+            .iter()
+            .flat_map(|p| p.placed_triangles(object.transform));
+        let is_lone = object.reason == DEFAULT && is_box(&placed.collect::<Vec<_>>());
+        for primitive in primitives {
+            *has_others.entry(primitive.material).or_default() |= !is_lone;
+        }
+        if is_lone {
+            boxes.push(i);
+        }
+    }
+    boxes.retain(|&i| {
+        let primitives = &scene.meshes[scene.objects[i].mesh as usize].primitives;
+        primitives.iter().all(|p| !has_others[&p.material])
+    });
+    boxes
+}
+
+/// Returns `true` if triangles are those of a box.
+fn is_box(triangles: &[Triangle]) -> bool {
+    if triangles.len() != BOX_TRIANGLES {
+        return false;
+    }
+    let size = Rectangle::around(facing(triangles), triangles.as_flattened()).size();
+    let around = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    let own: f64 = triangles
+        .iter()
+        .map(|t| triangle_area_normal(t).length() / 2.0)
+        .sum();
+    size.min_element() > 0.0 && (own - around).abs() <= BOX_SURFACE * around
 }
 
 #[cfg(test)]
@@ -91,7 +153,15 @@ mod tests {
         ] {
             assert!(of_name(name, false).is_some(), "{name}");
         }
-        for name in ["Portal", "Portal_03", "Door trigger", "Bounds"] {
+        for name in [
+            "Portal",
+            "Portal_03",
+            "Portal_kitchen",
+            "hall-portal",
+            "hall-bound",
+            "Door trigger",
+            "Bounds",
+        ] {
             assert!(of_name(name, true).is_some(), "{name}");
             assert!(of_name(name, false).is_none(), "{name}");
         }

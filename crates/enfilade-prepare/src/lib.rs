@@ -25,6 +25,7 @@ pub use copies::{collision_copies, lower_levels};
 pub use error::BadOption;
 pub use finding::{Example, Finding};
 pub use glob::{Glob, GlobState, is_match};
+pub use helpers::unnamed_helpers;
 pub use repair::{GridSteps, RepairOptions, RepairReport, put_back, repair, weld_quantized};
 pub use roles::{RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal};
 pub use sky::{is_sky_around, skies};

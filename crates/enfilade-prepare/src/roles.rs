@@ -65,6 +65,8 @@ pub enum RoleVerdict {
     Keep(Role, String),
     /// Left out, as a helper of some engine; with the reason.
     Ignore(String),
+    /// Left out, as a mark of an opening; with the reason.
+    Mark(String),
     /// Left out, as its format gives it no matter; with the reason.
     Void(String),
 }
@@ -227,11 +229,19 @@ impl RoleRules {
         };
         if !facts.materials.is_empty() && facts.materials.iter().all(is_nothing) {
             let texture = facts.materials[0];
-            return RoleVerdict::Ignore(format!("nothing but the tool texture '{texture}'"));
+            let reason = format!("nothing but the tool texture '{texture}'");
+            return match texture_matter(&self.textures, texture) {
+                Some(TextureMatter::Portal) => RoleVerdict::Mark(reason),
+                _ => RoleVerdict::Ignore(reason),
+            };
         }
         let mut names = (facts.names.iter()).filter(|n| marked_portal(n).is_none());
         if let Some(helper) = names.find_map(|name| helpers::of_name(name, facts.is_plain)) {
-            return RoleVerdict::Ignore(format!("{helper}, by its name"));
+            let reason = format!("{helper}, by its name");
+            return match helper {
+                helpers::OPENING => RoleVerdict::Mark(reason),
+                _ => RoleVerdict::Ignore(reason),
+            };
         }
         if let Some(why) = facts.moves {
             return detail(format!("moves: {why}"));

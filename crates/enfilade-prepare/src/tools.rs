@@ -118,7 +118,7 @@ const QUAKE: [Pattern; 3] = [("sky*", Sky), ("\\**", Water), ("#*", Water)];
 /// The tags of TrenchBroom for all games.
 const TRENCHBROOM: [Pattern; 9] = [
     ("hint", Hint),
-    ("hintskip", Hint),
+    ("hintskip", Air),
     ("skip", Undrawn),
     ("waterskip", Water),
     ("lavaskip", Water),

@@ -150,6 +150,12 @@ impl Verdict {
         self.trust < other.trust || self.trust == other.trust && self.doubt < other.doubt
     }
 
+    /// Returns `true` if nothing speaks against the world.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.trust == Trust::Good
+    }
+
     /// Number of its rooms.
     #[must_use]
     pub fn n_rooms(&self) -> usize {

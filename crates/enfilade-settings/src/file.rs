@@ -40,6 +40,8 @@ pub struct Settings {
     pub auto_roles: Option<bool>,
     /// `true` if objects called `mirror` or `portal:NAME` become mirrors and links.
     pub marks: Option<bool>,
+    /// Marks of designers that are kept.
+    pub given: Option<Given>,
     /// `true` if triangles that are missing one by one are put back.
     pub put_back: Option<bool>,
     /// Distance within which a repair welds vertices. [Units: wu]
@@ -72,6 +74,14 @@ pub enum UpAxis {
     Y,
     /// +Z.
     Z,
+}
+
+/// Marks of designers that a bake can keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Given {
+    /// Openings between rooms or areas.
+    Portals,
 }
 
 /// The table `[bsp]`.
@@ -213,7 +223,7 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 44);
+        assert_eq!(n, 45);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: Settings = parse_toml(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));

@@ -76,6 +76,7 @@ impl Settings {
         ] {
             *field = given.unwrap_or(*field);
         }
+        config.keeps_given = self.given.is_some();
         config.bsp = self.bsp.config()?;
         let named = self.names.into_iter();
         let named = named.map(|(name, at)| RoomName::at(name, DVec3::from_array(at)));

@@ -278,7 +278,7 @@ pub(crate) fn cut_cell(
 }
 
 /// Returns the plane of a polygon, and the polygon in it, counter-clockwise.
-fn checked(corners: &[DVec3]) -> Result<(Plane, Winding), AddPortalError> {
+pub(crate) fn checked(corners: &[DVec3]) -> Result<(Plane, Winding), AddPortalError> {
     let n = corners.len();
     if n < 3 {
         return Err(AddPortalError::TooFewCorners { n });

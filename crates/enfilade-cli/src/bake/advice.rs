@@ -1,13 +1,14 @@
 //! Options that read the input in another way: tried before they are proposed, since a wrong one sends people astray. Each costs a
 //! bake.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write as _};
 use std::time::{Duration, Instant};
 
 use enfilade::bake::{BakeContext, Silent, bake};
 use enfilade::cpg::World;
-use enfilade::import::ImportReport;
+use enfilade::geom::scene::Scene;
+use enfilade::import::{ImportReport, unnamed_helpers};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
 use enfilade_report::{InputDoubt, Verdict};
@@ -17,6 +18,8 @@ use crate::screen::Warned;
 
 /// Least time of a trial; it gets as much as the bake took.
 const LEAST: Duration = Duration::from_secs(2);
+/// Most names of objects in a proposal.
+const MOST_NAMES: usize = 8;
 /// Units that stand for `--unit UNIT`.
 const UNITS: [&str; 4] = ["mm", "cm", "in", "ft"];
 
@@ -31,7 +34,11 @@ pub(super) fn verdict(
     let mut trials = Trials::new(args, &readied.report, readied.scene.is_open_world, time);
     let mut said = found::input_doubts(&readied.report);
     let mut hint = found::hint(&readied.report);
-    let verdict = trials.verdict(world, &mut said, &mut hint);
+    let mut verdict = trials.verdict(world, &mut said, &mut hint);
+    if let Some(doubt) = trials.unnamed_helpers(&readied.scene, &verdict) {
+        said.push(doubt);
+        verdict = trials.verdict(world, &mut said, &mut hint);
+    }
     for text in said.iter().map(|doubt| &doubt.text).chain(&hint) {
         writeln!(Warned, "{text}")?;
     }
@@ -94,6 +101,30 @@ impl<'a> Trials<'a> {
                 .all(|value| !option.ends_with(&format!(" {value}")))
         });
         options.is_empty() || options.iter().any(|option| self.helps(option, than))
+    }
+
+    /// Returns the doubt about boxes that may be volumes of an engine, if a world without them deserves more trust.
+    fn unnamed_helpers(&mut self, scene: &Scene, than: &Verdict) -> Option<InputDoubt> {
+        if than.is_good() {
+            return None;
+        }
+        let boxes = unnamed_helpers(scene)
+            .into_iter()
+            .map(|i| &*scene.objects[i].name);
+        let names: Vec<&str> = boxes.collect::<BTreeSet<_>>().into_iter().collect();
+        let is_told = |name: &&str| !name.is_empty() && !name.contains('\'');
+        if names.is_empty() || names.len() > MOST_NAMES || !names.iter().all(is_told) {
+            return None;
+        }
+        let names = names.join("' --detail-name '");
+        let option = format!("--detail-name '{names}'");
+        self.helps(&option, than).then(|| InputDoubt {
+            text: format!(
+                "boxes of a material of their own may be volumes of an engine, such as triggers; the rooms are better without them (try \
+                 {option})"
+            ),
+            is_about_up: false,
+        })
     }
 
     /// Returns the option to propose instead of one that the verdict has, if any.

@@ -11,7 +11,8 @@ use enfilade::bake::{Method, Outdoors};
 use enfilade::geom::{Allowance, DVec3};
 use enfilade::import::{AirSide, HeightOptions, IfcConverter, ImportOptions, VolumeOptions};
 use enfilade_settings::{
-    Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit, parse_weld,
+    Given, Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit,
+    parse_weld,
 };
 
 use enfilade_cli::input::{name_of, read_text};
@@ -108,9 +109,10 @@ pub(crate) struct BakeOptions {
     /// Maps: a sealed level, which must not leak, or an open world, whose sky an engine draws.
     #[arg(long, value_enum, default_value_t = WorldName::Auto)]
     pub(super) world: WorldName,
-    /// Tell for each opening that a map marks (visportals, areaportals) which portal it is, or how far away the next one is.
+    /// Put portals where designers marked openings (visportals, areaportals, hints, objects called portal), and tell for each mark
+    /// whether the bake found it, and how far away.
     #[arg(long, value_enum)]
-    pub(super) given: Option<GivenName>,
+    given: Option<GivenName>,
     /// Report the narrowest place on the widest way from a room to the outdoors, and write the way into the world as
     /// a line: from the middle of the largest air with walls around, or from a point of the world that should be in a
     /// room.
@@ -192,7 +194,7 @@ enum OutdoorsName {
 
 /// Marks of designers.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum GivenName {
+enum GivenName {
     /// Openings between rooms or areas.
     Portals,
 }
@@ -264,6 +266,11 @@ impl BakeOptions {
             ("--unit", _) => options.scene.unit = Some(parse_unit(value).ok()?),
             ("--up", "y") => options.scene.up = Some(Axis::Y),
             ("--up", "z") => options.scene.up = Some(Axis::Z),
+            ("--detail-name", _) => {
+                let (_, names) = option.split_once('\'')?;
+                let names = names.strip_suffix('\'')?.split("' --detail-name '");
+                options.scene.detail_name.extend(names.map(str::to_owned));
+            }
             ("--min-cost", _) => options.min_cost = Some(value.parse().ok()?),
             _ => return None,
         }
@@ -307,6 +314,10 @@ pub(crate) fn resolve(options: &BakeOptions) -> anyhow::Result<Resolved> {
     settings.voxel = options.voxel.or(settings.voxel);
     settings.min_opening = options.min_opening.or(settings.min_opening);
     settings.smallest_hole = options.smallest_hole.or(settings.smallest_hole);
+    settings.given = options
+        .given
+        .map(|GivenName::Portals| Given::Portals)
+        .or(settings.given);
     let table = &mut settings.bsp;
     table.min_cost = options.min_cost.map(f64::from).or(table.min_cost);
     table.max_cost = options.max_cost.map(f64::from).or(table.max_cost);

@@ -1,4 +1,4 @@
-//! Openings that a designer marks: visportals of Doom 3, areaportals of Quake 2, Quake 3 and Source.
+//! Openings that a designer marks: visportals of Doom 3, areaportals of Quake 2, Quake 3 and Source, sides of hint brushes.
 
 use enfilade_geom::scene::GivenPortal;
 use enfilade_geom::{ConvexSolid, DVec3};
@@ -15,8 +15,10 @@ pub(super) fn portals(
     rules: &RoleRules,
     placed: impl Fn(&Brush<'_>) -> Option<ConvexSolid>,
 ) -> Vec<GivenPortal> {
-    let is_mark =
-        |texture: &str| texture_matter(&rules.textures, texture) == Some(TextureMatter::Portal);
+    let is_mark = |texture: &str| {
+        let matter = texture_matter(&rules.textures, texture);
+        matches!(matter, Some(TextureMatter::Portal | TextureMatter::Hint))
+    };
     let mut found: Vec<GivenPortal> = Vec::new();
     for entity in entities {
         let class = entity.get("classname").unwrap_or("");

@@ -1,7 +1,8 @@
 //! Layers and groups of TrenchBroom: entities that name themselves by `_tb_id`, and members that name them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
+use crate::ImportError;
 use crate::builder::Builder;
 
 use super::parse::RawEntity;
@@ -45,4 +46,68 @@ pub(super) fn leave_out_omitted(entities: &mut Vec<RawEntity<'_>>, builder: &mut
         }
     }
     entities.retain(|e| !is_gone(e, &gone));
+}
+
+/// Keys by which members name their group or layer, the nearest first.
+const ABOVE: [&str; 2] = ["_tb_group", "_tb_layer"];
+/// Groups in groups, in groups: deeper ones are not named.
+const MAX_DEPTH: usize = 32;
+
+/// The groups and layers of a map.
+pub(super) struct Groups<'t> {
+    /// Identity to name, and the entity that is the group.
+    by_id: BTreeMap<&'t str, (&'t str, usize)>,
+}
+
+impl<'t> Groups<'t> {
+    /// Collects the groups and layers among the entities.
+    pub(super) fn of(entities: &[RawEntity<'t>]) -> Self {
+        let named = entities.iter().enumerate().filter_map(|(i, e)| {
+            e.get("_tb_type")?;
+            Some((e.get("_tb_id")?, (e.get("_tb_name")?, i)))
+        });
+        Self {
+            by_id: named.collect(),
+        }
+    }
+
+    /// Returns the names of the groups and layers around the brushes of an entity, the nearest first.
+    pub(super) fn around(&self, entities: &[RawEntity<'t>], entity: usize) -> Vec<&'t str> {
+        let own = &entities[entity];
+        let is_group = own.get("_tb_type").is_some();
+        let mut names: Vec<&str> = own
+            .get("_tb_name")
+            .filter(|_| is_group)
+            .into_iter()
+            .collect();
+        let mut at = own;
+        while names.len() < MAX_DEPTH {
+            let above = ABOVE.iter().find_map(|key| self.by_id.get(at.get(key)?));
+            let Some(&(name, next)) = above else { break };
+            names.push(name);
+            at = &entities[next];
+        }
+        names
+    }
+}
+
+/// Numbers of nodes of groups, by the names around them, the nearest first.
+pub(super) type GroupNodes<'t> = BTreeMap<Vec<&'t str>, Option<u32>>;
+
+/// Returns the node of the group or layer with these names around it, the nearest first; `None` outside of all.
+pub(super) fn node_of<'t>(
+    around: &[&'t str],
+    nodes: &mut GroupNodes<'t>,
+    builder: &mut Builder<'_>,
+) -> Result<Option<u32>, ImportError> {
+    let Some((own, above)) = around.split_first() else {
+        return Ok(None);
+    };
+    if let Some(node) = nodes.get(around) {
+        return Ok(*node);
+    }
+    let parent = node_of(above, nodes, builder)?;
+    let node = builder.add_source("groups", parent, own, "")?;
+    nodes.insert(around.to_vec(), node);
+    Ok(node)
 }

@@ -27,7 +27,9 @@ use enfilade_prepare::{TextureMatter, is_sky_around, texture_matter};
 use serde_json::json;
 
 use crate::builder::Builder;
+use crate::origins::extras_of;
 use crate::{ImportError, Up};
+use layers::{GroupNodes, Groups, node_of};
 use parse::Place;
 use parse::{Brush, MAX_COORDINATE, RawEntity};
 use patch::Tessellation;
@@ -305,6 +307,7 @@ fn build(
     let mut brushwork = Brushwork {
         entities,
         shaped,
+        groups: Groups::of(entities),
         roles: roles_of(entities, builder),
         is_open: false,
     };
@@ -327,14 +330,9 @@ fn build(
     builder.add_solids(structural.iter().map(|s| placed(s)));
     for (i, e) in entities.iter().enumerate() {
         builder.add_entity(Entity {
-            class: e.get("classname").unwrap_or("").to_owned(),
             position: origin_of(e),
-            properties: e
-                .properties
-                .iter()
-                .map(|&(k, v)| (k.to_owned(), v.to_owned()))
-                .collect(),
             object: object_of.get(&i).copied(),
+            ..entity_of(e)
         });
     }
     if structural.is_empty() {
@@ -343,12 +341,25 @@ fn build(
     Ok(())
 }
 
+/// Returns the class and the properties of an entity.
+fn entity_of(entity: &RawEntity<'_>) -> Entity {
+    let properties = entity.properties.iter();
+    Entity {
+        class: entity.get("classname").unwrap_or("").to_owned(),
+        properties: properties
+            .map(|&(k, v)| (k.to_owned(), v.to_owned()))
+            .collect(),
+        ..Entity::default()
+    }
+}
+
 fn class_of<'t>(entity: &RawEntity<'t>) -> &'t str {
     entity.get("classname").unwrap_or("brushes")
 }
 
 /// Returns the role of each entity, with the reason.
 fn roles_of(entities: &[RawEntity<'_>], builder: &Builder<'_>) -> Vec<(Role, String)> {
+    let groups = Groups::of(entities);
     let role = |(e, entity): (usize, &RawEntity<'_>)| {
         let class = class_of(entity);
         let told = || match kind_of_class(class) {
@@ -357,7 +368,12 @@ fn roles_of(entities: &[RawEntity<'_>], builder: &Builder<'_>) -> Vec<(Role, Str
             _ => (Role::Detail, format!("map: brushes of {class}")),
         };
         let rules = &builder.options.roles;
-        rules.forced(&format!("{class} {e}")).unwrap_or_else(told)
+        let of_group = || {
+            let around = groups.around(entities, e);
+            around.into_iter().find_map(|name| rules.forced(name))
+        };
+        let forced = rules.forced(&format!("{class} {e}")).or_else(of_group);
+        forced.unwrap_or_else(told)
     };
     entities.iter().enumerate().map(role).collect()
 }
@@ -366,6 +382,7 @@ fn roles_of(entities: &[RawEntity<'_>], builder: &Builder<'_>) -> Vec<(Role, Str
 struct Brushwork<'s, 't> {
     entities: &'s [RawEntity<'t>],
     shaped: &'s [Shaped<'t>],
+    groups: Groups<'t>,
     /// Role of each entity, with the reason.
     roles: Vec<(Role, String)>,
     /// The sky is around an open world, and left out.
@@ -455,6 +472,7 @@ impl<'s, 't> Brushwork<'s, 't> {
     ) -> Result<BTreeMap<usize, u32>, ImportError> {
         let mut material_of: BTreeMap<(&str, Look), u32> = BTreeMap::new();
         let mut object_of: BTreeMap<usize, u32> = BTreeMap::new();
+        let mut nodes = GroupNodes::new();
         for ((e, part), parts) in faces {
             if parts.is_empty() {
                 continue;
@@ -491,6 +509,16 @@ impl<'s, 't> Brushwork<'s, 't> {
                 primitives,
             });
             let object = builder.place_as(mesh, base, &name, role, reason)?;
+            let around = self.groups.around(self.entities, e);
+            if let Some(group) = node_of(&around, &mut nodes, builder)? {
+                let node = builder.add_source(
+                    &name,
+                    Some(group),
+                    &name,
+                    &extras_of(&entity_of(&self.entities[e])),
+                )?;
+                builder.put_at(object, node);
+            }
             object_of.entry(e).or_insert(object);
         }
         Ok(object_of)
