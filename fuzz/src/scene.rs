@@ -4,7 +4,7 @@ use enfilade_geom::DVec3;
 use enfilade_geom::scene::Role;
 use enfilade_import::{
     CleaningOptions, HeightOptions, ImportError, ImportOptions, Imported, Limits, VolumeOptions, cleaning_report, decode_gltf,
-    decode_e57, decode_heights, decode_implicit, decode_las, decode_map, decode_obj, decode_patches, decode_ply, decode_stl, decode_volume, export_glb, read_prt, read_pvs_text, write_prt,
+    decode_e57, decode_heights, decode_implicit, decode_las, decode_map, decode_obj, decode_patches, decode_ply, decode_stl, decode_volume, decode_vox, export_glb, read_prt, read_pvs_text, write_prt,
     write_pvs_text,
 };
 
@@ -107,6 +107,11 @@ fn quiet() {
 /// STL.
 pub fn stl(data: &[u8]) {
     check(decode_stl(data, &options()));
+}
+
+/// Models of MagicaVoxel.
+pub fn vox(data: &[u8]) {
+    check(decode_vox(data, &options()));
 }
 
 /// Portal files and text PVS: a decoded file is encoded and decoded alike.

@@ -6,6 +6,7 @@ use enfilade_prepare::{Upward, judge_up};
 
 use crate::map::MAPS;
 use crate::report::UpDoubt;
+use crate::vox::VOX;
 use crate::{FileReport, ImportError, ImportOptions, ImportReport, Up};
 
 /// Returns the files of a report, comma separated.
@@ -323,8 +324,9 @@ pub(crate) fn up_doubt(
         Upward::Likely(axis) => (axis, false),
         Upward::Unknown => return None,
     };
-    // Maps are read with z up, so that across z here is across y there.
-    let (other, turned) = match report.files.iter().any(|f| MAPS.contains(&f.format)) {
+    // Some formats are read with z up, so that across z here is across y there.
+    let is_z_up = |f: &FileReport| MAPS.contains(&f.format) || f.format == VOX;
+    let (other, turned) = match report.files.iter().any(is_z_up) {
         false => ("z", Up::Z),
         true => ("y", Up::Y),
     };

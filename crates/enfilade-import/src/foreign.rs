@@ -13,7 +13,7 @@ struct Foreign {
     advice: &'static str,
 }
 
-const FOREIGN: [Foreign; 21] = [
+const FOREIGN: [Foreign; 20] = [
     Foreign {
         name: "FBX",
         magic: &[b"Kaydara FBX Binary", b"; FBX"],
@@ -112,12 +112,6 @@ const FOREIGN: [Foreign; 21] = [
         advice: "export it as OBJ, e.g. with Mineways",
     },
     Foreign {
-        name: "a model of MagicaVoxel",
-        magic: &[b"VOX "],
-        endings: &["vox"],
-        advice: "in MagicaVoxel: Export > obj",
-    },
-    Foreign {
         name: "a model of SketchUp",
         magic: &[b"\xFF\xFE\xFF\x0E"],
         endings: &["skp"],
@@ -214,7 +208,6 @@ mod tests {
             (b"[gd_scene load_steps=2", "a.txt", "Godot", "Export As"),
             (b"%YAML 1.1\n%TAG !u! tag", "a.txt", "Unity", "glTFast"),
             (b"\x1f\x8b", "a.schem", "Minecraft", "Mineways"),
-            (b"VOX \x96", "a.bin", "MagicaVoxel", "Export > obj"),
             (b"{", "a.hbjson", "HBJSON", "IFC or OBJ"),
         ] {
             let error = unsupported(bytes, Path::new(path)).unwrap().to_string();

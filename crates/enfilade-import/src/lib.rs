@@ -51,6 +51,7 @@ mod soup;
 mod sources;
 mod stl;
 mod textures;
+mod vox;
 
 pub use arrays::{ArrayMesh, import_arrays};
 pub use enfilade_prepare::{
@@ -173,6 +174,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::E57 => scans::read_e57(bytes, builder),
         Format::Las => scans::read_las(bytes, builder),
         Format::Heights => sources::read_heights(bytes, builder),
+        Format::Vox => vox::read(bytes, builder),
     }
 }
 
@@ -191,6 +193,7 @@ enum Format {
     E57,
     Las,
     Heights,
+    Vox,
 }
 
 impl Format {
@@ -209,7 +212,8 @@ impl Format {
             | Self::Volume
             | Self::E57
             | Self::Las
-            | Self::Heights => u64::MAX,
+            | Self::Heights
+            | Self::Vox => u64::MAX,
         }
     }
 }
@@ -234,6 +238,8 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
             return Err(error);
         } else if bytes.starts_with(b"glTF") {
             Format::Gltf
+        } else if vox::is_vox(bytes) {
+            Format::Vox
         } else if ply::is_ply(bytes) {
             Format::Ply
         } else if ending == "obj" {
@@ -353,6 +359,15 @@ pub fn decode_obj(bytes: &[u8], options: &ImportOptions) -> Result<Imported, Imp
 /// As [`import`].
 pub fn decode_map(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
     decode(bytes, "memory.map", options, map::read)
+}
+
+/// Reads models of MagicaVoxel from memory.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn decode_vox(bytes: &[u8], options: &ImportOptions) -> Result<Imported, ImportError> {
+    decode(bytes, "memory.vox", options, vox::read)
 }
 
 /// Reads a PLY file from memory.

@@ -69,7 +69,7 @@ pub struct UpDoubt {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `VMF`, `implicit`, `patches`, `NIfTI`, `NRRD`, `raw volume`, `E57` or `LAS`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `VMF`, `MagicaVoxel`, `implicit`, `patches`, `NIfTI`, `NRRD`, `raw volume`, `E57` or `LAS`.
     pub format: &'static str,
     /// Objects read from it.
     pub n_objects: u64,

@@ -431,7 +431,7 @@ mod tests {
     fn role(name: &str) -> Option<Role> {
         match judge(name) {
             RoleVerdict::Keep(role, _) => Some(role),
-            RoleVerdict::Ignore(_) | RoleVerdict::Void(_) => None,
+            _ => None,
         }
     }
 
@@ -544,7 +544,7 @@ mod tests {
         };
         let reason = |verdict| match verdict {
             RoleVerdict::Keep(role, reason) => (role, reason),
-            RoleVerdict::Ignore(reason) | RoleVerdict::Void(reason) => panic!("{reason}"),
+            other => panic!("{other:?}"),
         };
         let of = |name: &str| reason(judge_with(&rules, name, |_| {})).0;
         assert_eq!(of("wall KEEP"), Role::Structural);
