@@ -5,6 +5,7 @@ mod advice;
 mod bars;
 mod hole;
 mod levels;
+mod marked;
 mod openings;
 mod sets;
 mod spoilt;
@@ -14,13 +15,16 @@ mod worlds;
 use crate::rows::{Chosen, RowPrinter};
 use worlds::Worlds;
 
+/// Segments and rays of `verify`.
+const RAYS: u64 = 1_000_000;
+
 /// The options of the bench.
 #[derive(clap::Args)]
 pub(crate) struct Rooms {
     #[command(flatten)]
     chosen: Chosen,
     /// Segments that `verify` tries, and as many rays; a hundredth as many views.
-    #[arg(long, default_value_t = 1_000_000)]
+    #[arg(long, default_value_t = RAYS)]
     rays: u64,
     /// Do not bake again what an earlier run of the same build has baked.
     #[arg(long)]
@@ -30,7 +34,10 @@ pub(crate) struct Rooms {
 /// Measures the rows of levels alone, each baked anew; an error if a bar is missed.
 pub(crate) fn bench_levels(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> {
     let mut out = RowPrinter::new(is_json);
-    levels::run(&mut Worlds::new(chosen, false)?, &mut out)?;
+    let mut worlds = Worlds::new(chosen, false)?;
+    levels::run(&mut worlds, &mut out)?;
+    verified::run_levels(&mut worlds, RAYS, &mut out)?;
+    marked::run(chosen, &mut out)?;
     advice::run(chosen, &mut out)?;
     out.finish()
 }

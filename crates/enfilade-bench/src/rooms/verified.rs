@@ -37,12 +37,7 @@ pub(super) fn run(worlds: &mut Worlds<'_>, rays: u64, out: &mut RowPrinter) -> a
     let spoilt = SPOILINGS.iter().map(|s| s.form);
     let forms = [Form::Clean].into_iter().chain(spoilt);
     let forms = forms.chain(METHODS.map(Form::Method));
-    let mut verified = Verified {
-        rays,
-        out,
-        n: 0,
-        n_good: 0,
-    };
+    let mut verified = Verified::new(rays, out);
     for form in forms {
         let row = format!("verify: {}", form.name());
         if !worlds.chosen.has_row(&row) {
@@ -54,12 +49,42 @@ pub(super) fn run(worlds: &mut Worlds<'_>, rays: u64, out: &mut RowPrinter) -> a
             verified.print(&row, &measure::name(&dir), world.map_err(|why| &**why))?;
         }
     }
-    if worlds.chosen.has_row("verify: levels") {
+    verified.levels(worlds)?;
+    verified.finish();
+    Ok(())
+}
+
+/// Prints a row for the world of each level and small case, and one for all.
+pub(super) fn run_levels(
+    worlds: &mut Worlds<'_>,
+    rays: u64,
+    out: &mut RowPrinter,
+) -> anyhow::Result<()> {
+    let mut verified = Verified::new(rays, out);
+    verified.levels(worlds)?;
+    verified.finish();
+    Ok(())
+}
+
+impl<'a> Verified<'a> {
+    fn new(rays: u64, out: &'a mut RowPrinter) -> Self {
+        Self {
+            rays,
+            out,
+            n: 0,
+            n_good: 0,
+        }
+    }
+
+    fn levels(&mut self, worlds: &mut Worlds<'_>) -> anyhow::Result<()> {
+        if !worlds.chosen.has_row("verify: levels") {
+            return Ok(());
+        }
         for (name, file) in files() {
             if worlds.chosen.has_scene(&name) {
                 let baked = worlds.level(&file);
                 let world = baked.graph.as_ref().map(|_| &*baked.world);
-                verified.print("verify: levels", &name, world.map_err(|why| &**why))?;
+                self.print("verify: levels", &name, world.map_err(|why| &**why))?;
             }
         }
         for (case, file) in cases() {
@@ -67,20 +92,21 @@ pub(super) fn run(worlds: &mut Worlds<'_>, rays: u64, out: &mut RowPrinter) -> a
             if worlds.chosen.has_scene(&name)
                 && let Some(world) = &worlds.case(case, &file)?.world
             {
-                verified.print("verify: levels", &name, Ok(world))?;
+                self.print("verify: levels", &name, Ok(world))?;
             }
         }
+        Ok(())
     }
-    let Verified { n, n_good, .. } = verified;
-    if n > 0 {
-        let note = format!("{n_good} of {n} worlds");
-        let value = n_good as f64 / n as f64;
-        out.print("verify", "all", Some(value), "1", Some(n == n_good), &note);
-    }
-    Ok(())
-}
 
-impl Verified<'_> {
+    fn finish(self) {
+        let Self { n, n_good, out, .. } = self;
+        if n > 0 {
+            let note = format!("{n_good} of {n} worlds");
+            let value = n_good as f64 / n as f64;
+            out.print("verify", "all", Some(value), "1", Some(n == n_good), &note);
+        }
+    }
+
     fn print(&mut self, row: &str, scene: &str, world: Result<&Path, &str>) -> anyhow::Result<()> {
         let (code, note) = match world {
             Ok(world) => self.verify(world)?,

@@ -1,0 +1,119 @@
+//! Rows `levels: given portals` and `levels: sky time`: marks of designers become portals where they stand; a sky around a level costs
+//! little.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, ensure};
+use enfilade::geom::scene::GivenPortal;
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::import::{ImportOptions, import};
+use serde_json::Value;
+
+use crate::measure;
+use crate::process::{bake_command, scenes_dir, target_dir};
+use crate::rows::{Chosen, RowPrinter};
+use crate::score::{inspect, list, vec3};
+
+/// Files in which openings are marked, beside the real scenes.
+const MARKED: [&str; 5] = [
+    "cases/levels/d3-visportal.map",
+    "cases/levels/q2-areaportal-entity.map",
+    "cases/levels/q3-areaportal-brush.map",
+    "cases/levels/helper-portal-in-doorway.glb",
+    "levels/q2_areaportals.map",
+];
+/// The same level without a sky, and with one.
+const SKIES: [&str; 3] = ["two-rooms.glb", "skybox.glb", "skydome40.glb"];
+/// Bakes of which the median counts.
+const N_BAKES: usize = 5;
+/// Greatest distance of a portal's vertices from the plane of its mark, beyond half of the mark's thickness. [Units: wu]
+const OFF: f64 = 0.05;
+
+/// Prints both rows.
+pub(super) fn run(chosen: &Chosen, out: &mut RowPrinter) -> anyhow::Result<()> {
+    let beside = |file: &str| scenes_dir().map(|dir| dir.with_file_name(file));
+    let there = |file: &str| beside(file).filter(|f| f.is_file());
+    if chosen.has_row("levels: given portals") {
+        let files = MARKED.iter().filter_map(|file| there(file));
+        for file in files.filter(|f| chosen.has_scene(&measure::name(f))) {
+            given(&file, out)?;
+        }
+    }
+    let skies = SKIES.map(|name| there(&format!("cases/levels/{name}")));
+    if chosen.has_row("levels: sky time")
+        && let [Some(plain), Some(boxed), Some(domed)] = skies
+    {
+        let without = seconds(&plain)?;
+        for file in [boxed, domed] {
+            let times = seconds(&file)? / without;
+            let note = format!("times {without:.2} s");
+            let ok = Some(times <= 1.5);
+            out.print(
+                "levels: sky time",
+                &measure::name(&file),
+                Some(times),
+                "<= 1.5",
+                ok,
+                &note,
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Prints the share of a file's marks that are portals of its world.
+fn given(file: &Path, out: &mut RowPrinter) -> anyhow::Result<()> {
+    let marks = import(&[file.to_owned()], &[], &ImportOptions::default())?;
+    let marks = marks.scene.given_portals;
+    let world = target_dir().join("given.glb");
+    let done = bake_command(file, &world)
+        .args(["--given", "portals"])
+        .output()?;
+    ensure!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let graph = inspect(&world)?;
+    let portals = list(&graph["portals"]);
+    let n = marks
+        .iter()
+        .filter(|mark| portals.iter().any(|p| is_at(p, mark)))
+        .count();
+    let share = n as f64 / marks.len().max(1) as f64;
+    let note = format!("{n} of {} marks", marks.len());
+    out.print(
+        "levels: given portals",
+        &measure::name(file),
+        Some(share),
+        "1",
+        Some(n > 0 && n == marks.len()),
+        &note,
+    );
+    Ok(())
+}
+
+/// Returns `true` if a portal lies in a mark.
+fn is_at(portal: &Value, mark: &GivenPortal) -> bool {
+    let points = list(&portal["outline"]).iter().filter_map(vec3);
+    let points: Vec<DVec3> = points.map(DVec3::from).collect();
+    let away = |p: &DVec3| mark.normal.dot(*p - mark.outline[0]).abs();
+    let around = Aabb::of_points(&mark.outline).expanded(OFF + mark.thickness / 2.0);
+    !points.is_empty()
+        && points.iter().all(|p| away(p) <= OFF + mark.thickness / 2.0)
+        && around.overlaps(&Aabb::of_points(&points))
+}
+
+/// Returns the median time of a bake. [Units: s]
+fn seconds(file: &Path) -> anyhow::Result<f64> {
+    let mut times = Vec::with_capacity(N_BAKES);
+    for _ in 0..N_BAKES {
+        let began = Instant::now();
+        let done = bake_command(file, &target_dir().join("sky.glb")).output()?;
+        ensure!(done.status.success(), "{}: not baked", file.display());
+        times.push(began.elapsed().as_secs_f64());
+    }
+    times.sort_by(f64::total_cmp);
+    times.get(N_BAKES / 2).copied().context("no bake")
+}
