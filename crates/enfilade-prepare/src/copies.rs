@@ -59,16 +59,21 @@ fn without_copy(name: &str) -> &str {
     }
 }
 
-/// Returns the name without its level of detail, in small letters, and the level: `wall` and 1 of `Wall_LOD1.002`.
+/// Returns the other words of a name, in small letters, and its level of detail: `wall` and 1 of `Wall_LOD1.002` and `LOD 1 Wall`.
 fn level_of(name: &str) -> Option<(String, u32)> {
     let stem = without_copy(name).to_lowercase();
-    let n = stem.chars().rev().take_while(char::is_ascii_digit).count();
-    let (head, level) = stem.split_at(stem.len() - n);
-    let head = head.trim_end_matches(['_', '-', ' ']).strip_suffix("lod")?;
-    let base = head.trim_end_matches(['_', '-', ' ', '.']);
-    let is_ending = head.is_empty() || base.len() < head.len();
-    let level = level.parse().ok()?;
-    is_ending.then(|| (base.to_owned(), level))
+    let mut words: Vec<&str> = stem.split(['_', '-', ' ', '.']).collect();
+    let at = words.iter().position(|word| {
+        let rest = word.strip_prefix("lod");
+        rest.is_some_and(|rest| rest.bytes().all(|b| b.is_ascii_digit()))
+    })?;
+    let own = words.remove(at).trim_start_matches("lod");
+    let level = match own {
+        "" if at < words.len() => words.remove(at).parse().ok()?,
+        own => own.parse().ok()?,
+    };
+    words.retain(|word| !word.is_empty());
+    Some((words.join("_"), level))
 }
 
 #[cfg(test)]
@@ -110,11 +115,12 @@ mod tests {
             ("Wall_LOD0", 0.0),
             ("Wall_LOD1.002", 0.0),
             ("wall-lod2", 0.5),
+            ("LOD_3_Wall", 0.5),
             ("Wall_LOD1", 9.0),
             ("Roof LOD 1", 0.0),
             ("Roof LOD 2", 0.0),
         ];
-        assert_eq!(lower_levels(&scene(&all)), [1, 2, 5]);
+        assert_eq!(lower_levels(&scene(&all)), [1, 2, 3, 6]);
     }
 
     #[test]

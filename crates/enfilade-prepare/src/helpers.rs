@@ -15,32 +15,44 @@ pub(crate) const OPENING: &str = "a mark of an opening";
 type Phrase = (&'static [&'static str], &'static str);
 
 /// Phrases that name a helper wherever they stand in a name, whatever its shape.
-const ALWAYS: [Phrase; 32] = [
+const ALWAYS: [Phrase; 45] = [
     (&["trigger", "volume"], "a trigger volume"),
     (&["trigger", "box"], "a trigger volume"),
     (&["trigger", "zone"], "a trigger volume"),
     (&["trigger", "area"], "a trigger volume"),
     (&["kill", "volume"], "a trigger volume"),
     (&["kill", "zone"], "a trigger volume"),
+    (&["kill", "z"], "a trigger volume"),
     (&["spawn", "volume"], "a trigger volume"),
+    (&["spawn", "area"], "a trigger volume"),
+    (&["sensor", "area"], "a trigger volume"),
     (&["reflection", "probe"], "a probe of light"),
+    (&["reflection", "capture"], "a probe of light"),
     (&["light", "probe"], "a probe of light"),
     (&["lightmass", "importance"], "a volume of light"),
+    (&["voxel", "gi"], "a volume of light"),
+    (&["lightmap"], "a volume of light"),
     (&["room", "bounds"], "bounds of a room"),
-    (&["nav", "mesh"], "a navigation mesh"),
+    (&["ak", "room"], "a zone of sound"),
+    (&["nav"], "a navigation mesh"),
     (&["navmesh"], "a navigation mesh"),
-    (&["navigation", "mesh"], "a navigation mesh"),
-    (&["nav", "blocker"], "a navigation mesh"),
+    (&["navigation"], "a navigation mesh"),
     (&["collider"], "a collision shape"),
     (&["colliders"], "a collision shape"),
+    (&["invisible", "wall"], "a collision shape"),
+    (&["player", "clip"], "a collision shape"),
+    (&["hurtbox"], "a collision shape"),
     (&["audio", "zone"], "a zone of sound"),
     (&["audio", "volume"], "a zone of sound"),
+    (&["audio", "probe"], "a zone of sound"),
     (&["sound", "zone"], "a zone of sound"),
     (&["reverb", "zone"], "a zone of sound"),
     (&["reverb", "volume"], "a zone of sound"),
     (&["occlusion", "volume"], "a volume of occlusion"),
     (&["occlusion", "area"], "a volume of occlusion"),
     (&["occlusion", "portal"], OPENING),
+    (&["occluder"], "a volume of occlusion"),
+    (&["notifier"], "a volume of visibility"),
     (&["cull", "volume"], "a volume of occlusion"),
     (&["culling", "volume"], "a volume of occlusion"),
     (&["visibility", "volume"], "a volume of occlusion"),
@@ -48,6 +60,7 @@ const ALWAYS: [Phrase; 32] = [
     (&["postprocess"], "a volume of effects"),
     (&["blocking", "volume"], "a collision shape"),
     (&["physics", "volume"], "a volume of physics"),
+    (&["area", "d"], "a trigger volume"),
 ];
 
 /// Phrases that name a helper at the end of the name of a plain box or sheet: anything else may be a thing called so, such as
@@ -63,10 +76,22 @@ const PLAIN: [Phrase; 8] = [
     (&["areaportal"], OPENING),
 ];
 
+/// Last words, behind another, of the names of plain boxes that engines call so, but for parts of buildings: a main volume.
+const KINDS: [(&str, &str); 3] = [
+    ("volume", "a volume of an engine"),
+    ("zone", "a zone of an engine"),
+    ("probe", "a probe of an engine"),
+];
+
+/// Words for the volumes that a building consists of.
+const MASSING: [&str; 10] = [
+    "building", "floor", "house", "lower", "main", "mass", "massing", "roof", "stair", "upper",
+];
+
 /// The beginning of the name of a portal of Godot, before that of the room to which it leads.
 const PORTAL_TO: &str = "Portal_";
 
-/// The last word of a collision shape made beside the mesh that is drawn: `Wall_collision`.
+/// The word for a collision shape made beside the mesh that is drawn: `Wall_collision`, `collision_hull`.
 const BESIDE: &str = "collision";
 
 /// Returns the thing that a name is of, if that is a helper. `is_plain` tells that it has no more triangles than a box.
@@ -78,9 +103,14 @@ pub(crate) fn of_name(name: &str, is_plain: bool) -> Option<&'static str> {
         .find(|(phrase, _)| words.windows(phrase.len()).any(|w| w == *phrase));
     let at_end = || PLAIN.iter().find(|(phrase, _)| words.ends_with(phrase));
     let plain = || at_end().filter(|_| is_plain);
+    let kind = || KINDS.iter().find(|(last, _)| words.last() == Some(last));
+    let is_of_engine = || is_plain && words.len() > 1 && !words.iter().any(|w| MASSING.contains(w));
+    let of_kind = || kind().filter(|_| is_of_engine()).map(|(_, thing)| *thing);
     let leads = || (is_plain && name.starts_with(PORTAL_TO)).then_some(OPENING);
-    let found = (always.or_else(plain).map(|(_, thing)| *thing)).or_else(leads);
-    let is_beside = words.len() > 1 && words.last() == Some(&BESIDE);
+    let found = (always.or_else(plain).map(|(_, thing)| *thing))
+        .or_else(leads)
+        .or_else(of_kind);
+    let is_beside = words.len() > 1 && words.contains(&BESIDE);
     found.or(is_beside.then_some("a collision shape"))
 }
 
@@ -150,6 +180,10 @@ mod tests {
             "PostProcessVolume",
             "Wall_collision",
             "OcclusionPortal",
+            "NavigationRegion3D",
+            "KillZVolume",
+            "Collision_Wall",
+            "InvisibleWall",
         ] {
             assert!(of_name(name, false).is_some(), "{name}");
         }
@@ -178,6 +212,8 @@ mod tests {
             "Sound wall",
             "probe",
             "boundary wall",
+            "Main volume",
+            "Roof volume",
             "",
         ] {
             assert!(of_name(name, true).is_none(), "{name}");

@@ -511,7 +511,7 @@ mod tests {
                 f.is_plain = is_plain;
             })
         };
-        assert!(matches!(portal(true), RoleVerdict::Ignore(_)));
+        assert!(matches!(portal(true), RoleVerdict::Mark(_)));
         assert!(matches!(portal(false), RoleVerdict::Keep(..)));
         let skip = judge_with(&RoleRules::default(), "x", |f| {
             f.materials = &["skip", "clip"];

@@ -4,7 +4,7 @@
 //! stands on or near what is in it, and a valley has no ceiling.
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Aabb, Bvh, ConvexSolid, DVec3, Ray, Triangle};
+use enfilade_geom::{Aabb, Bvh, ConvexSolid, DVec3, Ray, Triangle, triangle_area_normal};
 
 /// A sky is at least this many times as wide as what it surrounds: a hall around a hut may be wider than the hut, too, but then the
 /// hut stands on its floor.
@@ -16,29 +16,75 @@ const INSIDE: [f64; 2] = [2.5, 1.8];
 /// Ground is flatter than this share of its width, and wider than this share of the sky.
 const FLAT: f64 = 0.05;
 const GROUND: f64 = 0.5;
+/// Most skies in each other, and most sheets of one.
+const NESTED: usize = 3;
+const SHEETS: usize = 12;
+/// Least share of its box that a sheet of a sky fills.
+const WHOLE: f64 = 0.99;
 /// Rise of the rays that look for the sky on all sides, beside their run: over the rim of a dome, below its top.
 const RISE: f64 = 0.3;
 
-/// Returns the objects that are skies, ascending. O(n) boxes for each, and one pass over the triangles.
+/// Returns the objects that are skies, ascending. `O(n log n)` in objects, and a few passes over the triangles.
 #[must_use]
 pub fn skies(scene: &Scene) -> Vec<usize> {
     let boxes: Vec<Aabb> = (0..scene.objects.len())
         .map(|i| scene.object_aabb(i))
         .collect();
-    let mut inside: Vec<usize> = (0..boxes.len())
+    let mut all: Vec<usize> = (0..boxes.len())
         .filter(|&i| !boxes[i].is_empty() && scene.objects[i].role == Role::Structural)
         .collect();
-    let mut found = Vec::new();
+    let volume = |i: usize| boxes[i].volume();
+    all.sort_by(|&a, &b| volume(b).total_cmp(&volume(a)).then(a.cmp(&b)));
+    let mut found = sheets_around(scene, &all, &boxes);
+    all.retain(|i| !found.contains(i));
     // A dome of clouds may lie in one of stars.
-    while let Some(sky) = largest(&inside, &boxes) {
-        inside.retain(|&i| i != sky);
-        if !is_sky(scene, sky, &inside, &boxes) {
-            break;
-        }
-        found.push(sky);
+    while let Some(n) = (1..=NESTED.min(all.len().saturating_sub(1))).find(|&n| {
+        let (skies, inside) = all.split_at(n);
+        let lie_in = skies
+            .windows(2)
+            .all(|w| encloses(&boxes[w[0]], &boxes[w[1]]));
+        lie_in && is_sky(scene, &skies[n - 1..], inside, &boxes)
+    }) {
+        found.extend(all.drain(..n));
     }
     found.sort_unstable();
     found
+}
+
+/// Returns the sheets of a box around everything else that is not one object: walls, a lid, and a bottom that nothing touches. All are
+/// whole rectangles, while a hall has a doorway.
+fn sheets_around(scene: &Scene, all: &[usize], boxes: &[Aabb]) -> Vec<usize> {
+    let longest = |b: &Aabb| b.size().max_element();
+    let whole = all.iter().fold(Aabb::EMPTY, |sum, &i| sum.union(boxes[i]));
+    let is_sheet = |b: &Aabb| b.size().min_element() < FLAT * longest(b);
+    let is_wide = |&i: &usize| is_sheet(&boxes[i]) && longest(&boxes[i]) > GROUND * longest(&whole);
+    let (sheets, rest): (Vec<usize>, Vec<usize>) = all.iter().partition(|i| is_wide(i));
+    let inside = rest.iter().fold(Aabb::EMPTY, |sum, &i| sum.union(boxes[i]));
+    let width = wide(&whole);
+    let is_ground = |i: &usize| is_ground(&boxes[*i], width) && boxes[*i].max.y < inside.max.y;
+    let touches = |i: &usize| boxes[*i].max.y > inside.min.y - NEAR;
+    let (grounds, sky): (Vec<usize>, Vec<usize>) =
+        sheets.iter().partition(|i| is_ground(i) && touches(i));
+    let others: Vec<usize> = rest.iter().chain(&grounds).copied().collect();
+    let is_whole = |&i: &usize| {
+        let size = boxes[i].size();
+        let across = [size.x * size.y, size.y * size.z, size.z * size.x];
+        let area = |t: &Triangle| triangle_area_normal(t).length() / 2.0;
+        let own: f64 = triangles_of(scene, &[i]).iter().map(area).sum();
+        own >= WHOLE * across.into_iter().fold(0.0, f64::max)
+    };
+    let is_box = sky.len() > 1 && sky.len() <= SHEETS && sky.iter().all(is_whole);
+    if is_box && is_sky(scene, &sky, &others, boxes) {
+        sky
+    } else {
+        Vec::new()
+    }
+}
+
+/// Returns `true` if a box is around another in plan, and as high.
+fn encloses(outer: &Aabb, inner: &Aabb) -> bool {
+    let around = |k: usize| outer.min[k] < inner.min[k] && outer.max[k] > inner.max[k];
+    around(0) && around(2) && outer.max.y > inner.max.y
 }
 
 /// Returns `true` if the solids of a sky lie beyond all others on four sides and overhead. Level ground may run to them, or farther.
@@ -82,16 +128,9 @@ fn is_ground(b: &Aabb, sky: f64) -> bool {
     b.size().y < FLAT * wide(b) && wide(b) > GROUND * sky
 }
 
-fn largest(all: &[usize], boxes: &[Aabb]) -> Option<usize> {
-    let volume = |i: &&usize| boxes[**i].volume();
-    let largest = all
-        .iter()
-        .max_by(|a, b| volume(a).total_cmp(&volume(b)).then(b.cmp(a)));
-    largest.copied()
-}
-
-fn is_sky(scene: &Scene, sky: usize, others: &[usize], boxes: &[Aabb]) -> bool {
-    let own = boxes[sky];
+/// Returns `true` if objects together are a sky around others.
+fn is_sky(scene: &Scene, sky: &[usize], others: &[usize], boxes: &[Aabb]) -> bool {
+    let own = sky.iter().fold(Aabb::EMPTY, |sum, &i| sum.union(boxes[i]));
     let is_inside = |i: &usize| !is_ground(&boxes[*i], wide(&own));
     let inside: Vec<usize> = others.iter().copied().filter(is_inside).collect();
     let bounds = inside
@@ -101,12 +140,11 @@ fn is_sky(scene: &Scene, sky: usize, others: &[usize], boxes: &[Aabb]) -> bool {
         return false;
     }
     let around = bounds.expanded(NEAR);
-    let surrounds = |k: usize| own.min[k] < around.min[k] && own.max[k] > around.max[k];
-    let is_above = own.max.y > around.max.y && own.min.y < bounds.max.y;
-    if !(surrounds(0) && surrounds(2) && is_above && wide(&own) >= WIDER * wide(&bounds)) {
+    let is_low = own.min.y < bounds.max.y;
+    if !(encloses(&own, &around) && is_low && wide(&own) >= WIDER * wide(&bounds)) {
         return false;
     }
-    let triangles = triangles_of(scene, &[sky]);
+    let triangles = triangles_of(scene, sky);
     let shell = Bvh::build(&triangles);
     let middle = DVec3::new(bounds.center().x, bounds.max.y, bounds.center().z);
     let is_seen = |direction: DVec3| {
@@ -181,6 +219,44 @@ mod tests {
         assert_eq!(skies(&scene(&[around(40.0, -0.4), HOUSE, ground])), [0]);
         let two = [around(90.0, -90.0), around(40.0, -40.0), HOUSE];
         assert_eq!(skies(&scene(&two)), [0, 1]);
+        // Hardly wider than the other.
+        let two = [HOUSE, around(90.0, -90.0), around(100.0, -100.0)];
+        assert_eq!(skies(&scene(&two)), [1, 2]);
+    }
+
+    #[test]
+    fn sheets_on_all_sides_are_one_sky_and_the_walls_of_a_hall_are_not() {
+        let sheet = |axis: usize, at: f64, low: f64| {
+            let [mut min, mut max] = [[-60.0, low, -60.0], [60.0, 60.0, 60.0]];
+            (min[axis], max[axis]) = (at, at);
+            [min, max]
+        };
+        let sides = |low| {
+            [(0, -60.0), (0, 60.0), (2, -60.0), (2, 60.0), (1, 60.0)]
+                .map(|(k, at)| sheet(k, at, low))
+        };
+        let six = [&[HOUSE][..], &sides(-60.0), &[sheet(1, -60.0, 0.0)]].concat();
+        assert_eq!(skies(&scene(&six)), [1, 2, 3, 4, 5, 6]);
+        // The ground on which the house stands stays.
+        let five = [&[HOUSE][..], &sides(-0.2), &[sheet(1, -0.2, 0.0)]].concat();
+        assert_eq!(skies(&scene(&five)), [1, 2, 3, 4, 5]);
+        let open = [&[HOUSE][..], &sides(-0.2)[1..]].concat();
+        assert!(skies(&scene(&open)).is_empty());
+        // With a doorway in a wall, it is a hall around a house.
+        let mut hall = scene(&five);
+        let wall = &mut hall.meshes[1].primitives[0];
+        let has_area = |t: &[u32]| {
+            let [a, b, c] =
+                [0, 1, 2].map(|k| DVec3::from(wall.positions[t[k] as usize].map(f64::from)));
+            triangle_area_normal(&[a, b, c]).length() > 0.0
+        };
+        let half = wall
+            .indices
+            .chunks(3)
+            .find(|t| has_area(t))
+            .map(<[u32]>::to_vec);
+        wall.indices = half.unwrap();
+        assert!(skies(&hall).is_empty());
     }
 
     #[test]
