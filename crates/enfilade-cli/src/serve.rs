@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Serve) -> anyhow::Result<()> {
 fn check_room(root: &Path) -> anyhow::Result<()> {
     const NEEDED: usize = 16;
     let open = (0..NEEDED).map(|_| File::open(root));
-    // Folders are no files on some systems, which have no such limit either.
+    // Some systems do not open folders as files, and lack such a limit, too.
     match open.collect::<io::Result<Vec<File>>>() {
         Err(why) if why.kind() != ErrorKind::PermissionDenied => {
             Err(why).context("allow more open files, with `ulimit -n 64` or more")

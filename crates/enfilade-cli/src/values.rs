@@ -57,7 +57,7 @@ pub fn door(text: &str) -> Result<(u32, f32), String> {
     })
 }
 
-/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. `0` is no limit: more than there is.
+/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. `0` stands for more than there is.
 /// [Units: bytes]
 ///
 /// # Errors

@@ -113,11 +113,9 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             bar.set(done);
         });
     bar.finish();
-    report.problems.extend(check_drawn(&file));
-    if let Some(scene) = &source {
-        report.problems.extend(detail_problems(&world, scene));
-        report.problems.extend(compare_scene(&world, scene));
-    }
+    report
+        .problems
+        .extend(problems_of_file(&world, &file, source.as_ref()));
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
         .transpose()?;
@@ -271,6 +269,16 @@ fn structure_of(scene: &Scene) -> Vec<Triangle> {
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))
         .collect()
+}
+
+/// Problems if viewers draw something else than the world, or it does not have all that came with the scene.
+fn problems_of_file(world: &World, file: &[u8], scene: Option<&Scene>) -> Vec<String> {
+    let mut problems = check_drawn(file);
+    if let Some(scene) = scene {
+        problems.extend(detail_problems(world, scene));
+        problems.extend(compare_scene(world, scene));
+    }
+    problems
 }
 
 /// Problems if the world's details are not those of the scene.

@@ -66,7 +66,7 @@ impl PackedWorld {
                 return differs(&format!("piece {}", id.0));
             }
         }
-        // What depends on the compression.
+        // Places and sizes depend on the compression.
         head.places.clone_from(&self.head.places);
         (head.rest, head.rest_packed) = (self.head.rest, self.head.rest_packed);
         head.catalog = packed_as(&head.catalog, |piece| own[piece].n_packed);

@@ -1,4 +1,4 @@
-//! What glTF viewers draw of a world, which know nothing of cells: it must be what the world says.
+//! The picture of a world in glTF viewers, which know nothing of cells: it must be that of the world.
 
 use std::collections::BTreeMap;
 
@@ -105,7 +105,7 @@ fn check_nodes(root: &Value, out: &mut Vec<String>) {
         let there = reached.get(node).copied().unwrap_or_default();
         there.n == 1 && there.is_below_still
     };
-    // What each node with a mesh is for; the nodes of each mesh.
+    // Nodes with a known purpose; the nodes of each mesh.
     let mut known = vec![false; nodes.len()];
     let mut of_mesh: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (i, node) in nodes.iter().enumerate() {

@@ -385,6 +385,11 @@ impl<'a> Subject<'a> {
         is_thin(&self.triangles[triangle as usize], self.eps)
     }
 
+    /// Returns `true` if the segment [grazes](Self::is_grazing), or meets a [thin](Self::is_thin) triangle.
+    pub(crate) fn grazes(&self, triangle: u32, a: DVec3, b: DVec3) -> bool {
+        self.is_thin(triangle) || self.is_grazing(a, b)
+    }
+
     /// Calls `visit` with each of the world's own triangles that the ray meets and whose plane is within `2 eps` of
     /// `at`, and its batch.
     pub(crate) fn for_each_own_at(&self, ray: &Ray, at: DVec3, mut visit: impl FnMut(u32, u32)) {

@@ -1,4 +1,4 @@
-//! What glTF viewers draw of a world is what the world says.
+//! Viewers of glTF draw what a world says.
 
 mod common;
 
@@ -40,7 +40,7 @@ fn nodes_and_extents_that_lie_are_found() {
             root["nodes"][node]["translation"] = json!([0.0, 0.5, 0.0]);
         }),
         ("moves", &|root| {
-            root["nodes"][0]["scale"] = json!([2, 2, 2])
+            root["nodes"][0]["scale"] = json!([2, 2, 2]);
         }),
         ("not at that of its cell", &|root| {
             let [a, b] = [0, 1].map(|cell| cell_node(root, cell));
@@ -63,7 +63,7 @@ fn nodes_and_extents_that_lie_are_found() {
                 .push(n.into());
         }),
         ("nodes of the scene", &|root| {
-            root["scenes"][0]["nodes"] = json!([])
+            root["scenes"][0]["nodes"] = json!([]);
         }),
         ("smallest and largest", &|root| {
             let accessors = root["accessors"].as_array_mut().unwrap();
