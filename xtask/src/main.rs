@@ -7,6 +7,7 @@ mod check;
 mod dependencies;
 mod engines;
 mod features;
+mod fuzzed;
 mod lengths;
 mod mutual;
 mod names;

@@ -239,6 +239,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
         "--no-deps",
     ]))?;
     let mut problems = dependency_problems(&serde_json::from_str(&said)?);
+    problems.extend(crate::fuzzed::problems()?);
     let mut n_files = 0;
     let mut sources = BTreeMap::new();
     for file in listed.lines() {

@@ -6,7 +6,8 @@
 //!
 //! **Keys** are hashes of everything that a piece depends on: the scene, the settings that change a result, the version, the kind
 //! of piece and the site. So pieces of other bakes never match, and two processes that make the same piece write the same bytes.
-//! Each piece begins with a hash of its contents: one that is damaged or cut off counts as missing.
+//! Each piece begins with a hash of its key and its contents: one that is damaged or cut off, or lies under the key of another,
+//! counts as missing.
 
 use std::fmt::{self, Write as _};
 
@@ -72,11 +73,11 @@ impl<'a> Kept<'a> {
             return make();
         };
         let key = self.key(kind, plot);
-        if let Some(found) = pieces.get(&key).and_then(|bytes| unsealed(&bytes)) {
+        if let Some(found) = pieces.get(&key).and_then(|bytes| unsealed(&key, &bytes)) {
             return Ok(found);
         }
         let made = make()?;
-        pieces.put(&key, &sealed(&made));
+        pieces.put(&key, &sealed(&key, &made));
         Ok(made)
     }
 }
@@ -161,17 +162,24 @@ pub(crate) trait KeptPiece: Sized {
     fn read(written: Self::Written) -> Option<Self>;
 }
 
-/// Returns the bytes of a piece, after a hash of them.
-fn sealed<T: KeptPiece>(piece: &T) -> Vec<u8> {
-    let body = bitcode::serialize(&piece.written()).expect("numbers, text and lists");
-    let hash = XxHash3_128::oneshot(&body).to_le_bytes();
-    [&hash[..], &body].concat()
+/// Returns the hash of a piece's key and contents.
+fn seal(key: &str, body: &[u8]) -> [u8; 16] {
+    let mut hashed = Hashed(XxHash3_128::new());
+    hashed.add(key.as_bytes());
+    hashed.add(body);
+    hashed.0.finish_128().to_le_bytes()
 }
 
-/// Returns the piece of these bytes, unless they were changed.
-pub(crate) fn unsealed<T: KeptPiece>(bytes: &[u8]) -> Option<T> {
+/// Returns the bytes of a piece, after a hash of its key and them.
+fn sealed<T: KeptPiece>(key: &str, piece: &T) -> Vec<u8> {
+    let body = bitcode::serialize(&piece.written()).expect("numbers, text and lists");
+    [&seal(key, &body)[..], &body].concat()
+}
+
+/// Returns the piece of these bytes, unless they were changed or have another key.
+pub(crate) fn unsealed<T: KeptPiece>(key: &str, bytes: &[u8]) -> Option<T> {
     let (hash, body) = bytes.split_first_chunk::<16>()?;
-    if *hash != XxHash3_128::oneshot(body).to_le_bytes() {
+    if *hash != seal(key, body) {
         return None;
     }
     T::read(bitcode::deserialize(body).ok()?)

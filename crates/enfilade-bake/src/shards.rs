@@ -62,8 +62,8 @@ pub fn bake_pieces(
     Ok(())
 }
 
-/// Returns `true` if these are the bytes of a whole piece with the rooms of a site.
+/// Returns `true` if these are the bytes of the whole piece with this key, which has the rooms of a site.
 #[must_use]
-pub fn is_piece(bytes: &[u8]) -> bool {
-    unsealed::<Proposal>(bytes).is_some()
+pub fn is_piece(key: &str, bytes: &[u8]) -> bool {
+    unsealed::<Proposal>(key, bytes).is_some()
 }

@@ -89,22 +89,43 @@ fn a_bake_goes_on_from_whole_pieces_and_makes_the_same_world() {
             Vec::new(),
         ];
         for spoilt in spoilt {
-            assert!(!is_piece(&spoilt));
+            assert!(!is_piece(key, &spoilt));
             pieces.put(key, &spoilt);
             // Rooms are found again from basins; spoilt basins are not needed.
             let (again, stages) = baked(&scene, &config, &pieces);
             assert!(again == expected && !stages.contains(&Stage::Flood));
-            assert_eq!(stages.contains(&Stage::Rooms), is_piece(bytes));
+            assert_eq!(stages.contains(&Stage::Rooms), is_piece(key, bytes));
             pieces.put(key, bytes);
         }
     }
-    let rooms: Vec<_> = all.values().filter(|bytes| is_piece(bytes)).collect();
+    let rooms: Vec<_> = all
+        .iter()
+        .filter(|(key, bytes)| is_piece(key, bytes))
+        .collect();
     assert_eq!(rooms.len(), 2);
     // A bit that is wrong anywhere.
-    for at in (0..rooms[0].len()).step_by(rooms[0].len() / 50) {
-        let mut spoilt = rooms[0].clone();
+    for at in (0..rooms[0].1.len()).step_by(rooms[0].1.len() / 50) {
+        let mut spoilt = rooms[0].1.clone();
         spoilt[at] ^= 4;
-        assert!(!is_piece(&spoilt), "byte {at}");
+        assert!(!is_piece(rooms[0].0, &spoilt), "byte {at}");
+    }
+}
+
+#[test]
+fn pieces_under_the_keys_of_others_are_made_anew() {
+    let config = BakeConfig::default();
+    let scene = two_buildings();
+    let (own, others) = (InMemory::default(), InMemory::default());
+    let (expected, _) = baked(&scene, &config, &own);
+    baked(&rooms_with_closet().scene, &config, &others);
+    let foreign = others.all().into_values().chain(own.all().into_values());
+    for foreign in foreign {
+        let spoilt = InMemory::default();
+        for key in own.all().keys().filter(|key| own.all()[*key] != foreign) {
+            assert!(!is_piece(key, &foreign));
+            spoilt.put(key, &foreign);
+        }
+        assert!(baked(&scene, &config, &spoilt).0 == expected);
     }
 }
 
@@ -181,7 +202,10 @@ fn pieces_made_anywhere_in_any_order_make_the_same_world() {
         let context = BakeContext::default().keeping(&alone);
         bake_pieces(&scene, &config, &context, |k| k == key).unwrap();
         let made = alone.all();
-        let rooms: Vec<_> = made.iter().filter(|(_, bytes)| is_piece(bytes)).collect();
+        let rooms: Vec<_> = made
+            .iter()
+            .filter(|(key, bytes)| is_piece(key, bytes))
+            .collect();
         assert!(rooms.len() == 1 && rooms[0].0 == key);
         together.put(key, rooms[0].1);
     }

@@ -16,6 +16,7 @@ use anyhow::{Context, bail};
 use enfilade::bake::Pieces;
 use enfilade::vis::VisConfig;
 use enfilade::whole;
+use enfilade::world::WalkMapKey;
 use enfilade_cli::input::{is_stream, name_of, read};
 use enfilade_cli::values::bytes;
 use serde::{Deserialize, Serialize};
@@ -100,6 +101,8 @@ struct Manifest {
     #[serde(flatten)]
     work: Work,
     shards: Vec<String>,
+    /// Sum of all of the above and of the input, against damage.
+    sum: String,
 }
 
 /// The kind of work, and its settings.
@@ -119,6 +122,22 @@ enum Work {
 const MEMORY: u64 = 8_000_000_000;
 
 impl Manifest {
+    /// Returns the sum of a manifest of this input.
+    fn sum_of(&self, input: &[u8]) -> anyhow::Result<String> {
+        // All fields, so that none is forgotten.
+        let Self {
+            version,
+            input: name,
+            max_memory,
+            work,
+            shards,
+            sum: _,
+        } = self;
+        let input = WalkMapKey::hash(input);
+        let text = serde_json::to_string(&(version, name, max_memory, work, shards, input))?;
+        Ok(format!("{:016x}", WalkMapKey::hash(text.as_bytes())))
+    }
+
     /// Opens the work on the input at `path`.
     fn work(&self, path: PathBuf, bytes: &[u8]) -> anyhow::Result<Box<dyn Shards>> {
         Ok(match &self.work {
@@ -152,21 +171,28 @@ impl Opened {
     fn at(dir: &Path) -> anyhow::Result<Self> {
         let manifest = manifest_of(dir)?;
         let path = dir.join(&manifest.input);
-        let bytes = read(&path)?;
-        let work = manifest.work(path, &bytes)?;
-        if work.keys()? != manifest.shards {
-            bail!(
+        let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let refused = || {
+            format!(
                 "{}: planned by another version, or its input has changed; plan it again in a new folder",
                 dir.display()
-            );
+            )
+        };
+        if manifest.sum_of(&bytes)? != manifest.sum {
+            bail!(refused());
+        }
+        let work = manifest.work(path, &bytes)?;
+        if work.keys()? != manifest.shards {
+            bail!(refused());
         }
         Ok(Self { manifest, work })
     }
 
     /// Returns the bytes of a shard in a folder, if it is there and whole.
     fn whole(&self, folder: &PieceFolder, shard: usize) -> Option<Vec<u8>> {
-        let bytes = folder.get(&self.manifest.shards[shard])?;
-        self.work.is_whole(shard, &bytes).then_some(bytes)
+        let key = &self.manifest.shards[shard];
+        let bytes = folder.get(key)?;
+        self.work.is_whole(shard, key, &bytes).then_some(bytes)
     }
 
     /// Returns the shards that are not there, or damaged.
@@ -203,6 +229,7 @@ fn plan(args: &JobPlan) -> anyhow::Result<()> {
         max_memory: args.max_memory,
         work: work_of(args, &bytes)?,
         shards: Vec::new(),
+        sum: String::new(),
     };
     manifest.input = copy_name(&manifest.work, args, &bytes)?;
     let bytes = match manifest.work {
@@ -213,6 +240,7 @@ fn plan(args: &JobPlan) -> anyhow::Result<()> {
     };
     let work = manifest.work(args.input.clone(), &bytes)?;
     manifest.shards = work.keys()?;
+    manifest.sum = manifest.sum_of(&bytes)?;
     if args.output.exists() {
         if manifest_of(&args.output).ok() != Some(manifest_copy(&manifest)?) {
             bail!(
@@ -341,6 +369,7 @@ fn run_shards(args: &JobRun) -> anyhow::Result<()> {
     left.retain(is_asked);
     let n_asked = (0..shards.len()).filter(is_asked).count();
     job.work.compute(&left, &folder, args)?;
+    folder.tidy(shards);
     let done = ShardCounts {
         done: left.len(),
         there: n_asked - left.len(),

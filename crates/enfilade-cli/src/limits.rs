@@ -23,7 +23,8 @@ pub(crate) struct Limits {
     /// End without a result after this long.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
-    /// End without a result rather than use more memory: a number and K, M, G or T.
+    /// End without a result rather than use more memory: a number and K, M, G or T; 0 for no limit, not even on files that unpack
+    /// to hundreds of times their size.
     #[arg(long, value_name = "BYTES", value_parser = bytes)]
     max_memory: Option<u64>,
 }

@@ -233,9 +233,12 @@ pub(crate) fn write_unnamed(
         }
         changed.push((path, bytes));
     }
-    changed
-        .into_iter()
-        .try_for_each(|(path, bytes)| write_whole(path, bytes))
+    for (path, bytes) in changed {
+        write_whole(path, bytes)?;
+    }
+    let paths: Vec<&PathBuf> = files.iter().map(|(path, _)| path).collect();
+    whole::remove_left(&paths);
+    Ok(())
 }
 
 /// Makes the folder that `option` names, unless it exists.

@@ -9,6 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::Context;
 use enfilade::bake::Pieces;
 use enfilade::vis::VisBlocks;
+use enfilade::whole;
 
 use crate::output::write_whole;
 
@@ -57,6 +58,12 @@ impl PieceFolder {
     pub(crate) fn has_error(&self) -> bool {
         let error = self.error.lock().unwrap_or_else(PoisonError::into_inner);
         error.is_some()
+    }
+
+    /// Removes what killed runs left half written of pieces with these keys.
+    pub(crate) fn tidy(&self, keys: &[String]) {
+        let files: Vec<PathBuf> = keys.iter().map(|key| self.file(key)).collect();
+        whole::remove_left(&files);
     }
 
     /// Removes the pieces, and the folder if nothing else is in it.

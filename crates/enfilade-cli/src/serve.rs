@@ -1,5 +1,6 @@
 //! `enfilade serve`: a folder over HTTP, for programs that stream packed worlds.
 
+use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -22,11 +23,12 @@ use tower_http::services::fs::{Backend, TokioBackend};
 
 use crate::screen::printed;
 
-/// Serves a folder over HTTP until Ctrl-C: files, ranges of them, and whole files compressed. Prints the addresses of the
+/// Serves a folder over HTTP until Ctrl-C: files, ranges of them, and whole files compressed, but none that are hidden. Prints the addresses of the
 /// packed worlds in it, which all commands take in place of files. Any page of a browser may read it.
 #[derive(clap::Args)]
 pub(crate) struct Serve {
-    /// Folder with packed worlds, or a packed world. Links that lead out of it are not followed.
+    /// Folder with packed worlds, or a packed world. Links that lead out of it are not followed, and names that begin with a dot
+    /// are not there.
     dir: PathBuf,
     /// Address and port: 0.0.0.0 serves other machines, too; port 0 takes one that is free.
     #[arg(long, value_name = "IP:PORT", default_value = "127.0.0.1:8000")]
@@ -42,10 +44,12 @@ pub(crate) fn run(args: &Serve) -> anyhow::Result<()> {
             args.dir.display()
         );
     }
+    check_room(&root).with_context(cannot)?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();
-    runtime.with_context(cannot)?.block_on(async {
+    let runtime = runtime.with_context(cannot)?;
+    let served = runtime.block_on(async {
         let listener = TcpListener::bind(args.address).await.with_context(|| {
             format!(
                 "cannot listen at {}; choose another one with --address",
@@ -58,7 +62,23 @@ pub(crate) fn run(args: &Serve) -> anyhow::Result<()> {
         tell(args, listener.local_addr()?)?;
         tokio::spawn(serve(listener, root));
         Ok(end.await??)
-    })
+    });
+    // A disk that does not answer holds up nobody.
+    runtime.shutdown_background();
+    served
+}
+
+/// Checks that the process may open what a server needs besides its callers: the runtime panics without.
+fn check_room(root: &Path) -> anyhow::Result<()> {
+    const NEEDED: usize = 16;
+    let open = (0..NEEDED).map(|_| File::open(root));
+    // Some systems do not open folders as files, and lack such a limit, too.
+    match open.collect::<io::Result<Vec<File>>>() {
+        Err(why) if why.kind() != ErrorKind::PermissionDenied => {
+            Err(why).context("allow more open files, with `ulimit -n 64` or more")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Letters of names that stand for themselves in addresses.
@@ -136,16 +156,22 @@ async fn serve(listener: TcpListener, root: PathBuf) {
     }
 }
 
-/// The files of a folder, without those that links in it lead to outside.
+/// The files and folders of a folder, without those that links in it lead to outside, hidden ones, and what is neither: a pipe
+/// would be waited for.
 #[derive(Clone)]
 struct Inside(PathBuf);
 
 impl Inside {
     fn check(&self, path: &Path) -> io::Result<()> {
-        if path.canonicalize()?.starts_with(&self.0) {
-            return Ok(());
-        }
-        Err(ErrorKind::NotFound.into())
+        let found = path.canonicalize().ok().and_then(|found| {
+            let inside = found.strip_prefix(&self.0).ok()?;
+            let asked = path.strip_prefix(&self.0).ok()?;
+            let mut names = inside.components().chain(asked.components());
+            let is_hidden = names.any(|n| n.as_os_str().as_encoded_bytes().starts_with(b"."));
+            let kind = found.metadata().ok()?.file_type();
+            (!is_hidden && (kind.is_file() || kind.is_dir())).then_some(())
+        });
+        found.ok_or_else(|| ErrorKind::NotFound.into())
     }
 }
 

@@ -57,12 +57,17 @@ pub fn door(text: &str) -> Result<(u32, f32), String> {
     })
 }
 
-/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. [Units: bytes]
+/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. `0` stands for more than there is.
+/// [Units: bytes]
 ///
 /// # Errors
 ///
 /// For anything else, and a number without a unit; the text says what is needed.
 pub fn bytes(text: &str) -> Result<u64, String> {
+    const NO_LIMIT: u64 = 1 << 62;
+    if text == "0" {
+        return Ok(NO_LIMIT);
+    }
     let parse = || {
         let split = text.find(|c: char| c.is_ascii_alphabetic())?;
         let number: f64 = text[..split].trim().parse().ok()?;
@@ -72,7 +77,9 @@ pub fn bytes(text: &str) -> Result<u64, String> {
         let value = number * 1024f64.powi(power as i32);
         (value >= 1.0 && value < 2f64.powi(63)).then_some(value as u64)
     };
-    parse().ok_or_else(|| "an amount of memory with its unit is needed, e.g. 4G or 800M".into())
+    parse().ok_or_else(|| {
+        "an amount of memory with its unit is needed, e.g. 4G or 800M, or 0 for no limit".into()
+    })
 }
 
 #[cfg(test)]

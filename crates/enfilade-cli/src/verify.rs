@@ -10,8 +10,8 @@ use enfilade::geom::scene::{Role, Scene, TriangleSource};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_render::AdapterChoice;
 use enfilade_verify::{
-    SourceDetail, VerifyOptions, ViewOptions, ViewReport, compare_details, compare_scene,
-    other_scene, verify_evidence, verify_views, verify_world_with_progress,
+    SourceDetail, VerifyOptions, ViewOptions, ViewReport, check_drawn, compare_details,
+    compare_scene, other_scene, verify_evidence, verify_views, verify_world_with_progress,
 };
 
 use crate::bake::settings::{SceneOptions, bound};
@@ -24,7 +24,7 @@ use crate::screen::{print_json, printed, printed_at_once, write_lines};
 use enfilade_cli::answers::Answers;
 use enfilade_cli::input::{import_scene, name_of, read};
 use enfilade_cli::values::size;
-use enfilade_cli::world::read_world;
+use enfilade_cli::world::read_world_checked;
 
 /// Tests the promises of a world with random sight lines; exits with 1 if one is broken.
 #[derive(clap::Args)]
@@ -94,7 +94,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(folder) = pictures {
         make_folder("--pictures", folder)?;
     }
-    let world = read_world(&args.world)?;
+    let (world, file) = read_world_checked(&args.world)?;
     let source = (!args.source.is_empty())
         .then(|| read_source(args, &mut outputs))
         .transpose()?;
@@ -113,10 +113,9 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             bar.set(done);
         });
     bar.finish();
-    if let Some(scene) = &source {
-        report.problems.extend(detail_problems(&world, scene));
-        report.problems.extend(compare_scene(&world, scene));
-    }
+    report
+        .problems
+        .extend(problems_of_file(&world, &file, source.as_ref()));
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
         .transpose()?;
@@ -270,6 +269,16 @@ fn structure_of(scene: &Scene) -> Vec<Triangle> {
         .triangle_sources(Role::Structural)
         .map(|source| scene.world_triangle(source))
         .collect()
+}
+
+/// Problems if viewers draw something else than the world, or it does not have all that came with the scene.
+fn problems_of_file(world: &World, file: &[u8], scene: Option<&Scene>) -> Vec<String> {
+    let mut problems = check_drawn(file);
+    if let Some(scene) = scene {
+        problems.extend(detail_problems(world, scene));
+        problems.extend(compare_scene(world, scene));
+    }
+    problems
 }
 
 /// Problems if the world's details are not those of the scene.

@@ -7,6 +7,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use enfilade::geom::shown;
+use enfilade::whole;
 use enfilade::world::{Agent, PartId, Space, WalkMap, WalkMapKey};
 
 use crate::output::write_whole;
@@ -115,6 +116,7 @@ pub(crate) fn keep(
     let path = beside(file.path);
     let bytes = map.kept(space, &walks.key(file.hash));
     write_whole(&path, &bytes)?;
+    whole::remove_left(&[&path]);
     let n = map.floors(PartId::ROOT).n_floors();
     writeln!(
         Told,

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade::cpg::wire::decode_glb;
+use enfilade::stream::{PackError, PackedFiles, PackedPlace};
 use enfilade::world::WalkMapKey;
 
 use crate::input::{name_of, read_glb};
@@ -16,6 +17,26 @@ use crate::input::{name_of, read_glb};
 /// If the file cannot be read or is not a valid world; the error names it.
 pub fn read_world(path: &Path) -> anyhow::Result<World> {
     decode_glb(&read_glb(path)?).with_context(|| name_of(path))
+}
+
+/// As [`read_world`]; also checks that the head of a packed world is that of its pieces, and returns the file.
+///
+/// # Errors
+///
+/// As [`read_world`]; a head that was forged, or written wrongly.
+pub fn read_world_checked(path: &Path) -> anyhow::Result<(World, Vec<u8>)> {
+    let read = || {
+        let packed = PackedPlace::read_all(path)?;
+        let file = packed.unpack()?;
+        packed.check(&file)?;
+        Ok::<_, PackError>(file)
+    };
+    let file = if PackedPlace::is_url(path) || PackedFiles::is_packed(path) {
+        read().with_context(|| name_of(path))?
+    } else {
+        read_glb(path)?
+    };
+    Ok((decode_glb(&file).with_context(|| name_of(path))?, file))
 }
 
 /// As [`read_world`]; also returns the hash of the file, for what is kept beside it.

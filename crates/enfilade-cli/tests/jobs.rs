@@ -85,6 +85,24 @@ fn shards_of_a_bake_from_anywhere_make_the_world_of_one_machine() {
     done(dir, "job finish a -o made.glb");
     assert!(same(dir, "made.glb", "alone.glb"));
     assert!(shard("a", keys[0]).exists());
+    // A shard under the name of another counts as missing, and a manifest that was changed is refused.
+    fs::copy(shard("b", keys[1]), shard("b", keys[0])).unwrap();
+    let text = refused(dir, "job finish b -o made.glb");
+    assert!(
+        text.contains("1 of 2 shards are missing or damaged"),
+        "{text}"
+    );
+    done(dir, "job run b");
+    assert!(same(
+        dir,
+        &format!("a/shards/{}.block", keys[0]),
+        &format!("b/shards/{}.block", keys[0])
+    ));
+    let manifest = fs::read_to_string(dir.join("b/manifest.json")).unwrap();
+    fs::write(dir.join("b/manifest.json"), manifest.replace("0.5", "0.6")).unwrap();
+    let text = refused(dir, "job run b");
+    assert!(text.contains("plan it again"), "{text}");
+    fs::write(dir.join("b/manifest.json"), manifest).unwrap();
     // A job whose input was changed is refused.
     let tower = office_tower(&TowerParams::with_rooms(2, 1)).scene;
     fs::write(dir.join("b/town.glb"), export_glb(&tower)).unwrap();
@@ -189,6 +207,14 @@ fn a_bake_that_is_killed_goes_on_from_its_pieces() {
         !child.wait().unwrap().success() && pieces.exists()
     });
     assert!(is_killed && !dir.join("made.glb").exists());
+    // Pieces of another scene under the names of these.
+    done(dir, "job plan town.glb -o town");
+    done(dir, "job run town");
+    let foreign = fs::read_dir(dir.join("town/shards")).unwrap().next();
+    let foreign = foreign.unwrap().unwrap().path();
+    for piece in fs::read_dir(&pieces).unwrap() {
+        fs::copy(&foreign, piece.unwrap().path()).unwrap();
+    }
     fs::write(pieces.join("notes.txt"), "mine").unwrap();
     done(dir, words);
     assert!(same(dir, "made.glb", "alone.glb"));

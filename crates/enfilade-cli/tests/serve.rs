@@ -177,3 +177,75 @@ fn a_server_ends_on_ctrl_c() {
     );
     assert!(server.0.wait().unwrap().success());
 }
+
+/// Waits for the end of a server for some seconds.
+#[cfg(unix)]
+fn ends(server: &mut Server) -> bool {
+    (0..200).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        server.0.try_wait().unwrap().is_some()
+    })
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_loops_and_hidden_files_are_not_there_and_hold_up_nothing() {
+    let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("serve-odd");
+    let _ = fs::remove_dir_all(&dir);
+    fs::create_dir_all(dir.join("worlds/.git")).unwrap();
+    let worlds = dir.join("worlds");
+    for name in ["plain", ".env", ".git/config"] {
+        fs::write(worlds.join(name), "words").unwrap();
+    }
+    let made = Command::new("mkfifo").arg(worlds.join("pipe")).status();
+    assert!(made.unwrap().success());
+    for (target, link) in [
+        ("one", "two"),
+        ("two", "one"),
+        (".env", "shown"),
+        (".git", "folder"),
+    ] {
+        std::os::unix::fs::symlink(target, worlds.join(link)).unwrap();
+    }
+    // A server whose reader is gone ends: both lines are read.
+    let (mut server, lines) = serve(&dir, 2);
+    let host = lines[0].split(' ').nth(3).unwrap();
+    let host = &host["http://".len()..host.len() - 1];
+    for path in ["/plain", "/./plain"] {
+        assert_eq!(ask(host, path, "").1, b"words", "{path}");
+    }
+    for path in [
+        "/pipe",
+        "/one",
+        "/.env",
+        "/.git/config",
+        "/shown",
+        "/folder/config",
+        "/.git/",
+        "/%2eenv",
+    ] {
+        let (head, _) = ask(host, path, "");
+        assert!(head.starts_with("http/1.1 404"), "{path}: {head}");
+    }
+    let ended = Command::new("kill")
+        .args(["-INT", &server.0.id().to_string()])
+        .status();
+    assert!(ended.unwrap().success() && ends(&mut server));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn too_few_files_that_may_be_open_are_told() {
+    let dir = env!("CARGO_TARGET_TMPDIR");
+    for n in 5..16 {
+        let script = format!("ulimit -n {n}; exec \"$0\" serve . --address 127.0.0.1:0");
+        let done = Command::new("sh")
+            .args(["-c", &script, env!("CARGO_BIN_EXE_enfilade")])
+            .current_dir(dir)
+            .output()
+            .unwrap();
+        let err = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(1), "{n}: {err}");
+        assert!(err.contains("ulimit -n"), "{n}: {err}");
+    }
+}

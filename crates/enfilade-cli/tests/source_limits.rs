@@ -139,17 +139,18 @@ fn the_memory_of_reading_counts() {
     let zeros = std::io::repeat(0).take(1_000_000_000);
     std::io::copy(&mut head.as_slice().chain(zeros), &mut zip).unwrap();
     zip.finish().unwrap();
-    let args = [
-        "bake",
-        "zeros.nii.gz",
-        "--level",
-        "1",
-        "-o",
-        "out.glb",
-        "--max-memory",
-        "300M",
+    let args = ["bake", "zeros.nii.gz", "--level", "1", "-o", "out.glb"];
+    let limited = [&args[..], &["--max-memory", "300M"]].concat();
+    let said = folder.refused(&limited, &["zeros.nii.gz: ", "--max-memory"]);
+    assert!(!said.contains("unpack from"), "{said}");
+    // Without a limit, it is out of proportion.
+    let start = Instant::now();
+    let words = [
+        "zeros.nii.gz: samples: 1000000000 unpack from",
+        "--max-memory 0",
     ];
-    folder.refused(&args, &["zeros.nii.gz: ", "--max-memory"]);
+    folder.refused(&args, &words);
+    assert!(start.elapsed() < Duration::from_secs(10));
 }
 
 /// A LAZ whose packed points have another size than its head tells: its reader, of another project, panics.

@@ -47,6 +47,87 @@ fn a_good_world_passes_and_is_its_own_source() {
     }
 }
 
+/// Bakes a scene of this text, and returns what `verify` says of it.
+fn verified(name: &str, text: &str) -> Output {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let [scene, world] = [name.to_owned(), format!("{name}.glb")]
+        .map(|n| folder.join(n).to_str().unwrap().to_owned());
+    fs::write(&scene, text).unwrap();
+    let baked = enfilade(&["bake", &scene, "-o", &world, "--allow-empty"]);
+    assert!(
+        baked.status.success(),
+        "{}",
+        String::from_utf8_lossy(&baked.stderr)
+    );
+    enfilade(&["verify", &world, "--rays", "20000", "--sight", "200"])
+}
+
+#[test]
+fn objects_without_names_of_their_own_break_no_promise() {
+    let triangle = r#""buffers":[{"byteLength":36,"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAQAAAAAAAAAAAAAAAAAAAQEAAAAAA"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}]"#;
+    let primitives = r#""primitives":[{"attributes":{"POSITION":0}}]"#;
+    for (k, nodes, meshes) in [
+        // Below an object with a name: without any name, and with one of its mesh.
+        (
+            0,
+            r#"{"mesh":0,"name":"Lamp","children":[1]},{"mesh":1,"translation":[3,0,1]}"#,
+            ["", "", ""],
+        ),
+        (
+            1,
+            r#"{"mesh":0,"name":"Lamp","children":[1]},{"mesh":1,"translation":[3,0,1]}"#,
+            ["", "Shade", ""],
+        ),
+        // Called as an object elsewhere.
+        (
+            2,
+            r#"{"name":"Group","children":[1]},{"mesh":0},{"mesh":1,"name":"Chair","translation":[3,0,1]}"#,
+            ["Chair", "", ""],
+        ),
+    ] {
+        let meshes = meshes
+            .map(|name| format!("{{{primitives},\"name\":\"{name}\"}}"))
+            .join(",");
+        let roots = if k == 2 { "0,2,3" } else { "0,2" };
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[{roots}]}}],"nodes":[{nodes},{{"mesh":2,"name":"Wall","scale":[2,2,2]}}],"meshes":[{meshes}],{triangle}}}"#
+        );
+        let done = verified(&format!("nameless-{k}.gltf"), &text);
+        assert!(
+            done.status.success(),
+            "{k}: {}",
+            String::from_utf8_lossy(&done.stdout)
+        );
+    }
+}
+
+#[test]
+fn triangles_without_area_break_no_promise() {
+    // A room seen from inside, and in it what is left of a box of no thickness.
+    let mut text = String::new();
+    for corner in 0..8 {
+        let [x, y, z] = [
+            corner / 4 * 5 - 2,
+            corner / 2 % 2 * 3 - 1,
+            corner % 2 * 4 - 2,
+        ];
+        text += &format!("v {x} {y} {z}\n");
+    }
+    text += "v 0 0 0\nv 9e-44 1.5 -9e-44\nv 5.266220431402358e-37 1.5000154972076416 -9e-44\n";
+    for side in [
+        "3 4 2 1", "6 8 7 5", "2 6 5 1", "7 8 4 3", "5 7 3 1", "4 8 6 2", "9 10 11", "9 9 10",
+    ] {
+        text += &format!("f {side}\n");
+    }
+    let done = verified("needle.obj", &text);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stdout)
+    );
+}
+
 #[test]
 fn a_broken_promise_ends_in_exit_code_1_and_says_where() {
     let mut world = house();

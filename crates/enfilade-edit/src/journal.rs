@@ -1,4 +1,7 @@
 //! The journal of a session: a file with a line for each operation, undo and redo.
+//!
+//! The last field of a line is a sum of the whole journal up to it, so a line that was changed, moved or comes from another journal
+//! is refused. It detects damage, not forgery.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -7,7 +10,7 @@ use std::path::Path;
 use crate::operation::EditOperation;
 
 /// First field of a journal, with the version of its format.
-const HEADER: &str = "enfilade edits 1";
+const HEADER: &str = "enfilade edits 2";
 
 /// Reason why a journal cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -57,12 +60,60 @@ impl Entry {
     }
 }
 
+/// The sum of a journal so far: FNV-1a, 64 bits.
+#[derive(Clone, Copy, Debug)]
+struct Sum(u64);
+
+impl Sum {
+    /// Begins a journal over a ground.
+    fn of_header(ground: &str) -> Self {
+        Self(0xcbf2_9ce4_8422_2325).with(&header(ground))
+    }
+
+    /// Adds a line.
+    fn with(self, line: &str) -> Self {
+        let bytes = line.bytes().chain([b'\n']);
+        Self(bytes.fold(self.0, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        }))
+    }
+
+    /// Returns a line with the sum after it.
+    fn sealed(self, line: &str) -> String {
+        format!("{line}\t{:016x}", self.with(line).0)
+    }
+
+    /// Returns a line without the sum after it; `None` if it has another.
+    fn unsealed(self, line: &str) -> Option<&str> {
+        let (own, _) = line.rsplit_once('\t')?;
+        (self.sealed(own) == line).then_some(own)
+    }
+}
+
+fn header(ground: &str) -> String {
+    format!("{HEADER}\t{ground}")
+}
+
+/// Returns the text of a journal over a `ground` with these lines, for tests of journals that no session writes.
+#[doc(hidden)]
+#[must_use]
+pub fn journal_of<'a>(ground: &str, lines: impl IntoIterator<Item = &'a str>) -> String {
+    let mut sum = Sum::of_header(ground);
+    let mut text = header(ground) + "\n";
+    for line in lines {
+        text += &(sum.sealed(line) + "\n");
+        sum = sum.with(line);
+    }
+    text
+}
+
 /// An open journal, which nobody else writes.
 #[derive(Debug)]
 pub(crate) struct Journal {
     file: File,
     /// Length of what is written whole. [Units: bytes]
     length: u64,
+    sum: Sum,
 }
 
 /// The contents of a journal that was opened.
@@ -94,9 +145,9 @@ impl Journal {
             .rposition(|b| *b == b'\n')
             .map_or(0, |at| at + 1);
         let (lines, rest) = bytes.split_at(whole);
-        let header = format!("{HEADER}\t{ground}\n");
+        let header = header(ground);
         // A file of something else is not cut.
-        if whole == 0 && !header.as_bytes().starts_with(rest) {
+        if whole == 0 && !format!("{header}\n").as_bytes().starts_with(rest) {
             return Err(JournalError::NotAJournal);
         }
         let text = std::str::from_utf8(lines).map_err(|_| JournalError::NotAJournal)?;
@@ -112,30 +163,40 @@ impl Journal {
                 _ => return Err(JournalError::NotAJournal),
             }
         }
+        let mut sum = Sum::of_header(ground);
         for (line, text) in numbered {
-            let entry = Entry::of_line(text).map_err(|why| JournalError::Line { line, why })?;
+            let refused = |why| JournalError::Line { line, why };
+            let own = sum.unsealed(text).ok_or_else(|| {
+                refused("it or one before it was changed, for its sum is another".to_owned())
+            })?;
+            sum = sum.with(own);
+            let entry = Entry::of_line(own).map_err(refused)?;
             contents.entries.push((line, entry));
         }
         let mut journal = Self {
             file,
             length: whole as u64,
+            sum,
         };
         if !rest.is_empty() {
             journal.file.set_len(journal.length)?;
         }
         if whole == 0 {
-            journal.append(header.trim_end_matches('\n'))?;
+            journal.append(&header)?;
         }
         Ok((journal, contents))
     }
 
     /// Writes an entry. If that fails, the journal is as before, or at worst has a line without an end.
     pub(crate) fn write(&mut self, entry: &Entry) -> Result<(), JournalError> {
-        match entry {
-            Entry::Operation(operation) => self.append(&operation.line()),
-            Entry::Undo => self.append("undo"),
-            Entry::Redo => self.append("redo"),
-        }
+        let line = match entry {
+            Entry::Operation(operation) => operation.line(),
+            Entry::Undo => "undo".to_owned(),
+            Entry::Redo => "redo".to_owned(),
+        };
+        self.append(&self.sum.sealed(&line))?;
+        self.sum = self.sum.with(&line);
+        Ok(())
     }
 
     fn append(&mut self, line: &str) -> Result<(), JournalError> {

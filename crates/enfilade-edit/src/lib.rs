@@ -42,7 +42,7 @@ mod session;
 
 pub use followed::EditedSpace;
 pub use hand::{HandEdit, HandEditError, HandEditKind};
-pub use journal::JournalError;
+pub use journal::{JournalError, journal_of};
 pub use operation::EditOperation;
 pub use own::OwnWorlds;
 pub use session::{EditError, EditGround, EditSession, EditedWorld, Resumed};

@@ -11,6 +11,7 @@ use enfilade_cpg::{PortalKind, World};
 use enfilade_edit::random::random_operation;
 use enfilade_edit::{
     EditError, EditGround, EditOperation, EditSession, HandEditKind, JournalError, Resumed,
+    journal_of,
 };
 use enfilade_geom::DVec3;
 use enfilade_kit::{Choice, DEFAULT_TOLERANCE, InstanceId, Kit, Piece};
@@ -336,18 +337,26 @@ fn a_torn_line_is_cut_and_told_and_damage_is_refused_with_its_line() {
     let text = String::from_utf8(whole.clone()).unwrap();
     for (bad, says) in [
         (
-            text.replace("put\tchamber", "put\tcellar"),
+            journal_of("-", ["put\tcellar\t0 0 0 0 0 0 1"]),
             "line 2 of the journal: the kit has no piece \"cellar\"",
         ),
         (
-            text.replace("undo", "undoo"),
+            journal_of("-", ["undo", "undoo"]),
             "line 3 of the journal: 'undoo'",
         ),
         (
-            text.replace("edits 1\t-", "edits 1\tother"),
+            text.replace("put\tchamber", "put\tcellar"),
+            "line 2 of the journal: it or one before it was changed",
+        ),
+        (
+            text.replace("undo", "redo"),
+            "line 3 of the journal: it or one before it was changed",
+        ),
+        (
+            text.replace("edits 2\t-", "edits 2\tother"),
             "begun over another world",
         ),
-        (text.replace("edits 1", "edits 2"), "no journal"),
+        (text.replace("edits 2", "edits 1"), "no journal"),
         ("a letter to a friend\n".into(), "no journal"),
         ("a letter".into(), "no journal"),
     ] {
@@ -355,6 +364,31 @@ fn a_torn_line_is_cut_and_told_and_damage_is_refused_with_its_line() {
         let why = opened(&path).unwrap_err().to_string();
         assert!(why.contains(says), "{why}");
         assert!(std::fs::read_to_string(&path).unwrap() == bad, "it stays");
+    }
+    // A bit of any byte, and lines that are missing, exchanged, or of another journal.
+    let lines: Vec<&str> = text.lines().collect();
+    let joined = |at: &[usize]| at.iter().map(|k| format!("{}\n", lines[*k])).collect();
+    let other = journal_of("other", ["undo"])
+        .lines()
+        .nth(1)
+        .unwrap()
+        .to_owned();
+    let mut spoilt: Vec<Vec<u8>> = [joined(&[0, 2]), joined(&[0, 1, 3]), joined(&[0, 1, 3, 2])]
+        .map(String::into_bytes)
+        .to_vec();
+    spoilt.push(format!("{}\n{other}\n", lines[0]).into_bytes());
+    // The last byte is the end of a line: without it, the line is cut off.
+    for at in 0..whole.len() - 1 {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 1;
+        spoilt.push(bytes);
+    }
+    for spoilt in spoilt {
+        std::fs::write(&path, &spoilt).unwrap();
+        let why = opened(&path).err();
+        let text = String::from_utf8_lossy(&spoilt);
+        assert!(matches!(why, Some(EditError::Journal(_))), "{text}");
+        assert!(std::fs::read(&path).unwrap() == spoilt, "it stays");
     }
 }
 

@@ -89,6 +89,12 @@ impl Allowance {
         self.until.is_some()
     }
 
+    /// Returns `true` if it has a limit on memory.
+    #[must_use]
+    pub fn holds_memory(&self) -> bool {
+        self.memory.is_some()
+    }
+
     /// Adds work: the task turned out larger, by an amount that is bounded elsewhere.
     pub fn grant(&self, work: u64) {
         let most = self.most().saturating_add(work);

@@ -6,6 +6,7 @@
 
 mod classes;
 mod folder;
+mod group;
 mod programs;
 
 use std::fs::{self, File};
@@ -18,6 +19,7 @@ use crate::options::IfcConverter;
 use crate::{ImportError, files, gltf};
 pub(crate) use classes::is_guid;
 use folder::Folder;
+use group::{Group, lead};
 use programs::IfcProgram;
 
 /// Most of the program's output that goes into an error. [Units: bytes]
@@ -156,7 +158,8 @@ impl Run<'_> {
         // An absolute path, so that a name that begins with a dash is not an option.
         let input = fs::canonicalize(input).map_err(text)?;
         let arguments = self.kind.arguments(self.folder).map_err(text)?;
-        let mut child = Command::new(self.program)
+        let mut command = Command::new(self.program);
+        let mut child = lead(&mut command)
             .args(arguments)
             .args([&input, &output])
             // Python writes names in the encoding of the system otherwise.
@@ -167,6 +170,8 @@ impl Run<'_> {
             .spawn()
             .map_err(|e| format!("cannot be run: {e}; name another with --ifc-convert PATH"))?;
         let sizes = [(output.as_path(), self.most), (said.as_path(), MAX_SAID)];
+        // Ended with all that it has started, whatever happens from here on.
+        let _group = Group::of(&child);
         let status = match wait(&mut child, self.converter, sizes) {
             Ok(status) => status,
             Err(why) => {

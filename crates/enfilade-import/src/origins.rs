@@ -1,6 +1,6 @@
 //! Names and metadata of the input: tree of names, lights, cameras, markers, copyright.
 
-use enfilade_geom::scene::{About, Entity, Fixture, FixtureKind, Scene, SourceNode};
+use enfilade_geom::scene::{About, Entity, Fixture, FixtureKind, Object, Scene, SourceNode};
 use enfilade_geom::{DMat3, DMat4, DVec3};
 use serde_json::{Map, Value};
 use std::collections::{BTreeSet, HashMap};
@@ -107,11 +107,38 @@ impl Origins {
         for object in &mut scene.objects {
             object.node = object.node.map(|n| number[n as usize]);
         }
+        name_after_groups(scene);
         scene.fixtures = self.fixtures;
         scene.about = About {
             copyright: Vec::from_iter(self.copyrights).join("\n"),
             extras: self.extras,
         };
+    }
+}
+
+/// Names objects without a node of their own after the node around them where the name of their mesh, or none, would make them
+/// another's: if an object has the node's name, or another node has theirs.
+fn name_after_groups(scene: &mut Scene) {
+    let named: BTreeSet<&str> = scene.nodes.iter().map(|node| &*node.name).collect();
+    let group = |object: &Object| object.node.map(|n| (n, &*scene.nodes[n as usize].name));
+    let is_own = |object: &&Object| group(object).is_some_and(|g| g.1 == object.name);
+    let owned: BTreeSet<u32> = scene
+        .objects
+        .iter()
+        .filter(is_own)
+        .filter_map(|o| o.node)
+        .collect();
+    let renamed: Vec<(usize, String)> = (0..)
+        .zip(&scene.objects)
+        .filter_map(|(i, object)| {
+            let (node, name) = group(object)?;
+            let is_elsewhere = !object.name.is_empty() && named.contains(&*object.name);
+            (object.name != name && (is_elsewhere || owned.contains(&node)))
+                .then(|| (i, name.to_owned()))
+        })
+        .collect();
+    for (i, name) in renamed {
+        scene.objects[i].name = name;
     }
 }
 

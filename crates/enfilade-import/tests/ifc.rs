@@ -132,6 +132,40 @@ fn a_converter_is_ended_that_takes_too_long_too_much_or_writes_too_much() {
     }
 }
 
+#[cfg(target_os = "linux")]
+/// Returns `true` once a process is there no more, or `false` after ten seconds.
+fn is_gone(process: &str) -> bool {
+    (0..200).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        // A zombie is of whoever should wait for it.
+        let state = std::fs::read_to_string(format!("/proc/{}/stat", process.trim()));
+        state.is_ok_and(|s| s.contains(") Z ")) || !Path::new("/proc").join(process.trim()).exists()
+    })
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_converter_has_started_ends_with_it() {
+    for (name, script, is_read) in [
+        (
+            "ifc-stays",
+            "trap '' TERM INT; sleep 3600 & echo $! > child; sleep 3600",
+            false,
+        ),
+        (
+            "ifc-forks",
+            "sleep 3600 & echo $! > child; cp made.glb \"$4\"",
+            true,
+        ),
+    ] {
+        let (folder, mut converter) = house(name, script);
+        converter.max_time = Duration::from_secs(2);
+        assert_eq!(read(&folder, Some(converter)).is_ok(), is_read);
+        let child = std::fs::read_to_string(folder.join("child")).unwrap();
+        assert!(is_gone(&child), "{name}");
+    }
+}
+
 #[test]
 fn a_link_in_the_place_of_what_is_made_is_not_followed() {
     let (folder, converter) = house("ifc-link", "ln -s \"$PWD/made.glb\" \"$4\"");

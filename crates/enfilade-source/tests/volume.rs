@@ -1,8 +1,9 @@
 //! Volumes: headers, orientation, units, levels, and what is refused. Covers S3.
 
 use std::io::Write;
+use std::sync::Arc;
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{Allowance, DVec3};
 use enfilade_source::{AirSide, Level, SourceLimits, Volume};
 
 const N: [usize; 3] = [24, 20, 16];
@@ -194,6 +195,24 @@ fn truncated_and_wrong_headers_are_refused_at_their_place() {
     large[42..44].copy_from_slice(&3000_i16.to_le_bytes());
     let error = Volume::parse(&large, &mut beside, &tiny).unwrap_err();
     assert!(error.problem.contains("more than"), "{error}");
+}
+
+#[test]
+fn samples_out_of_proportion_to_their_packed_bytes_are_refused() {
+    // More than 2^27, and little of it is there: it is refused before it is unpacked.
+    let zeros = gzip(&[0; 1 << 16]);
+    let head = String::from_utf8(nrrd("gzip", &[])).unwrap();
+    let head = head.replace("sizes: 24 20 16", "sizes: 1000 1000 200");
+    let file = [head.as_bytes(), &zeros].concat();
+    let why = parse(&file).unwrap_err();
+    assert!(why.problem.contains("unpack from"), "{why}");
+    let mut beside = |_: &str| Err(String::new());
+    let held = SourceLimits {
+        allowance: Some(Arc::new(Allowance::default().holding(1 << 62, || Some(0)))),
+        ..SourceLimits::default()
+    };
+    let why = Volume::parse(&file, &mut beside, &held).unwrap_err();
+    assert!(why.problem.contains("cut off"), "{why}");
 }
 
 #[test]

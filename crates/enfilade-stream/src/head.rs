@@ -1,11 +1,11 @@
 //! The head of a packed world: all that is always in memory.
 
-use enfilade_cpg::World;
 use enfilade_cpg::wire::{WireError, decode_glb, encode_glb};
+use enfilade_cpg::{CellId, World};
 use enfilade_runtime::{Sight, SightError, SightSkeleton};
 use serde::{Deserialize, Serialize};
 
-use crate::{Catalog, Piece, PieceId};
+use crate::{Catalog, Piece, PieceId, WorldPieces, images_of};
 
 /// First bytes of a head.
 const MAGIC: [u8; 8] = *b"enfpack\0";
@@ -16,8 +16,20 @@ const VERSION: u32 = 1;
 /// Bytes before the compressed body: magic, version, sizes and hash of the body.
 const FRONT: usize = 8 + 4 + 8 + 8 + 16;
 
-/// Largest head, unpacked. [Units: bytes]
+/// Largest head, packed. [Units: bytes]
+const MOST_PACKED: u64 = 256 << 20;
+
+/// Largest head or piece, unpacked. [Units: bytes]
 const MOST: u64 = 4 << 30;
+
+/// Size to which any part may expand, whatever it takes packed. [Units: bytes]
+const MOST_FREE: u64 = 16 << 20;
+
+/// Most bytes of a head for each packed one. Hashes of pieces and coordinates are half of it: heads take 2 to 6.
+const HEAD_RATIO: u64 = 64;
+
+/// Most bytes of a piece for each packed one.
+const PIECE_RATIO: u64 = 512;
 
 /// The reasons why a world cannot be packed, or bytes are not a packed world.
 #[derive(Debug, thiserror::Error)]
@@ -40,6 +52,9 @@ pub enum PackError {
     /// Damage.
     #[error("the packed world is damaged: {0}; pack the world again, or fetch it again")]
     Damaged(String),
+    /// A head beyond all proportion.
+    #[error("its head takes more than 256 MiB; divide the world, and pack the parts")]
+    TooLarge,
     /// A file or folder.
     #[error("{path}: {problem}")]
     File {
@@ -101,6 +116,44 @@ struct Listed {
     file: (u64, [u8; 16]),
 }
 
+impl Listed {
+    /// Checks that the pieces lie one after the other, are those into which the world falls, and that each cell lists all that
+    /// the head knows it needs: only the pictures of objects depend on triangles.
+    fn check(&self, world: &World) -> Result<(), PackError> {
+        let mut end = Some(0_u64);
+        for [offset, n_packed, _] in &self.pieces {
+            if end != Some(*offset) {
+                return Err(damaged("its pieces do not lie one after the other"));
+            }
+            end = offset.checked_add(*n_packed);
+        }
+        if end != Some(self.rest.0[0]) {
+            return Err(damaged("its rest does not follow its pieces"));
+        }
+        let needs = WorldPieces::of_world(world, &|material| images_of(world, material)).catalog;
+        let n = self.pieces.len();
+        if needs.pieces().len() != n {
+            let expected = needs.pieces().len();
+            let problem = format!("it lists {n} pieces, and its world falls into {expected}");
+            return Err(damaged(problem));
+        }
+        for (cell, row) in (0..).zip(&self.cells) {
+            let is_list = row.is_sorted_by(|a, b| a < b) && row.iter().all(|p| (*p as usize) < n);
+            let lacks = |p: &&PieceId| row.binary_search(&p.0).is_err();
+            if !is_list {
+                return Err(damaged(format!("cell {cell} has no list of its pieces")));
+            }
+            if let Some(piece) = needs.pieces_of(CellId(cell)).iter().find(lacks) {
+                let piece = piece.0;
+                return Err(damaged(format!(
+                    "cell {cell} needs piece {piece}, and does not list it"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
 impl PackedHead {
     /// Prepares the world for queries: answers are those of the whole world.
     ///
@@ -120,7 +173,7 @@ impl PackedHead {
     pub fn encode_body(&self) -> Result<Vec<u8>, PackError> {
         let pieces = self.catalog.pieces().iter().zip(&self.places);
         let of_cell = |c: u32| {
-            let pieces = self.catalog.pieces_of(enfilade_cpg::CellId(c));
+            let pieces = self.catalog.pieces_of(CellId(c));
             pieces.iter().map(|p| p.0).collect()
         };
         let batches = self.world.batches.iter();
@@ -151,7 +204,10 @@ impl PackedHead {
     /// A world that breaks invariants.
     pub fn encode(&self) -> Result<Vec<u8>, PackError> {
         let body = self.encode_body()?;
-        let packed = compressed(&body)?;
+        let packed = compressed(&body, HEAD_RATIO)?;
+        if packed.len() as u64 > MOST_PACKED {
+            return Err(PackError::TooLarge);
+        }
         let mut out = MAGIC.to_vec();
         out.extend(VERSION.to_le_bytes());
         out.extend((packed.len() as u64).to_le_bytes());
@@ -176,13 +232,13 @@ impl PackedHead {
             return Err(PackError::Version(version));
         }
         let n = word(front, 12).saturating_add(FRONT as u64);
-        (n <= MOST)
+        (n <= MOST_PACKED + FRONT as u64)
             .then_some(n)
-            .ok_or_else(|| damaged("its head is larger than 4 GiB"))
+            .ok_or(PackError::TooLarge)
     }
 
-    /// Decodes a head; bytes after it are ignored. Safe on hostile bytes: no panic, memory bounded by the sizes that the head
-    /// states, at most 4 GiB.
+    /// Decodes a head; bytes after it are ignored. Safe on hostile bytes: no panic, memory of a small multiple of 16 MiB and 64
+    /// times their number.
     ///
     /// # Errors
     ///
@@ -194,7 +250,7 @@ impl PackedHead {
         if bytes[FRONT - 16..FRONT] != hash_of(packed) {
             return Err(damaged("its head has another hash than was packed"));
         }
-        Self::decode_body(&expanded(packed, word(bytes, 20))?)
+        Self::decode_body(&expanded(packed, word(bytes, 20), HEAD_RATIO)?)
     }
 
     /// Decodes the body of a head, unpacked: for fuzzers, which would not get past its hash.
@@ -229,6 +285,7 @@ impl PackedHead {
         for (batch, material) in world.batches.iter_mut().zip(&listed.materials) {
             batch.primitive.material = *material;
         }
+        listed.check(&world)?;
         let pieces = listed.pieces.iter().map(|[_, n_packed, n_resident]| Piece {
             n_packed: *n_packed,
             n_resident: *n_resident,
@@ -263,16 +320,45 @@ fn word(bytes: &[u8], at: usize) -> u64 {
     u64::from_le_bytes(word)
 }
 
-/// Packs bytes.
-pub(crate) fn compressed(bytes: &[u8]) -> Result<Vec<u8>, PackError> {
-    const LEVEL: i32 = 9;
-    zstd::bulk::compress(bytes, LEVEL).map_err(|e| damaged(e.to_string()))
+/// Returns the most bytes that packed ones may expand to.
+fn most_of(packed: &[u8], ratio: u64) -> u64 {
+    MOST_FREE.saturating_add(ratio.saturating_mul(packed.len() as u64))
 }
 
-/// Unpacks bytes of a known size.
-pub(crate) fn expanded(packed: &[u8], n: u64) -> Result<Vec<u8>, PackError> {
-    if n > MOST {
-        return Err(damaged("a part of it is larger than 4 GiB"));
+/// Packs bytes so that they [may be expanded](most_of).
+fn compressed(bytes: &[u8], ratio: u64) -> Result<Vec<u8>, PackError> {
+    const LEVEL: i32 = 9;
+    /// First bytes of a frame that decoders skip.
+    const SKIPPED: [u8; 4] = 0x184D_2A50_u32.to_le_bytes();
+    let mut packed = zstd::bulk::compress(bytes, LEVEL).map_err(|e| damaged(e.to_string()))?;
+    let lacks = (bytes.len() as u64).saturating_sub(most_of(&packed, ratio));
+    if lacks > 0 {
+        // Tens of megabytes of zeros: rare enough to be filled up.
+        let n = lacks.div_ceil(ratio) as u32;
+        packed.extend(SKIPPED);
+        packed.extend(n.to_le_bytes());
+        packed.resize(packed.len() + n as usize, 0);
+    }
+    Ok(packed)
+}
+
+/// Packs the bytes of a piece.
+pub(crate) fn compressed_piece(bytes: &[u8]) -> Result<Vec<u8>, PackError> {
+    compressed(bytes, PIECE_RATIO)
+}
+
+/// Unpacks the bytes of a piece, of a known size.
+pub(crate) fn expanded_piece(packed: &[u8], n: u64) -> Result<Vec<u8>, PackError> {
+    expanded(packed, n, PIECE_RATIO)
+}
+
+/// Unpacks bytes of a known size, at most `ratio` for each beside [`MOST_FREE`].
+fn expanded(packed: &[u8], n: u64, ratio: u64) -> Result<Vec<u8>, PackError> {
+    if n > MOST.min(most_of(packed, ratio)) {
+        return Err(damaged(format!(
+            "{n} bytes are more than a part of it that takes {} expands to",
+            packed.len()
+        )));
     }
     // Read bit by bit: a false size allocates no more than the bytes hold.
     let mut out = Vec::new();
@@ -283,4 +369,22 @@ pub(crate) fn expanded(packed: &[u8], n: u64) -> Result<Vec<u8>, PackError> {
         return Err(damaged("a part of it has another size than was packed"));
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_are_packed_so_that_they_may_be_expanded() {
+        for n in [0, 1 << 10, (MOST_FREE as usize) + (40 << 20)] {
+            let zeros = vec![0; n];
+            let packed = compressed_piece(&zeros).unwrap();
+            assert!(expanded_piece(&packed, n as u64).unwrap() == zeros);
+        }
+        // Others than we pack more tightly.
+        let tight = zstd::bulk::compress(&vec![0; 56 << 20], 9).unwrap();
+        let why = expanded_piece(&tight, 56 << 20).unwrap_err().to_string();
+        assert!(why.contains("more than a part of it that takes"), "{why}");
+    }
 }

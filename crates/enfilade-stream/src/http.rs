@@ -1,8 +1,8 @@
 //! Packed worlds on servers, over HTTP and HTTPS.
 
-use std::io::{Read, copy, sink};
+use std::io::{self, ErrorKind, Read, copy, sink};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ureq::Agent;
 use ureq::http::HeaderMap;
@@ -17,7 +17,7 @@ use crate::{Fetch, PackedWorld, ThreadSource};
 const CONNECTIONS: usize = 3;
 /// Longest wait for a connection, for the next bytes, and for a whole answer of no length.
 const MOST_WAIT: Duration = Duration::from_secs(10);
-/// Slowest pace at which an answer may come, beyond [`MOST_WAIT`]. [Units: bytes per second]
+/// Slowest pace at which an answer may come, beyond [`MOST_WAIT`]: a minute for a megabyte. [Units: bytes per second]
 const LEAST_PACE: u64 = 16 << 10;
 /// Most bytes that are read from the beginning of a file to the end of a range, if a server ignores ranges. [Units: bytes]
 const MOST_WHOLE: u64 = 64 << 20;
@@ -122,8 +122,8 @@ impl PackedHttp {
     }
 }
 
-/// Fetches over HTTP by requests for ranges. An answer is given up if no connection or no bytes come for 10 s, or it takes longer
-/// than 10 s and 1 s for every 16 KiB. If the server ignores ranges, the part is taken out of its answer, up to 64 MiB into the
+/// Fetches over HTTP by requests for ranges. An answer is given up if no connection or no bytes come for 10 s, or its bytes come
+/// more slowly than 16 KiB a second after the first 10 s. If the server ignores ranges, the part is taken out of its answer, up to 64 MiB into the
 /// file.
 #[derive(Debug)]
 pub struct HttpFetch {
@@ -178,6 +178,7 @@ fn agent() -> Agent {
         .http_status_as_error(false)
         .max_idle_connections(1)
         .timeout_connect(Some(MOST_WAIT))
+        .timeout_recv_response(Some(MOST_WAIT))
         .timeout_per_read(Some(MOST_WAIT))
         .user_agent(concat!("enfilade/", env!("CARGO_PKG_VERSION")));
     config.build().into()
@@ -190,12 +191,13 @@ fn at(url: &str, problem: &str) -> PackError {
     }
 }
 
-/// Tries until it succeeds, or for the last time.
+/// Tries until it succeeds, or for the last time; what fails after a long wait is not tried again.
 fn tried<T>(mut work: impl FnMut() -> Result<T, PackError>) -> Result<T, PackError> {
+    let start = Instant::now();
     let mut last = Err(PackError::NotPacked);
     for _ in tries() {
         last = work();
-        if last.is_ok() {
+        if last.is_ok() || start.elapsed() >= MOST_WAIT {
             break;
         }
     }
@@ -285,7 +287,11 @@ fn range(agent: &Agent, url: &str, start: u64, n: u64) -> Result<Vec<u8>, Failur
         return Err(Failure::Other(why));
     }
     let length = text(headers, CONTENT_LENGTH).and_then(|n| n.parse().ok());
-    let mut body = answer.into_body().into_reader();
+    let mut body = Paced {
+        from: answer.into_body().into_reader(),
+        start: Instant::now(),
+        n: 0,
+    };
     copy(&mut (&mut body).take(skip), &mut sink())?;
     let mut out = Vec::new();
     (&mut body).take(n).read_to_end(&mut out)?;
@@ -294,6 +300,25 @@ fn range(agent: &Agent, url: &str, start: u64, n: u64) -> Result<Vec<u8>, Failur
         let _ = body.read(&mut [0]);
     }
     Ok(out)
+}
+
+/// A reader that gives up once its bytes come more slowly than [`LEAST_PACE`] allows.
+struct Paced<R> {
+    from: R,
+    start: Instant,
+    n: u64,
+}
+
+impl<R: Read> Read for Paced<R> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let n = self.from.read(to)?;
+        self.n += n as u64;
+        if n > 0 && self.start.elapsed() > MOST_WAIT + Duration::from_secs(self.n / LEAST_PACE) {
+            let text = "the server sends less than 16 KiB a second";
+            return Err(io::Error::new(ErrorKind::TimedOut, text));
+        }
+        Ok(n)
+    }
 }
 
 /// Returns the first and the last byte of a `Content-Range`.

@@ -1,9 +1,12 @@
 //! World file → packed world, and back.
 
+use enfilade_cpg::CellId;
 use enfilade_cpg::wire::{SplitFile, join_file, split_file};
 use enfilade_runtime::{Sight, SightSkeleton};
 
-use crate::head::{PackError, PackedHead, PieceAt, compressed, damaged, expanded, hash_of};
+use crate::head::{
+    PackError, PackedHead, PieceAt, compressed_piece, damaged, expanded_piece, hash_of,
+};
 use crate::{Catalog, Piece, PieceId, WorldPieces, images_of};
 
 /// A packed world in memory.
@@ -23,42 +26,62 @@ impl PackedWorld {
     ///
     /// A file of something else.
     pub fn pack(file: &[u8]) -> Result<Self, PackError> {
-        let SplitFile {
-            world,
+        let Divided {
+            mut head,
             pieces,
             rest,
-        } = split_file(file)?;
-        let skeleton = Sight::build(&world)?.skeleton().clone();
-        let needs = WorldPieces::of_world(&world, &|material| images_of(&world, material));
-        if needs.catalog.pieces().len() != pieces.len() {
-            return Err(damaged("the world falls into other pieces than its file"));
-        }
+        } = Divided::of(file)?;
         let mut body = Vec::new();
-        let (mut places, mut sizes) = (Vec::new(), Vec::new());
+        let mut sizes = Vec::new();
         for piece in &pieces {
-            let (at, n_packed) = push(&mut body, &compressed(piece)?);
-            places.push(at);
-            sizes.push(Piece {
-                n_packed,
-                n_resident: piece.len() as u64,
-            });
+            let (at, n_packed) = push(&mut body, &compressed_piece(piece)?);
+            head.places.push(at);
+            sizes.push(n_packed);
         }
         let mut sized = (rest.len() as u64).to_le_bytes().to_vec();
-        sized.extend(compressed(&rest)?);
-        let (rest, rest_packed) = push(&mut body, &sized);
-        let rows: Vec<Vec<PieceId>> = (world.graph.cell_ids())
-            .map(|cell| needs.catalog.pieces_of(cell).to_vec())
-            .collect();
-        let head = PackedHead {
-            world: SightSkeleton::hollow(&world),
-            skeleton,
-            catalog: Catalog::new(sizes, &rows),
-            places,
-            rest,
-            rest_packed,
-            file: (file.len() as u64, hash_of(file)),
-        };
+        sized.extend(compressed_piece(&rest)?);
+        (head.rest, head.rest_packed) = push(&mut body, &sized);
+        head.catalog = packed_as(&head.catalog, |piece| sizes[piece]);
         Ok(Self { head, body })
+    }
+
+    /// Checks that head and pieces are those of the file: a head that was forged, or written wrongly, answers queries and fetches
+    /// pieces for another world than it unpacks to. Time and memory as for [`PackedWorld::pack`], without the compression.
+    ///
+    /// # Errors
+    ///
+    /// The first difference.
+    pub fn check(&self, file: &[u8]) -> Result<(), PackError> {
+        let differs = |what: &str| Err(damaged(format!("{what} is not that of its pieces")));
+        let Divided {
+            mut head, pieces, ..
+        } = Divided::of(file)?;
+        let own = self.head.catalog.pieces();
+        if own.len() != pieces.len() {
+            return differs("its list of pieces");
+        }
+        for (id, piece) in (0..).map(PieceId).zip(&pieces) {
+            let packed = self.packed(id).unwrap_or_default();
+            if self.head.expand(id, packed).as_ref() != Ok(piece) {
+                return differs(&format!("piece {}", id.0));
+            }
+        }
+        // Places and sizes depend on the compression.
+        head.places.clone_from(&self.head.places);
+        (head.rest, head.rest_packed) = (self.head.rest, self.head.rest_packed);
+        head.catalog = packed_as(&head.catalog, |piece| own[piece].n_packed);
+        if head.encode_body()? == self.head.encode_body()? {
+            return Ok(());
+        }
+        for cell in head.world.graph.cell_ids() {
+            if head.catalog.pieces_of(cell) != self.head.catalog.pieces_of(cell) {
+                return differs(&format!("the list of the pieces of cell {}", cell.0));
+            }
+        }
+        if head.skeleton.encode() != self.head.skeleton.encode() {
+            return differs("its list of boxes");
+        }
+        differs("the world in its head")
     }
 
     /// Returns the file that was packed.
@@ -82,7 +105,7 @@ impl PackedWorld {
             return Err(damaged("its rest has another hash than was packed"));
         }
         let (n, packed) = (packed.split_first_chunk::<8>()).ok_or_else(|| damaged("its rest"))?;
-        pieces.push(expanded(packed, u64::from_le_bytes(*n))?);
+        pieces.push(expanded_piece(packed, u64::from_le_bytes(*n))?);
         let (len, hash) = self.head.file;
         let file = join_file(len, pieces.iter().map(Vec::as_slice))?;
         if hash_of(&file) != hash {
@@ -123,8 +146,63 @@ impl PackedHead {
         if hash_of(packed) != at.hash {
             return Err("it has another hash than was packed".to_owned());
         }
-        expanded(packed, size.n_resident).map_err(|why| why.to_string())
+        expanded_piece(packed, size.n_resident).map_err(|why| why.to_string())
     }
+}
+
+/// A world file in pieces, and all of its head but what depends on the compression.
+struct Divided {
+    head: PackedHead,
+    pieces: Vec<Vec<u8>>,
+    rest: Vec<u8>,
+}
+
+impl Divided {
+    fn of(file: &[u8]) -> Result<Self, PackError> {
+        let SplitFile {
+            world,
+            pieces,
+            rest,
+        } = split_file(file)?;
+        let skeleton = Sight::build(&world)?.skeleton().clone();
+        let needs = WorldPieces::of_world(&world, &|material| images_of(&world, material));
+        if needs.catalog.pieces().len() != pieces.len() {
+            return Err(damaged("the world falls into other pieces than its file"));
+        }
+        let rows: Vec<Vec<PieceId>> = (world.graph.cell_ids())
+            .map(|cell| needs.catalog.pieces_of(cell).to_vec())
+            .collect();
+        let sizes = pieces.iter().map(|piece| Piece {
+            n_packed: 0,
+            n_resident: piece.len() as u64,
+        });
+        let nowhere = PieceAt {
+            offset: 0,
+            hash: [0; 16],
+        };
+        let head = PackedHead {
+            world: SightSkeleton::hollow(&world),
+            skeleton,
+            catalog: Catalog::new(sizes.collect(), &rows),
+            places: Vec::new(),
+            rest: nowhere,
+            rest_packed: 0,
+            file: (file.len() as u64, hash_of(file)),
+        };
+        Ok(Self { head, pieces, rest })
+    }
+}
+
+/// Returns a catalog with these sizes in transit.
+fn packed_as(catalog: &Catalog, n_packed: impl Fn(usize) -> u64) -> Catalog {
+    let pieces = catalog.pieces().iter().enumerate().map(|(i, piece)| Piece {
+        n_packed: n_packed(i),
+        ..*piece
+    });
+    let rows: Vec<Vec<PieceId>> = (0..catalog.n_cells() as u32)
+        .map(|cell| catalog.pieces_of(CellId(cell)).to_vec())
+        .collect();
+    Catalog::new(pieces.collect(), &rows)
 }
 
 /// Appends packed bytes; returns their place and size.

@@ -25,9 +25,11 @@ enum Fault {
     HangsUp,
     /// More than was asked for, without an end.
     Endless,
+    /// A byte now and then.
+    Dribbles,
 }
 
-use Fault::{Endless, HangsUp, IgnoresRange, OtherRange, Short, Status500, WrongByte};
+use Fault::{Dribbles, Endless, HangsUp, IgnoresRange, OtherRange, Short, Status500, WrongByte};
 
 /// A server of files in memory, at a free port.
 struct Server {
@@ -132,6 +134,14 @@ impl Server {
                 loop {
                     stream.write_all(&body).ok()?;
                 }
+            }
+            Some(Dribbles) => {
+                send("206 Partial Content", n, &part(a), &[])?;
+                for byte in &body {
+                    stream.write_all(&[*byte]).ok()?;
+                    std::thread::sleep(Duration::from_millis(500));
+                }
+                return None;
             }
             None => {}
         }
@@ -266,6 +276,16 @@ fn each_fault_is_told_in_words() {
         fetch.fetch(3, 10).unwrap(),
         packed.one_file().unwrap()[3..13]
     );
+}
+
+#[test]
+fn a_server_that_sends_a_byte_now_and_then_is_given_up_soon() {
+    let (_, packed) = packed();
+    let (_server, url) = Server::start(&packed, &[Dribbles], 100);
+    let start = Instant::now();
+    let why = PackedPlace::open(format!("{url}/one.enf")).unwrap_err();
+    assert!(why.to_string().contains("16 KiB a second"), "{why}");
+    assert!(start.elapsed() < Duration::from_secs(20));
 }
 
 #[test]

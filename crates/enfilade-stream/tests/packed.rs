@@ -5,10 +5,11 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
 use enfilade_cpg::wire::{PieceContent, decode_glb, encode_glb, read_piece};
-use enfilade_cpg::{CellId, World};
+use enfilade_cpg::{CellId, Pvs, World};
 use enfilade_runtime::{Sight, SightState, View, Viewer};
 use enfilade_stream::{
-    Fetch, FetchError, PackedFiles, PackedHead, PackedWorld, PieceId, Reply, Source, ThreadSource,
+    Catalog, Fetch, FetchError, PackedFiles, PackedHead, PackedWorld, PieceId, Reply, Source,
+    ThreadSource,
 };
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
@@ -183,6 +184,115 @@ fn hostile_heads_and_pieces_are_told_or_harmless() {
         n_read[1] += usize::from(read_piece(&damage(&bytes, &mut rng)).is_ok());
     }
     assert!(n_read.iter().all(|n| *n > 0 && *n < 300), "{n_read:?}");
+}
+
+type Change<'a, T> = &'a dyn Fn(&mut T);
+
+/// A change of the list of pieces in the body of a head.
+fn relisted(body: &[u8], change: impl FnOnce(&mut serde_json::Value)) -> Vec<u8> {
+    let n = u64::from_le_bytes(body[..8].try_into().unwrap()) as usize;
+    let mut listed = serde_json::from_slice(&body[8..8 + n]).unwrap();
+    change(&mut listed);
+    let listed = serde_json::to_vec(&listed).unwrap();
+    let n_listed = (listed.len() as u64).to_le_bytes();
+    [&n_listed, &listed[..], &body[8 + n..]].concat()
+}
+
+#[test]
+fn heads_that_list_other_pieces_than_their_world_has_are_refused() {
+    let file = encode_glb(&world()).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    let body = packed.head.encode_body().unwrap();
+    assert!(PackedHead::decode_body(&relisted(&body, |_| ())).is_ok());
+    let refused = |change: Change<'_, serde_json::Value>| {
+        let why = PackedHead::decode_body(&relisted(&body, change)).unwrap_err();
+        why.to_string()
+    };
+    let again = |v: &mut serde_json::Value| {
+        for list in ["pieces", "hashes"] {
+            let first = v[list][0].clone();
+            v[list].as_array_mut().unwrap().push(first);
+        }
+    };
+    let changes: [(&str, Change<'_, serde_json::Value>); 8] = [
+        ("needs piece", &|v| v["cells"][3] = [0_u32; 0][..].into()),
+        ("no list of its pieces", &|v| {
+            v["cells"][3] = [0, 0, 1][..].into();
+        }),
+        ("no list of its pieces", &|v| {
+            v["cells"][3].as_array_mut().unwrap().push(9999.into());
+        }),
+        ("no list of its pieces", &|v| {
+            v["cells"][3].as_array_mut().unwrap().reverse();
+        }),
+        ("one after the other", &|v| v["pieces"][1][0] = 0.into()),
+        ("one after the other", &again),
+        ("of another world", &|v| v["materials"][0] = 9999.into()),
+        ("its rest does not", &|v| v["rest"][0][0] = 0.into()),
+    ];
+    for (words, change) in changes {
+        let why = refused(change);
+        assert!(why.contains(words), "{words}: {why}");
+    }
+    // A body that expands a thousand times is not expanded.
+    let long = relisted(&body, |v| v["cells"][3] = vec![0; 12 << 20].into());
+    let tight = zstd::bulk::compress(&long, 9).unwrap();
+    let mut head = packed.head.encode().unwrap()[..12].to_vec();
+    head.extend((tight.len() as u64).to_le_bytes());
+    head.extend((long.len() as u64).to_le_bytes());
+    head.extend(twox_hash::XxHash3_128::oneshot(&tight).to_le_bytes());
+    head.extend(&tight);
+    let why = PackedHead::decode(&head).unwrap_err().to_string();
+    assert!(why.contains("more than a part of it"), "{why}");
+    // Four gigabytes that are claimed are not waited for.
+    head[12..20].copy_from_slice(&(4_u64 << 30).to_le_bytes());
+    assert!(PackedHead::size(&head).is_err());
+}
+
+#[test]
+fn a_head_of_another_world_than_its_pieces_is_told() {
+    let mut whole = world();
+    let n = whole.graph.cells.len() as u32;
+    whole.pvs = Some(Pvs::of_ascending((0..n).map(|_| 0..n)));
+    let file = encode_glb(&whole).unwrap();
+    let packed = PackedWorld::pack(&file).unwrap();
+    packed.check(&packed.unpack().unwrap()).unwrap();
+    let other = room_grid(&GridParams::offices(12, 2));
+    let other = PackedWorld::pack(&encode_glb(&other).unwrap()).unwrap();
+    let told = |change: Change<'_, PackedHead>| {
+        let mut forged = packed.clone();
+        change(&mut forged.head);
+        // As it comes back from its file.
+        forged.head = PackedHead::decode(&forged.head.encode().unwrap()).unwrap();
+        // Its pieces still make the file.
+        assert!(forged.unpack().unwrap() == file);
+        forged.check(&file).unwrap_err().to_string()
+    };
+    let lists_more = |head: &mut PackedHead| {
+        let rows: Vec<Vec<PieceId>> = (0..n)
+            .map(|_| (0..head.places.len() as u32).map(PieceId).collect())
+            .collect();
+        head.catalog = Catalog::new(head.catalog.pieces().to_vec(), &rows);
+    };
+    let changes: [(&str, Change<'_, PackedHead>); 5] = [
+        ("the list of the pieces of cell", &lists_more),
+        ("its list of boxes", &|h| {
+            h.skeleton = other.head.skeleton.clone();
+        }),
+        ("the world in its head", &|h| {
+            h.world.pvs = Some(Pvs::of_ascending((0..n).map(|c| [c])));
+        }),
+        ("the world in its head", &|h| {
+            h.world.graph.cells[1].aabb[1][1] -= 0.5;
+        }),
+        ("the world in its head", &|h| {
+            h.world.graph.cells[1].name = "elsewhere".into();
+        }),
+    ];
+    for (words, change) in changes {
+        let why = told(change);
+        assert!(why.contains(words), "{words}: {why}");
+    }
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub(crate) fn try_ray(subject: &Subject, rng: &mut Rng, i: u64, tally: &mut Tall
     let at = ray.at(hit.t);
     // Extend the ray slightly past the triangle, so that it passes the triangle's own edges, too.
     let b = ray.at(hit.t + 2.0 * subject.eps);
-    if subject.is_grazing(a, b) || subject.nearest_portal(at).is_some() {
+    if subject.grazes(hit.triangle, a, b) || subject.nearest_portal(at).is_some() {
         counts.grazing += 1;
         return None;
     }

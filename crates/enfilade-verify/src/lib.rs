@@ -41,6 +41,7 @@ mod claims;
 mod complete;
 mod decisions;
 mod details;
+mod drawn;
 mod evidence;
 mod faces;
 mod fittings;
@@ -67,6 +68,7 @@ use enfilade_geom::Triangle;
 use rayon::prelude::*;
 
 pub use carried::compare_scene;
+pub use drawn::check_drawn;
 pub use evidence::{EvidenceError, EvidenceReport, verify_evidence};
 pub use options::VerifyOptions;
 pub use report::{CompleteCounts, Failure, FailureKind, SealedCounts, VerifyReport, VisibleCounts};

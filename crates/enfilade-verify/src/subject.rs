@@ -380,6 +380,16 @@ impl<'a> Subject<'a> {
             .is_some_and(|bvh| nearest_edge(bvh, a, b, reach) < reach)
     }
 
+    /// Returns `true` if a triangle that blocks is so thin that all rays that meet it graze, and where they do is rounding.
+    pub(crate) fn is_thin(&self, triangle: u32) -> bool {
+        is_thin(&self.triangles[triangle as usize], self.eps)
+    }
+
+    /// Returns `true` if the segment [grazes](Self::is_grazing), or meets a [thin](Self::is_thin) triangle.
+    pub(crate) fn grazes(&self, triangle: u32, a: DVec3, b: DVec3) -> bool {
+        self.is_thin(triangle) || self.is_grazing(a, b)
+    }
+
     /// Calls `visit` with each of the world's own triangles that the ray meets and whose plane is within `2 eps` of
     /// `at`, and its batch.
     pub(crate) fn for_each_own_at(&self, ray: &Ray, at: DVec3, mut visit: impl FnMut(u32, u32)) {
@@ -392,6 +402,14 @@ impl<'a> Subject<'a> {
             }
         });
     }
+}
+
+/// Returns `true` if all points of a triangle are within `2 eps` of its edges.
+pub(crate) fn is_thin(t: &Triangle, eps: f64) -> bool {
+    let edges = [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
+    let longest = edges.map(DVec3::length).into_iter().fold(0.0, f64::max);
+    // The height over the longest edge.
+    edges[0].cross(edges[1]).length() <= 2.0 * eps * longest
 }
 
 fn nearest_edge(bvh: &Bvh, a: DVec3, b: DVec3, reach: f64) -> f64 {

@@ -447,7 +447,9 @@ impl<'a> Court<'a> {
                 if let Some(cell) = s.locator.locate(before) {
                     mark(&mut hits.cells, cell.0, hits.stamp, &mut hits.n[2]);
                 }
-                if answer.triangles[hit.triangle as usize] != answer.stamp {
+                if answer.triangles[hit.triangle as usize] != answer.stamp
+                    && !s.is_thin(hit.triangle)
+                {
                     let batch = s.own[hit.triangle as usize].1;
                     let index = hit.triangle - self.first_of_batch[batch as usize];
                     self.miss(i, &view, eye_cell, &ray, hit.t, Some(batch), index, report);

@@ -1,7 +1,7 @@
 //! The state of a search as bytes, so that it can be resumed.
 //!
 //! Saved between rounds, when nothing is under way, so a resumed search finds the same as an uninterrupted one. A
-//! hash ties the bytes to the graph, the settings and the caller's salt; they are compressed and have a checksum.
+//! hash ties the bytes to the graph, the settings and the caller's salt; they are compressed, and a checksum covers both.
 //! Bytes that do not fit are refused as a whole.
 
 use std::io::{Read, Write};
@@ -17,7 +17,7 @@ use crate::config::{VisConfig, VisError};
 use crate::rays::Line;
 use crate::search::{Rest, Search};
 
-const MAGIC: &[u8; 8] = b"ENFVCHK2";
+const MAGIC: &[u8; 8] = b"ENFVCHK3";
 
 /// Returns the FNV-1a hash of everything that determines a search.
 pub(crate) fn key(graph: &SightGraph, config: &VisConfig, salt: u64) -> u64 {
@@ -44,6 +44,14 @@ pub(crate) fn fnv(bytes: &[u8]) -> u64 {
     })
 }
 
+/// Returns what a state on disk begins with: a name of its kind, the hash of what it belongs to, and a sum of both and of
+/// its packed bytes.
+pub(crate) fn front(magic: [u8; 8], key: u64, packed: &[u8]) -> [[u8; 8]; 3] {
+    let key = key.to_le_bytes();
+    let sum = fnv(&[&magic, &key, packed].concat());
+    [magic, key, sum.to_le_bytes()]
+}
+
 pub(crate) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
     let mut words = vec![rest.done, rest.total, search.effort.steps];
     for table in search.tables() {
@@ -65,11 +73,8 @@ pub(crate) fn encode(search: &Search<'_>, rest: &Rest, key: u64) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
     let written = encoder.write_all(&body).and_then(|()| encoder.finish());
     let packed = written.unwrap_or_default();
-    let mut out = MAGIC.to_vec();
-    out.extend(key.to_le_bytes());
-    out.extend(fnv(&packed).to_le_bytes());
-    out.extend(packed);
-    out
+    let front = front(*MAGIC, key, &packed);
+    [front.as_flattened(), &packed].concat()
 }
 
 /// Restores a search from bytes; returns the work left.
@@ -82,15 +87,14 @@ pub(crate) fn decode(
     let damaged = || refuse("it is damaged");
     let (head, body) = bytes.split_at_checked(24).ok_or_else(damaged)?;
     let (magic, rest) = head.split_at(8);
-    let (key, sum) = rest.split_at(8);
     if magic != MAGIC {
         return Err(refuse("it is not a checkpoint"));
     }
-    if key != expected.to_le_bytes() {
+    if rest[..8] != expected.to_le_bytes() {
         return Err(refuse("it belongs to another graph or other settings"));
     }
     // The checksum of zlib ignores the bits that pad its last byte.
-    if sum != fnv(body).to_le_bytes() {
+    if head != front(*MAGIC, expected, body).as_flattened() {
         return Err(damaged());
     }
     let n = search.dirs.len() as u64;

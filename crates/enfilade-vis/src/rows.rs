@@ -1,7 +1,7 @@
 //! Rows of a block of cells as bytes, and the answer that the rows of all blocks make together.
 //!
 //! A row lists the cells seen as runs, each as the gap before it and its length, in variable-length numbers; the whole
-//! is compressed and has a checksum. A pair of cells of two blocks is in the row of one of them only, so rows of a
+//! is compressed, and a checksum covers the block's key, too. A pair of cells of two blocks is in the row of one of them only, so rows of a
 //! graph's blocks are united with what they say the other way round. That is a union of sets: blocks may come in any
 //! order, and twice.
 
@@ -12,9 +12,9 @@ use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
 
-use crate::checkpoint::fnv;
+use crate::checkpoint::front;
 
-const MAGIC: &[u8; 8] = b"ENFVBLK1";
+const MAGIC: &[u8; 8] = b"ENFVBLK2";
 
 /// Pairs turned round at a time, which bounds the memory for it. [Units: 4 bytes]
 const MOST_TURNED: usize = 1 << 23;
@@ -95,19 +95,15 @@ impl BlockRows {
         let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
         let written = encoder.write_all(&body).and_then(|()| encoder.finish());
         let packed = written.unwrap_or_default();
-        let mut out = MAGIC.to_vec();
-        out.extend(key.to_le_bytes());
-        out.extend(fnv(&packed).to_le_bytes());
-        out.extend(packed);
-        out
+        let front = front(*MAGIC, key, &packed);
+        [front.as_flattened(), &packed].concat()
     }
 
     /// Reads the rows of `cells`, ascending numbers, in a graph of `n_cells`. `None` if the bytes are damaged or not
     /// theirs.
     pub(crate) fn decode(bytes: &[u8], key: u64, cells: &[u32], n_cells: u32) -> Option<Self> {
         let (head, packed) = bytes.split_at_checked(24)?;
-        let expected = [*MAGIC, key.to_le_bytes(), fnv(packed).to_le_bytes()];
-        if head != expected.as_flattened() {
+        if head != front(*MAGIC, key, packed).as_flattened() {
             return None;
         }
         // A row has at most as many runs as cells, of two numbers with at most ten bytes.

@@ -259,7 +259,14 @@ fn checkpoints_that_do_not_fit_are_refused() {
         ..config.clone()
     };
     assert!(refused(&graph, &far, &saved));
-    assert!(refused(&Grid::new(6, 6).graph(), &config, &saved));
+    let other = Grid::new(6, 6).graph();
+    assert!(refused(&other, &config, &saved));
+    // Also if it is called that of the other graph or settings.
+    for (graph, config) in [(&other, &config), (&graph, &far)] {
+        let (_, own) = see_in_parts(graph, config, None, 1);
+        let renamed = [&saved[..8], &own[8..16], &saved[16..]].concat();
+        assert!(!refused(graph, config, &own) && refused(graph, config, &renamed));
+    }
     for end in (0..saved.len()).step_by(7) {
         assert!(refused(&graph, &config, &saved[..end]), "{end} bytes");
     }
@@ -280,11 +287,10 @@ fn tampered(saved: &[u8], change: impl FnOnce(&mut [u8])) -> Vec<u8> {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
     encoder.write_all(&body).unwrap();
     let packed = encoder.finish().unwrap();
-    let sum = packed
-        .iter()
-        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
+    let summed = saved[..16].iter().chain(&packed);
+    let sum = summed.fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
     [&saved[..16], &sum.to_le_bytes(), &packed].concat()
 }
 

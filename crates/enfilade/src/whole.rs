@@ -1,7 +1,8 @@
 //! Writing of files, whole or not at all.
 //!
 //! Data goes first to a file beside the target, `.NAME.PROCESS-TIME.tmp`, which is locked while it is written and
-//! then renamed. A killed run leaves such a file behind, unlocked; [`remove_left`] recognizes it by the missing lock.
+//! then renamed, and so are folders. A killed run leaves such a file or folder behind, unlocked; [`remove_left`] recognizes it by
+//! the missing lock.
 //! [`save`](crate::save) and the command `enfilade` follow this rule; files beside a world may do so, too.
 
 use std::ffi::{OsStr, OsString};
@@ -54,7 +55,7 @@ pub fn write_with<E: From<io::Error>>(
 
 /// Writes files, by their paths in it, to a folder beside `path` and renames that, so that a reader sees the old folder or the
 /// new one and never a part; between the two there is none for a moment. Replaces what is at `path`. A killed run leaves a folder
-/// `.NAME.PROCESS-TIME.tmp`.
+/// `.NAME.PROCESS-TIME.tmp`, which the next call for the path that succeeds [removes](remove_left).
 ///
 /// # Errors
 ///
@@ -64,8 +65,7 @@ pub fn write_folder<P: AsRef<Path>, B: AsRef<[u8]>>(
     files: impl IntoIterator<Item = (P, B)>,
 ) -> io::Result<()> {
     let path = followed(path);
-    let new = aside(&path)?;
-    fs::create_dir(&new)?;
+    let (new, lock) = make_aside(&path)?;
     let fill = || {
         for (name, bytes) in files {
             let name = new.join(name);
@@ -77,11 +77,35 @@ pub fn write_folder<P: AsRef<Path>, B: AsRef<[u8]>>(
         replace(&new, &path)
     };
     let written = fill();
-    if written.is_err() {
+    drop(lock);
+    match written {
+        Ok(()) => remove_left(&[&path]),
         // The first error is the one to report.
-        let _ = fs::remove_dir_all(&new);
+        Err(_) => drop(fs::remove_dir_all(&new)),
     }
     written
+}
+
+/// Makes a folder beside a path, for this call alone, and locks it on systems that lock folders.
+fn make_aside(path: &Path) -> io::Result<(PathBuf, Option<File>)> {
+    for _ in 0..MOST_TRIES {
+        let aside = aside(path)?;
+        match fs::create_dir(&aside) {
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
+            made => made?,
+        }
+        let lock = File::open(&aside).ok();
+        let is_taken = |lock: &File| matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock));
+        // Another process may have removed it as a leftover before it was locked.
+        if !lock.as_ref().is_some_and(is_taken) && aside.exists() {
+            return Ok((aside, lock));
+        }
+    }
+    Err(no_name())
+}
+
+fn no_name() -> io::Error {
+    io::Error::new(ErrorKind::AlreadyExists, "no name beside it is free")
 }
 
 /// Puts a folder in the place of another, which goes.
@@ -121,10 +145,10 @@ pub fn try_write(path: impl AsRef<Path>) -> io::Result<()> {
     }
 }
 
-/// Removes files that killed runs left beside the files of these paths, which lie in one folder. A file that a run is
-/// writing now is locked and stays. Linear in the size of the folder.
+/// Removes files and folders that killed runs left beside these paths, which lie in one folder. One that a run is
+/// writing now is locked and stays; so do folders on systems that lock none (Windows). Linear in the size of the folder.
 ///
-/// Skips files that it cannot remove: they only take disk space.
+/// Skips what it cannot remove: they only take disk space.
 pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
     let paths: Vec<PathBuf> = paths.iter().map(followed).collect();
     let Some(entries) = paths.first().and_then(|p| fs::read_dir(folder_of(p)).ok()) else {
@@ -136,10 +160,20 @@ pub fn remove_left<P: AsRef<Path>>(paths: &[P]) {
         if target.is_none() || !paths.iter().any(|p| p.file_name() == target) {
             continue;
         }
-        if let Ok(file) = File::open(entry.path())
+        // A pipe of such a name is not ours, and opening it would wait.
+        let Ok(kind) = entry.file_type() else {
+            continue;
+        };
+        if (kind.is_file() || kind.is_dir())
+            && let Ok(file) = File::open(entry.path())
             && file.try_lock().is_ok()
         {
-            let _ = fs::remove_file(entry.path());
+            let remove = if kind.is_dir() {
+                fs::remove_dir_all
+            } else {
+                fs::remove_file
+            };
+            let _ = remove(entry.path());
         }
     }
 }
@@ -196,10 +230,7 @@ fn open_aside(path: &Path) -> io::Result<(PathBuf, File)> {
             return Ok((aside, file));
         }
     }
-    Err(io::Error::new(
-        ErrorKind::AlreadyExists,
-        "no name beside it is free",
-    ))
+    Err(no_name())
 }
 
 /// Returns a fresh name: a process that looks up a name long after its file is gone must not find another file.
@@ -261,6 +292,29 @@ mod tests {
         assert!(write_folder(&path, [("a", "no"), ("a/b", "no")]).is_err());
         assert_eq!(fs::read(path.join("a/b")).unwrap(), b"new");
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn folders_that_killed_runs_left_go_once_a_run_succeeds() {
+        let folder = fresh_folder("left-folders");
+        let path = folder.join("w.enf");
+        for left in [".w.enf.17-1.tmp", ".w.enf.18-1.tmp", ".v.enf.17-1.tmp"] {
+            fs::create_dir_all(folder.join(left).join("deep")).unwrap();
+            fs::write(folder.join(left).join("deep/half"), b"half").unwrap();
+        }
+        let written = File::open(folder.join(".w.enf.18-1.tmp")).unwrap();
+        written.lock().unwrap();
+        // A call that fails removes nothing: what was left may be all that there is.
+        assert!(write_folder(&path, [("a", "no"), ("a/b", "no")]).is_err());
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 3);
+        write_folder(&path, [("a", "new")]).unwrap();
+        assert!(!folder.join(".w.enf.17-1.tmp").exists());
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 3);
+        drop(written);
+        write_folder(&path, [("a", "new")]).unwrap();
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 2);
         fs::remove_dir_all(&folder).unwrap();
     }
 

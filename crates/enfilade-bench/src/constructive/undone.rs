@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::edit::random::random_operation;
-use enfilade::edit::{EditGround, EditOperation, EditSession, HandEditKind, Resumed};
+use enfilade::edit::{EditGround, EditOperation, EditSession, HandEditKind, Resumed, journal_of};
 use enfilade::geom::DVec3;
 use enfilade::kit::{DEFAULT_TOLERANCE, InstanceId, Kit};
 use enfilade::world::Pose;
@@ -220,15 +220,12 @@ fn taken_in(scene: &str, folder: &Path) -> anyhow::Result<Figure> {
     // The file's name is that of the kit.
     let path = folder.join(scene);
     for (words, text) in [
-        ("no journal", "a letter to a friend\n"),
-        ("another world", "enfilade edits 1\tother\n"),
-        (
-            "line 2 of the journal: 'erase'",
-            "enfilade edits 1\t-\nerase\n",
-        ),
+        ("no journal", "a letter to a friend\n".to_owned()),
+        ("another world", journal_of("other", [])),
+        ("line 2 of the journal: 'erase'", journal_of("-", ["erase"])),
         (
             "line 3 of the journal: there is no instance",
-            "enfilade edits 1\t-\nundo\ntake\t4\n",
+            journal_of("-", ["undo", "take\t4"]),
         ),
     ] {
         std::fs::write(&path, text)?;

@@ -85,8 +85,8 @@ impl Shards for BakedJob {
         Ok(piece_keys(scene, config, &context)?)
     }
 
-    fn is_whole(&self, _shard: usize, bytes: &[u8]) -> bool {
-        is_piece(bytes)
+    fn is_whole(&self, _shard: usize, key: &str, bytes: &[u8]) -> bool {
+        is_piece(key, bytes)
     }
 
     fn compute(&self, wanted: &[usize], folder: &PieceFolder, args: &JobRun) -> anyhow::Result<()> {

@@ -63,7 +63,7 @@ impl Shards for SeenJob {
         })
     }
 
-    fn is_whole(&self, shard: usize, bytes: &[u8]) -> bool {
+    fn is_whole(&self, shard: usize, _key: &str, bytes: &[u8]) -> bool {
         let is_block = self.with_plan(|plan| plan.is_block(shard, bytes));
         is_block.unwrap_or(false)
     }

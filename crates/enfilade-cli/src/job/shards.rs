@@ -40,8 +40,8 @@ pub(super) trait Shards {
     /// Returns the key of each shard.
     fn keys(&self) -> anyhow::Result<Vec<String>>;
 
-    /// Returns `true` if these are the bytes of a whole shard.
-    fn is_whole(&self, shard: usize, bytes: &[u8]) -> bool;
+    /// Returns `true` if these are the bytes of a whole shard, whose key is given, too.
+    fn is_whole(&self, shard: usize, key: &str, bytes: &[u8]) -> bool;
 
     /// Computes some shards into a folder. What cannot be kept there is an error of the folder.
     fn compute(&self, wanted: &[usize], folder: &PieceFolder, args: &JobRun) -> anyhow::Result<()>;

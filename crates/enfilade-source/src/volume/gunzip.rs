@@ -13,6 +13,29 @@ pub fn is_gzip(bytes: &[u8]) -> bool {
 /// Bytes unpacked between two looks at the limits.
 const PART: u64 = 1 << 20;
 
+/// Samples to which any file may unpack. [Units: samples]
+const MOST_FREE: u64 = 1 << 27;
+/// Most samples beyond that for each packed byte.
+const RATIO: u64 = 64;
+
+/// Refuses samples out of proportion to their packed bytes, unless there is a limit on memory.
+pub(crate) fn check_ratio(
+    packed: &[u8],
+    n: usize,
+    limits: &SourceLimits,
+) -> Result<(), SourceError> {
+    let most = MOST_FREE.saturating_add(RATIO.saturating_mul(packed.len() as u64));
+    let is_held = limits.allowance.as_ref().is_some_and(|a| a.holds_memory());
+    if n as u64 <= most || is_held {
+        return Ok(());
+    }
+    let problem = format!(
+        "{n} unpack from {} bytes, far more than data do; if they are right, set a limit on memory (--max-memory 0 for none)",
+        packed.len()
+    );
+    Err(SourceError::new("samples", problem))
+}
+
 /// Works as [`gunzip`], as long as the limits allow.
 pub(crate) fn gunzip_within(
     bytes: &[u8],

@@ -2,7 +2,7 @@
 
 use enfilade_geom::{DMat3, DMat4, DQuat, DVec3, DVec4};
 
-use super::gunzip::gunzip_within;
+use super::gunzip::{check_ratio, gunzip_within};
 use super::samples::{SampleKind, Stored, read};
 use super::{Beside, Volume, gunzip, is_gzip};
 use crate::{SourceError, SourceLimits};
@@ -131,6 +131,7 @@ pub(super) fn parse(
         }
         let unpacked;
         let bytes = if is_gzip(file) {
+            check_ratio(file, n, limits)?;
             // No more than the header promises.
             let most = (n_after as u64).saturating_add((n * stored.kind.size()) as u64);
             unpacked = gunzip_within(file, most, limits)?.unwrap_or_default();

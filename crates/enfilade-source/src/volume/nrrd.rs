@@ -2,7 +2,7 @@
 
 use enfilade_geom::{DMat3, DMat4, DVec3};
 
-use super::gunzip::gunzip_within;
+use super::gunzip::{check_ratio, gunzip_within};
 use super::samples::{SampleKind, Stored, read};
 use super::{Beside, Volume};
 use crate::{SourceError, SourceLimits};
@@ -72,6 +72,7 @@ pub(super) fn parse(
             limits,
         )?,
         "gzip" | "gz" => {
+            check_ratio(data, n, limits)?;
             let most = n_bytes.saturating_add(head.n_skipped as u64);
             let plain = gunzip_within(data, most, limits)?;
             let plain = plain.ok_or_else(|| bad("samples", "are damaged: not gzip"))?;

@@ -251,6 +251,11 @@ fn blocks_that_are_damaged_or_missing_or_of_another_search_are_refused() {
             plan.finish(&blocks).unwrap();
         }
     }
+    // A block that is called another.
+    let mut blocks = good.clone();
+    blocks[1].splice(8..16, plan.key(0).to_le_bytes());
+    blocks[0].splice(8..16, plan.key(1).to_le_bytes());
+    assert!(refused(&blocks).contains("damaged"));
     let mut rng = Rng::new(1);
     for _ in 0..300 {
         let mut blocks = good.clone();
