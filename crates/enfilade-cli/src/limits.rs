@@ -15,7 +15,7 @@ use enfilade::geom::{Allowance, PROGRAM};
 
 use crate::output::WRITING;
 use crate::screen::Warned;
-use enfilade_cli::values::{bytes, seconds};
+use enfilade_cli::values::{memory_limit, seconds};
 
 /// Options of all commands that can take long.
 #[derive(clap::Args, Clone, Copy, Default)]
@@ -25,7 +25,7 @@ pub(crate) struct Limits {
     max_time: Option<Duration>,
     /// End without a result rather than use more memory: a number and K, M, G or T; 0 for no limit, not even on files that unpack
     /// to hundreds of times their size.
-    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = memory_limit)]
     max_memory: Option<u64>,
 }
 

@@ -57,17 +57,25 @@ pub fn door(text: &str) -> Result<(u32, f32), String> {
     })
 }
 
-/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. `0` stands for more than there is.
-/// [Units: bytes]
+/// Reads a limit of memory: an amount as for [`bytes`], or `0`, which stands for more than there is. [Units: bytes]
+///
+/// # Errors
+///
+/// As [`bytes`].
+pub fn memory_limit(text: &str) -> Result<u64, String> {
+    const NO_LIMIT: u64 = 1 << 62;
+    if text == "0" {
+        return Ok(NO_LIMIT);
+    }
+    bytes(text).map_err(|problem| format!("{problem}, or 0 for no limit"))
+}
+
+/// Reads an amount of memory: a number and its unit, `4G`, `1.5 GiB`, `800M`. A K is 1,024. [Units: bytes]
 ///
 /// # Errors
 ///
 /// For anything else, and a number without a unit; the text says what is needed.
 pub fn bytes(text: &str) -> Result<u64, String> {
-    const NO_LIMIT: u64 = 1 << 62;
-    if text == "0" {
-        return Ok(NO_LIMIT);
-    }
     let parse = || {
         let split = text.find(|c: char| c.is_ascii_alphabetic())?;
         let number: f64 = text[..split].trim().parse().ok()?;
@@ -77,9 +85,7 @@ pub fn bytes(text: &str) -> Result<u64, String> {
         let value = number * 1024f64.powi(power as i32);
         (value >= 1.0 && value < 2f64.powi(63)).then_some(value as u64)
     };
-    parse().ok_or_else(|| {
-        "an amount of memory with its unit is needed, e.g. 4G or 800M, or 0 for no limit".into()
-    })
+    parse().ok_or_else(|| "an amount of memory with its unit is needed, e.g. 4G or 800M".into())
 }
 
 #[cfg(test)]
@@ -101,10 +107,13 @@ mod tests {
         assert_eq!(bytes("1.5 GiB"), Ok(3 << 29));
         assert_eq!(bytes("800m"), Ok(800 << 20));
         assert_eq!(bytes("12B"), Ok(12));
+        assert!(bytes("0").is_err());
+        assert!(memory_limit("0").is_ok_and(|n| n > 1 << 60));
         for bad in [
             "", "4", "G", "-1G", "0G", "nanG", "infG", "1e30T", "4X", "4GG",
         ] {
             assert!(bytes(bad).is_err(), "{bad}");
+            assert!(memory_limit(bad).is_err(), "{bad}");
         }
     }
 }

@@ -25,7 +25,7 @@ pub use edt::{distance, distance_squared, distance_squared_near};
 pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use far::far_outdoors;
 pub use grid::{BitVolume, Grid, for_runs, set_bits};
-pub use labels::Labels;
+pub use labels::{Labels, Reader};
 pub use sparse::SparseVolume;
 pub use voxelize::voxelize;
 pub use watershed::{

@@ -7,8 +7,8 @@ use super::flooded::Flooded;
 use super::fronts::{Front, face_center};
 use crate::MergeSettings;
 use crate::judge::{FRAMED, OpeningSection};
-use crate::structure::{Jambs, OUTDOORS, Opening, connected_count, rim_share};
-use crate::voxel::Grid;
+use crate::structure::{Jambs, OUTDOORS, Opening, rim_share};
+use crate::voxel::{Grid, Reader};
 
 /// Least share of a front that leaves hold if it stands between them.
 const LEAVES: f64 = 0.2;
@@ -97,10 +97,10 @@ fn measured(
     let (mut n_open, mut at) = (opening.area / unit, 0);
     let has_leaves = opening.closed >= LEAVES;
     if has_leaves {
-        let (mut inside, mut stack) = (vec![false; slices.seeds.len()], Vec::new());
+        let mut flood = SliceFlood::of(slices);
         for s in (1..=reach).flat_map(|s| [s, -s]) {
-            slices.visit(s, |k, cell| inside[k] = cell == a || cell == b);
-            let n = connected_count(&mut inside, slices.side, &slices.seeds, &mut stack, |_| ());
+            flood.begin(slices, s);
+            let n = flood.count(slices, |cell| cell == a || cell == b, |_| ());
             if n > 0 && (n as f64) < PINCHED * n_open {
                 (n_open, at) = (n as f64, s);
             }
@@ -109,7 +109,7 @@ fn measured(
 
     // Once both are this large, the opening is a pinch in any case.
     let enough = n_open / settings.threshold;
-    let mut sides = [Side::of(&slices.seeds), Side::of(&slices.seeds)];
+    let mut sides = [Side::of(slices), Side::of(slices)];
     let is_level = is_rather_level(opening.plane.normal);
     let frame = |jambs: Jambs| {
         if is_level || has_leaves {
@@ -173,19 +173,15 @@ struct Side {
     largest: [usize; 2],
     /// Points that the section of the cell on this side contains in any slice.
     beside: Vec<bool>,
-    /// Buffers for one slice.
-    inside: [Vec<bool>; 2],
-    stack: Vec<usize>,
+    flood: SliceFlood,
 }
 
 impl Side {
-    fn of(seeds: &[bool]) -> Self {
-        let nowhere = || vec![false; seeds.len()];
+    fn of(slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>) -> Self {
         Self {
             largest: [0; 2],
-            beside: nowhere(),
-            inside: [nowhere(), nowhere()],
-            stack: Vec::new(),
+            beside: vec![false; slices.seeds.len()],
+            flood: SliceFlood::of(slices),
         }
     }
 
@@ -197,20 +193,112 @@ impl Side {
         cells: [u32; 2],
         own: usize,
     ) {
-        let [in_a, in_b] = &mut self.inside;
-        slices.visit(s, |k, cell| {
-            in_a[k] = cell == cells[0];
-            in_b[k] = cell == cells[1];
-        });
-        for (c, inside) in self.inside.iter_mut().enumerate() {
+        self.flood.begin(slices, s);
+        for (c, of) in cells.into_iter().enumerate() {
             let mut n = 0;
             let mark = |k: usize| {
                 self.beside[k] |= c == own;
                 n += usize::from(!slices.above[k]);
             };
-            connected_count(inside, slices.side, &slices.seeds, &mut self.stack, mark);
+            self.flood.count(slices, |cell| cell == of, mark);
             self.largest[c] = self.largest[c].max(n);
         }
+    }
+}
+
+/// A flood of one slice from the opening outward, which reads no point that it does not reach: in a cave or a wide hall, the space
+/// around an opening is mostly of others.
+struct SliceFlood {
+    /// Cell of each point read, [`UNREAD`] or [`COUNTED`].
+    cells: Vec<u32>,
+    /// Points that are not [`UNREAD`].
+    read: Vec<u32>,
+    stack: Vec<u32>,
+    /// First point of the slice. [Units: vx]
+    base: DVec3,
+    /// The allowance is used up.
+    is_over: bool,
+}
+
+/// A point that was not looked at.
+const UNREAD: u32 = u32::MAX;
+/// A point that was counted.
+const COUNTED: u32 = u32::MAX - 1;
+
+impl SliceFlood {
+    fn of(slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>) -> Self {
+        Self {
+            cells: vec![UNREAD; slices.seeds.len()],
+            read: Vec::new(),
+            stack: Vec::new(),
+            base: slices.base,
+            is_over: false,
+        }
+    }
+
+    /// Turns to the slice `s` steps along the normal.
+    fn begin(&mut self, slices: &Slices<'_, impl Fn(u32) -> u32 + Sync>, s: i64) {
+        for k in self.read.drain(..) {
+            self.cells[k as usize] = UNREAD;
+        }
+        self.base = slices.base + slices.along[2] * s as f64;
+        let work = 1 + slices.seeds.len() as u64 / 8;
+        self.is_over = !slices.flooded.allowance.spend(work);
+    }
+
+    /// Returns the number of points connected to the opening within cells, and calls `mark` for each. Each counts once in a slice. Points
+    /// behind a wall beside the opening do not belong to the section at the opening.
+    fn count<F: Fn(u32) -> u32>(
+        &mut self,
+        slices: &Slices<'_, F>,
+        is_own: impl Fn(u32) -> bool,
+        mut mark: impl FnMut(usize),
+    ) -> usize {
+        if self.is_over {
+            return 0;
+        }
+        let Self {
+            cells,
+            read,
+            stack,
+            base,
+            ..
+        } = self;
+        let mut reader = slices.reader(*base);
+        let [width, height] = slices.side.map(|n| n as u32);
+        let mut take = |k: u32, stack: &mut Vec<u32>| {
+            let cell = &mut cells[k as usize];
+            if *cell == UNREAD {
+                *cell = reader.cell_at(k % width, k / width);
+                read.push(k);
+            }
+            if *cell != COUNTED && is_own(*cell) {
+                *cell = COUNTED;
+                stack.push(k);
+            }
+        };
+        let mut n = 0;
+        for &seed in &slices.opening {
+            take(seed, stack);
+            while let Some(k) = stack.pop() {
+                n += 1;
+                mark(k as usize);
+                let (i, j) = (k % width, k / width);
+                if i > 0 {
+                    take(k - 1, stack);
+                }
+                if i + 1 < width {
+                    take(k + 1, stack);
+                }
+                if j > 0 {
+                    take(k - width, stack);
+                }
+                if j + 1 < height {
+                    take(k + width, stack);
+                }
+            }
+        }
+        n
     }
 }
 
@@ -233,6 +321,8 @@ struct Slices<'a, F> {
     side: [usize; 2],
     /// Points that lie in the opening.
     seeds: Vec<bool>,
+    /// … as a list.
+    opening: Vec<u32>,
     /// Points above the head of an upright opening: people are below it, so a beam or a lower ceiling alone makes no opening narrow.
     above: Vec<bool>,
 }
@@ -276,6 +366,9 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
             base: grid.to_voxel(opening.center + u * start[0] + v * start[1]),
             along: [u, v, opening.plane.normal].map(|d| d * (step / grid.voxel)),
             side,
+            opening: (0..seeds.len() as u32)
+                .filter(|&k| seeds[k as usize])
+                .collect(),
             seeds,
         }
     }
@@ -286,40 +379,44 @@ impl<'a, F: Fn(u32) -> u32> Slices<'a, F> {
         Jambs::of(&self.seeds, self.side, [up.x, up.y], is_beside)
     }
 
-    /// Visits each point of the slice `s` steps along the normal, with the cell that it lies in.
-    ///
-    /// Visits none once the allowance is used up.
-    fn visit(&self, s: i64, mut point: impl FnMut(usize, u32)) {
-        if !self
-            .flooded
-            .allowance
-            .spend(1 + self.seeds.len() as u64 / 8)
-        {
-            return;
-        }
+    /// Returns a reader of the slice with this first point. [Units: vx]
+    fn reader(&self, base: DVec3) -> SliceReader<'_, F> {
         let Flooded { grid, labels, .. } = self.flooded;
-        let end = DVec3::from(grid.dims.map(|n| n as f64));
-        let is_in = |p: DVec3| p.cmpge(DVec3::ZERO).all() && p.cmplt(end).all();
-        // Positive, so the cast rounds down; and 32 bits are half the work of 64.
-        let mut reader = labels.reader();
-        let mut label_at = |p: DVec3| reader.at([p.x, p.y, p.z].map(|c| c as i32 as usize));
-        let [du, dv, dn] = self.along;
-        // In voxel coordinates, so that a lattice point costs an addition and a look-up.
-        let base = self.base + dn * s as f64;
-        let mut last = (0, 0);
-        for j in 0..self.side[1] {
-            let row = base + dv * j as f64;
-            let at = |i: usize| row + du * i as f64;
-            // A segment between two points of a box lies in it.
-            let all_in = is_in(at(0)) && is_in(at(self.side[0] - 1));
-            for i in 0..self.side[0] {
-                let p = at(i);
-                let label = if all_in || is_in(p) { label_at(p) } else { 0 };
-                if label != last.0 {
-                    last = (label, if label == 0 { 0 } else { (self.cell_of)(label) });
-                }
-                point(j * self.side[0] + i, last.1);
-            }
+        SliceReader {
+            reader: labels.reader(),
+            cell_of: self.cell_of,
+            base,
+            along: [self.along[0], self.along[1]],
+            end: DVec3::from(grid.dims.map(|n| n as f64)),
+            last: (0, 0),
         }
+    }
+}
+
+/// Reads the cells of points of one slice.
+struct SliceReader<'a, F> {
+    reader: Reader<'a>,
+    cell_of: &'a F,
+    base: DVec3,
+    along: [DVec3; 2],
+    end: DVec3,
+    /// The basin read last, and its cell.
+    last: (u32, u32),
+}
+
+impl<F: Fn(u32) -> u32> SliceReader<'_, F> {
+    /// Returns the cell of a point; 0 in matter and beyond the grid.
+    fn cell_at(&mut self, i: u32, j: u32) -> u32 {
+        // In voxel coordinates, so that a lattice point costs two additions and a look-up.
+        let p = self.base + self.along[1] * f64::from(j) + self.along[0] * f64::from(i);
+        if !(p.cmpge(DVec3::ZERO).all() && p.cmplt(self.end).all()) {
+            return 0;
+        }
+        // Positive, so the cast rounds down; and 32 bits are half the work of 64.
+        let label = self.reader.at([p.x, p.y, p.z].map(|c| c as i32 as usize));
+        if label != self.last.0 {
+            self.last = (label, if label == 0 { 0 } else { (self.cell_of)(label) });
+        }
+        self.last.1
     }
 }

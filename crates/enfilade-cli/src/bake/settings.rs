@@ -146,7 +146,7 @@ pub(crate) struct BakeOptions {
     smallest_hole: Option<f64>,
     /// Most memory to use, a number and K, M, G or T: sets the number of voxels and points [default: 8G, and less for
     /// few triangles].
-    #[arg(long, value_name = "BYTES", value_parser = enfilade_cli::values::bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = enfilade_cli::values::memory_limit)]
     pub(crate) max_memory: Option<u64>,
     /// End without a world after this long; if not given, when the work is out of proportion to the triangles.
     #[arg(long, value_name = "SECONDS", value_parser = enfilade_cli::values::seconds)]
