@@ -405,10 +405,18 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     builder.go_on("scene")?;
     let (mut scene, mut report) = builder.finish();
     if scene.objects.is_empty() {
-        let advice = match report.notes.first() {
-            Some(note) => format!("the first thing noticed: {note}"),
-            None => "export the meshes, too".into(),
+        let kept = |left_out: &LeftOut| {
+            let name = left_out.names.first()?;
+            Some(format!("{left_out} (--structural-name '{name}' keeps it)"))
         };
+        let noticed = || {
+            Some(format!(
+                "the first thing noticed: {}",
+                report.notes.first()?
+            ))
+        };
+        let advice = report.left_out.first().and_then(kept).or_else(noticed);
+        let advice = advice.unwrap_or_else(|| "export the meshes, too".into());
         return Err(ImportError::NoTriangles {
             paths: extent::paths_of(&report),
             advice,

@@ -153,3 +153,12 @@ fn marks_of_openings_and_groups_of_rooms_are_read_by_the_names_of_engines() {
         assert_eq!(named.join(" "), name, "{group}");
     }
 }
+
+#[test]
+fn a_file_of_nothing_but_helpers_is_refused_with_the_option_that_keeps_them() {
+    let text = boxes(&[("NavMesh", "stone", SHELL[0], SHELL[1])]);
+    let error = decode_obj(text.as_bytes(), &ImportOptions::default()).unwrap_err();
+    let said = error.to_string();
+    let keeps = "a navigation mesh, by its name (--structural-name 'NavMesh' keeps it)";
+    assert!(said.contains(keeps), "{said}");
+}

@@ -15,7 +15,7 @@ pub(crate) const OPENING: &str = "a mark of an opening";
 type Phrase = (&'static [&'static str], &'static str);
 
 /// Phrases that name a helper wherever they stand in a name, whatever its shape.
-const ALWAYS: [Phrase; 45] = [
+const ALWAYS: [Phrase; 50] = [
     (&["trigger", "volume"], "a trigger volume"),
     (&["trigger", "box"], "a trigger volume"),
     (&["trigger", "zone"], "a trigger volume"),
@@ -34,9 +34,14 @@ const ALWAYS: [Phrase; 45] = [
     (&["lightmap"], "a volume of light"),
     (&["room", "bounds"], "bounds of a room"),
     (&["ak", "room"], "a zone of sound"),
-    (&["nav"], "a navigation mesh"),
+    (&["nav", "mesh"], "a navigation mesh"),
+    (&["nav", "blocker"], "a navigation mesh"),
+    (&["nav", "link"], "a navigation mesh"),
+    (&["nav", "modifier"], "a navigation mesh"),
     (&["navmesh"], "a navigation mesh"),
-    (&["navigation"], "a navigation mesh"),
+    (&["navigation", "mesh"], "a navigation mesh"),
+    (&["navigation", "region"], "a navigation mesh"),
+    (&["navigation", "link"], "a navigation mesh"),
     (&["collider"], "a collision shape"),
     (&["colliders"], "a collision shape"),
     (&["invisible", "wall"], "a collision shape"),
@@ -213,6 +218,7 @@ mod tests {
             "probe",
             "boundary wall",
             "Main volume",
+            "nav_test",
             "Roof volume",
             "",
         ] {
