@@ -198,3 +198,34 @@ fn boxes_that_may_be_volumes_of_an_engine_are_named_if_rooms_are_better_without_
     let text = told(&[pillar]);
     assert!(!text.contains("volumes of an engine"), "{text}");
 }
+
+#[test]
+fn what_was_left_out_by_name_is_proposed_if_rooms_are_better_with_it() {
+    let dir = folder("kept");
+    let told = |names: [&str; 2]| {
+        let mut text = String::new();
+        let [low, high] = names;
+        for (name, [min, max]) in [
+            ("Floor", [[-0.3, -0.3, -0.3], [8.3, 0.0, 5.3]]),
+            ("Ceiling", [[-0.3, 3.0, -0.3], [8.3, 3.3, 5.3]]),
+            (low, [[-0.3, 0.0, -0.3], [0.0, 3.0, 5.3]]),
+            (high, [[8.0, 0.0, -0.3], [8.3, 3.0, 5.3]]),
+            ("South", [[0.0, 0.0, -0.3], [8.0, 3.0, 0.0]]),
+            ("North", [[0.0, 0.0, 5.0], [8.0, 3.0, 5.3]]),
+        ] {
+            text = with_boxes(&text, &[[min, max]]).replace("Cube.000", name);
+        }
+        fs::write(dir.join("a.obj"), text).unwrap();
+        let done = run(&dir, "bake a.obj -o a.glb");
+        said(&done) + &printed(&done)
+    };
+    // Thinner than what people go into, so part of the building whatever its name.
+    let text = told(["Storage zone", "Stack volume"]);
+    assert!(text.contains("good: 1 room"), "{text}");
+    let text = told(["Occluder west", "Collider east"]);
+    let proposal = "--structural-name 'Collider east' --structural-name 'Occluder west'";
+    assert!(text.contains(proposal), "{text}");
+    // With one of two walls no room is better.
+    let text = told(["Occluder west", "Gate 7-noimp"]);
+    assert!(!text.contains("better with it"), "{text}");
+}

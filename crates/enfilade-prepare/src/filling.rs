@@ -71,7 +71,7 @@ mod tests {
             is_see_through: false,
             moves: None,
             is_detail_file: false,
-            is_plain: false,
+            thickness_if_plain: None,
         };
         facts.filling()
     }

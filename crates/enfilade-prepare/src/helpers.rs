@@ -81,7 +81,8 @@ const PLAIN: [Phrase; 8] = [
     (&["areaportal"], OPENING),
 ];
 
-/// Last words, behind another, of the names of plain boxes that engines call so, but for parts of buildings: a main volume.
+/// Last words, behind another, of the names of plain boxes that engines call so and that things go into, but for parts of buildings: a
+/// main volume.
 const KINDS: [(&str, &str); 3] = [
     ("volume", "a volume of an engine"),
     ("zone", "a zone of an engine"),
@@ -93,25 +94,33 @@ const MASSING: [&str; 10] = [
     "building", "floor", "house", "lower", "main", "mass", "massing", "roof", "stair", "upper",
 ];
 
+/// Least thickness of a box that things go into, metres: more than a wall has, less than a person takes.
+const ROOMY: f64 = 0.5;
+
 /// The beginning of the name of a portal of Godot, before that of the room to which it leads.
 const PORTAL_TO: &str = "Portal_";
+/// Words for what stands around an opening, beside which that is no name of a room.
+const AROUND: [&str; 5] = ["arch", "frame", "jamb", "lintel", "wall"];
 
 /// The word for a collision shape made beside the mesh that is drawn: `Wall_collision`, `collision_hull`.
 const BESIDE: &str = "collision";
 
-/// Returns the thing that a name is of, if that is a helper. `is_plain` tells that it has no more triangles than a box.
-pub(crate) fn of_name(name: &str, is_plain: bool) -> Option<&'static str> {
+/// Returns the thing that a name is of, if that is a helper. The thickness is that of a box or less, metres.
+pub(crate) fn of_name(name: &str, thickness_if_plain: Option<f64>) -> Option<&'static str> {
     let words = words(name);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let is_plain = thickness_if_plain.is_some();
+    let is_roomy = thickness_if_plain.is_some_and(|t| t >= ROOMY);
+    let has = |list: &[&str]| words.iter().any(|w| list.contains(w));
     let always = ALWAYS
         .iter()
         .find(|(phrase, _)| words.windows(phrase.len()).any(|w| w == *phrase));
     let at_end = || PLAIN.iter().find(|(phrase, _)| words.ends_with(phrase));
     let plain = || at_end().filter(|_| is_plain);
     let kind = || KINDS.iter().find(|(last, _)| words.last() == Some(last));
-    let is_of_engine = || is_plain && words.len() > 1 && !words.iter().any(|w| MASSING.contains(w));
+    let is_of_engine = || is_roomy && words.len() > 1 && !has(&MASSING);
     let of_kind = || kind().filter(|_| is_of_engine()).map(|(_, thing)| *thing);
-    let leads = || (is_plain && name.starts_with(PORTAL_TO)).then_some(OPENING);
+    let leads = || (is_plain && name.starts_with(PORTAL_TO) && !has(&AROUND)).then_some(OPENING);
     let found = (always.or_else(plain).map(|(_, thing)| *thing))
         .or_else(leads)
         .or_else(of_kind);
@@ -190,7 +199,7 @@ mod tests {
             "Collision_Wall",
             "InvisibleWall",
         ] {
-            assert!(of_name(name, false).is_some(), "{name}");
+            assert!(of_name(name, None).is_some(), "{name}");
         }
         for name in [
             "Portal",
@@ -201,8 +210,8 @@ mod tests {
             "Door trigger",
             "Bounds",
         ] {
-            assert!(of_name(name, true).is_some(), "{name}");
-            assert!(of_name(name, false).is_none(), "{name}");
+            assert!(of_name(name, Some(3.0)).is_some(), "{name}");
+            assert!(of_name(name, None).is_none(), "{name}");
         }
     }
 
@@ -213,6 +222,7 @@ mod tests {
             "Volume",
             "portal:a",
             "Portal frame",
+            "Portal_frame",
             "light box",
             "Sound wall",
             "probe",
@@ -222,7 +232,12 @@ mod tests {
             "Roof volume",
             "",
         ] {
-            assert!(of_name(name, true).is_none(), "{name}");
+            assert!(of_name(name, Some(3.0)).is_none(), "{name}");
+        }
+        // A wall is thinner than what things go into.
+        for name in ["Storage zone", "Stack volume", "Hall probe"] {
+            assert!(of_name(name, Some(0.3)).is_none(), "{name}");
+            assert!(of_name(name, Some(0.5)).is_some(), "{name}");
         }
     }
 }

@@ -54,8 +54,8 @@ pub struct RoleFacts<'n> {
     pub moves: Option<&'static str>,
     /// Its file was given as one of detail.
     pub is_detail_file: bool,
-    /// It has no more triangles than a box.
-    pub is_plain: bool,
+    /// Its least extent along its own axes, metres, if it has no more triangles than a box.
+    pub thickness_if_plain: Option<f64>,
 }
 
 /// The role of an object, or its removal.
@@ -236,7 +236,9 @@ impl RoleRules {
             };
         }
         let mut names = (facts.names.iter()).filter(|n| marked_portal(n).is_none());
-        if let Some(helper) = names.find_map(|name| helpers::of_name(name, facts.is_plain)) {
+        if let Some(helper) =
+            names.find_map(|name| helpers::of_name(name, facts.thickness_if_plain))
+        {
             let reason = format!("{helper}, by its name");
             return match helper {
                 helpers::OPENING => RoleVerdict::Mark(reason),
@@ -412,7 +414,7 @@ mod tests {
             is_see_through: false,
             moves: None,
             is_detail_file: false,
-            is_plain: false,
+            thickness_if_plain: None,
         };
         change(&mut facts);
         rules.judge(&facts)
@@ -506,13 +508,13 @@ mod tests {
 
     #[test]
     fn helper_volumes_and_tool_textures_are_left_out_unless_a_rule_keeps_them() {
-        let portal = |is_plain: bool| {
+        let portal = |thickness: Option<f64>| {
             judge_with(&RoleRules::default(), "Portal", |f| {
-                f.is_plain = is_plain;
+                f.thickness_if_plain = thickness;
             })
         };
-        assert!(matches!(portal(true), RoleVerdict::Mark(_)));
-        assert!(matches!(portal(false), RoleVerdict::Keep(..)));
+        assert!(matches!(portal(Some(0.1)), RoleVerdict::Mark(_)));
+        assert!(matches!(portal(None), RoleVerdict::Keep(..)));
         let skip = judge_with(&RoleRules::default(), "x", |f| {
             f.materials = &["skip", "clip"];
         });

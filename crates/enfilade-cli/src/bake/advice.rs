@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use enfilade::bake::{BakeContext, Silent, bake};
 use enfilade::cpg::World;
 use enfilade::geom::scene::Scene;
-use enfilade::import::{ImportReport, unnamed_helpers};
+use enfilade::import::{ImportReport, LeftOut, unnamed_helpers};
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
 use enfilade_report::{InputDoubt, Verdict};
@@ -20,6 +20,8 @@ use crate::screen::Warned;
 const LEAST: Duration = Duration::from_secs(2);
 /// Most names of objects in a proposal.
 const MOST_NAMES: usize = 8;
+/// Most reasons for leaving things out that are tried on their own.
+const MOST_REASONS: usize = 3;
 /// Units that stand for `--unit UNIT`.
 const UNITS: [&str; 4] = ["mm", "cm", "in", "ft"];
 
@@ -35,8 +37,12 @@ pub(super) fn verdict(
     let mut said = found::input_doubts(&readied.report);
     let mut hint = found::hint(&readied.report);
     let mut verdict = trials.verdict(world, &mut said, &mut hint);
-    if let Some(doubt) = trials.unnamed_helpers(&readied.scene, &verdict) {
-        said.push(doubt);
+    let doubts = [
+        trials.unnamed_helpers(&readied.scene, &verdict),
+        trials.left_out(&readied.report, &verdict),
+    ];
+    if doubts.iter().any(Option::is_some) {
+        said.extend(doubts.into_iter().flatten());
         verdict = trials.verdict(world, &mut said, &mut hint);
     }
     for text in said.iter().map(|doubt| &doubt.text).chain(&hint) {
@@ -105,26 +111,43 @@ impl<'a> Trials<'a> {
 
     /// Returns the doubt about boxes that may be volumes of an engine, if a world without them deserves more trust.
     fn unnamed_helpers(&mut self, scene: &Scene, than: &Verdict) -> Option<InputDoubt> {
-        if than.is_good() {
+        let boxes = unnamed_helpers(scene).into_iter();
+        let names = boxes.map(|i| scene.objects[i].name.clone()).collect();
+        let option = self.helps_to_name("--detail-name", &names, than)?;
+        let why = "boxes of a material of their own may be volumes of an engine, such as triggers; the rooms are better without them";
+        Some(doubt(why, &option))
+    }
+
+    /// Returns the doubt about what was left out, if a world with it deserves more trust: with all, or else with what one reason left out.
+    fn left_out(&mut self, report: &ImportReport, than: &Verdict) -> Option<InputDoubt> {
+        let names = |l: &LeftOut| l.names.iter().cloned().collect();
+        let names: Vec<BTreeSet<String>> = report.left_out.iter().map(names).collect();
+        let all = names.iter().flatten().cloned().collect();
+        let sets = [&all].into_iter().chain(&names).take(1 + MOST_REASONS);
+        let option =
+            { sets }.find_map(|names| self.helps_to_name("--structural-name", names, than))?;
+        let why = "what was left out may be part of the building; the rooms are better with it";
+        Some(doubt(why, &option))
+    }
+
+    /// Returns an option for some names, if a world made with it deserves more trust than one that is not good.
+    fn helps_to_name(
+        &mut self,
+        option: &str,
+        names: &BTreeSet<String>,
+        than: &Verdict,
+    ) -> Option<String> {
+        let is_told = |name: &String| !name.is_empty() && !name.contains('\'');
+        if than.is_good() || !(1..=MOST_NAMES).contains(&names.len()) || !names.iter().all(is_told)
+        {
             return None;
         }
-        let boxes = unnamed_helpers(scene)
-            .into_iter()
-            .map(|i| &*scene.objects[i].name);
-        let names: Vec<&str> = boxes.collect::<BTreeSet<_>>().into_iter().collect();
-        let is_told = |name: &&str| !name.is_empty() && !name.contains('\'');
-        if names.is_empty() || names.len() > MOST_NAMES || !names.iter().all(is_told) {
-            return None;
-        }
-        let names = names.join("' --detail-name '");
-        let option = format!("--detail-name '{names}'");
-        self.helps(&option, than).then(|| InputDoubt {
-            text: format!(
-                "boxes of a material of their own may be volumes of an engine, such as triggers; the rooms are better without them (try \
-                 {option})"
-            ),
-            is_about_up: false,
-        })
+        let names: Vec<String> = names
+            .iter()
+            .map(|name| format!("{option} '{name}'"))
+            .collect();
+        let options = names.join(" ");
+        self.helps(&options, than).then_some(options)
     }
 
     /// Returns the option to propose instead of one that the verdict has, if any.
@@ -200,6 +223,14 @@ impl<'a> Trials<'a> {
             &baked.world,
             &found::input_doubts(&imported.report),
         ))
+    }
+}
+
+/// Returns a doubt about the input that an option settles.
+fn doubt(why: &str, option: &str) -> InputDoubt {
+    InputDoubt {
+        text: format!("{why} (try {option})"),
+        is_about_up: false,
     }
 }
 

@@ -266,10 +266,14 @@ impl BakeOptions {
             ("--unit", _) => options.scene.unit = Some(parse_unit(value).ok()?),
             ("--up", "y") => options.scene.up = Some(Axis::Y),
             ("--up", "z") => options.scene.up = Some(Axis::Z),
-            ("--detail-name", _) => {
-                let (_, names) = option.split_once('\'')?;
-                let names = names.strip_suffix('\'')?.split("' --detail-name '");
-                options.scene.detail_name.extend(names.map(str::to_owned));
+            ("--detail-name" | "--structural-name", _) => {
+                let names = value.strip_prefix('\'')?.strip_suffix('\'')?;
+                let between = format!("' {name} '");
+                let names = names.split(&between).map(str::to_owned);
+                match name {
+                    "--detail-name" => options.scene.detail_name.extend(names),
+                    _ => options.scene.structural_name.extend(names),
+                }
             }
             ("--min-cost", _) => options.min_cost = Some(value.parse().ok()?),
             _ => return None,
