@@ -54,6 +54,25 @@ impl Labels {
         Self::from_layers(dims, layers.map(layer).collect())
     }
 
+    /// Labels a box of `dims` in layers of bricks: `fill(z, labels)` writes those of the layers of voxels from `z` on, which are 0.
+    /// Threads share the work; besides the answer, each takes 16 bytes for each voxel of a layer.
+    #[must_use]
+    pub fn filled(dims: [usize; 3], fill: impl Fn(usize, &mut [u32]) + Sync) -> Self {
+        let [nx, ny, nz] = dims;
+        if dims.contains(&0) {
+            return Self::zero(dims);
+        }
+        let layer = |labels: &mut Vec<u32>, z: usize| {
+            labels.clear();
+            labels.resize(nx * ny * EDGE.min(nz - z), 0);
+            fill(z, labels);
+            Layer::of([nx, ny], labels)
+        };
+        let starts: Vec<usize> = (0..nz).step_by(EDGE).collect();
+        let layers = starts.into_par_iter().map_init(Vec::new, layer);
+        Self::from_layers(dims, layers.collect())
+    }
+
     /// Returns a box of `dims` of these layers.
     pub(crate) fn from_layers(dims: [usize; 3], layers: Vec<Layer>) -> Self {
         debug_assert_eq!(layers.len(), dims[2].div_ceil(EDGE), "layers of {dims:?}");

@@ -20,7 +20,7 @@ mod voxelize;
 mod watershed;
 mod widest;
 
-pub use components::{Components, Connectivity, components, flood};
+pub use components::{Components, Connectivity, components, connected_labels, flood};
 pub use edt::{distance, distance_squared, distance_squared_near};
 pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use far::far_outdoors;

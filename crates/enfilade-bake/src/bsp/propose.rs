@@ -11,8 +11,8 @@ use crate::complex::region::RegionShape;
 use crate::complex::{Label, LabelSettings, Vote};
 use crate::config::BspConfig;
 use crate::proposal::Proposal;
-use crate::rooms::{self, Basins};
-use crate::structure::{Candidate, OUTDOORS, Structure, grown};
+use crate::rooms::{self, Basins, Parts, Place, ROOT};
+use crate::structure::{Candidate, Frame, OUTDOORS, Structure, grown};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 use super::cells::{self, LeafCells, NO_CELL};
@@ -20,6 +20,7 @@ use super::input::input_of;
 use super::inside::Soup;
 use super::leaves::Bsp;
 use super::separator::{self, Separator};
+use super::tree::{Tree, leaf_index};
 use super::{arrange, guided, lattice, leak, shape};
 
 /// Finds rooms by binary space partition and separators, for levels made of brushes and for clean architectural models.
@@ -67,11 +68,12 @@ fn rooms_of(
     let (cell_of_leaf, n_cells) = cells::components(bsp, &kept);
     let guides = guided::separators(bsp);
     let air = rooms::prepare(structure, config, context)?;
-    let cell_at = |p| {
-        let leaf = bsp.tree.leaf_of(structure.frame.to_scene(p));
-        Some(cell_of_leaf[leaf as usize]).filter(|&cell| cell != NO_CELL)
+    let parts = TreeParts {
+        tree: &bsp.tree,
+        cell_of_leaf: &cell_of_leaf,
+        frame: &structure.frame,
     };
-    let basins = Basins::of_parts(&air, cell_at, context.allowance());
+    let basins = Basins::of_parts(&air, &parts, context.allowance());
     let mut proposal = rooms::propose(structure, air, basins, config, context)?;
     proposal.label = label_settings(structure.scene);
     if !bsp.is_open[bsp.outer_leaf() as usize] {
@@ -91,6 +93,31 @@ fn rooms_of(
         proposal.candidates.extend(candidates_of(bsp, &guides));
     }
     Ok(proposal)
+}
+
+/// The cells of a tree, in the axes of the grid. Places are children as in a [`Node`](super::tree::Node).
+struct TreeParts<'a> {
+    tree: &'a Tree,
+    cell_of_leaf: &'a [u32],
+    frame: &'a Frame,
+}
+
+impl Parts for TreeParts<'_> {
+    fn around(&self, place: Place, center: DVec3, radius: f64) -> Place {
+        let from = if place == ROOT { self.tree.root } else { place };
+        self.tree.around(from, self.frame.to_scene(center), radius)
+    }
+
+    fn is_part(&self, place: Place) -> bool {
+        place < 0
+    }
+
+    fn part_at(&self, place: Place, p: DVec3) -> Option<u32> {
+        // A point is a ball that no plane cuts.
+        let leaf = self.around(place, p, 0.0);
+        let cell = self.cell_of_leaf[leaf_index(leaf) as usize];
+        Some(cell).filter(|&cell| cell != NO_CELL)
+    }
 }
 
 /// Proposes all cells between separators that cross no other.

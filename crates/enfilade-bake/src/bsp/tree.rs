@@ -55,13 +55,21 @@ pub(super) struct Tree {
 impl Tree {
     /// Returns the leaf that contains `p`; points in a plane belong to its front.
     pub(super) fn leaf_of(&self, p: DVec3) -> u32 {
-        let mut at = self.root;
+        leaf_index(self.around(self.root, p, 0.0))
+    }
+
+    /// Returns the least of the nodes below and at a child that holds all of a ball within that child, as a child.
+    pub(super) fn around(&self, child: i32, center: DVec3, radius: f64) -> i32 {
+        let mut at = child;
         while at >= 0 {
             let node = &self.nodes[at as usize];
-            let is_back = self.planes[node.plane as usize].signed_distance(p) < 0.0;
-            at = node.children[usize::from(is_back)];
+            let distance = self.planes[node.plane as usize].signed_distance(center);
+            if distance.abs() < radius {
+                break;
+            }
+            at = node.children[usize::from(distance < 0.0)];
         }
-        leaf_index(at)
+        at
     }
 
     /// Returns the fragments that lie in a node's plane within its region.

@@ -7,9 +7,7 @@ use enfilade_geom::Allowance;
 use super::lids::{Lids, find_lids};
 use super::rims::rim_caps;
 use crate::structure::{Site, Structure};
-use crate::voxel::{
-    BitVolume, DistanceField, Grid, SparseVolume, distance_squared_near, far_outdoors, voxelize,
-};
+use crate::voxel::{BitVolume, DistanceField, Grid, SparseVolume, far_outdoors, voxelize};
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
 /// The air of a scene in voxels, before it is divided.
@@ -35,25 +33,22 @@ pub(crate) struct Plot {
     pub(crate) resolution: Resolution,
 }
 
-/// Peak memory of a bake by the watershed, rounded from `docs/benchmarks/growth.md`. [Units: bytes/vx]
+/// Peak memory of a bake in voxels, rounded from `docs/benchmarks/growth.md`. [Units: bytes/vx]
 pub(crate) const FLOODED: f64 = 2.2;
-/// Peak memory of a bake whose parts of the air are given: labels and distances of all voxels. [Units: bytes/vx]
-const IN_PARTS: f64 = 6.5;
 
-/// Lays grids over parts of a structure whose voxels take so many bytes each, and reports the work ahead.
+/// Lays grids over parts of a structure, and reports the work ahead.
 ///
 /// # Errors
 /// If a setting is invalid, or the scene is too large for the voxel budget.
 pub(crate) fn plots(
     structure: &Structure<'_>,
     sites: Vec<Site>,
-    bytes_a_voxel: f64,
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<Vec<Plot>, BakeError> {
     config.check_opening()?;
     let grid = |site: Site| {
-        let grid = config.grid(&site.bounds, structure.triangles.len(), bytes_a_voxel)?;
+        let grid = config.grid(&site.bounds, structure.triangles.len(), FLOODED)?;
         Ok::<_, BakeError>((site, grid))
     };
     let grids: Vec<(Site, Grid)> = sites
@@ -69,7 +64,7 @@ pub(crate) fn plots(
         n_voxels: n_voxels as u64,
     };
     // Grids are held one after the other.
-    let memory = bytes_a_voxel * largest.map_or(0, Grid::n_voxels) as f64;
+    let memory = FLOODED * largest.map_or(0, Grid::n_voxels) as f64;
     context.tell(resolution, memory);
     let plot = |(site, grid): (Site, Grid)| Plot {
         site,
@@ -91,13 +86,7 @@ pub(crate) fn prepare(
 ) -> Result<VoxelAir, BakeError> {
     let sites = structure.sites(config.min_opening);
     let all = sites.into_iter().reduce(Site::union);
-    let mut plots = plots(
-        structure,
-        all.into_iter().collect(),
-        IN_PARTS,
-        config,
-        context,
-    )?;
+    let mut plots = plots(structure, all.into_iter().collect(), config, context)?;
     measure(structure, plots.swap_remove(0), config, context)
 }
 
@@ -163,21 +152,14 @@ impl Solid {
         }
     }
 
-    /// Returns the squared distance of air voxels to the nearest surface, and the outdoor voxels so far away that
-    /// theirs do not matter. Door leaves count as surfaces here. [Units: vx²]
-    pub(super) fn distances(&self, allowance: &Allowance) -> (Vec<u16>, BitVolume) {
-        let (blocked, far) = self.blocked(allowance);
-        (distance_squared_near(&blocked, &far, allowance), far)
-    }
-
-    /// Returns these distances packed, which takes a tenth of the memory.
+    /// Returns the distance of air voxels to the nearest surface. Door leaves count as surfaces here.
     pub(crate) fn field(&self, allowance: &Allowance) -> DistanceField {
         let (blocked, far) = self.blocked(allowance);
         DistanceField::of(&blocked, &far, allowance)
     }
 
     /// Returns all voxels that stop a flood, and the outdoor voxels far from them.
-    fn blocked(&self, allowance: &Allowance) -> (Cow<'_, BitVolume>, BitVolume) {
+    pub(super) fn blocked(&self, allowance: &Allowance) -> (Cow<'_, BitVolume>, BitVolume) {
         let mut blocked = Cow::Borrowed(&self.occupied);
         if !self.shut.is_empty() {
             self.shut.add_to(blocked.to_mut());

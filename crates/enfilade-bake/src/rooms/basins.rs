@@ -1,10 +1,9 @@
 //! Basins: the parts into which a builder divides the air, before they are merged into rooms.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use enfilade_geom::{Allowance, DVec3};
-
-use rayon::prelude::*;
 
 use super::air::VoxelAir;
 use super::flooded::Flooded;
@@ -13,10 +12,27 @@ use super::regions::{Regions, merge_basins};
 use super::slabs::cut_at_slabs;
 use crate::BakeConfig;
 use crate::structure::OUTDOORS;
-use crate::voxel::{BitVolume, DistanceField, Grid, Labels, SparseVolume, border};
+use crate::voxel::{BitVolume, DistanceField, Grid, Labels, SparseVolume, connected_labels};
 
-/// Marks a voxel that has a part, but no basin yet; the other bits are the part.
-const WAITING: u32 = 1 << 31;
+/// Label of part 0, before parts have basins.
+const AFTER: u32 = OUTDOORS + 1;
+/// Edges of the blocks whose part is looked up at once, the second as thick as a layer of labels. [Units: vx]
+const BLOCKS: [usize; 2] = [16, 4];
+
+/// A place in a division of space: a part, or several.
+pub(crate) type Place = i32;
+/// All of space.
+pub(crate) const ROOT: Place = i32::MAX;
+
+/// A division of space into parts, in the axes of the grid.
+pub(crate) trait Parts: Sync {
+    /// Returns the smallest known place within `place` that holds a ball.
+    fn around(&self, place: Place, center: DVec3, radius: f64) -> Place;
+    /// Returns `true` if a place is one part.
+    fn is_part(&self, place: Place) -> bool;
+    /// Returns the part of a point in a place, below 2³⁰, or `None` for matter.
+    fn part_at(&self, place: Place, p: DVec3) -> Option<u32>;
+}
 
 /// Parts of the air. The outdoors is the basin [`OUTDOORS`](crate::structure::OUTDOORS).
 pub(crate) struct Basins {
@@ -30,41 +46,34 @@ pub(crate) struct Basins {
 }
 
 impl Basins {
-    /// Makes a basin of each connected set of air voxels in one part. `part_at` returns the part of a point, below 2³¹, or
-    /// `None` for matter. Everything that connects to the border is outdoors.
+    /// Makes a basin of each connected set of air voxels in one part. Everything that connects to the border is outdoors.
     ///
-    /// Linear in voxels, besides the calls of `part_at` for those that are not far from everything; 6 bytes a voxel.
-    pub(crate) fn of_parts(
-        air: &VoxelAir,
-        part_at: impl Fn(DVec3) -> Option<u32> + Sync,
-        allowance: &Allowance,
-    ) -> Self {
-        let dims = air.grid.dims;
-        let (distances, far) = air.solid.distances(allowance);
-        let mut outdoors = border(dims);
-        outdoors.union_with(&far);
-        let part_of = |i: usize| {
-            if distances[i] == 0 || !allowance.spend(1) {
-                return 0;
+    /// Blocks of voxels are looked up before their voxels, so that the time is linear in voxels, and logarithmic in parts near
+    /// borders of parts alone. About 2 bytes a voxel.
+    pub(crate) fn of_parts(air: &VoxelAir, parts: &impl Parts, allowance: &Allowance) -> Self {
+        let grid = &air.grid;
+        let field = air.solid.field(allowance);
+        let outer = parts.part_at(ROOT, grid.center(0, 0, 0)).unwrap_or(0);
+        let is_outer = |label: u32| label == OUTDOORS || label == AFTER + outer;
+        let mut n = OUTDOORS + 1;
+        let name = |least: u32| match least {
+            OUTDOORS => OUTDOORS,
+            _ => {
+                n += 1;
+                n - 1
             }
-            if outdoors.get_index(i) {
-                return OUTDOORS;
-            }
-            let [x, y, z] = air.grid.coords(i);
-            part_at(air.grid.center(x, y, z)).map_or(0, |part| WAITING | part)
         };
-        let mut labels: Vec<u32> = (0..distances.len()).into_par_iter().map(part_of).collect();
-        let outer = part_at(air.grid.center(0, 0, 0)).unwrap_or(0);
-        let n = number_parts(dims, &mut labels, outer);
-        let field = DistanceField::of_squared(dims, distances, &outdoors);
+        let labels = part_labels(air, parts, allowance);
+        let alike = |a: u32, b: u32| a == b || is_outer(a) && is_outer(b);
+        let labels = connected_labels(&labels, alike, name);
         let mut basins = Self {
-            labels: Labels::of(dims, &labels),
-            peaks: vec![0.0; n],
+            labels,
+            peaks: vec![0.0; n as usize],
             saddles: BTreeMap::new(),
-            n_basins: n - 1,
+            n_basins: n as usize - 1,
         };
         basins.measure(&field, |_| true, allowance);
-        basins.cut(&air.grid, &air.slabs, &field, allowance);
+        basins.cut(grid, &air.slabs, &field, allowance);
         basins
     }
 
@@ -154,36 +163,67 @@ impl Basins {
     }
 }
 
-/// Replaces the parts of voxels by basins, numbered in order of their first voxels; returns the number of labels. Waiting
-/// voxels of part `outer` that connect to those that are outdoors are, too.
-fn number_parts([nx, ny, nz]: [usize; 3], labels: &mut [u32], outer: u32) -> usize {
-    let mut stack: Vec<usize> = (0..labels.len())
-        .filter(|&i| labels[i] == OUTDOORS)
-        .collect();
-    let flood = |labels: &mut [u32], stack: &mut Vec<usize>, from: u32, to: u32| {
-        while let Some(i) = stack.pop() {
-            let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
-            for (at, n, step) in [(x, nx, 1), (y, ny, nx), (z, nz, nx * ny)] {
-                let next = [(at > 0, i.wrapping_sub(step)), (at + 1 < n, i + step)];
-                for (_, j) in next.into_iter().filter(|n| n.0) {
-                    if labels[j] == from {
-                        labels[j] = to;
-                        stack.push(j);
+/// Labels voxels by parts: 0 is matter, the border and what is far from everything is [`OUTDOORS`], and the rest follow.
+fn part_labels(air: &VoxelAir, parts: &impl Parts, allowance: &Allowance) -> Labels {
+    let grid = &air.grid;
+    let [nx, ny, nz] = grid.dims;
+    let (blocked, far) = air.solid.blocked(allowance);
+    let label_of = |part: Option<u32>| part.map_or(0, |part| AFTER + part);
+    // The place that holds all voxels from the first to before the last.
+    let within = |place: Place, first: [usize; 3], last: [usize; 3]| {
+        let [low, high] = [first, last].map(|at| grid.to_world(DVec3::from(at.map(|n| n as f64))));
+        parts.around(place, (low + high) / 2.0, low.distance(high) / 2.0)
+    };
+    Labels::filled(grid.dims, |z, labels| {
+        let end = nz.min(z + BLOCKS[1]);
+        for wide in blocks([0, 0], [nx, ny], BLOCKS[0]) {
+            let place = within(
+                ROOT,
+                [wide[0].start, wide[1].start, z],
+                [wide[0].end, wide[1].end, end],
+            );
+            let [first, last] = [wide.clone().map(|r| r.start), wide.map(|r| r.end)];
+            for narrow in blocks(first, last, BLOCKS[1]) {
+                let [xs, ys] = narrow;
+                if !allowance.spend((xs.len() * ys.len() * (end - z)) as u64) {
+                    return;
+                }
+                let place = within(place, [xs.start, ys.start, z], [xs.end, ys.end, end]);
+                let whole = parts
+                    .is_part(place)
+                    .then(|| label_of(parts.part_at(place, DVec3::ZERO)));
+                for k in z..end {
+                    for y in ys.clone() {
+                        for x in xs.clone() {
+                            let is_border = [(x, nx), (y, ny), (k, nz)]
+                                .iter()
+                                .any(|&(at, n)| at == 0 || at + 1 == n);
+                            labels[x + nx * (y + ny * (k - z))] = if blocked.get(x, y, k) {
+                                0
+                            } else if is_border || far.get(x, y, k) {
+                                OUTDOORS
+                            } else {
+                                whole.unwrap_or_else(|| {
+                                    label_of(parts.part_at(place, grid.center(x, y, k)))
+                                })
+                            };
+                        }
                     }
                 }
             }
         }
+    })
+}
+
+/// Returns the blocks of a rectangle, of at most so many steps each way.
+fn blocks(
+    first: [usize; 2],
+    last: [usize; 2],
+    edge: usize,
+) -> impl Iterator<Item = [Range<usize>; 2]> {
+    let along = move |k: usize| {
+        let starts = (first[k]..last[k]).step_by(edge);
+        starts.map(move |at| at..last[k].min(at + edge))
     };
-    flood(labels, &mut stack, WAITING | outer, OUTDOORS);
-    let mut n = OUTDOORS + 1;
-    for i in 0..labels.len() {
-        let part = labels[i];
-        if part & WAITING != 0 {
-            labels[i] = n;
-            stack.push(i);
-            flood(labels, &mut stack, part, n);
-            n += 1;
-        }
-    }
-    n as usize
+    along(1).flat_map(move |ys| along(0).map(move |xs| [xs, ys.clone()]))
 }

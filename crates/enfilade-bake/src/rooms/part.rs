@@ -2,7 +2,7 @@
 
 use enfilade_geom::{Aabb, Allowance, DVec3};
 
-use super::air::{FLOODED, Solid, VoxelAir, plots};
+use super::air::{Solid, VoxelAir, plots};
 use super::lids::Lids;
 use crate::structure::{Site, Structure};
 use crate::voxel::{BitVolume, Grid, SparseVolume, distance_squared};
@@ -44,7 +44,7 @@ impl WholeAir {
         let [site] = *sites else {
             return Ok(None);
         };
-        let plots = plots(structure, vec![site], FLOODED, config, context)?;
+        let plots = plots(structure, vec![site], config, context)?;
         context.begin(Stage::Voxelize)?;
         let (grid, resolution) = (plots[0].grid, plots[0].resolution);
         let solid = Solid::of(structure, &grid, config);

@@ -53,7 +53,7 @@ pub(crate) fn sites_of(
     context: &BakeContext<'_>,
 ) -> Result<Vec<Plot>, BakeError> {
     let sites = structure.sites(config.min_opening);
-    rooms::plots(structure, sites, rooms::FLOODED, config, context)
+    rooms::plots(structure, sites, config, context)
 }
 
 /// Finds the rooms of a site, from its pieces as far as they are there.

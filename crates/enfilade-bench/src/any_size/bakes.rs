@@ -66,6 +66,32 @@ pub(super) fn memory(scene: &str) -> anyhow::Result<Figure> {
     })
 }
 
+/// Processor time of a bake by binary space partition ÷ that of the default method.
+pub(super) fn bsp_time(scene: &str) -> anyhow::Result<Figure> {
+    let [bsp, own] = [bsp_of(scene)?, used_for(scene)?];
+    Ok(Figure {
+        value: bsp.user / own.user,
+        most: 2.0,
+        note: format!("{:.1} s instead of {:.1} s", bsp.user, own.user),
+    })
+}
+
+/// Peak memory of a bake by binary space partition. [Units: GiB]
+pub(super) fn bsp_memory(scene: &str) -> anyhow::Result<Figure> {
+    Ok(Figure {
+        value: bsp_of(scene)?.peak / f64::from(1 << 30),
+        most: 0.6,
+        note: "GiB".to_owned(),
+    })
+}
+
+fn bsp_of(scene: &str) -> anyhow::Result<Used> {
+    let dir = target_dir().join(scene);
+    bake_tower(rooms_of(scene)?)?;
+    let world = dir.join("bsp.glb");
+    used_by(bake_command(&dir, &world).args(["--method", "bsp"]))
+}
+
 /// Exponent of processor time in occupied voxels, from a small tower to this one.
 pub(super) fn growth(scene: &str) -> anyhow::Result<Figure> {
     let [small, large] = [SMALL_TOWER, rooms_of(scene)?].map(bake_tower);

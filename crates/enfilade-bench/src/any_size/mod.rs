@@ -35,6 +35,8 @@ pub(crate) const ROWS: &[Row] = &[
     made("bake: seconds", TOWERS, bakes::seconds),
     named("bake: seconds", CLINIC, bakes::seconds_shared),
     made("bake: memory", HIGH_TOWER, bakes::memory),
+    made("bsp: time", TOWER, bakes::bsp_time),
+    made("bsp: memory", TOWER, bakes::bsp_memory),
     named("land: seconds", HOUSE, bakes::seconds_on_land),
     named("land: rooms lost", BUILDINGS, bakes::lost_on_land),
     named("land: rooms lost of three", BUILDINGS, bakes::lost_on_site),
