@@ -86,6 +86,12 @@ fn rooms_without_a_doorway_are_told() {
     assert!(text.contains("1 room has no doorway"), "{text}");
     assert!(text.contains("--detail-name"), "{text}");
     assert!(text.contains(" 1.30 2.00"), "{text}");
+    // What only a person can fill in is proposed, and not tried.
+    let printed = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(
+        printed.contains("(try --detail-name 'PATTERN')"),
+        "{printed}"
+    );
     let done = bake(&input, &["--detail-name", "*leaf"]);
     assert!(!said(&done).contains("no doorway"), "{}", said(&done));
     assert_eq!(n_doors(&done), "1");

@@ -263,6 +263,7 @@ impl BakeOptions {
         let mut options = self.clone();
         let (name, value) = option.split_once(' ')?;
         match (name, value) {
+            (_, "'PATTERN'") => return None,
             ("--unit", _) => options.scene.unit = Some(parse_unit(value).ok()?),
             ("--up", "y") => options.scene.up = Some(Axis::Y),
             ("--up", "z") => options.scene.up = Some(Axis::Z),
