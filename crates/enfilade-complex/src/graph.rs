@@ -120,7 +120,8 @@ impl<'a> LeafGraph<'a> {
                 &mut |leaf, piece| {
                     at_border[leaf as usize] = true;
                     grow(&mut boxes[leaf as usize], piece);
-                    volumes[leaf as usize] += cone_volume(piece, outward, origin);
+                    volumes[leaf as usize] +=
+                        cone_volume(poly::area(piece), piece[0], outward, origin);
                 },
             );
         }
@@ -226,7 +227,7 @@ impl Clearance<'_> {
     /// there are wide ones. One query of the triangles in the open, at most `4n + 1` in a gap.
     pub(super) fn is_gap(&self, points: &[DVec3]) -> bool {
         let mut series = NearSeries::default();
-        let is_gap = self.is_narrower(points, self.hole, true, &mut series);
+        let is_gap = self.is_narrower(points, self.hole, true, None, &mut series);
         self.spend(&series);
         is_gap
     }
@@ -237,11 +238,14 @@ impl Clearance<'_> {
         let crack = CRACK_GAPS * self.hole;
         series.n_looked = 0;
         // Most are in the open and take one query.
-        let in_middle = self.bvh.any_within(middle_of(points), 0.5 * crack, series);
-        let mut is_narrower =
-            |diameter: f64| self.is_narrower(points, diameter, width >= diameter, series);
+        let middle = middle_of(points);
+        let in_middle = self.bvh.any_within(middle, 0.5 * crack, series);
         let [mut is_narrow, mut is_gap] = [false; 2];
-        if crack > 0.0 && in_middle.is_some() {
+        if let Some(distance) = in_middle.filter(|_| crack > 0.0) {
+            let known = (middle, distance);
+            let mut is_narrower = |diameter: f64| {
+                self.is_narrower(points, diameter, width >= diameter, Some(known), series)
+            };
             is_gap = is_narrower(self.hole);
             is_narrow = is_gap || is_narrower(crack);
         }
@@ -253,7 +257,7 @@ impl Clearance<'_> {
     /// as [`is_gap`](Self::is_gap).
     fn is_clear(&self, points: &[DVec3], rounding: f64) -> bool {
         let mut series = NearSeries::default();
-        let is_near = self.is_narrower(points, 2.0 * CLEAR * rounding, true, &mut series);
+        let is_near = self.is_narrower(points, 2.0 * CLEAR * rounding, true, None, &mut series);
         self.spend(&series);
         !is_near
     }
@@ -263,12 +267,14 @@ impl Clearance<'_> {
         self.purse.spend(series.n_looked / 4);
     }
 
-    /// Returns `true` if an opening lets no ball of this diameter pass; tests only its middle unless `is_whole`.
+    /// Returns `true` if an opening lets no ball of this diameter pass; tests only its middle unless `is_whole`. Some matter
+    /// is at the `known` distance from a point.
     fn is_narrower(
         &self,
         points: &[DVec3],
         diameter: f64,
         is_whole: bool,
+        known: Option<(DVec3, f64)>,
         series: &mut NearSeries,
     ) -> bool {
         if diameter <= 0.0 {
@@ -282,7 +288,8 @@ impl Clearance<'_> {
         let inner = inner.flat_map(|p| [0.1, 0.5].map(|t| p.lerp(middle, t)));
         let inner = inner.filter(|_| is_whole);
         // Distances change no faster than positions, so points near one known to be close need no query.
-        let mut known: SmallVec<[(DVec3, f64); 8]> = SmallVec::new();
+        let known = known.map(|(p, distance)| (p, reach - distance));
+        let mut known: SmallVec<[(DVec3, f64); 8]> = known.into_iter().collect();
         std::iter::once(middle).chain(inner).all(|p| {
             if known.iter().any(|(q, left)| p.distance(*q) <= *left) {
                 return true;
@@ -299,10 +306,10 @@ fn middle_of(points: &[DVec3]) -> DVec3 {
     points.iter().sum::<DVec3>() / points.len() as f64
 }
 
-/// Returns the signed volume of the cone from `origin` over a polygon; over a closed surface, these add up to its
-/// volume.
-fn cone_volume(points: &[DVec3], normal: DVec3, origin: DVec3) -> f64 {
-    poly::area(points) * normal.dot(points[0] - origin) / 3.0
+/// Returns the signed volume of the cone from `origin` over a polygon through `p`; over a closed surface, these add up
+/// to its volume.
+fn cone_volume(area: f64, p: DVec3, normal: DVec3, origin: DVec3) -> f64 {
+    area * normal.dot(p - origin) / 3.0
 }
 
 fn grow(b: &mut Aabb, points: &[DVec3]) {
@@ -367,13 +374,13 @@ struct LeafSink<'a> {
 impl FacetSink for LeafSink<'_> {
     fn take(&mut self, facet: &RawFacet<'_>) {
         let normal = self.visitor.tree.planes[facet.plane as usize].normal;
-        let cone = cone_volume(facet.points, normal, self.origin);
+        let area = poly::area(facet.points);
+        let cone = cone_volume(area, facet.points[0], normal, self.origin);
         let [front, back] = facet.leaves.map(|l| (l - self.first_leaf) as usize);
         self.volumes[front] -= cone;
         self.volumes[back] += cone;
-        let face = poly::area(facet.points) as f32;
         for leaf in [front, back] {
-            self.faces[leaf] = self.faces[leaf].max(face);
+            self.faces[leaf] = self.faces[leaf].max(area as f32);
             grow(&mut self.boxes[leaf], facet.points);
         }
         let first = self.facets.len();

@@ -320,9 +320,9 @@ fn edge_key(a: DVec3, b: DVec3) -> EdgeKey {
 
 /// Returns `true` if all of a surface lies in the plane `plane_id`. Fragments moved one by one would come apart where
 /// their regions meet.
-pub(super) fn lies_in(
+pub(super) fn lies_in<'a>(
     surface_plane: u32,
-    points: &[DVec3],
+    points: impl FnOnce() -> &'a [DVec3],
     plane_id: u32,
     planes: &[Plane],
     tolerance: &Tolerance,
@@ -337,7 +337,7 @@ pub(super) fn lies_in(
         .cross(plane.normal)
         .length_squared()
         < PARALLEL * PARALLEL
-        && points
+        && points()
             .iter()
             .all(|&p| plane.signed_distance(p).abs() <= tolerance.plane)
 }

@@ -31,6 +31,9 @@ use super::tree::{Node, Tree, leaf_index};
 /// Most cuts through one leaf; the longest come first.
 const MAX_CUTS: usize = 256;
 
+/// Subtrees with more edges are examined in parallel.
+const PARALLEL_EDGES: usize = 2048;
+
 /// Edges within this share of a gap of a cut are not cut again. A larger share makes fewer leaves and larger seals:
 /// at a half, seals have two fifths more area; at a tenth, there are a seventh more leaves.
 const ALIKE: f64 = 0.25;
@@ -58,22 +61,31 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
         found: Vec::new(),
     };
     visitor.visit(&mut sink);
-    let mut edges = sink.found;
-    // A stable sort keeps the order of the tree.
-    edges.par_sort_by_key(|e| e.leaf);
+    let edges = sink.found;
+    // By leaf, then in the order of the tree.
+    let mut by_leaf: Vec<(u32, u32)> = (0..).zip(&edges).map(|(i, e)| (e.leaf, i)).collect();
+    by_leaf.par_sort_unstable();
     let tree = visitor.tree;
-    let mut cutter = LeafCutter {
+    let finder = StripFinder {
         tree,
         edges: &edges,
         gap,
         tolerance: visitor.tolerance,
+    };
+    let region = CutBox::all(tree.bounds);
+    let mut cuts = finder.find(tree.root, &by_leaf, region).into_iter();
+    let mut cutter = LeafCutter {
+        tree,
+        gap,
         purse: visitor.purse,
+        next: cuts.next(),
+        cuts,
         planes: tree.planes.clone(),
         nodes: Vec::with_capacity(tree.nodes.len()),
         on_plane: Vec::with_capacity(tree.on_plane.len()),
         n_leaves: 0,
     };
-    let root = cutter.copy(tree.root, &mut CutBox::all(tree.bounds));
+    let root = cutter.copy(tree.root, 0..tree.n_leaves);
     let LeafCutter {
         planes,
         nodes,
@@ -162,8 +174,13 @@ impl FacetSink for Edges<'_> {
     }
 
     fn join(&mut self, front: Self, back: Self) {
-        self.found.extend(front.found);
-        self.found.extend(back.found);
+        for part in [front, back] {
+            if self.found.is_empty() {
+                self.found = part.found;
+            } else {
+                self.found.extend(part.found);
+            }
+        }
     }
 }
 
@@ -178,63 +195,79 @@ fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
     })
 }
 
-struct LeafCutter<'a> {
+/// Strips across one leaf with their planes.
+type LeafCuts = (u32, Vec<(Plane, Poly)>);
+
+struct StripFinder<'a> {
     tree: &'a Tree,
     edges: &'a [Edge],
     /// Leaves are cut where they are thinner than this. [Units: wu]
     gap: f64,
     tolerance: Tolerance,
-    purse: Purse<'a>,
-    planes: Vec<Plane>,
-    nodes: Vec<Node>,
-    on_plane: Vec<u32>,
-    n_leaves: u32,
 }
 
-impl LeafCutter<'_> {
-    fn edges_of(&self, leaves: Range<u32>) -> &[Edge] {
-        let at = |leaf: u32| self.edges.partition_point(|e| e.leaf < leaf);
-        &self.edges[at(leaves.start)..at(leaves.end)]
-    }
-
-    /// Copies a subtree and cuts its leaves; returns its new root.
-    fn copy(&mut self, child: i32, region: &mut CutBox) -> i32 {
-        if child < 0 {
-            let strips = self.strips(leaf_index(child), region);
-            return self.split(strips);
+impl StripFinder<'_> {
+    /// Returns the strips across the leaves of a subtree, by leaf. `edges` are those of these leaves, each after its leaf.
+    fn find(&self, child: i32, edges: &[(u32, u32)], mut region: CutBox) -> Vec<LeafCuts> {
+        if edges.len() < PARALLEL_EDGES || child < 0 {
+            let mut out = Vec::new();
+            self.find_in_turn(child, edges, &mut region, &mut out);
+            return out;
         }
-        let node = self.tree.nodes[child as usize];
-        let at = self.push(node.plane);
-        self.on_plane
-            .extend_from_slice(self.tree.surfaces_on(child as usize));
-        let is_cut = !self.edges_of(self.tree.leaf_range(child)).is_empty();
-        let children = if is_cut {
-            let plane = self.planes[node.plane as usize];
-            [0, 1].map(|side| {
-                region.on_side(&plane, side, |part| self.copy(node.children[side], part))
+        let (plane, children, edges) = self.halves(child, edges);
+        let find = |side: usize| {
+            let mut region = region.clone();
+            region.on_side(&plane, side, |part| {
+                self.find(children[side], edges[side], part.clone())
             })
-        } else {
-            // Nothing below is cut, so the region does not matter.
-            node.children.map(|c| self.copy(c, region))
         };
-        self.nodes[at].children = children;
-        at as i32
+        let (mut front, back) = rayon::join(|| find(0), || find(1));
+        front.extend(back);
+        front
     }
 
-    fn push(&mut self, plane: u32) -> usize {
-        self.nodes.push(Node {
-            plane,
-            on_start: self.on_plane.len() as u32,
-            children: [0; 2],
-        });
-        self.nodes.len() - 1
+    fn find_in_turn(
+        &self,
+        child: i32,
+        edges: &[(u32, u32)],
+        region: &mut CutBox,
+        out: &mut Vec<LeafCuts>,
+    ) {
+        if edges.is_empty() {
+            return;
+        }
+        if child < 0 {
+            let strips = self.strips(edges, region);
+            if !strips.is_empty() {
+                out.push((leaf_index(child), strips));
+            }
+            return;
+        }
+        let (plane, children, edges) = self.halves(child, edges);
+        for side in 0..2 {
+            region.on_side(&plane, side, |part| {
+                self.find_in_turn(children[side], edges[side], part, out);
+            });
+        }
+    }
+
+    /// Returns the plane of a node, its children, and the edges of each.
+    fn halves<'b>(
+        &self,
+        node: i32,
+        edges: &'b [(u32, u32)],
+    ) -> (Plane, [i32; 2], [&'b [(u32, u32)]; 2]) {
+        let node = &self.tree.nodes[node as usize];
+        let first_back = self.tree.leaf_range(node.children[1]).start;
+        let (front, back) = edges.split_at(edges.partition_point(|e| e.0 < first_back));
+        let plane = self.tree.planes[node.plane as usize];
+        (plane, node.children, [front, back])
     }
 
     /// Returns the strips that will cut a leaf.
-    fn strips(&mut self, leaf: u32, region: &CutBox) -> Vec<Strip> {
-        let mut found: Vec<(f64, Plane, Poly)> = self
-            .edges_of(leaf..leaf + 1)
-            .iter()
+    fn strips(&self, edges: &[(u32, u32)], region: &CutBox) -> Vec<(Plane, Poly)> {
+        let edges = edges.iter().map(|&(_, i)| &self.edges[i as usize]);
+        let mut found: Vec<(f64, Plane, Poly)> = edges
             .filter_map(|e| {
                 let depth = e.inward * self.gap;
                 let quad = [e.from, e.to, e.to + depth, e.from + depth];
@@ -256,16 +289,88 @@ impl LeafCutter<'_> {
         // Longest first. Equal lengths come from both sides of one edge.
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found.truncate(MAX_CUTS);
-        found
-            .into_iter()
-            .map(|(_, plane, points)| {
-                self.planes.push(plane);
-                Strip {
-                    plane: self.planes.len() as u32 - 1,
-                    points,
-                }
-            })
-            .collect()
+        let strips = found.into_iter();
+        strips.map(|(_, plane, points)| (plane, points)).collect()
+    }
+}
+
+struct LeafCutter<'a> {
+    tree: &'a Tree,
+    gap: f64,
+    purse: Purse<'a>,
+    /// Those of the next leaf that is cut.
+    next: Option<LeafCuts>,
+    /// Those of the leaves after it, ascending.
+    cuts: std::vec::IntoIter<LeafCuts>,
+    planes: Vec<Plane>,
+    nodes: Vec<Node>,
+    on_plane: Vec<u32>,
+    n_leaves: u32,
+}
+
+impl LeafCutter<'_> {
+    /// Copies a subtree with these leaves and cuts them; returns its new root.
+    fn copy(&mut self, child: i32, leaves: Range<u32>) -> i32 {
+        if !self.next.as_ref().is_some_and(|n| n.0 < leaves.end) {
+            return self.copy_uncut(child, leaves);
+        }
+        if child < 0 {
+            let strips = self.next.take().map(|n| n.1).unwrap_or_default();
+            self.next = self.cuts.next();
+            let first = self.planes.len() as u32;
+            self.planes.extend(strips.iter().map(|s| s.0));
+            let strips = (first..).zip(strips);
+            let strips = strips.map(|(plane, (_, points))| Strip { plane, points });
+            return self.split(strips.collect());
+        }
+        let node = self.tree.nodes[child as usize];
+        let at = self.push(node.plane);
+        self.on_plane
+            .extend_from_slice(self.tree.surfaces_on(child as usize));
+        let [front, back] = node.children;
+        let middle = self.tree.leaf_range(back).start;
+        let children = [
+            self.copy(front, leaves.start..middle),
+            self.copy(back, middle..leaves.end),
+        ];
+        self.nodes[at].children = children;
+        at as i32
+    }
+
+    /// Copies a subtree whose leaves are not cut: its nodes are in a row, one fewer than its leaves.
+    fn copy_uncut(&mut self, child: i32, leaves: Range<u32>) -> i32 {
+        let by_leaf = self.n_leaves as i32 - leaves.start as i32;
+        self.n_leaves += leaves.len() as u32;
+        if child < 0 {
+            return child - by_leaf;
+        }
+        let (nodes, rest) = self.tree.nodes[child as usize..].split_at(leaves.len() - 1);
+        let on_start = nodes[0].on_start;
+        let on_end = rest
+            .first()
+            .map_or(self.tree.on_plane.len(), |n| n.on_start as usize);
+        let (by_node, new_on) = (self.nodes.len() as i32 - child, self.on_plane.len() as u32);
+        self.nodes.extend(nodes.iter().map(|n| {
+            Node {
+                plane: n.plane,
+                on_start: n.on_start - on_start + new_on,
+                children: n
+                    .children
+                    .map(|c| if c >= 0 { c + by_node } else { c - by_leaf }),
+            }
+        }));
+        let on_plane = &self.tree.on_plane[on_start as usize..on_end];
+        self.on_plane.extend_from_slice(on_plane);
+        child + by_node
+    }
+
+    fn push(&mut self, plane: u32) -> usize {
+        self.nodes.push(Node {
+            plane,
+            on_start: self.on_plane.len() as u32,
+            children: [0; 2],
+        });
+        self.nodes.len() - 1
     }
 
     /// Splits a leaf by the planes of strips, each only where the strip lies.

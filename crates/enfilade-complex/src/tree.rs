@@ -5,7 +5,7 @@
 //! plane cut the whole building. Boxes first keep each plane local, which makes the number of leaves near-linear. If
 //! possible, a box side lies on a large axis-aligned surface, which then needs no split of its own.
 
-use enfilade_geom::poly::{self, Poly, Sides};
+use enfilade_geom::poly::{self, Poly, Side};
 use enfilade_geom::{Aabb, DVec3, Plane, Purse};
 
 use rayon::prelude::*;
@@ -100,10 +100,44 @@ pub(super) fn leaf_index(child: i32) -> u32 {
     (-1 - child) as u32
 }
 
-/// A piece of a surface in a box or a region of it.
+/// A piece of a surface in a box or a region of it. Small, since each moves once for each node above it.
 struct Fragment {
     surface: u32,
-    points: Poly,
+    plane: u32,
+    bounds: Aabb,
+    /// Its vertices, unless they are those of the surface.
+    cut: Option<Box<Poly>>,
+}
+
+impl Fragment {
+    fn cut_to(&self, points: Poly) -> Self {
+        Self {
+            bounds: Aabb::of_points(&points),
+            cut: Some(Box::new(points)),
+            ..*self
+        }
+    }
+
+    fn points<'a>(&'a self, set: &'a SurfaceSet) -> &'a [DVec3] {
+        match &self.cut {
+            Some(points) => points,
+            None => &set.surfaces[self.surface as usize].points,
+        }
+    }
+
+    /// Returns its side of a plane across an axis, as [`poly::side`] does.
+    fn side(&self, axis: usize, at: f64, eps: f64) -> Side {
+        let [is_front, is_back] = [
+            self.bounds.max[axis] - at > eps,
+            self.bounds.min[axis] - at < -eps,
+        ];
+        match (is_front, is_back) {
+            (false, false) => Side::On,
+            (true, false) => Side::Front,
+            (false, true) => Side::Back,
+            (true, true) => Side::Both,
+        }
+    }
 }
 
 /// A subtree under construction. Planes of box sides are numbered after those of surfaces.
@@ -165,7 +199,12 @@ pub(super) fn build(
                 return None;
             }
             let points = poly::clip_to_box(&s.points, &bounds, tolerance.cut)?;
-            Some(Fragment { surface, points })
+            Some(Fragment {
+                surface,
+                plane: s.plane,
+                bounds: Aabb::of_points(&points),
+                cut: (points[..] != s.points[..]).then(|| Box::new(points)),
+            })
         })
         .collect();
     let axis_of: Vec<Option<u8>> = set
@@ -261,10 +300,6 @@ impl<'a> Sweep<'a> {
 }
 
 impl Builder<'_> {
-    fn plane_of(&self, f: &Fragment) -> u32 {
-        self.set.surfaces[f.surface as usize].plane
-    }
-
     fn split_box(&self, fragments: Vec<Fragment>, bounds: Aabb, out: &mut Part) -> i32 {
         let n = fragments.len();
         if !self.purse.spend(2 * n as u64) {
@@ -332,12 +367,13 @@ impl Builder<'_> {
     ) -> (Vec<Fragment>, Vec<Fragment>) {
         let on_start = on_plane.len();
         let [mut front, mut back] = [0; 2].map(|_| Vec::with_capacity(fragments.len() / 2 + 1));
+        let axis = (0..3).find(|&a| cut.normal[a] == 1.0);
+        let eps = self.tolerance.cut;
         for f in fragments {
-            let own = self.plane_of(&f);
             if let Some(id) = plane_id
                 && lies_in(
-                    own,
-                    &self.set.surfaces[f.surface as usize].points,
+                    f.plane,
+                    || &self.set.surfaces[f.surface as usize].points,
                     id,
                     self.set.planes.planes(),
                     &self.tolerance,
@@ -346,21 +382,21 @@ impl Builder<'_> {
                 on_plane.push(f.surface);
                 continue;
             }
-            match poly::split(&f.points, cut, self.tolerance.cut) {
-                Sides::Front => front.push(f),
-                Sides::Back => back.push(f),
-                Sides::Both(a, b) => {
-                    front.push(Fragment {
-                        surface: f.surface,
-                        points: a,
-                    });
-                    back.push(Fragment {
-                        surface: f.surface,
-                        points: b,
-                    });
+            let side = match axis {
+                Some(axis) => f.side(axis, -cut.d, eps),
+                None => poly::side(f.points(self.set), cut, eps),
+            };
+            match side {
+                Side::Front => front.push(f),
+                Side::Back => back.push(f),
+                Side::Both => {
+                    let [mut a, mut b] = [Poly::new(), Poly::new()];
+                    poly::add_parts(f.points(self.set), cut, eps, &mut a, &mut b);
+                    front.push(f.cut_to(a));
+                    back.push(f.cut_to(b));
                 }
                 // Too small to have a side; nothing of it is left.
-                Sides::On => {}
+                Side::On => {}
             }
         }
         // A surface may arrive in several fragments if regions were cut before.
@@ -380,7 +416,6 @@ impl Builder<'_> {
     fn choose_box_split(&self, fragments: &[Fragment], bounds: &Aabb) -> Option<BoxSplit> {
         let stride = fragments.len().div_ceil(SAMPLE);
         let sample: Vec<&Fragment> = fragments.iter().step_by(stride).collect();
-        let boxes: Vec<Aabb> = sample.iter().map(|f| Aabb::of_points(&f.points)).collect();
         let total = sample.len() as f64;
         let size = bounds.size();
         let mut best: Option<(f64, BoxSplit)> = None;
@@ -391,8 +426,8 @@ impl Builder<'_> {
                 continue;
             }
             let (lo, hi) = (bounds.min[axis], bounds.max[axis]);
-            let mut mins: Vec<f64> = boxes.iter().map(|b| b.min[axis]).collect();
-            let mut maxs: Vec<f64> = boxes.iter().map(|b| b.max[axis]).collect();
+            let mut mins: Vec<f64> = sample.iter().map(|f| f.bounds.min[axis]).collect();
+            let mut maxs: Vec<f64> = sample.iter().map(|f| f.bounds.max[axis]).collect();
             mins.sort_unstable_by(f64::total_cmp);
             maxs.sort_unstable_by(f64::total_cmp);
             let (u, v) = (size[(axis + 1) % 3], size[(axis + 2) % 3]);
@@ -404,14 +439,10 @@ impl Builder<'_> {
             // The planes of axis-aligned surfaces; those that cover much of the section are preferred.
             let mut flat: Vec<(f64, u32, f64)> = sample
                 .iter()
-                .filter(|f| self.axis_of[self.plane_of(f) as usize] == Some(axis as u8))
+                .filter(|f| self.axis_of[f.plane as usize] == Some(axis as u8))
                 .map(|f| {
-                    let id = self.plane_of(f);
-                    (
-                        -self.set.planes.planes()[id as usize].d,
-                        id,
-                        poly::area(&f.points),
-                    )
+                    let at = -self.set.planes.planes()[f.plane as usize].d;
+                    (at, f.plane, poly::area(f.points(self.set)))
                 })
                 .filter(|&(at, ..)| at > lo + self.tolerance.cut && at < hi - self.tolerance.cut)
                 .collect();
@@ -433,13 +464,7 @@ impl Builder<'_> {
                     ));
                 }
             }
-            let mut ends: Vec<f64> = Vec::with_capacity(2 * mins.len() + 2);
-            ends.push(lo);
-            ends.extend_from_slice(&mins);
-            ends.extend_from_slice(&maxs);
-            ends.push(hi);
-            // A stable sort merges what is in order.
-            ends.sort_by(f64::total_cmp);
+            let ends = merged(&merged(&mins, &maxs), &[lo, hi]);
             let step = (ends.len() / 128).max(1);
             let mut sweep = Sweep::over(&mins, &maxs, 0.0);
             for pair in ends.windows(2).step_by(step) {
@@ -524,7 +549,7 @@ impl Builder<'_> {
 
     /// Returns the plane that splits the fewest fragments, then balances best, then covers most, then comes first.
     fn choose_plane(&self, fragments: &[Fragment]) -> u32 {
-        let mut ids: Vec<u32> = fragments.iter().map(|f| self.plane_of(f)).collect();
+        let mut ids: Vec<u32> = fragments.iter().map(|f| f.plane).collect();
         ids.sort_unstable();
         ids.dedup();
         // Ids are in order of falling area, so the first few are the large surfaces.
@@ -534,11 +559,11 @@ impl Builder<'_> {
             let plane = &self.set.planes.planes()[id as usize];
             let (mut n_front, mut n_back, mut n_cut) = (0i64, 0i64, 0i64);
             for f in fragments {
-                if self.plane_of(f) == id {
+                if f.plane == id {
                     continue;
                 }
                 let (mut front, mut back) = (false, false);
-                for &p in &f.points {
+                for &p in f.points(self.set) {
                     let d = plane.signed_distance(p);
                     front |= d > self.tolerance.plane;
                     back |= d < -self.tolerance.plane;
@@ -554,6 +579,24 @@ impl Builder<'_> {
         }
         best.map_or(0, |b| b.1)
     }
+}
+
+/// Merges two ascending lists.
+fn merged(a: &[f64], b: &[f64]) -> Vec<f64> {
+    let (mut a, mut b) = (a, b);
+    let mut out = Vec::with_capacity(a.len() + b.len());
+    while let (Some((x, a_rest)), Some((y, b_rest))) = (a.split_first(), b.split_first()) {
+        if x.total_cmp(y).is_le() {
+            out.push(*x);
+            a = a_rest;
+        } else {
+            out.push(*y);
+            b = b_rest;
+        }
+    }
+    out.extend_from_slice(a);
+    out.extend_from_slice(b);
+    out
 }
 
 /// Keeps the largest fragments of a knot; see [`MAX_BSP_FRAGMENTS`].

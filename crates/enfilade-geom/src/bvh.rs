@@ -14,7 +14,9 @@ use std::ops::ControlFlow;
 use glam::Vec4;
 use smallvec::SmallVec;
 
-use crate::ray::{Ray, RayHit, ShearedRay, closest_point_on_triangle, triangle_touches_box};
+use crate::ray::{
+    Ray, RayHit, ShearedRay, closest_point_on_triangle, closest_with_normal, triangle_touches_box,
+};
 use crate::{Aabb, DVec3, Triangle};
 use build::{Built, Node, build_nodes, round_down, round_up};
 
@@ -208,10 +210,23 @@ impl Bvh {
     }
 
     /// As [`Bvh::for_each_in_box`], until `is_found` returns `true`; returns `true` if it did.
-    pub fn any_in_box(&self, query: &Aabb, mut is_found: impl FnMut(u32) -> bool) -> bool {
+    pub fn any_in_box(&self, query: &Aabb, is_found: impl FnMut(u32) -> bool) -> bool {
+        self.any_in_box_of(query, |_| true, is_found)
+    }
+
+    /// Does [`Bvh::any_in_box`] for the triangles that a test accepts, which is made first.
+    pub fn any_in_box_of(
+        &self,
+        query: &Aabb,
+        is_asked: impl Fn(&Triangle) -> bool,
+        mut is_found: impl FnMut(u32) -> bool,
+    ) -> bool {
         let mut any = false;
         self.walk_box(query, |i| {
-            any = triangle_touches_box(&self.triangle(i), query) && is_found(self.ids[i]);
+            let triangle = self.triangle(i);
+            any = is_asked(&triangle)
+                && triangle_touches_box(&triangle, query)
+                && is_found(self.ids[i]);
             !any
         });
         any
@@ -284,7 +299,7 @@ impl Bvh {
         if off * off > reach * reach * n.length_squared() {
             return None;
         }
-        let d2 = closest_point_on_triangle(p, &t).distance_squared(p);
+        let d2 = closest_with_normal(p, &t, n).distance_squared(p);
         (d2 <= reach * reach).then(|| d2.sqrt())
     }
 

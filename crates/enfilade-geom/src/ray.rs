@@ -135,7 +135,12 @@ pub fn closest_point_on_segment(p: DVec3, a: DVec3, b: DVec3) -> DVec3 {
 /// prism it is the foot of the perpendicular, elsewhere the nearest point of the three edges.
 #[must_use]
 pub fn closest_point_on_triangle(p: DVec3, t: &Triangle) -> DVec3 {
-    let n = (t[1] - t[0]).cross(t[2] - t[0]);
+    closest_with_normal(p, t, (t[1] - t[0]).cross(t[2] - t[0]))
+}
+
+/// Does [`closest_point_on_triangle`] with the cross product of two edges.
+#[inline]
+pub(crate) fn closest_with_normal(p: DVec3, t: &Triangle, n: DVec3) -> DVec3 {
     let n2 = n.length_squared();
     if n2 > 0.0 {
         let inside = (0..3).all(|i| {

@@ -98,16 +98,16 @@ impl Sheets<'_> {
         }
         let bounds = Aabb::of_points(&section).expanded(near.slack);
         let mut inside = Vec::new();
-        self.bvh.any_in_box(&bounds, |i| {
-            let triangle = self.triangle(i);
-            if triangle
-                .iter()
-                .all(|&p| plane.signed_distance(p).abs() <= near.slack)
-            {
+        let is_in = |p: &DVec3| plane.signed_distance(*p).abs() <= near.slack;
+        // Few triangles near it lie in the plane, and that is quickly told.
+        self.bvh.any_in_box_of(
+            &bounds,
+            |triangle| triangle.iter().all(is_in),
+            |i| {
                 inside.push(i);
-            }
-            inside.len() >= MAX_TRIANGLES
-        });
+                inside.len() >= MAX_TRIANGLES
+            },
+        );
         inside.sort_unstable();
         let mut left = vec![section];
         for i in inside {

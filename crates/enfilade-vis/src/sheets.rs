@@ -85,6 +85,14 @@ impl<'a> Sheets<'a> {
         hull: &Hull,
         line: [DVec3; 2],
     ) -> Option<Vec<u32>> {
+        // `None` also if the triangle touches an end of the beam.
+        let is_crossed = |t: u32| {
+            let triangle = &self.triangles[t as usize];
+            let is_crossed = crosses(triangle, line, hull.apart)?;
+            let is_apart = |end: &Vec<DVec3>| are_apart(triangle, end, hull.apart);
+            beam.ends.iter().all(is_apart).then_some(is_crossed)
+        };
+        let mut n_crossed = u32::from(is_crossed(seed)?);
         let mut sheet = vec![seed];
         let mut rim: Vec<(u32, u32)> = self.edges[seed as usize].map(|e| (e, seed)).to_vec();
         let mut at = 0;
@@ -113,18 +121,10 @@ impl<'a> Sheets<'a> {
                 }
             }
         }
-        let mut n_crossed = 0;
-        for &t in &sheet {
-            n_crossed += u32::from(crosses(&self.triangles[t as usize], line, hull.apart)?);
+        for &t in &sheet[1..] {
+            n_crossed += u32::from(is_crossed(t)?);
         }
-        let is_free = n_crossed % 2 == 1
-            && sheet.iter().all(|&t| {
-                let triangle = &self.triangles[t as usize];
-                beam.ends
-                    .iter()
-                    .all(|end| are_apart(triangle, end, hull.apart))
-            });
-        is_free.then_some(sheet)
+        (n_crossed % 2 == 1).then_some(sheet)
     }
 
     /// Returns how straight a sheet continues over an edge: the cosine of the turn.
