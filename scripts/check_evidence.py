@@ -258,6 +258,7 @@ class Checker:
             "lines": len(self.lines),
             "trace_bytes": len(self.trace),
             "clearance": self.c,
+            "far": None if math.isinf(self.far) else self.far,
         }
 
     # Why hidden is hidden

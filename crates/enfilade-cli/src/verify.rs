@@ -234,6 +234,7 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
             "lines": report.n_lines,
             "trace_bytes": report.n_trace,
             "clearance": report.clearance,
+            "far": report.far.is_finite().then_some(report.far),
         });
         print_json(out, &value)?;
     } else {
@@ -247,6 +248,13 @@ fn verify_visibility(args: &Verify, evidence: &Path) -> anyhow::Result<()> {
             report.n_hidden,
             report.n_visible - report.n_proved
         )?;
+        if report.far.is_finite() {
+            writeln!(
+                out,
+                "within {} m: all that is farther counts as hidden",
+                report.far
+            )?;
+        }
     }
     Ok(())
 }

@@ -135,6 +135,11 @@ fn a_world_without_rooms_is_written_only_if_asked_for() {
     let done = run(&dir, "bake flat.obj -o flat.glb --allow-empty");
     assert!(done.status.success());
     assert!(printed(&done).contains("trust: none: no rooms"));
+    // A triangle is no room in any unit, and whichever axis points up: what was tried in vain is no advice.
+    for vain in ["--unit", "--up"] {
+        assert!(!printed(&done).contains(vain), "{}", printed(&done));
+    }
+    assert!(printed(&done).contains("--leak-path"), "{}", printed(&done));
     let done = run(&dir, "plan flat.glb -o flat.svg");
     assert!(said(&done).contains("has no room"), "{}", said(&done));
 }

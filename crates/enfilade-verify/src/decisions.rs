@@ -101,6 +101,7 @@ pub(crate) fn check(subject: &Subject, own: &[Triangle], seed: u64) -> Vec<Strin
                 .find_map(|why| area_problem(graph, portal, why));
             out.extend(problem.map(|what| format!("portal {i}: {what}")));
         }
+        out.extend(border_problems(graph));
         out.extend(spaces::check(subject, own, seed));
     }
     out
@@ -164,6 +165,29 @@ fn is_decided(graph: &CellPortalGraph) -> bool {
     let of_cells = graph.cells.iter().map(|c| &c.why);
     let mut all = of_cells.chain(graph.portals.iter().map(|p| &p.why));
     all.any(|whys| !whys.is_empty())
+}
+
+/// Returns contradictions between land and the borders that part it: each area has one, and each is that of an area.
+fn border_problems(graph: &CellPortalGraph) -> Vec<String> {
+    let is_border = |p: &Portal| p.why.iter().any(|why| why.reason == Reason::Border);
+    let land = graph.cells.iter().filter(|c| c.is_land);
+    let bare = land.filter(|c| !c.portals.iter().any(|&p| is_border(&graph[p])));
+    let mut out: Vec<String> = bare
+        .map(|c| {
+            format!(
+                "{}: it is land, but no border parts it from other land",
+                c.name
+            )
+        })
+        .collect();
+    for (i, portal) in graph.portals.iter().enumerate() {
+        if is_border(portal) && !portal.cells.iter().any(|&c| graph[c].is_land) {
+            out.push(format!(
+                "portal {i}: a border of open land, but no land is beside it"
+            ));
+        }
+    }
+    out
 }
 
 /// Names the first cell and the first portal without a decision.

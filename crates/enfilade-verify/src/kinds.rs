@@ -6,9 +6,10 @@
 //!
 //! Sills are measured anew from the triangles of the file; values within rounding of another kind are not judged.
 
-use enfilade_cpg::{DetailObject, Portal, PortalKind, World};
-use enfilade_geom::{Bvh, DVec3, Plane, Ray, Triangle, Winding};
+use enfilade_cpg::{DetailObject, Fact, Portal, PortalKind, World};
+use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle, Winding};
 
+use crate::details::triangles_of;
 use crate::subject::to_dvec;
 
 /// Largest width of every piece of a crack: nobody climbs through. [Units: wu]
@@ -21,6 +22,10 @@ const CURB: f64 = 0.07;
 const LEAST_DOOR: f64 = 1.5;
 /// More than the growth of outlines: closer to a bound, nothing is judged. [Units: wu]
 const ROOM: f64 = 0.02;
+/// Share of an opening that leaves and panes must fill to shut it, if the bake does not say another.
+const CLOSED: f64 = 0.6;
+/// Distance from an opening at which an object may fill it. [Units: wu]
+const REACH: f64 = 0.5;
 /// Distance from an opening at which the ground is searched. [Units: wu]
 const BESIDE: f64 = 0.5;
 
@@ -167,9 +172,43 @@ fn is_told_elsewhere(world: &World, detail: &DetailObject) -> bool {
     names.chain(groups).any(|name| tells(&name.to_lowercase()))
 }
 
-/// Returns a contradiction between kind, height and sill of an upright portal.
+/// Returns `true` if an object near a portal may say which opening it fills.
+fn is_told_near(world: &World, p: &Portal) -> bool {
+    let corners = p.pieces.iter().flatten().map(|&c| to_dvec(c));
+    let near = corners.fold(Aabb::EMPTY, Aabb::including).expanded(REACH);
+    world.details.iter().any(|detail| {
+        let tells = tells(&detail.name.to_lowercase()) || is_told_elsewhere(world, detail);
+        tells
+            && triangles_of(world, detail)
+                .iter()
+                .any(|t| near.overlaps(&Aabb::of_points(t)))
+    })
+}
+
+/// Returns `true` if a decision knows how little fills an opening, and no object may say that it is a window, as none does of a level one.
+fn is_unfilled(world: &World, p: &Portal) -> bool {
+    let settings = &world.graph.provenance.settings;
+    let shut = settings.get("merge.closed_share");
+    let shut = shut.and_then(|s| s.parse().ok()).unwrap_or(CLOSED);
+    let mut closed = p
+        .why
+        .iter()
+        .filter_map(|why| why.facts.get(&Fact::Closed))
+        .peekable();
+    closed.peek().is_some()
+        && closed.all(|&share| f64::from(share) < shut - ROOM)
+        && p.fittings.is_empty()
+        && (!is_upright(p) || !is_told_near(world, p))
+}
+
+/// Returns a contradiction between kind, height and sill of a portal.
 fn stance_problem(world: &World, p: &Portal, ground: &Bvh) -> Option<String> {
-    if p.kind == PortalKind::Crack || !is_upright(p) {
+    let is_window = p.kind == PortalKind::Window && p.pieces.len() == 1;
+    if !is_upright(p) {
+        let is_wrong = is_window && is_unfilled(world, p);
+        return is_wrong.then(|| "lies level, and nothing fills it".to_owned());
+    }
+    if p.kind == PortalKind::Crack {
         return None;
     }
     // Measure the open area: outlines of sharp openings are rectangles and may reach below the ground.
@@ -196,6 +235,9 @@ fn stance_problem(world: &World, p: &Portal, ground: &Bvh) -> Option<String> {
                 && most < if leads_outdoors(world, p) { CURB } else { SILL } - ROOM =>
         {
             Some(format!("is {height:.2} m high and stands on the ground"))
+        }
+        PortalKind::Window if is_window && most < SILL - ROOM && is_unfilled(world, p) => {
+            Some("stands on the ground, and nothing fills it".to_owned())
         }
         _ => None,
     }

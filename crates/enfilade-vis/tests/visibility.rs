@@ -3,13 +3,14 @@
 mod common;
 
 use std::io::Read;
+use std::ops::Range;
 use std::time::Duration;
 
 use common::pack;
 use enfilade_cpg::{CellId, Pvs, SightGraph, SightGraphError, SightPortal};
 use enfilade_geom::DVec3;
 use enfilade_testkit::Rng;
-use enfilade_verify::verify_evidence;
+use enfilade_verify::{EvidenceReport, verify_evidence};
 use enfilade_vis::{VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, see_all};
 use proptest::prelude::*;
 
@@ -603,4 +604,72 @@ fn a_graph_too_large_for_the_memory_allowed_is_refused_before_it_is_taken() {
     for word in ["portals", "GiB", "--max-memory"] {
         assert!(error.contains(word), "{error}");
     }
+}
+
+/// The parts of a body of evidence that a changed bit is tried in: names and bytes.
+fn parts_of_body(body: &[u8], n: usize) -> Vec<(&'static str, Range<usize>)> {
+    let word = |at: usize| u32::from_le_bytes(body[at..at + 4].try_into().unwrap()) as usize;
+    let table = n * n.div_ceil(8);
+    let lines = 40 + 2 * table;
+    // Numbers of lines and trees fit in the lower half of theirs.
+    let trees = (0..word(lines)).fold(lines + 8, |at, _| at + 52 + 4 * word(at + 48));
+    let traces = (0..word(trees)).fold(trees + 8, |at, _| at + 12 + word(at + 8));
+    vec![
+        ("graph", 0..8),
+        ("clearance", 8..16),
+        ("far", 16..24),
+        ("totals", 24..40),
+        ("might", 40..40 + table),
+        ("claims", 40 + table..lines),
+        ("lines", lines..trees),
+        ("number of trees", trees..traces),
+        ("traces", traces..body.len()),
+    ]
+}
+
+// The bits of a tree are those of `evidence_by_walls_that_are_not_there_is_rejected`.
+#[test]
+fn a_changed_bit_is_refused_or_changes_nothing_that_is_claimed() {
+    let mut n_accepted = 0;
+    for graph in [Grid::new(5, 11).graph(), Grid::new(3, 4).graph()] {
+        let bytes = see(&graph, &with_evidence()).evidence.unwrap();
+        let honest = verify_evidence(&graph, &bytes, None).unwrap();
+        let mut body = Vec::new();
+        let mut unpacker = flate2::read::ZlibDecoder::new(&bytes[24..]);
+        unpacker.read_to_end(&mut body).unwrap();
+        let n = 2 * graph.portals.len();
+        let row_bytes = n.div_ceil(8);
+        let mut rng = Rng::new(5);
+        for (part, range) in parts_of_body(&body, n) {
+            for _ in 0..200 {
+                let (at, bit) = (range.start + rng.below(range.len()), rng.below(8));
+                let mut forged = body.clone();
+                forged[at] ^= 1 << bit;
+                let Ok(report) = verify_evidence(&graph, &pack(&forged), None) else {
+                    continue;
+                };
+                n_accepted += 1;
+                let [row, column] = {
+                    let at = at - range.start;
+                    [at / row_bytes, at % row_bytes * 8 + bit]
+                };
+                match part {
+                    "clearance" => assert_ne!(report.clearance, honest.clearance),
+                    "far" => assert_ne!(report.far, honest.far),
+                    // The two directions of one portal, between neighbors.
+                    "might" => assert_eq!(column, row ^ 1),
+                    // Claims that have another reason, too; lines that are as good.
+                    "claims" | "lines" => {}
+                    _ => panic!("{part}: byte {at}, bit {bit}"),
+                }
+                let claimed = EvidenceReport {
+                    clearance: honest.clearance,
+                    far: honest.far,
+                    ..report
+                };
+                assert_eq!(claimed, honest, "{part}: byte {at}, bit {bit}");
+            }
+        }
+    }
+    assert!(n_accepted > 100, "{n_accepted}");
 }

@@ -32,12 +32,69 @@ const SCENE: &[&str] = &[
 /// `two.obj`.
 const BARE: &[&str] = SCENE.split_at(SCENE.len() - 1).0;
 
+/// [`BARE`], and the last with a world of the same materials.
+const GLTF: &[&str] = &{
+    let mut all = [""; SCENE.len()];
+    all.copy_from_slice(SCENE);
+    all[SCENE.len() - 1] = "verify gltf.glb --source @ --rays 200 --sight 5";
+    all
+};
+
 const BAKE: &[&str] = &[
     "bake two.gltf -o out.glb",
     "bake two.gltf -o out.glb --method bsp",
 ];
 
-pub(super) const INPUTS: [Input; 22] = [
+/// For what is not triangles: a surface is made first.
+const SURFACE: &[&str] = &[
+    "bake @ -o out.glb --allow-empty",
+    "bake @ -o out.glb --allow-empty --method delaunay",
+];
+
+/// The same, for points without the place of their scanner.
+const STATION: &[&str] = &["bake @ -o out.glb --allow-empty --station 2,1.5,2"];
+
+/// The seeds of fuzzing for these.
+const SEEDS: [(&str, &[u8]); 9] = [
+    (
+        "room.e57",
+        include_bytes!("../../../../fuzz/seeds/e57/room.e57"),
+    ),
+    (
+        "room.las",
+        include_bytes!("../../../../fuzz/seeds/las/room.las"),
+    ),
+    (
+        "room.laz",
+        include_bytes!("../../../../fuzz/seeds/las/room.laz"),
+    ),
+    (
+        "ball.nii",
+        include_bytes!("../../../../fuzz/seeds/volume/ball.nii"),
+    ),
+    (
+        "ball.nii.gz",
+        include_bytes!("../../../../fuzz/seeds/volume/ball.nii.gz"),
+    ),
+    (
+        "ball.nrrd",
+        include_bytes!("../../../../fuzz/seeds/volume/ball.nrrd"),
+    ),
+    (
+        "house.json",
+        include_bytes!("../../../../fuzz/seeds/implicit/house.json"),
+    ),
+    (
+        "geotiff.tif",
+        include_bytes!("../../../../fuzz/seeds/heights/geotiff.tif"),
+    ),
+    (
+        "vault.json",
+        include_bytes!("../../../../fuzz/seeds/patches/vault.json"),
+    ),
+];
+
+pub(super) const INPUTS: [Input; 32] = [
     Input {
         file: "two.obj",
         commands: SCENE,
@@ -45,12 +102,12 @@ pub(super) const INPUTS: [Input; 22] = [
     },
     Input {
         file: "two.glb",
-        commands: SCENE,
+        commands: GLTF,
         weight: 10,
     },
     Input {
         file: "two.gltf",
-        commands: SCENE,
+        commands: GLTF,
         weight: 8,
     },
     Input {
@@ -188,11 +245,64 @@ pub(super) const INPUTS: [Input; 22] = [
         commands: &["decimate two.obj --steps < @"],
         weight: 1,
     },
+    Input {
+        file: "room.e57",
+        commands: SURFACE,
+        weight: 3,
+    },
+    Input {
+        file: "room.las",
+        commands: STATION,
+        weight: 4,
+    },
+    Input {
+        file: "room.laz",
+        commands: STATION,
+        weight: 4,
+    },
+    Input {
+        file: "ball.nii",
+        commands: SURFACE,
+        weight: 4,
+    },
+    Input {
+        file: "ball.nii.gz",
+        commands: SURFACE,
+        weight: 2,
+    },
+    Input {
+        file: "ball.nrrd",
+        commands: SURFACE,
+        weight: 4,
+    },
+    Input {
+        file: "house.json",
+        commands: SURFACE,
+        weight: 4,
+    },
+    Input {
+        file: "geotiff.tif",
+        commands: SURFACE,
+        weight: 4,
+    },
+    Input {
+        file: "vault.json",
+        commands: SURFACE,
+        weight: 4,
+    },
+    Input {
+        file: "living.json",
+        commands: &[
+            "render world.glb -o out.png --size 8x8 --eye 1,1.5,2 --look 7,1.5,2 --adapter software --living @ --time 2",
+        ],
+        weight: 1,
+    },
 ];
 
 /// Commands that make further inputs from these, in order.
-pub(super) const MADE: [&str; 4] = [
+pub(super) const MADE: [&str; 5] = [
     "bake two.obj -o world.glb --method watershed",
+    "bake two.gltf -o gltf.glb",
     "pvs world.glb -o out.pvs --into world.glb --parts --volumes --evidence world.ev",
     "pvs grid.prt -o out.pvs --evidence grid.ev",
     "pvs grid.prt -o out.pvs --checkpoint grid.search --budget 0",
@@ -210,7 +320,7 @@ pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
     let n = bin.len();
     let inline = with_buffer(json!({"byteLength": n}));
     let outside = with_buffer(json!({"byteLength": n, "uri": "two.bin"}));
-    let files: [(&str, Vec<u8>); 16] = [
+    let files: [(&str, Vec<u8>); 17] = [
         ("two.obj", obj(&boxes).into()),
         (
             "two.mtl",
@@ -233,17 +343,23 @@ pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
             "keep = [[4.1, 1.05, 2.5]]\njoin = [[1.0, 1.5, 2.0]]\n".into(),
         ),
         ("points.txt", "1 1.5 2\n7 1.5 2\n".into()),
+        ("living.json", LIVING.into()),
         ("walk.txt", "1 1.5 2 7 1.5 2\n".into()),
     ];
     let steps = (
         "steps.txt",
         b"b 3\nl\nkeep\nn\njoin\nundo\nbake out.glb\nsave out.toml\ng 0\nq\n".to_vec(),
     );
-    for (name, bytes) in files.into_iter().chain([steps]) {
+    let seeds = SEEDS.map(|(name, bytes)| (name, bytes.to_vec()));
+    for (name, bytes) in files.into_iter().chain([steps]).chain(seeds) {
         std::fs::write(folder.join(name), bytes).with_context(|| name.to_owned())?;
     }
     Ok(())
 }
+
+const LIVING: &str = r#"{"version": 1, "lamps": [{"at": [1, 2, 2], "color": [1.6, 1.3, 1], "range": 7}],
+    "people": {"count": 2, "seed": 1, "places": [[1, 0, 2], [7, 0, 2]], "stay": [4, 30]},
+    "sounds": [{"name": "radio", "at": [2, 1, 2]}]}"#;
 
 const SETTINGS: &str = "\
 min_opening = 0.5

@@ -46,6 +46,14 @@ pub(super) const ALL: &[Tampering] = &[
         w.graph.cells[i].is_void = false;
         Some(())
     }),
+    Tampering::new("a room that is called land", |w, at| {
+        called_land(w, at).map(|_| ())
+    }),
+    Tampering::new("a room that is called land, and decided so", |w, at| {
+        let i = called_land(w, at)?;
+        w.graph.cells[i].why = vec![Why::given(Reason::Land)];
+        Some(())
+    }),
     Tampering::new("an outdoors with the decision of land", |w, _| {
         let mut cells = w.graph.cells.iter_mut();
         let outdoors = cells.find(|c| c.outdoor)?;
@@ -91,6 +99,12 @@ pub(super) const ALL: &[Tampering] = &[
         Some(())
     }),
 ];
+
+fn called_land(w: &mut World, at: usize) -> Option<usize> {
+    let i = pick(w.graph.cells.len(), at, |i| w.graph.cells[i].is_room())?;
+    w.graph.cells[i].is_land = true;
+    Some(i)
+}
 
 /// Returns `true` for the decision that people can stand in a room.
 fn is_of_room(why: &Why) -> bool {

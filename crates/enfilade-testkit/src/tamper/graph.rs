@@ -24,6 +24,18 @@ pub(super) const ALL: &[Tampering] = &[
     Tampering::new("a door that is called open", |w, at| {
         kind(w, at, PortalKind::Door, PortalKind::Open)
     }),
+    Tampering::new(
+        "an opening without a sill that is called a window",
+        |w, at| {
+            let is_low = |i: usize| {
+                let p = &w.graph.portals[i];
+                p.kind == PortalKind::Open && p.pieces.len() == 1 && p.fittings.is_empty()
+            };
+            let i = pick(w.graph.portals.len(), at, is_low)?;
+            w.graph.portals[i].kind = PortalKind::Window;
+            Some(())
+        },
+    ),
     Tampering::new("a wide crack", |w, at| {
         portal(w, at)?.kind = PortalKind::Crack;
         Some(())
@@ -172,6 +184,17 @@ pub(super) const ALL: &[Tampering] = &[
         w.graph.locator.planes.get_mut(i)?[3] += 0.05;
         Some(())
     }),
+    Tampering::new("a plane of the locator moved by 0.3 m", |w, at| {
+        let n = w.graph.locator.planes.len();
+        // Many divide what is of one cell on both sides.
+        let moved = (0..n).map(|i| (i + at * n / 3) % n).find_map(|i| {
+            let mut moved = w.graph.locator.clone();
+            moved.planes[i][3] -= 0.3;
+            answers_differ(&w.graph.locator, &moved).then_some(moved)
+        });
+        w.graph.locator = moved?;
+        Some(())
+    }),
     Tampering::new("a leaf of the locator of another cell", |w, at| {
         let [leaf, other] = two_rooms(w, at)?.map(|i| Locator::leaf(Some(CellId(i as u32))));
         let nodes = w.graph.locator.nodes.iter_mut();
@@ -246,6 +269,21 @@ fn scaled(p: &mut Portal, by: f64) -> Option<()> {
     }
     p.area *= (by * by) as f32;
     Some(())
+}
+
+/// Returns `true` if two locators of one box give different cells at one of the points of a grid.
+fn answers_differ(one: &Locator, other: &Locator) -> bool {
+    const SIDE: usize = 40;
+    let share = |k: usize| (k as f64 + 0.5) / SIDE as f64;
+    (0..SIDE * SIDE * SIDE).any(|k| {
+        let by = DVec3::new(
+            share(k % SIDE),
+            share(k / SIDE % SIDE),
+            share(k / SIDE / SIDE),
+        );
+        let p = one.bounds.min + one.bounds.size() * by;
+        one.locate(p) != other.locate(p)
+    })
 }
 
 fn area(piece: &[[f32; 3]]) -> f32 {

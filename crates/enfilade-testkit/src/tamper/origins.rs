@@ -65,6 +65,11 @@ pub(super) const ALL: &[Tampering] = &[
         w.sources[named[i] as usize].name.push('x');
         Some(())
     }),
+    Tampering::by_source("forged extras of a source", |w, at| {
+        let i = pick(w.sources.len(), at, |_| true)?;
+        w.sources[i].extras = r#"{"forged":true}"#.into();
+        Some(())
+    }),
     Tampering::new("a source of which nothing is there", |w, at| {
         let parent = (at as u32).checked_rem(w.sources.len() as u32)?;
         let mut more = w.sources[parent as usize].clone();

@@ -1,7 +1,7 @@
 //! Claims about sight: cells, volumes and parts.
 
-use enfilade_cpg::{CellId, CellSet, PartNumbers, Pvs, VisibleParts, VisibleVolumes, World};
-use enfilade_geom::{Bvh, DVec3, Plane, Triangle};
+use enfilade_cpg::{Cell, CellId, CellSet, PartNumbers, Pvs, VisibleParts, VisibleVolumes, World};
+use enfilade_geom::{Bvh, DVec3, Plane, Ray, Triangle};
 
 use super::{Tampering, pick};
 
@@ -46,6 +46,23 @@ pub(super) const ALL: &[Tampering] = &[
             pieces.push(vec![[1.0, 0.0, 0.0, -1e4]]);
         })
     }),
+    Tampering::new("a piece of a visible volume dropped", |w, at| {
+        let volumes = w.pvs.as_ref()?.volumes.as_ref()?;
+        let pairs = Pairs::new(w)?;
+        let of_several = |i: usize| pairs.are_apart(w, i) && volumes.pieces_of(i).count() > 1;
+        let (pair, piece) = pairs.from_place(at, of_several, |pair, lines| {
+            let pieces: Vec<&[[f64; 4]]> = volumes.pieces_of(pair).collect();
+            let is_only_of = |i: usize, p: DVec3| {
+                let mut holding = (0..pieces.len()).filter(|&k| is_in(pieces[k], p));
+                holding.next() == Some(i) && holding.next().is_none()
+            };
+            let n_lost = |i: usize| lines.iter().filter(|l| is_only_of(i, l[1])).count();
+            (0..pieces.len()).find(|&i| n_lost(i) > lines.len() / MOST_HIDDEN)
+        })?;
+        volumes_of_pair(w, pair, |pieces| {
+            pieces.remove(piece);
+        })
+    }),
     Tampering::new("the parts of a pair emptied", |w, at| {
         parts(w, at, Vec::clear)
     }),
@@ -54,6 +71,20 @@ pub(super) const ALL: &[Tampering] = &[
             let half = row.len() / 2;
             row.truncate(half);
         })
+    }),
+    Tampering::new("a row of parts of cells apart shortened", |w, at| {
+        let parts = w.pvs.as_ref()?.parts.as_ref()?;
+        let pairs = Pairs::new(w)?;
+        let is_far = |i: usize| pairs.are_apart(w, i) && !parts.runs_of(i).is_empty();
+        let (pair, end) = pairs.from_place(at, is_far, |pair, lines| {
+            let runs = parts.runs_of(pair).iter();
+            let row: Vec<u32> = runs.flat_map(|&[a, b]| a..b).collect();
+            let (end, to) = (row[row.len() / 2], pairs.pairs[pair].1);
+            let is_lost = |t: u32| t >= end && row.contains(&t) && cells_of(w, t) == [to];
+            let met = lines.iter().filter_map(|l| pairs.met(l));
+            (met.filter(|&t| is_lost(t)).count() > lines.len() / MOST_HIDDEN).then_some(end)
+        })?;
+        parts_of_pair(w, pair, |row| row.retain(|&t| t < end))
     }),
     Tampering::new("the largest triangle that a pair sees left out", |w, at| {
         let p = portal(w, at)?;
@@ -69,6 +100,89 @@ pub(super) const ALL: &[Tampering] = &[
         })
     }),
 ];
+
+/// Of so many lines of sight between two cells, more than one must meet what a lie hides: where none does, it is no lie, and few of a
+/// checker's lines meet less.
+const MOST_HIDDEN: usize = 20;
+
+/// Ordered pairs of cells, and the walls between.
+struct Pairs {
+    pairs: Vec<(CellId, CellId)>,
+    walls: Bvh,
+    /// Points in the air of each cell.
+    points: Vec<Vec<DVec3>>,
+}
+
+impl Pairs {
+    fn new(w: &World) -> Option<Self> {
+        let batches = w.batches.iter();
+        let all: Vec<Triangle> = batches.flat_map(|b| b.primitive.triangles()).collect();
+        let points_of = |(i, cell): (usize, &Cell)| {
+            const SIDE: usize = 5;
+            let [low, high] = cell.aabb.map(|p| DVec3::from(p.map(f64::from)));
+            let share = |k: usize| (k % SIDE) as f64 / SIDE as f64 + 0.08;
+            let by = |k: usize| DVec3::new(share(k), share(k / SIDE), share(k / SIDE / SIDE));
+            let grid = (0..SIDE * SIDE * SIDE).map(|k| low + (high - low) * by(k));
+            let is_own = |p: &DVec3| w.graph.locator.locate(*p) == Some(CellId(i as u32));
+            grid.filter(is_own).collect()
+        };
+        Some(Self {
+            pairs: w.pvs.as_ref()?.pairs().collect(),
+            walls: Bvh::build(&all),
+            points: w.graph.cells.iter().enumerate().map(points_of).collect(),
+        })
+    }
+
+    /// The first pair from one of three places on that `is_fit`, with the lie that `lie` finds in it, given its lines of sight.
+    fn from_place<T>(
+        &self,
+        place: usize,
+        is_fit: impl Fn(usize) -> bool,
+        lie: impl Fn(usize, &[[DVec3; 2]]) -> Option<T>,
+    ) -> Option<(usize, T)> {
+        let fit: Vec<usize> = (0..self.pairs.len()).filter(|&i| is_fit(i)).collect();
+        let (before, after) = fit.split_at(place * fit.len() / 3);
+        let mut from = after.iter().chain(before);
+        from.find_map(|&pair| Some((pair, lie(pair, &self.lines(pair))?)))
+    }
+
+    /// The lines of sight between the points of a pair.
+    fn lines(&self, pair: usize) -> Vec<[DVec3; 2]> {
+        let (a, b) = self.pairs[pair];
+        let [eyes, ends] = [a, b].map(|c| &self.points[c.idx()]);
+        let all = eyes.iter().flat_map(|&p| ends.iter().map(move |&q| [p, q]));
+        let is_open = |[p, q]: &[DVec3; 2]| !self.walls.any_hit(*p, *q, |_| false);
+        all.filter(is_open).collect()
+    }
+
+    /// The triangle that a line meets behind its end.
+    fn met(&self, &[p, q]: &[DVec3; 2]) -> Option<u32> {
+        let ray = Ray {
+            origin: p,
+            direction: (q - p).try_normalize()?,
+            t_max: f64::INFINITY,
+        };
+        Some(self.walls.closest_hit(&ray, |_| false)?.triangle)
+    }
+
+    fn are_apart(&self, w: &World, pair: usize) -> bool {
+        let (a, b) = self.pairs[pair];
+        let mut portals = w.graph.portals.iter();
+        a != b && !portals.any(|p| p.cells.contains(&a) && p.cells.contains(&b))
+    }
+}
+
+/// The cells of a triangle of the structure.
+fn cells_of(w: &World, triangle: u32) -> &[CellId] {
+    let numbers = PartNumbers::new(w);
+    let mut batches = (0..w.batches.len()).filter(|&b| numbers.of_batch(b).contains(&triangle));
+    batches.next().map_or(&[], |b| &w.batches[b].cells)
+}
+
+fn is_in(piece: &[[f64; 4]], p: DVec3) -> bool {
+    let mut planes = piece.iter();
+    planes.all(|&[x, y, z, d]| DVec3::new(x, y, z).dot(p) + d >= 0.0)
+}
 
 /// A portal between two cells, the larger ones of its kind.
 fn portal(w: &World, place: usize) -> Option<usize> {

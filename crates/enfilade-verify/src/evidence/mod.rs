@@ -39,6 +39,8 @@ pub struct EvidenceReport {
     pub n_trace: u64,
     /// Lines that pass closer than this to an opening's edge may be lost. [Units: wu]
     pub clearance: f64,
+    /// Only what is nearer than this is claimed: farther pairs are hidden by the distance alone. Infinite for none. [Units: wu]
+    pub far: f64,
 }
 
 /// Returns `true` if something solid lies between two points.
@@ -103,6 +105,7 @@ pub fn verify_evidence(
         n_lines: evidence.lines.len() as u64,
         n_trace: evidence.trace.len() as u64,
         clearance: evidence.clearance,
+        far: evidence.far,
         cells,
     })
 }
