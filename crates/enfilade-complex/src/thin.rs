@@ -63,7 +63,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     visitor.visit(&mut sink);
     let edges = sink.found;
     // By leaf, then in the order of the tree.
-    let mut by_leaf: Vec<(u32, u32)> = (0..).zip(&edges).map(|(i, e)| (e.leaf, i)).collect();
+    let mut by_leaf: Vec<LeafEdge> = (0..).zip(&edges).map(|(i, e)| (e.leaf, i)).collect();
     by_leaf.par_sort_unstable();
     let tree = visitor.tree;
     let finder = StripFinder {
@@ -195,6 +195,9 @@ fn is_within(points: &[DVec3], normal: DVec3, p: DVec3) -> bool {
     })
 }
 
+/// A leaf, and the index of an edge seen from it.
+type LeafEdge = (u32, u32);
+
 /// Strips across one leaf with their planes.
 type LeafCuts = (u32, Vec<(Plane, Poly)>);
 
@@ -208,7 +211,7 @@ struct StripFinder<'a> {
 
 impl StripFinder<'_> {
     /// Returns the strips across the leaves of a subtree, by leaf. `edges` are those of these leaves, each after its leaf.
-    fn find(&self, child: i32, edges: &[(u32, u32)], mut region: CutBox) -> Vec<LeafCuts> {
+    fn find(&self, child: i32, edges: &[LeafEdge], mut region: CutBox) -> Vec<LeafCuts> {
         if edges.len() < PARALLEL_EDGES || child < 0 {
             let mut out = Vec::new();
             self.find_in_turn(child, edges, &mut region, &mut out);
@@ -229,7 +232,7 @@ impl StripFinder<'_> {
     fn find_in_turn(
         &self,
         child: i32,
-        edges: &[(u32, u32)],
+        edges: &[LeafEdge],
         region: &mut CutBox,
         out: &mut Vec<LeafCuts>,
     ) {
@@ -255,8 +258,8 @@ impl StripFinder<'_> {
     fn halves<'b>(
         &self,
         node: i32,
-        edges: &'b [(u32, u32)],
-    ) -> (Plane, [i32; 2], [&'b [(u32, u32)]; 2]) {
+        edges: &'b [LeafEdge],
+    ) -> (Plane, [i32; 2], [&'b [LeafEdge]; 2]) {
         let node = &self.tree.nodes[node as usize];
         let first_back = self.tree.leaf_range(node.children[1]).start;
         let (front, back) = edges.split_at(edges.partition_point(|e| e.0 < first_back));
@@ -265,7 +268,7 @@ impl StripFinder<'_> {
     }
 
     /// Returns the strips that will cut a leaf.
-    fn strips(&self, edges: &[(u32, u32)], region: &CutBox) -> Vec<(Plane, Poly)> {
+    fn strips(&self, edges: &[LeafEdge], region: &CutBox) -> Vec<(Plane, Poly)> {
         let edges = edges.iter().map(|&(_, i)| &self.edges[i as usize]);
         let mut found: Vec<(f64, Plane, Poly)> = edges
             .filter_map(|e| {
@@ -311,7 +314,7 @@ struct LeafCutter<'a> {
 impl LeafCutter<'_> {
     /// Copies a subtree with these leaves and cuts them; returns its new root.
     fn copy(&mut self, child: i32, leaves: Range<u32>) -> i32 {
-        if !self.next.as_ref().is_some_and(|n| n.0 < leaves.end) {
+        if self.next.as_ref().is_none_or(|n| n.0 >= leaves.end) {
             return self.copy_uncut(child, leaves);
         }
         if child < 0 {
