@@ -86,7 +86,7 @@ fn rooms_without_a_doorway_are_told() {
     assert!(text.contains("1 room has no doorway"), "{text}");
     assert!(text.contains("--detail-name"), "{text}");
     assert!(text.contains(" 1.30 2.00"), "{text}");
-    // What only a person can fill in is proposed, and not tried.
+    // A placeholder is proposed, and not tried.
     let printed = String::from_utf8_lossy(&done.stdout).into_owned();
     assert!(
         printed.contains("(try --detail-name 'PATTERN')"),

@@ -135,7 +135,7 @@ fn a_world_without_rooms_is_written_only_if_asked_for() {
     let done = run(&dir, "bake flat.obj -o flat.glb --allow-empty");
     assert!(done.status.success());
     assert!(printed(&done).contains("trust: none: no rooms"));
-    // A triangle is no room in any unit, and whichever axis points up: what was tried in vain is no advice.
+    // A triangle is not a room in any unit, and whichever axis points up: what was tried in vain is not advised.
     for vain in ["--unit", "--up"] {
         assert!(!printed(&done).contains(vain), "{}", printed(&done));
     }

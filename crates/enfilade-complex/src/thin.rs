@@ -62,7 +62,7 @@ pub(super) fn cut_thin_leaves(visitor: &Visitor<'_>, gap: f64) -> Tree {
     };
     visitor.visit(&mut sink);
     let edges = sink.found;
-    // By leaf, then in the order of the tree.
+    // Sorted by leaf, then in the order of the tree.
     let mut by_leaf: Vec<LeafEdge> = (0..).zip(&edges).map(|(i, e)| (e.leaf, i)).collect();
     by_leaf.par_sort_unstable();
     let tree = visitor.tree;

@@ -464,7 +464,9 @@ impl Builder<'_> {
                     ));
                 }
             }
-            let ends = merged(&merged(&mins, &maxs), &[lo, hi]);
+            let mut ends = [&mins[..], &maxs, &[lo, hi]].concat();
+            // Joins ascending runs.
+            ends.sort_by(f64::total_cmp);
             let step = (ends.len() / 128).max(1);
             let mut sweep = Sweep::over(&mins, &maxs, 0.0);
             for pair in ends.windows(2).step_by(step) {
@@ -579,24 +581,6 @@ impl Builder<'_> {
         }
         best.map_or(0, |b| b.1)
     }
-}
-
-/// Merges two ascending lists.
-fn merged(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let (mut a, mut b) = (a, b);
-    let mut out = Vec::with_capacity(a.len() + b.len());
-    while let (Some((x, a_rest)), Some((y, b_rest))) = (a.split_first(), b.split_first()) {
-        if x.total_cmp(y).is_le() {
-            out.push(*x);
-            a = a_rest;
-        } else {
-            out.push(*y);
-            b = b_rest;
-        }
-    }
-    out.extend_from_slice(a);
-    out.extend_from_slice(b);
-    out
 }
 
 /// Keeps the largest fragments of a knot; see [`MAX_BSP_FRAGMENTS`].

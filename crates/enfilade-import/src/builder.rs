@@ -13,7 +13,7 @@ use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
     Entity, Filling, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
-use enfilade_geom::{ConvexSolid, DMat4, DVec3, Rectangle, Triangle, facing};
+use enfilade_geom::{ConvexSolid, DMat4, DVec3, Triangle};
 use enfilade_prepare::{GridSteps, RoleFacts, RoleVerdict, weld_quantized};
 use enfilade_source::SourceError;
 use std::collections::HashMap;
@@ -541,7 +541,7 @@ impl<'a> Builder<'a> {
             is_detail_file: self.is_detail_file,
             thickness_if_plain: (drawn().map(|p| p.indices.len() / 3).sum::<usize>()
                 <= BOX_TRIANGLES)
-                .then(|| thickness(mesh, placement.transforms)),
+                .then(|| openings::thickness(mesh, placement.transforms)),
         };
         let verdict = self.options.roles.judge(&facts);
         (verdict, facts.filling(), is_mixed)
@@ -598,15 +598,3 @@ const BOX_TRIANGLES: usize = 12;
 const OBJECT_BYTES: u64 = 2 * size_of::<Object>() as u64;
 /// Memory of a world-space triangle in the decomposition.
 const TRIANGLE_BYTES: u64 = size_of::<Triangle>() as u64;
-
-/// Returns the least extent of a mesh along its own axes, metres, over all its placements.
-fn thickness(mesh: &Mesh, transforms: &[DMat4]) -> f64 {
-    let placed = transforms.iter().map(|&transform| {
-        let primitives = mesh.primitives.iter();
-        let placed = primitives.flat_map(|p| p.placed_triangles(transform));
-        let triangles: Vec<Triangle> = placed.collect();
-        let size = Rectangle::around(facing(&triangles), triangles.as_flattened()).size();
-        size.min_element()
-    });
-    placed.fold(f64::INFINITY, f64::min)
-}

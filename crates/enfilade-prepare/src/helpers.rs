@@ -99,7 +99,7 @@ const ROOMY: f64 = 0.5;
 
 /// The beginning of the name of a portal of Godot, before that of the room to which it leads.
 const PORTAL_TO: &str = "Portal_";
-/// Words for what stands around an opening, beside which that is no name of a room.
+/// Words for what stands around an opening, beside which that is not the name of a room.
 const AROUND: [&str; 5] = ["arch", "frame", "jamb", "lintel", "wall"];
 
 /// The word for a collision shape made beside the mesh that is drawn: `Wall_collision`, `collision_hull`.

@@ -11,7 +11,7 @@ use crate::complex::region::RegionShape;
 use crate::complex::{Label, LabelSettings, Vote};
 use crate::config::BspConfig;
 use crate::proposal::Proposal;
-use crate::rooms::{self, Basins, Parts, Place, ROOT};
+use crate::rooms::{self, Basins, Division, DivisionNode, ROOT};
 use crate::structure::{Candidate, Frame, OUTDOORS, Structure, grown};
 use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
@@ -95,26 +95,26 @@ fn rooms_of(
     Ok(proposal)
 }
 
-/// The cells of a tree, in the axes of the grid. Places are children as in a [`Node`](super::tree::Node).
+/// The cells of a tree, in the axes of the grid. Nodes are children as in a [`Node`](super::tree::Node).
 struct TreeParts<'a> {
     tree: &'a Tree,
     cell_of_leaf: &'a [u32],
     frame: &'a Frame,
 }
 
-impl Parts for TreeParts<'_> {
-    fn around(&self, place: Place, center: DVec3, radius: f64) -> Place {
-        let from = if place == ROOT { self.tree.root } else { place };
+impl Division for TreeParts<'_> {
+    fn around(&self, node: DivisionNode, center: DVec3, radius: f64) -> DivisionNode {
+        let from = if node == ROOT { self.tree.root } else { node };
         self.tree.around(from, self.frame.to_scene(center), radius)
     }
 
-    fn is_part(&self, place: Place) -> bool {
-        place < 0
+    fn is_part(&self, node: DivisionNode) -> bool {
+        node < 0
     }
 
-    fn part_at(&self, place: Place, p: DVec3) -> Option<u32> {
+    fn part_at(&self, node: DivisionNode, p: DVec3) -> Option<u32> {
         // A point is a ball that no plane cuts.
-        let leaf = self.around(place, p, 0.0);
+        let leaf = self.around(node, p, 0.0);
         let cell = self.cell_of_leaf[leaf_index(leaf) as usize];
         Some(cell).filter(|&cell| cell != NO_CELL)
     }

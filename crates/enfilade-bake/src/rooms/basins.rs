@@ -19,19 +19,19 @@ const AFTER: u32 = OUTDOORS + 1;
 /// Edges of the blocks whose part is looked up at once, the second as thick as a layer of labels. [Units: vx]
 const BLOCKS: [usize; 2] = [16, 4];
 
-/// A place in a division of space: a part, or several.
-pub(crate) type Place = i32;
+/// A node of a division of space: a part, or several.
+pub(crate) type DivisionNode = i32;
 /// All of space.
-pub(crate) const ROOT: Place = i32::MAX;
+pub(crate) const ROOT: DivisionNode = i32::MAX;
 
 /// A division of space into parts, in the axes of the grid.
-pub(crate) trait Parts: Sync {
-    /// Returns the smallest known place within `place` that holds a ball.
-    fn around(&self, place: Place, center: DVec3, radius: f64) -> Place;
-    /// Returns `true` if a place is one part.
-    fn is_part(&self, place: Place) -> bool;
-    /// Returns the part of a point in a place, below 2³⁰, or `None` for matter.
-    fn part_at(&self, place: Place, p: DVec3) -> Option<u32>;
+pub(crate) trait Division: Sync {
+    /// Returns the smallest known node within `node` that holds a ball.
+    fn around(&self, node: DivisionNode, center: DVec3, radius: f64) -> DivisionNode;
+    /// Returns `true` if a node is one part.
+    fn is_part(&self, node: DivisionNode) -> bool;
+    /// Returns the part of a point in a node, below 2³⁰, or `None` for matter.
+    fn part_at(&self, node: DivisionNode, p: DVec3) -> Option<u32>;
 }
 
 /// Parts of the air. The outdoors is the basin [`OUTDOORS`](crate::structure::OUTDOORS).
@@ -50,10 +50,14 @@ impl Basins {
     ///
     /// Blocks of voxels are looked up before their voxels, so that the time is linear in voxels, and logarithmic in parts near
     /// borders of parts alone. About 2 bytes a voxel.
-    pub(crate) fn of_parts(air: &VoxelAir, parts: &impl Parts, allowance: &Allowance) -> Self {
+    pub(crate) fn of_parts(
+        air: &VoxelAir,
+        division: &impl Division,
+        allowance: &Allowance,
+    ) -> Self {
         let grid = &air.grid;
         let field = air.solid.field(allowance);
-        let outer = parts.part_at(ROOT, grid.center(0, 0, 0)).unwrap_or(0);
+        let outer = division.part_at(ROOT, grid.center(0, 0, 0)).unwrap_or(0);
         let is_outer = |label: u32| label == OUTDOORS || label == AFTER + outer;
         let mut n = OUTDOORS + 1;
         let name = |least: u32| match least {
@@ -63,7 +67,7 @@ impl Basins {
                 n - 1
             }
         };
-        let labels = part_labels(air, parts, allowance);
+        let labels = part_labels(air, division, allowance);
         let alike = |a: u32, b: u32| a == b || is_outer(a) && is_outer(b);
         let labels = connected_labels(&labels, alike, name);
         let mut basins = Self {
@@ -164,66 +168,79 @@ impl Basins {
 }
 
 /// Labels voxels by parts: 0 is matter, the border and what is far from everything is [`OUTDOORS`], and the rest follow.
-fn part_labels(air: &VoxelAir, parts: &impl Parts, allowance: &Allowance) -> Labels {
-    let grid = &air.grid;
-    let [nx, ny, nz] = grid.dims;
+fn part_labels(air: &VoxelAir, division: &impl Division, allowance: &Allowance) -> Labels {
+    let [nx, ny, nz] = air.grid.dims;
     let (blocked, far) = air.solid.blocked(allowance);
-    let label_of = |part: Option<u32>| part.map_or(0, |part| AFTER + part);
-    // The place that holds all voxels from the first to before the last.
-    let within = |place: Place, first: [usize; 3], last: [usize; 3]| {
-        let [low, high] = [first, last].map(|at| grid.to_world(DVec3::from(at.map(|n| n as f64))));
-        parts.around(place, (low + high) / 2.0, low.distance(high) / 2.0)
+    let labelling = Labelling {
+        grid: &air.grid,
+        blocked: &blocked,
+        far: &far,
+        division,
     };
-    Labels::filled(grid.dims, |z, labels| {
-        let end = nz.min(z + BLOCKS[1]);
-        for wide in blocks([0, 0], [nx, ny], BLOCKS[0]) {
-            let place = within(
-                ROOT,
-                [wide[0].start, wide[1].start, z],
-                [wide[0].end, wide[1].end, end],
-            );
-            let [first, last] = [wide.clone().map(|r| r.start), wide.map(|r| r.end)];
-            for narrow in blocks(first, last, BLOCKS[1]) {
-                let [xs, ys] = narrow;
-                if !allowance.spend((xs.len() * ys.len() * (end - z)) as u64) {
+    Labels::filled(air.grid.dims, |z, labels| {
+        let zs = z..nz.min(z + BLOCKS[1]);
+        for [xs, ys] in blocks([0..nx, 0..ny], BLOCKS[0]) {
+            let node = labelling.around(ROOT, [&xs, &ys, &zs]);
+            for [xs, ys] in blocks([xs, ys], BLOCKS[1]) {
+                if !allowance.spend((xs.len() * ys.len() * zs.len()) as u64) {
                     return;
                 }
-                let place = within(place, [xs.start, ys.start, z], [xs.end, ys.end, end]);
-                let whole = parts
-                    .is_part(place)
-                    .then(|| label_of(parts.part_at(place, DVec3::ZERO)));
-                for k in z..end {
-                    for y in ys.clone() {
-                        for x in xs.clone() {
-                            let is_border = [(x, nx), (y, ny), (k, nz)]
-                                .iter()
-                                .any(|&(at, n)| at == 0 || at + 1 == n);
-                            labels[x + nx * (y + ny * (k - z))] = if blocked.get(x, y, k) {
-                                0
-                            } else if is_border || far.get(x, y, k) {
-                                OUTDOORS
-                            } else {
-                                whole.unwrap_or_else(|| {
-                                    label_of(parts.part_at(place, grid.center(x, y, k)))
-                                })
-                            };
-                        }
-                    }
-                }
+                labelling.fill(node, [xs, ys, zs.clone()], labels);
             }
         }
     })
 }
 
+/// The division of a grid, and the voxels whose label is known without it.
+struct Labelling<'a, D> {
+    grid: &'a Grid,
+    blocked: &'a BitVolume,
+    far: &'a BitVolume,
+    division: &'a D,
+}
+
+impl<D: Division> Labelling<'_, D> {
+    /// Returns the smallest node within one that holds a block.
+    fn around(&self, node: DivisionNode, block: [&Range<usize>; 3]) -> DivisionNode {
+        let corner = |at: [usize; 3]| self.grid.to_world(DVec3::from(at.map(|n| n as f64)));
+        let (low, high) = (corner(block.map(|r| r.start)), corner(block.map(|r| r.end)));
+        let radius = low.distance(high) / 2.0;
+        self.division.around(node, (low + high) / 2.0, radius)
+    }
+
+    /// Labels a block within a node, in layers that begin with it.
+    fn fill(&self, node: DivisionNode, [xs, ys, zs]: [Range<usize>; 3], layers: &mut [u32]) {
+        let [nx, ny, nz] = self.grid.dims;
+        let is_end = |at: usize, n: usize| at == 0 || at + 1 == n;
+        let node = self.around(node, [&xs, &ys, &zs]);
+        let part_at = |p: DVec3| {
+            self.division
+                .part_at(node, p)
+                .map_or(0, |part| AFTER + part)
+        };
+        let whole = self.division.is_part(node).then(|| part_at(DVec3::ZERO));
+        for (y, z) in zs.clone().flat_map(|z| ys.clone().map(move |y| (y, z))) {
+            let row = &mut layers[nx * (y + ny * (z - zs.start))..][..nx];
+            let is_border = is_end(y, ny) || is_end(z, nz);
+            for x in xs.clone() {
+                row[x] = if self.blocked.get(x, y, z) {
+                    0
+                } else if is_border || is_end(x, nx) || self.far.get(x, y, z) {
+                    OUTDOORS
+                } else {
+                    whole.unwrap_or_else(|| part_at(self.grid.center(x, y, z)))
+                };
+            }
+        }
+    }
+}
+
 /// Returns the blocks of a rectangle, of at most so many steps each way.
-fn blocks(
-    first: [usize; 2],
-    last: [usize; 2],
-    edge: usize,
-) -> impl Iterator<Item = [Range<usize>; 2]> {
-    let along = move |k: usize| {
-        let starts = (first[k]..last[k]).step_by(edge);
-        starts.map(move |at| at..last[k].min(at + edge))
+fn blocks([xs, ys]: [Range<usize>; 2], edge: usize) -> impl Iterator<Item = [Range<usize>; 2]> {
+    let cut = move |r: Range<usize>| {
+        r.clone()
+            .step_by(edge)
+            .map(move |at| at..r.end.min(at + edge))
     };
-    along(1).flat_map(move |ys| along(0).map(move |xs| [xs, ys.clone()]))
+    cut(ys).flat_map(move |ys| cut(xs.clone()).map(move |xs| [xs, ys.clone()]))
 }

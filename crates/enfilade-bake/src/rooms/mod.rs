@@ -33,7 +33,7 @@ mod votes;
 mod voxel_balls;
 
 pub(crate) use air::{FLOODED, Plot, measure, plots, prepare};
-pub(crate) use basins::{Basins, Parts, Place, ROOT};
+pub(crate) use basins::{Basins, Division, DivisionNode, ROOT};
 pub(crate) use find::{COUNTS, propose};
 pub(crate) use flooded::Flooded;
 pub(crate) use limb_rule::{LimbRule, THICKER};

@@ -2,6 +2,7 @@
 
 mod budgets;
 mod commands;
+mod formats;
 mod gate;
 mod habits;
 mod inputs;

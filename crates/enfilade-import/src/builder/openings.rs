@@ -1,7 +1,7 @@
 //! Openings that a designer marked: by objects of their own, or as the format says.
 
-use enfilade_geom::scene::GivenPortal;
-use enfilade_geom::{DVec3, Rectangle, Triangle, facing, triangle_area_normal};
+use enfilade_geom::scene::{GivenPortal, Mesh, Primitive};
+use enfilade_geom::{DMat4, DVec3, Rectangle, Triangle, facing, triangle_area_normal};
 
 use super::{Builder, Placement};
 use crate::ImportError;
@@ -20,11 +20,10 @@ impl Builder<'_> {
         let n_placed = placement.transforms.len() as u64;
         self.charge_memory(placement.place, n_placed, n_bytes as u64)?;
         for &transform in placement.transforms {
-            let primitives = self.primitives(placement.mesh).iter();
-            let triangles = primitives.flat_map(|p| p.placed_triangles(transform));
-            let triangles: Vec<Triangle> = triangles.collect();
-            self.spend(placement.place, triangles.len() as u64)?;
-            let around = Rectangle::around(facing(&triangles), triangles.as_flattened());
+            let primitives = self.primitives(placement.mesh);
+            let n_triangles: usize = primitives.iter().map(|p| p.indices.len() / 3).sum();
+            self.spend(placement.place, n_triangles as u64)?;
+            let around = rectangle_around(self.primitives(placement.mesh), transform);
             let [half, other] = around.middle();
             let Some(normal) = triangle_area_normal(&half).try_normalize() else {
                 self.note(placement.place, "a mark of an opening without an area");
@@ -39,4 +38,20 @@ impl Builder<'_> {
         }
         Ok(())
     }
+}
+
+/// Returns the least extent of a mesh along its own axes, over all its placements. [Units: wu]
+pub(super) fn thickness(mesh: &Mesh, transforms: &[DMat4]) -> f64 {
+    let sizes = transforms
+        .iter()
+        .map(|&t| rectangle_around(&mesh.primitives, t).size());
+    sizes.map(DVec3::min_element).fold(f64::INFINITY, f64::min)
+}
+
+fn rectangle_around(primitives: &[Primitive], transform: DMat4) -> Rectangle {
+    let placed = primitives
+        .iter()
+        .flat_map(|p| p.placed_triangles(transform));
+    let triangles: Vec<Triangle> = placed.collect();
+    Rectangle::around(facing(&triangles), triangles.as_flattened())
 }

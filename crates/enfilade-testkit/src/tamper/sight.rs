@@ -50,7 +50,7 @@ pub(super) const ALL: &[Tampering] = &[
         let volumes = w.pvs.as_ref()?.volumes.as_ref()?;
         let pairs = Pairs::new(w)?;
         let of_several = |i: usize| pairs.are_apart(w, i) && volumes.pieces_of(i).count() > 1;
-        let (pair, piece) = pairs.from_place(at, of_several, |pair, lines| {
+        let (pair, piece) = pairs.lines_from_place(at, of_several, |pair, lines| {
             let pieces: Vec<&[[f64; 4]]> = volumes.pieces_of(pair).collect();
             let is_only_of = |i: usize, p: DVec3| {
                 let mut holding = (0..pieces.len()).filter(|&k| is_in(pieces[k], p));
@@ -76,7 +76,7 @@ pub(super) const ALL: &[Tampering] = &[
         let parts = w.pvs.as_ref()?.parts.as_ref()?;
         let pairs = Pairs::new(w)?;
         let is_far = |i: usize| pairs.are_apart(w, i) && !parts.runs_of(i).is_empty();
-        let (pair, end) = pairs.from_place(at, is_far, |pair, lines| {
+        let (pair, end) = pairs.lines_from_place(at, is_far, |pair, lines| {
             let runs = parts.runs_of(pair).iter();
             let row: Vec<u32> = runs.flat_map(|&[a, b]| a..b).collect();
             let (end, to) = (row[row.len() / 2], pairs.pairs[pair].1);
@@ -101,8 +101,8 @@ pub(super) const ALL: &[Tampering] = &[
     }),
 ];
 
-/// Of so many lines of sight between two cells, more than one must meet what a lie hides: where none does, it is no lie, and few of a
-/// checker's lines meet less.
+/// Number of lines of sight between two cells of which more than one must meet what a lie hides: where none does, it is not a lie, and few
+/// of a checker's lines meet less.
 const MOST_HIDDEN: usize = 20;
 
 /// Ordered pairs of cells, and the walls between.
@@ -134,7 +134,7 @@ impl Pairs {
     }
 
     /// The first pair from one of three places on that `is_fit`, with the lie that `lie` finds in it, given its lines of sight.
-    fn from_place<T>(
+    fn lines_from_place<T>(
         &self,
         place: usize,
         is_fit: impl Fn(usize) -> bool,
