@@ -248,6 +248,7 @@ fn plan(args: &JobPlan) -> anyhow::Result<()> {
                 args.output.display()
             );
         }
+        whole::remove_left(&[&args.output]);
     } else {
         let text = serde_json::to_string_pretty(&manifest)?;
         let files = [(MANIFEST, text.as_bytes()), (&manifest.input, &bytes[..])];
@@ -402,6 +403,7 @@ fn merge(args: &JobMerge) -> anyhow::Result<()> {
             n_copied += 1;
         }
     }
+    folder.tidy(&job.manifest.shards);
     let done = ShardCounts {
         done: n_copied,
         there: job.manifest.shards.len() - left.len(),

@@ -111,6 +111,28 @@ fn shards_of_a_bake_from_anywhere_make_the_world_of_one_machine() {
 }
 
 #[test]
+fn a_job_planned_or_merged_again_removes_what_killed_runs_left() {
+    let dir = &folder("left-of-jobs");
+    for job in ["a", "b"] {
+        done(dir, &format!("job plan town.glb -o {job}"));
+    }
+    done(dir, "job run b");
+    let of_plan = dir.join(".a.17-1.tmp");
+    fs::create_dir(&of_plan).unwrap();
+    fs::write(of_plan.join("manifest.json"), "{").unwrap();
+    done(dir, "job plan town.glb -o a");
+    assert!(!of_plan.exists());
+    let shards: Vec<_> = fs::read_dir(dir.join("b/shards")).unwrap().collect();
+    let name = shards[0].as_ref().unwrap().file_name();
+    let of_merge = format!("a/shards/.{}.17-1.tmp", name.to_str().unwrap());
+    fs::create_dir_all(dir.join("a/shards")).unwrap();
+    fs::write(dir.join(&of_merge), "half").unwrap();
+    done(dir, "job merge a b");
+    let count = fs::read_dir(dir.join("a/shards")).unwrap().count();
+    assert_eq!(count, shards.len());
+}
+
+#[test]
 fn a_long_file_of_text_is_copied_whole() {
     let dir = &folder("long-text");
     // Two rooms seen from inside, 200 m apart, after a long comment.

@@ -108,6 +108,34 @@ fn feet_are_seen_by_the_height_of_the_doors() {
 }
 
 #[test]
+fn a_unit_in_which_a_room_is_lost_is_not_advised() {
+    let dir = folder("lost");
+    let feet = |p: [f64; 3]| p.map(|v| v / 0.3048);
+    let corridor = obj(&mixed::double_door_corridor().scene, feet);
+    // A room of its own, so high: in feet nobody can stand in the lower one.
+    let told = |high: f64| {
+        let walls = [
+            [[199.0, -1.0, -1.0], [213.0, 0.0, 13.0]],
+            [[199.0, high, -1.0], [213.0, high + 1.0, 13.0]],
+            [[199.0, 0.0, -1.0], [200.0, high, 13.0]],
+            [[212.0, 0.0, -1.0], [213.0, high, 13.0]],
+            [[200.0, 0.0, -1.0], [212.0, high, 0.0]],
+            [[200.0, 0.0, 12.0], [212.0, high, 13.0]],
+        ];
+        let text = with_boxes(&corridor, &walls).replace("usemtl blue", "usemtl stone");
+        fs::write(dir.join("a.obj"), text).unwrap();
+        printed(&run(&dir, "bake a.obj -o a.glb"))
+    };
+    let text = told(9.0);
+    assert!(text.contains("--unit ft"), "{text}");
+    let text = told(4.0);
+    assert!(
+        text.contains("trust: low") && !text.contains("--unit"),
+        "{text}"
+    );
+}
+
+#[test]
 fn feet_are_seen_by_the_steps_of_stairs() {
     let dir = folder("steps");
     // Its two doorways without leaves show nothing.
