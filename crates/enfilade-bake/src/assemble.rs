@@ -7,8 +7,8 @@ mod bays;
 mod fillers;
 mod fittings;
 mod kinds;
-mod remnants;
 mod seals;
+mod weighed;
 
 pub(crate) use seals::{SealPart, batches_of};
 
@@ -145,7 +145,7 @@ pub(crate) fn portals_of(cut: &Cut<'_>, is_void: &dyn Fn(u32) -> bool) -> Vec<Po
         .iter()
         .filter_map(|j| portal(cut, j))
         .collect();
-    remnants::tell_remnants(&mut portals);
+    weighed::tell_unweighed(&mut portals);
     portals
 }
 

@@ -186,6 +186,27 @@ fn another_scene_is_told_before_anything_is_counted() {
     assert!(done.status.success(), "{}", said(&done));
 }
 
+#[test]
+fn a_scene_whose_vertices_the_bake_moved_is_told_apart_from_another() {
+    let dir = folder("moved");
+    // Each vertex by itself, by up to a millimeter.
+    let noise = |x: f64, by: f64| 1e-3 * ((x * 7919.0 + by).sin() * 43758.5453).fract();
+    let count = std::cell::Cell::new(0.0);
+    let moved = |p: [f64; 3]| {
+        count.set(count.get() + 1.0);
+        [0, 1, 2].map(|k| p[k] + noise(p[k] + k as f64, count.get()))
+    };
+    fs::write(dir.join("a.obj"), rooms(moved)).unwrap();
+    assert!(run(&dir, "bake a.obj -o a.glb").status.success());
+    let done = run(&dir, "verify a.glb --source a.obj --rays 1000 --sight 0");
+    let text = said(&done);
+    assert_eq!(done.status.code(), Some(1), "{text}");
+    assert!(text.contains("moved its vertices"), "{text}");
+    assert!(!text.contains("another scene"), "{text}");
+    let done = run(&dir, "verify a.glb --rays 1000 --sight 0");
+    assert!(done.status.success(), "{}", said(&done));
+}
+
 /// Adds boxes of a material of their own to an OBJ.
 fn with_boxes(text: &str, boxes: &[[[f64; 3]; 2]]) -> String {
     let mut text = format!("usemtl stone\n{text}");

@@ -41,6 +41,8 @@ struct State {
 #[derive(Clone, Copy, PartialEq)]
 enum Out {
     File,
+    /// The same, and the state stands for itself: one of another scene is as good.
+    Alone,
     Printed,
     Refusal,
 }
@@ -125,7 +127,7 @@ const STATES: [State; 10] = [
         other: None,
         path: "one.enf",
         uses: &["unpack one.enf -o out"],
-        out: Out::File,
+        out: Out::Alone,
     },
 ];
 
@@ -163,6 +165,8 @@ pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
             "{}: no state of another scene",
             state.name
         );
+        let is_alone = state.out == Out::Alone;
+        let foreign = if is_alone { Vec::new() } else { foreign };
         let (mut n, mut wrong) = (0, 0.0);
         for (path, how, bytes) in wrong_states(&own, &foreign) {
             restore(&own)?;
@@ -233,7 +237,7 @@ fn used(folder: &Path, state: &State) -> anyhow::Result<Option<Vec<u8>>> {
         printed = done.stdout;
     }
     Ok(Some(match state.out {
-        Out::File => fs::read(folder.join("out"))?,
+        Out::File | Out::Alone => fs::read(folder.join("out"))?,
         Out::Printed => printed,
         Out::Refusal => Vec::new(),
     }))

@@ -1,15 +1,18 @@
-//! What is left of an opening that a decimation weighed, where walls of other cells take most of it, was not weighed itself.
+//! Portals that have hardly anything of an opening that a decimation weighed, or far more, were not weighed themselves.
+//!
+//! A portal of the exact cut has the decision of the opening that its largest part lies on. Where walls of other cells take most of
+//! an opening, the portal is the little that they leave; where a gap of the model goes on in its plane, the opening is a small part of it.
 
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, Fact, Portal, Reason, Why};
 
-/// Most that such an opening is larger than all portals that are made of it beside a cell: 3.3 in buildings, whose openings have
-/// frames; in open caves 19 to 960, with portals of a few square centimeters.
+/// Most that an opening is larger than all portals that are made of it beside a cell, and a portal than its opening: 3.3 in
+/// buildings whose openings have frames; up to 960 in open caves, with portals of a few square centimeters.
 const MOST: f64 = 4.0;
 
-/// Gives remnants the reason of other gaps.
-pub(super) fn tell_remnants(portals: &mut [Portal]) {
+/// Gives such portals the reason of other gaps.
+pub(super) fn tell_unweighed(portals: &mut [Portal]) {
     let mut beside: BTreeMap<CellId, Vec<usize>> = BTreeMap::new();
     for (i, portal) in portals.iter().enumerate() {
         if opening(portal).is_some() {
@@ -18,17 +21,18 @@ pub(super) fn tell_remnants(portals: &mut [Portal]) {
             }
         }
     }
-    let is_remnant = |portal: &&Portal| {
-        opening(portal).is_some_and(|(why, area)| {
+    let is_unweighed = |portal: &Portal| {
+        opening(portal).is_some_and(|(why, weighed)| {
             let all = beside[&portal.cells[0]].iter().map(|&i| &portals[i]);
-            let of_opening = all.filter(|p| p.why.contains(why));
-            area > MOST * of_opening.map(|p| f64::from(p.area)).sum::<f64>()
+            let all = all.filter(|p| p.why.contains(why));
+            let all: f64 = all.map(|p| f64::from(p.area)).sum();
+            weighed > MOST * all || f64::from(portal.area) > MOST * weighed
         })
     };
-    let remnants: Vec<usize> = (0..portals.len())
-        .filter(|&i| is_remnant(&&portals[i]))
+    let unweighed: Vec<usize> = (0..portals.len())
+        .filter(|&i| is_unweighed(&portals[i]))
         .collect();
-    for i in remnants {
+    for i in unweighed {
         portals[i].why = vec![Why::given(Reason::Gap)];
     }
 }
@@ -57,18 +61,25 @@ mod tests {
             area,
             ..rounded_portal(&plane, &square, std::slice::from_ref(&square), 0.0).unwrap()
         };
-        // An opening whole, one in two parts, and one of which hardly anything is left.
+        // An opening whole, one in two parts, one of which hardly anything is left, and one that is a small part of a gap.
         let mut portals = [
             portal(1, 2.0, 1.9),
             portal(1, 4.0, 1.0),
             portal(2, 4.0, 0.9),
             portal(1, 3.4, 0.004),
+            portal(1, 0.05, 2.1),
         ];
-        tell_remnants(&mut portals);
+        tell_unweighed(&mut portals);
         let reasons = portals.each_ref().map(|p| p.why[0].reason);
         assert_eq!(
             reasons,
-            [Reason::Kept, Reason::Kept, Reason::Kept, Reason::Gap]
+            [
+                Reason::Kept,
+                Reason::Kept,
+                Reason::Kept,
+                Reason::Gap,
+                Reason::Gap
+            ]
         );
     }
 }
