@@ -122,7 +122,7 @@ fn a_job_planned_or_merged_again_removes_what_killed_runs_left() {
     fs::write(of_plan.join("manifest.json"), "{").unwrap();
     done(dir, "job plan town.glb -o a");
     assert!(!of_plan.exists());
-    // Also of pieces that are no shards, such as basins.
+    // Also of pieces that are not shards, such as basins.
     let shards = |job: &str| {
         let entries = fs::read_dir(dir.join(job).join("shards")).unwrap();
         let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
