@@ -113,7 +113,9 @@ fn said(world: &World, p: &Portal) -> Said {
     for f in &p.fittings {
         let detail = &world.details[f.detail as usize];
         all = match (all, said_by(&detail.name)) {
-            (Said::Nothing, Said::Nothing) if is_told_elsewhere(world, detail) => Said::Other,
+            (Said::Nothing, Said::Nothing) if is_told_elsewhere(world, detail, &TOLD) => {
+                Said::Other
+            }
             (a, Said::Nothing) => a,
             (Said::Nothing, b) => b,
             (a, b) if a == b => a,
@@ -150,15 +152,21 @@ fn said_by(name: &str) -> Said {
     }
 }
 
+/// Words by which a name may say which opening its object fills, and those for windows.
+const TOLD: [&str; 4] = ["door", "gate", "window", "skylight"];
+const WINDOWS: [&str; 2] = ["window", "skylight"];
+
 /// Returns `true` if a name in small letters may say which opening its object fills.
 fn tells(name: &str) -> bool {
-    ["door", "gate", "window", "skylight"]
-        .into_iter()
-        .any(|word| name.contains(word))
+    has_any(name, &TOLD)
+}
+
+fn has_any(name: &str, words: &[&str]) -> bool {
+    words.iter().any(|word| name.contains(word))
 }
 
 /// Returns `true` if the names of a detail's mesh, groups or materials may say which opening it fills.
-fn is_told_elsewhere(world: &World, detail: &DetailObject) -> bool {
+fn is_told_elsewhere(world: &World, detail: &DetailObject, words: &[&str]) -> bool {
     let mesh = world.detail_meshes.get(detail.mesh as usize);
     let primitives = mesh.iter().flat_map(|m| &m.primitives);
     let materials = primitives.filter_map(|q| world.materials.get(q.material? as usize));
@@ -169,20 +177,37 @@ fn is_told_elsewhere(world: &World, detail: &DetailObject) -> bool {
         Some(&own.name)
     });
     let names = materials.map(|m| &m.name).chain(mesh.map(|m| &m.name));
-    names.chain(groups).any(|name| tells(&name.to_lowercase()))
+    names
+        .chain(groups)
+        .any(|name| has_any(&name.to_lowercase(), words))
 }
 
 /// Returns `true` if an object near a portal may say which opening it fills.
 fn is_told_near(world: &World, p: &Portal) -> bool {
+    !triangles_told_near(world, p, &TOLD).is_empty()
+}
+
+/// Returns `true` if objects that may say that they are windows are before or behind half of an opening, or more.
+fn is_called_window(world: &World, p: &Portal, opening: &Winding) -> bool {
+    let windows = Bvh::build(&triangles_told_near(world, p, &WINDOWS));
+    let middle = opening.centroid();
+    let shares = [0.3, 0.6, 0.9];
+    let points = opening.points.iter();
+    let points = points.flat_map(|&q| shares.map(|share| middle.lerp(q, share)));
+    let n_before = |q: DVec3| usize::from(windows.nearest(q, REACH).is_some());
+    2 * points.map(n_before).sum::<usize>() >= shares.len() * opening.points.len()
+}
+
+/// Returns the triangles near a portal of objects that may say with one of these words which opening they fill.
+fn triangles_told_near(world: &World, p: &Portal, words: &[&str]) -> Vec<Triangle> {
     let corners = p.pieces.iter().flatten().map(|&c| to_dvec(c));
     let near = corners.fold(Aabb::EMPTY, Aabb::including).expanded(REACH);
-    world.details.iter().any(|detail| {
-        let tells = tells(&detail.name.to_lowercase()) || is_told_elsewhere(world, detail);
-        tells
-            && triangles_of(world, detail)
-                .iter()
-                .any(|t| near.overlaps(&Aabb::of_points(t)))
-    })
+    let tells = |detail: &&DetailObject| {
+        has_any(&detail.name.to_lowercase(), words) || is_told_elsewhere(world, detail, words)
+    };
+    let told = world.details.iter().filter(tells);
+    let all = told.flat_map(|detail| triangles_of(world, detail));
+    all.filter(|t| near.overlaps(&Aabb::of_points(t))).collect()
 }
 
 /// Returns `true` if a decision knows how little fills an opening, and no object may say that it is a window, as none does of a level one.
@@ -234,7 +259,7 @@ fn stance_problem(world: &World, p: &Portal, ground: &Bvh) -> Option<String> {
                 && height > LEAST_DOOR + ROOM
                 && most < if leads_outdoors(world, p) { CURB } else { SILL } - ROOM
                 // A window in many parts may have none as a fitting.
-                && !(p.fittings.is_empty() && is_told_near(world, p)) =>
+                && !(p.fittings.is_empty() && is_called_window(world, p, &opening)) =>
         {
             Some(format!("is {height:.2} m high and stands on the ground"))
         }
@@ -393,5 +418,11 @@ mod tests {
             }];
             assert_eq!(check(&world, &ground).len(), n, "{name}");
         }
+        // One beside the opening says nothing about it.
+        world.details[0].name = "RoomWindow_01".to_owned();
+        for corner in &mut world.detail_meshes[0].primitives[0].positions {
+            corner[2] += 1.8;
+        }
+        assert_eq!(check(&world, &ground).len(), 1);
     }
 }
