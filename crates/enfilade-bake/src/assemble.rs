@@ -8,6 +8,7 @@ mod fillers;
 mod fittings;
 mod kinds;
 mod seals;
+mod weighed;
 
 pub(crate) use seals::{SealPart, batches_of};
 
@@ -140,10 +141,12 @@ pub(crate) fn portals_of(cut: &Cut<'_>, is_void: &dyn Fn(u32) -> bool) -> Vec<Po
         })
     });
     let bays = bays::join_bays(judged.collect());
-    bays::join_slits(bays, is_void, |p| judge.kind(p, false))
+    let mut portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| judge.kind(p, false))
         .iter()
         .filter_map(|j| portal(cut, j))
-        .collect()
+        .collect();
+    weighed::tell_unweighed(&mut portals);
+    portals
 }
 
 /// Returns a world of a graph whose cells have neither geometry nor portals yet, and whose portals have no fittings.

@@ -248,6 +248,7 @@ fn plan(args: &JobPlan) -> anyhow::Result<()> {
                 args.output.display()
             );
         }
+        whole::remove_left(&[&args.output]);
     } else {
         let text = serde_json::to_string_pretty(&manifest)?;
         let files = [(MANIFEST, text.as_bytes()), (&manifest.input, &bytes[..])];
@@ -369,7 +370,7 @@ fn run_shards(args: &JobRun) -> anyhow::Result<()> {
     left.retain(is_asked);
     let n_asked = (0..shards.len()).filter(is_asked).count();
     job.work.compute(&left, &folder, args)?;
-    folder.tidy(shards);
+    folder.tidy();
     let done = ShardCounts {
         done: left.len(),
         there: n_asked - left.len(),
@@ -402,6 +403,7 @@ fn merge(args: &JobMerge) -> anyhow::Result<()> {
             n_copied += 1;
         }
     }
+    folder.tidy();
     let done = ShardCounts {
         done: n_copied,
         there: job.manifest.shards.len() - left.len(),

@@ -3,8 +3,18 @@
 /// Resident memory, if the system reports it: on Linux. [Units: bytes]
 #[must_use]
 pub fn held_memory() -> Option<u64> {
+    of_status("VmRSS:")
+}
+
+/// Most resident memory so far, if the system reports it: on Linux. [Units: bytes]
+#[must_use]
+pub fn most_held_memory() -> Option<u64> {
+    of_status("VmHWM:")
+}
+
+fn of_status(name: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;
+    let line = status.lines().find_map(|l| l.strip_prefix(name))?;
     let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;
     Some(kilobytes << 10)
 }
@@ -21,5 +31,6 @@ mod tests {
         let after = held_memory().unwrap();
         assert!(after > before + (48 << 20), "{before} {after}");
         drop(held);
+        assert!(most_held_memory().unwrap() > before + (48 << 20));
     }
 }

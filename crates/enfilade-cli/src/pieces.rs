@@ -60,10 +60,17 @@ impl PieceFolder {
         error.is_some()
     }
 
-    /// Removes what killed runs left half written of pieces with these keys.
-    pub(crate) fn tidy(&self, keys: &[String]) {
-        let files: Vec<PathBuf> = keys.iter().map(|key| self.file(key)).collect();
-        whole::remove_left(&files);
+    /// Removes what killed runs left half written of any piece.
+    pub(crate) fn tidy(&self) {
+        let names = fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let names = names.filter_map(|entry| entry.file_name().into_string().ok());
+        let end = format!(".{EXTENSION}");
+        let piece = |name: String| {
+            let (key, _) = name.strip_prefix('.')?.split_once(&end)?;
+            Some(self.file(key))
+        };
+        let pieces: Vec<PathBuf> = names.filter_map(piece).collect();
+        whole::remove_left(&pieces);
     }
 
     /// Removes the pieces, and the folder if nothing else is in it.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use enfilade::bake::{BakeConfig, Method, Progress, Resolution, Stage};
 use enfilade::geom::Aabb;
 use enfilade::geom::scene::{Role, Scene};
+use enfilade_cli::memory::most_held_memory;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use crate::progress_lines::{Now, Pace, Ticker};
@@ -347,6 +348,8 @@ impl Progress for BakeBar {
             clock.left = TimeLeft::new(clock.stages, n_voxels as f64, self.work.1);
             clock.left.expected.iter().sum::<f64>()
         };
+        // The tree of a partition is largest before.
+        let memory = memory.max(most_held_memory().unwrap_or_default() as f64);
         self.bar.suspend(|| {
             let _ = write!(Told, "{}", plan(resolution, memory, seconds));
             let _ = write!(Warned, "{}", coarser(edge, self.wanted));

@@ -191,10 +191,7 @@ fn refuse_other(
 ) -> anyhow::Result<()> {
     let problem = structure.and_then(|structure| other_scene(world, structure, options));
     if let Some(problem) = problem {
-        bail!(
-            "{} was not compared: {problem}; give the scene of its bake, with the same --unit, --up, --detail-name and so on",
-            name_of(&args.world)
-        );
+        bail!("{} was not compared: {problem}", name_of(&args.world));
     }
     Ok(())
 }

@@ -111,6 +111,38 @@ fn shards_of_a_bake_from_anywhere_make_the_world_of_one_machine() {
 }
 
 #[test]
+fn a_job_planned_or_merged_again_removes_what_killed_runs_left() {
+    let dir = &folder("left-of-jobs");
+    for job in ["a", "b"] {
+        done(dir, &format!("job plan town.glb -o {job}"));
+    }
+    done(dir, "job run b");
+    let of_plan = dir.join(".a.17-1.tmp");
+    fs::create_dir(&of_plan).unwrap();
+    fs::write(of_plan.join("manifest.json"), "{").unwrap();
+    done(dir, "job plan town.glb -o a");
+    assert!(!of_plan.exists());
+    // Also of pieces that are not shards, such as basins.
+    let shards = |job: &str| {
+        let entries = fs::read_dir(dir.join(job).join("shards")).unwrap();
+        let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.collect::<Vec<String>>()
+    };
+    let all = shards("b");
+    assert_eq!(all.len(), 4);
+    for (job, line) in [("a", "job merge a b"), ("b", "job run b")] {
+        fs::create_dir_all(dir.join(job).join("shards")).unwrap();
+        for name in &all {
+            let left = format!("{job}/shards/.{name}.17-1.tmp");
+            fs::write(dir.join(left), "half").unwrap();
+        }
+        done(dir, line);
+        let left = shards(job);
+        assert!(left.iter().all(|name| all.contains(name)), "{left:?}");
+    }
+}
+
+#[test]
 fn a_long_file_of_text_is_copied_whole() {
     let dir = &folder("long-text");
     // Two rooms seen from inside, 200 m apart, after a long comment.

@@ -108,6 +108,34 @@ fn feet_are_seen_by_the_height_of_the_doors() {
 }
 
 #[test]
+fn a_unit_in_which_a_room_is_lost_is_not_advised() {
+    let dir = folder("lost");
+    let feet = |p: [f64; 3]| p.map(|v| v / 0.3048);
+    let corridor = obj(&mixed::double_door_corridor().scene, feet);
+    // A room of its own, so high: in feet nobody can stand in the lower one.
+    let told = |high: f64| {
+        let walls = [
+            [[199.0, -1.0, -1.0], [213.0, 0.0, 13.0]],
+            [[199.0, high, -1.0], [213.0, high + 1.0, 13.0]],
+            [[199.0, 0.0, -1.0], [200.0, high, 13.0]],
+            [[212.0, 0.0, -1.0], [213.0, high, 13.0]],
+            [[200.0, 0.0, -1.0], [212.0, high, 0.0]],
+            [[200.0, 0.0, 12.0], [212.0, high, 13.0]],
+        ];
+        let text = with_boxes(&corridor, &walls).replace("usemtl blue", "usemtl stone");
+        fs::write(dir.join("a.obj"), text).unwrap();
+        printed(&run(&dir, "bake a.obj -o a.glb"))
+    };
+    let text = told(9.0);
+    assert!(text.contains("--unit ft"), "{text}");
+    let text = told(4.0);
+    assert!(
+        text.contains("trust: low") && !text.contains("--unit"),
+        "{text}"
+    );
+}
+
+#[test]
 fn feet_are_seen_by_the_steps_of_stairs() {
     let dir = folder("steps");
     // Its two doorways without leaves show nothing.
@@ -155,6 +183,27 @@ fn another_scene_is_told_before_anything_is_counted() {
     assert!(said(&done).contains("another scene"), "{}", said(&done));
     assert!(!said(&done).contains("breaks a promise"), "{}", said(&done));
     let done = run(&dir, "verify a.glb --source a.obj --rays 1000 --sight 0");
+    assert!(done.status.success(), "{}", said(&done));
+}
+
+#[test]
+fn a_scene_whose_vertices_the_bake_moved_is_told_apart_from_another() {
+    let dir = folder("moved");
+    // Each vertex by itself, by up to a millimeter.
+    let noise = |x: f64, by: f64| 1e-3 * ((x * 7919.0 + by).sin() * 43758.5453).fract();
+    let count = std::cell::Cell::new(0.0);
+    let moved = |p: [f64; 3]| {
+        count.set(count.get() + 1.0);
+        [0, 1, 2].map(|k| p[k] + noise(p[k] + k as f64, count.get()))
+    };
+    fs::write(dir.join("a.obj"), rooms(moved)).unwrap();
+    assert!(run(&dir, "bake a.obj -o a.glb").status.success());
+    let done = run(&dir, "verify a.glb --source a.obj --rays 1000 --sight 0");
+    let text = said(&done);
+    assert_eq!(done.status.code(), Some(1), "{text}");
+    assert!(text.contains("moved its vertices"), "{text}");
+    assert!(!text.contains("another scene"), "{text}");
+    let done = run(&dir, "verify a.glb --rays 1000 --sight 0");
     assert!(done.status.success(), "{}", said(&done));
 }
 

@@ -232,7 +232,9 @@ fn stance_problem(world: &World, p: &Portal, ground: &Bvh) -> Option<String> {
         PortalKind::Window
             if p.pieces.len() == 1
                 && height > LEAST_DOOR + ROOM
-                && most < if leads_outdoors(world, p) { CURB } else { SILL } - ROOM =>
+                && most < if leads_outdoors(world, p) { CURB } else { SILL } - ROOM
+                // A window in many parts may have none as a fitting.
+                && !(p.fittings.is_empty() && is_told_near(world, p)) =>
         {
             Some(format!("is {height:.2} m high and stands on the ground"))
         }
@@ -298,7 +300,8 @@ fn width(piece: &[[f32; 3]]) -> f64 {
 mod tests {
     use super::*;
     use enfilade_cpg::{CellId, CellPortalGraph};
-    use enfilade_geom::Aabb;
+    use enfilade_geom::scene::{Mesh, Primitive};
+    use enfilade_geom::{Aabb, DMat4};
 
     #[test]
     fn a_sill_is_that_of_what_is_open_and_not_of_the_outline() {
@@ -337,5 +340,58 @@ mod tests {
             said.len() == 1 && said[0].contains("1.00 m over the ground"),
             "{said:?}"
         );
+    }
+
+    #[test]
+    fn what_stands_on_the_ground_is_a_window_if_one_is_near_that_says_so() {
+        let ground = Aabb::new(DVec3::new(-5.0, -0.2, -5.0), DVec3::new(5.0, 0.0, 5.0)).triangles();
+        let piece = vec![
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 2.0],
+            [0.0, 2.0, 2.0],
+            [0.0, 2.0, 0.0],
+        ];
+        let window = Portal {
+            cells: [CellId(0), CellId(1)],
+            kind: PortalKind::Window,
+            normal: [1.0, 0.0, 0.0],
+            outline: piece.clone(),
+            pieces: vec![piece],
+            area: 4.0,
+            fittings: Vec::new(),
+            why: Vec::new(),
+        };
+        let mut world = World {
+            graph: CellPortalGraph {
+                portals: vec![window],
+                ..CellPortalGraph::default()
+            },
+            ..World::default()
+        };
+        world.graph.provenance.generator = concat!("enfilade ", env!("CARGO_PKG_VERSION")).into();
+        let said = check(&world, &ground);
+        assert!(
+            said.len() == 1 && said[0].contains("stands on the ground"),
+            "{said:?}"
+        );
+        world.detail_meshes = vec![Mesh {
+            name: String::new(),
+            primitives: vec![Primitive {
+                positions: vec![[0.1, 0.5, 0.5], [0.1, 0.5, 1.5], [0.1, 1.5, 1.0]],
+                indices: vec![0, 1, 2],
+                ..Primitive::default()
+            }],
+        }];
+        for (name, n) in [("RoomWindow_01", 0), ("Chair", 1)] {
+            world.details = vec![DetailObject {
+                name: name.to_owned(),
+                mesh: 0,
+                transform: DMat4::IDENTITY.to_cols_array().map(|v| v as f32),
+                cells: Vec::new(),
+                source: None,
+                part_of: None,
+            }];
+            assert_eq!(check(&world, &ground).len(), n, "{name}");
+        }
     }
 }

@@ -15,8 +15,8 @@ const SAME: usize = 50;
 /// Least percentage of triangles on the other's surface if fewer are equal: a world may have cut all of them.
 const ON_SURFACE: usize = 95;
 
-/// Returns the problem if `source` is another scene than the one that a world was baked from: nothing else is then worth
-/// counting. `None` for a world that is broken, too.
+/// Returns the problem, and what to do, if `source` is another scene than the one that a world was baked from, or the bake moved its
+/// vertices: nothing else is then worth counting. `None` for a world that is broken, too.
 ///
 /// O(n log n) for n triangles; no ray is cast.
 #[must_use]
@@ -29,8 +29,24 @@ pub fn other_scene(world: &World, source: &[Triangle], options: &VerifyOptions) 
         .iter()
         .fold(Aabb::EMPTY, |b, t| b.union(Aabb::of_points(t)));
     let eps = options.tolerance.unwrap_or_else(|| tolerance(&bounds));
-    problem(&own, source, REACH * eps)
+    let other = problem(&own, source, REACH * eps)?;
+    let hole = world.graph.provenance.settings.get("smallest_hole");
+    let hole = hole.and_then(|h| h.parse::<f64>().ok()).unwrap_or_default();
+    let hole = hole.max(LEAST_HOLE);
+    if percent_on_both(&own, source, hole) < ON_SURFACE {
+        return Some(format!(
+            "{other}; give the scene of its bake, with the same --unit, --up, --detail-name and so on"
+        ));
+    }
+    Some(format!(
+        "the scene's triangles miss each other, so the bake moved its vertices by up to {:.0} mm, and they are not those of the world; \
+         verify the world by itself, without --source",
+        hole * 1e3
+    ))
 }
+
+/// Width of the gaps of a bake that says none. [Units: wu]
+const LEAST_HOLE: f64 = 0.01;
 
 /// Distance at which a triangle lies on a surface, in tolerances.
 pub(crate) const REACH: f64 = 4.0;
@@ -43,7 +59,7 @@ pub(crate) fn problem(own: &[Triangle], source: &[Triangle], reach: f64) -> Opti
     if 100 * same >= SAME * most {
         return None;
     }
-    let share = percent_on(source, own, reach).min(percent_on(own, source, reach));
+    let share = percent_on_both(own, source, reach);
     (share < ON_SURFACE).then(|| {
         format!(
             "the source is another scene, or was read with other settings than in the bake: {same} of its {} triangles are among the \
@@ -62,6 +78,10 @@ pub(crate) fn key(t: &Triangle) -> Key {
     let mut key = t.map(|p| p.as_vec3().to_array().map(|v| (v + 0.0).to_bits()));
     key.sort_unstable();
     key
+}
+
+fn percent_on_both(a: &[Triangle], b: &[Triangle], reach: f64) -> usize {
+    percent_on(a, b, reach).min(percent_on(b, a, reach))
 }
 
 fn percent_on(of: &[Triangle], within: &[Triangle], reach: f64) -> usize {

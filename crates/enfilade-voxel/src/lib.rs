@@ -29,7 +29,7 @@ pub use labels::{Labels, Reader};
 pub use sparse::SparseVolume;
 pub use voxelize::voxelize;
 pub use watershed::{
-    Basin, DistanceField, Saddle, Touching, Watershed, WatershedOptions, WidestOfBlocks, mark_dams,
-    watershed,
+    Basin, DistanceField, Saddle, Touching, Watershed, WatershedOptions, WidestOfBlocks,
+    bytes_of_slabs, mark_dams, watershed,
 };
 pub use widest::{WidestPath, border, widest_path};

@@ -49,6 +49,17 @@ pub use basins::{Basin, Saddle, Watershed};
 pub use blocks::WidestOfBlocks;
 pub use touching::Touching;
 
+/// Returns the memory that the slabs of a flood take, on so many threads, beside what is kept of all voxels. [Units: bytes]
+#[must_use]
+pub fn bytes_of_slabs(dims: [usize; 3], n_threads: usize) -> usize {
+    let shape = Shape { dims };
+    if dims.contains(&0) {
+        return 0;
+    }
+    let n_slabs = dims[2].div_ceil(slabs::thickness(shape));
+    n_threads.min(n_slabs) * slabs::bytes_of_slab(shape)
+}
+
 /// Options of [`watershed`].
 #[derive(Clone, Debug, Default)]
 pub struct WatershedOptions {

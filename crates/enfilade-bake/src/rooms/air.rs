@@ -6,8 +6,12 @@ use enfilade_geom::Allowance;
 
 use super::lids::{Lids, find_lids};
 use super::rims::rim_caps;
+use super::votes::n_votes;
+use crate::complex::Vote;
 use crate::structure::{Site, Structure};
-use crate::voxel::{BitVolume, DistanceField, Grid, SparseVolume, far_outdoors, voxelize};
+use crate::voxel::{
+    BitVolume, DistanceField, Grid, SparseVolume, bytes_of_slabs, far_outdoors, voxelize,
+};
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
 /// The air of a scene in voxels, before it is divided.
@@ -33,8 +37,15 @@ pub(crate) struct Plot {
     pub(crate) resolution: Resolution,
 }
 
-/// Peak memory of a bake in voxels, rounded from `docs/benchmarks/growth.md`. [Units: bytes/vx]
+/// Most memory of a bake in voxels, by which a limit on memory bounds their number. [Units: bytes/vx]
 pub(crate) const FLOODED: f64 = 2.2;
+
+/// Memory of the distances, labels and bits of a flood, beside its slabs: from bakes of 20 buildings of 1 to 326 million voxels.
+/// [Units: bytes/vx]
+const KEPT: f64 = 0.9;
+
+/// Memory of a vote: itself, and its leaf. [Units: bytes]
+const BYTES_A_VOTE: usize = size_of::<Vote>() + size_of::<Option<u32>>();
 
 /// Lays grids over parts of a structure, and reports the work ahead.
 ///
@@ -64,8 +75,12 @@ pub(crate) fn plots(
         n_voxels: n_voxels as u64,
     };
     // Grids are held one after the other.
-    let memory = FLOODED * largest.map_or(0, Grid::n_voxels) as f64;
-    context.tell(resolution, memory);
+    let n_threads = rayon::current_num_threads();
+    let of_flood =
+        |grid: &Grid| KEPT * grid.n_voxels() as f64 + bytes_of_slabs(grid.dims, n_threads) as f64;
+    let of_flood = grids.iter().map(|g| of_flood(&g.1)).fold(0.0, f64::max);
+    let of_votes = BYTES_A_VOTE * n_votes(n_voxels);
+    context.tell(resolution, of_flood, of_votes as f64);
     let plot = |(site, grid): (Site, Grid)| Plot {
         site,
         share: grid.n_voxels() as f64 / n_voxels as f64,

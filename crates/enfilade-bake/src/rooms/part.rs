@@ -4,19 +4,13 @@ use enfilade_geom::{Aabb, Allowance, DVec3};
 
 use super::air::{Solid, VoxelAir, plots};
 use super::lids::Lids;
+use super::votes::block_of;
 use crate::structure::{Site, Structure};
 use crate::voxel::{BitVolume, Grid, SparseVolume, distance_squared};
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
 /// Surfaces farther than this from a voxel do not count for its distance, beside a part's border. [Units: vx]
 const AROUND: usize = 16;
-
-/// Voxels along an edge of the blocks to which parts are aligned: those of votes.
-fn block_of(n_voxels: usize) -> usize {
-    (1..)
-        .find(|b| n_voxels / (b * b * b) <= super::votes::MAX_VOTES)
-        .unwrap_or(1)
-}
 
 /// The voxels of a whole scene, before distances are measured in any part of it.
 pub(crate) struct WholeAir {

@@ -12,10 +12,22 @@ use crate::structure::Frame;
 use crate::voxel::{BitVolume, Grid, Labels, voxelize};
 
 /// Approximate upper limit on the number of votes.
-pub(super) const MAX_VOTES: usize = 1_000_000;
+const MAX_VOTES: usize = 1_000_000;
 /// Voxels this close to where two regions meet do not vote: a candidate may lie on either
 /// side of them. [Units: wu]
 const UNSURE: f64 = 0.35;
+
+/// Returns the number of voxels along an edge of the blocks that cast votes, to which parts are aligned.
+pub(super) fn block_of(n_voxels: usize) -> usize {
+    (1..)
+        .find(|b| n_voxels / (b * b * b) <= MAX_VOTES)
+        .unwrap_or(1)
+}
+
+/// Returns the number of votes of as many voxels.
+pub(super) fn n_votes(n_voxels: usize) -> usize {
+    n_voxels / block_of(n_voxels).pow(3)
+}
 
 /// Compact votes: there are many, and the labels are still in memory.
 pub(super) struct Ballots {

@@ -6,11 +6,13 @@ mod formats;
 mod gate;
 mod habits;
 mod inputs;
+mod leftovers;
 mod mutate;
 mod mutated;
 mod order;
 mod random;
 mod scenes;
+mod states;
 mod tampered;
 mod tight;
 
@@ -28,7 +30,8 @@ use crate::rows::{Chosen, RowPrinter};
 pub(crate) struct Trust {
     #[command(flatten)]
     chosen: Chosen,
-    /// Number of damaged files of `mutated`, and of shuffles of each scene of `order`; 20,000 and 20 by default.
+    /// Number of damaged files of `mutated`, of shuffles of each scene of `order`, and of kills of `leftovers`; 20,000, 20 and
+    /// 200 by default.
     #[arg(long)]
     count: Option<usize>,
     /// Index of the first of them.
@@ -52,9 +55,11 @@ const PARTS: &[(&str, Part)] = &[
     ("gate", gate::run),
     ("habits", habits::run),
     ("large", budgets::large),
+    ("leftovers", leftovers::run),
     ("mutated", mutated::run),
     ("nasty", budgets::nasty),
     ("order", order::run),
+    ("states", states::run),
     ("tampered", tampered::run),
     ("tight", tight::run),
 ];

@@ -12,6 +12,9 @@ use enfilade_cli::world::read_world;
 /// Version of the format.
 pub(crate) const VERSION: u32 = 1;
 
+/// Most people: a picture of them takes ten seconds without a graphics card.
+const MOST_PEOPLE: u32 = 20_000;
+
 /// Contents of a world that is lived in. Coordinates are those of the world, or of the lift that an entry names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -171,8 +174,8 @@ impl LivingFile {
             bail!("people.places: at least two are needed");
         }
         let [low, high] = people.stay;
-        if people.count > 100_000 || !(low >= 0.0 && low <= high && high.is_finite()) {
-            bail!("people: at most 100000, and a stay of two ascending numbers, are needed");
+        if people.count > MOST_PEOPLE || !(low >= 0.0 && low <= high && high.is_finite()) {
+            bail!("people: at most {MOST_PEOPLE}, and a stay of two ascending numbers, are needed");
         }
         let places = people.places.iter();
         let points = places.chain(self.sounds.iter().map(|s| &s.at));

@@ -1,5 +1,7 @@
 //! People on errands: each walks from place to place by the shortest path, whether anybody looks or not.
 
+use std::collections::HashMap;
+
 use enfilade::cpg::PortalId;
 use enfilade::geom::DVec3;
 use enfilade::world::{
@@ -9,6 +11,9 @@ use enfilade::world::{
 
 use super::file::PeopleEntry;
 use crate::walk::{Walks, WorldFile, kept_or_made};
+
+/// Most ways that are remembered.
+const MOST_KNOWN: usize = 1000;
 
 /// The people of a world.
 pub(super) struct People {
@@ -43,17 +48,20 @@ impl People {
 
     /// Adds those who are missing, each at a place in turn.
     pub(super) fn fill(&mut self, space: &Space, n: u32, is_way: impl Fn(PortalId) -> bool) {
-        for i in self.actors.len() as u32..n {
+        let layout = space.layout(PartId::ROOT);
+        let up = DVec3::Y * 0.5;
+        let start = |i: u32| {
             let at = self.places[i as usize % self.places.len()];
-            let up = DVec3::Y * 0.5;
-            if let Some(cell) = space.layout(PartId::ROOT).locate(at + up) {
-                let mut actors = std::mem::replace(&mut self.actors, Actors::new(0, 0));
-                let mut plan = self.planner(space, &is_way);
-                actors.add(at, cell, &mut plan);
-                drop(plan);
-                self.actors = actors;
-            }
+            Some((at, layout.locate(at + up)?))
+        };
+        let starts: Vec<_> = (self.actors.len() as u32..n).filter_map(start).collect();
+        let mut actors = std::mem::replace(&mut self.actors, Actors::new(0, 0));
+        let mut plan = self.planner(space, &is_way);
+        for (at, cell) in starts {
+            actors.add(at, cell, &mut plan);
         }
+        drop(plan);
+        self.actors = actors;
     }
 
     /// Plays until a time. Doors open for people, so all but those that `is_way` excludes are ways. [Units: s]
@@ -63,7 +71,7 @@ impl People {
         self.actors = actors;
     }
 
-    /// Returns a planner of errands.
+    /// Returns a planner of errands. Many people go from place to place, so it remembers ways while it lasts.
     fn planner<'a, F: Fn(PortalId) -> bool>(
         &'a mut self,
         space: &'a Space,
@@ -80,15 +88,23 @@ impl People {
         let layout = space.layout(PartId::ROOT);
         // They do not use lifts.
         let may_pass = |part, portal| part == PartId::ROOT && is_way(portal);
+        let mut known: HashMap<([u64; 3], u32), Option<Path>> = HashMap::new();
         move |event, chance, plan| {
             let n = places.len() as u32;
             errands.plan(chance, plan, n, |place, way| {
                 let Some(map) = map else { return };
-                let ends = [event.at, places[place as usize]].map(|p| (PartId::ROOT, p));
-                if search.find(map, space, ends, may_pass, path).is_err() {
-                    return;
+                if known.len() >= MOST_KNOWN {
+                    known.clear();
                 }
-                path.add_way_points(layout, event.cell, way);
+                let from = event.at.to_array().map(f64::to_bits);
+                let found = known.entry((from, place)).or_insert_with(|| {
+                    let ends = [event.at, places[place as usize]].map(|p| (PartId::ROOT, p));
+                    let found = search.find(map, space, ends, may_pass, path);
+                    found.is_ok().then(|| path.clone())
+                });
+                if let Some(path) = found {
+                    path.add_way_points(layout, event.cell, way);
+                }
             });
         }
     }

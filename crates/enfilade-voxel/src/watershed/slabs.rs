@@ -32,6 +32,13 @@ pub(super) fn thickness(shape: Shape) -> usize {
     enough.min(most).next_multiple_of(EDGE).max(EDGE)
 }
 
+/// Returns the memory that each thread takes for a slab: [`Buffers`] with a layer on either side. [Units: bytes]
+pub(super) fn bytes_of_slab(shape: Shape) -> usize {
+    let thick = thickness(shape).min(shape.dims[2]);
+    let each = size_of::<u8>() + size_of::<u32>() + size_of::<u16>();
+    (thick + 2) * shape.layer() * each
+}
+
 /// Contact of two roots.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
