@@ -107,8 +107,6 @@ pub(super) struct RawFacet<'a> {
 pub(super) struct Covers<'a> {
     all: &'a [Cover],
     near: &'a [u32],
-    /// A triangle covers the whole facet, so no part of it is open and none is near.
-    is_closed: bool,
 }
 
 impl<'a> Covers<'a> {
@@ -122,43 +120,14 @@ impl<'a> Covers<'a> {
         self.iter().any(|c| c.candidate.is_none())
     }
 
-    /// Returns those that come near a part of the facet; their indices go to `near`.
-    fn around<'b>(
-        self,
-        part: &[DVec3],
-        tolerance: &Tolerance,
-        near: &'b mut SmallVec<[u32; 16]>,
-    ) -> Covers<'b>
-    where
-        'a: 'b,
-    {
+    /// Returns the indices of the surfaces that come near a part of the facet.
+    fn near(self, part: &[DVec3], reach: f64) -> SmallVec<[u32; 16]> {
         if self.near.is_empty() {
-            return self;
+            return SmallVec::new();
         }
-        let bounds = Aabb::of_points(part);
-        let (reach, eps) = (bounds.expanded(tolerance.plane), tolerance.cut);
-        let mut is_closed = false;
-        for &i in self.near {
-            let cover = &self.all[i as usize];
-            if cover.bounds.overlaps(&reach) {
-                near.push(i);
-                // Narrower than this, a polygon is open for no cover, so half of it is to spare for rounding.
-                let room = cover.bounds.expanded(eps);
-                let may_hold = cover.candidate.is_none()
-                    && room.contains(bounds.min)
-                    && room.contains(bounds.max);
-                if may_hold && cover.holds(part, 0.5 * eps) {
-                    near.clear();
-                    is_closed = true;
-                    break;
-                }
-            }
-        }
-        Covers {
-            all: self.all,
-            near,
-            is_closed,
-        }
+        let reach = Aabb::of_points(part).expanded(reach);
+        let is_near = |i: &u32| self.all[*i as usize].bounds.overlaps(&reach);
+        self.near.iter().copied().filter(is_near).collect()
     }
 }
 
@@ -314,14 +283,11 @@ impl Visitor<'_> {
                     is_near.then(|| Cover::new(candidate, points, plane.normal))
                 }),
         );
-        let all: SmallVec<[u32; 16]> = (0..covers.len() as u32).collect();
-        let mut near = SmallVec::new();
+        let near: SmallVec<[u32; 16]> = (0..covers.len() as u32).collect();
         let covers = Covers {
             all: covers,
-            near: &all,
-            is_closed: false,
+            near: &near,
         };
-        let covers = covers.around(&points, &self.tolerance, &mut near);
         self.push_down(node.plane, &points, covers, node.children, tab, sink);
     }
 
@@ -374,8 +340,11 @@ impl Visitor<'_> {
                     poly::add_parts(points, cut, self.tolerance.cut, &mut front, &mut back);
                     for (child, part) in node.children.into_iter().zip([&front, &back]) {
                         children[at] = child;
-                        let mut near = SmallVec::new();
-                        let covers = covers.around(part, &self.tolerance, &mut near);
+                        let near = covers.near(part, self.tolerance.plane);
+                        let covers = Covers {
+                            near: &near,
+                            ..covers
+                        };
                         self.push_down(plane, part, covers, children, tab, sink);
                     }
                     return;
@@ -406,9 +375,11 @@ impl OpenPieces {
                 || poly::is_larger(p, 0.0, 2.0 * tolerance.cut)
                     && !is_along(p, structural(), normal, tolerance.width)
         };
+        // Narrower than this, a polygon is open for no cover, so half of it is to spare for rounding.
         let eps = tolerance.cut;
+        let is_closed = structural().any(|c| c.holds(facet.points, 0.5 * eps));
         let mut rest: Vec<Poly> = Vec::new();
-        if !facet.covers.is_closed && open(facet.points) {
+        if !is_closed && open(facet.points) {
             rest.push(facet.points.into());
         }
         let mut outside = Vec::new();
@@ -524,7 +495,6 @@ mod tests {
             covers: Covers {
                 all: covers,
                 near: &near,
-                is_closed: false,
             },
         };
         OpenPieces::of(&facet, DVec3::Z, &tolerance).pieces.len()

@@ -89,6 +89,12 @@ const KINDS: [(&str, &str); 3] = [
     ("probe", "a probe of an engine"),
 ];
 
+/// Words for things that fill an opening. Any structural word beside them wins: kits name a wall with a hole in it
+/// `wall_door`.
+pub(crate) const OPENING_WORDS: [&str; 8] = [
+    "door", "window", "gate", "shutter", "glass", "glazing", "pane", "leaf",
+];
+
 /// Words for the volumes that a building consists of.
 const MASSING: [&str; 10] = [
     "building", "floor", "house", "lower", "main", "mass", "massing", "roof", "stair", "upper",
@@ -118,7 +124,9 @@ pub(crate) fn of_name(name: &str, thickness_if_plain: Option<f64>) -> Option<&'s
     let at_end = || PLAIN.iter().find(|(phrase, _)| words.ends_with(phrase));
     let plain = || at_end().filter(|_| is_plain);
     let kind = || KINDS.iter().find(|(last, _)| words.last() == Some(last));
-    let is_of_engine = || is_roomy && words.len() > 1 && !has(&MASSING);
+    // Walls are not named after openings.
+    let is_no_wall = || is_roomy || (is_plain && has(&OPENING_WORDS));
+    let is_of_engine = || is_no_wall() && words.len() > 1 && !has(&MASSING);
     let of_kind = || kind().filter(|_| is_of_engine()).map(|(_, thing)| *thing);
     let leads = || (is_plain && name.starts_with(PORTAL_TO) && !has(&AROUND)).then_some(OPENING);
     let found = (always.or_else(plain).map(|(_, thing)| *thing))
@@ -238,6 +246,11 @@ mod tests {
         for name in ["Storage zone", "Stack volume", "Hall probe"] {
             assert!(of_name(name, Some(0.3)).is_none(), "{name}");
             assert!(of_name(name, Some(0.5)).is_some(), "{name}");
+        }
+        // A thin zone in a doorway: neither a leaf nor a wall.
+        for name in ["Door_zone", "WindowVolume", "gate probe"] {
+            assert!(of_name(name, Some(0.2)).is_some(), "{name}");
+            assert!(of_name(name, None).is_none(), "{name}");
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::auto_roles::DEFAULT;
 use crate::glob::is_match;
-use crate::helpers;
+use crate::helpers::{self, OPENING_WORDS};
 use crate::tools::{TextureMatter, texture_matter};
 use crate::words::words;
 use enfilade_geom::scene::Role;
@@ -135,12 +135,6 @@ const STRUCTURAL_WORDS: [&str; 19] = [
     "wall", "floor", "ceiling", "roof", "slab", "column", "pillar", "beam", "foundation",
     "facade", "partition", "building", "house", "stair", "staircase", "stairs", "ground",
     "corridor", "chimney",
-];
-
-/// Words for things that fill an opening. Any structural word beside them wins: kits name a wall with a hole in it
-/// `wall_door`.
-const OPENING_WORDS: [&str; 8] = [
-    "door", "window", "gate", "shutter", "glass", "glazing", "pane", "leaf",
 ];
 
 /// Words for things that stand in rooms.

@@ -4,6 +4,8 @@
 //! visible: a triangle counts as seen if it touches a piece of the volume, and everything in a cell counts as seen
 //! from the cell itself.
 
+use std::sync::OnceLock;
+
 use enfilade_cpg::{
     Batch, CellId, PartNumbers, Pvs, SightGraph, SightGraphError, VisibleParts, VisibleVolumes,
     World,
@@ -79,24 +81,31 @@ pub fn see_parts_through(
         rounding: glasses.tolerance().rounding,
         slack,
     };
-    let is_hidden: Vec<bool> = (asked.par_iter())
-        .with_min_len(64)
-        .map(|&(portal, part)| {
+    // Asked only if no other way shows the part.
+    let is_hidden: Vec<OnceLock<bool>> = asked.iter().map(|_| OnceLock::new()).collect();
+    let is_open = |portal: u32, part: u32| {
+        portal == ANY_PORTAL || {
+            let at = asked.binary_search(&(portal, part));
             let shape = &all[part as usize];
-            shade.hides(glasses.place(portal), &shape.triangles, &shape.bounds)
+            let hides = || shade.hides(glasses.place(portal), &shape.triangles, &shape.bounds);
+            at.is_ok_and(|at| !*is_hidden[at].get_or_init(hides))
+        }
+    };
+    let is_seen = |ways: &[(u32, [u32; 2])]| {
+        let is_free = |&(part, ends): &(u32, [u32; 2])| ends.iter().all(|&p| is_open(p, part));
+        ways.iter().any(is_free)
+    };
+    let rows: Vec<Vec<u32>> = (candidates.into_par_iter())
+        .map(|row| {
+            let mut ways: Vec<(u32, [u32; 2])> =
+                row.into_iter().map(|(e, part)| (part, e)).collect();
+            ways.sort_unstable();
+            ways.dedup();
+            let of_parts = ways.chunk_by(|a, b| a.0 == b.0);
+            let seen = of_parts.filter(|ways| is_seen(ways));
+            seen.map(|ways| ways[0].0).collect()
         })
         .collect();
-    let is_open = |pair: (u32, u32)| asked.binary_search(&pair).is_ok_and(|at| !is_hidden[at]);
-    let is_seen = |&&(ends, part): &&([u32; 2], u32)| {
-        let mut portals = ends.into_iter();
-        portals.all(|portal| portal == ANY_PORTAL || is_open((portal, part)))
-    };
-    let rows = candidates.iter().map(|row| {
-        let mut parts: Vec<u32> = row.iter().filter(is_seen).map(|pair| pair.1).collect();
-        parts.sort_unstable();
-        parts.dedup();
-        parts
-    });
     let parts = VisibleParts::of_ascending(rows);
     Ok((volumes, parts))
 }

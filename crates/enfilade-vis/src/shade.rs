@@ -4,14 +4,14 @@
 //! Here the lines from the portal to a triangle are tested against the walls, as `occlude` does between two portals:
 //! by sheets, and by all walls in one plane (`cover`). For an object, the lines to the faces of its box by which they
 //! may enter are tested first, and if that is not enough, those to its triangles. Where a wall's plane divides lines,
-//! they are split there rather than halved.
+//! they are split there, and where walls leave gaps, only lines through those are followed; other lines are halved.
 //!
 //! A few random lines find most of what is visible. Errs to visible: lines not settled within [`MAX_BEAMS`] pieces
 //! count as free.
 
 use enfilade_geom::{Aabb, DVec3, Ray, Triangle};
 
-use crate::cover::{Cover, Near};
+use crate::cover::{Cover, Near, narrowed};
 use crate::dirs::Dirs;
 use crate::occlude::{APART, spread};
 use crate::rng::Rng;
@@ -21,6 +21,10 @@ use crate::sheets::{Beam, Hull, Part, Sheets, cut, halves, inner_point, size};
 const MAX_BEAMS: usize = 24;
 /// Random lines tried first.
 const LINES: usize = 16;
+/// Walls in one plane that leave a larger share of the lines may belong to a curved face, which sheets follow.
+const MUCH: f64 = 0.5;
+/// Shortest polygon that is halved, in distances that count as apart.
+const SHORT: f64 = 1e3;
 /// Objects with more triangles are tested by their boxes alone.
 const MAX_TRIANGLES: usize = 64;
 
@@ -46,6 +50,32 @@ pub(crate) struct Shade<'a> {
     pub(crate) slack: f64,
 }
 
+/// Lines from one polygon to another.
+#[derive(Clone)]
+struct Lines {
+    ends: [Vec<DVec3>; 2],
+    /// How far each end may reach past a wall and still be on one side of it. [Units: wu]
+    strips: [f64; 2],
+}
+
+impl Lines {
+    fn with(&self, end: usize, part: Vec<DVec3>) -> Self {
+        let mut lines = self.clone();
+        lines.ends[end] = part;
+        lines
+    }
+
+    /// Returns the lines to and from the halves of the larger end; `None` if that is too short.
+    fn halves(&self, least: f64) -> Option<Vec<Self>> {
+        let end = usize::from(size(&self.ends[1]) > size(&self.ends[0]));
+        let mut halves = halves(&self.ends[end]).to_vec();
+        halves.retain(|half| !half.is_empty());
+        let is_long = halves.iter().all(|half| size(half) >= least);
+        let with = |half| self.with(end, half);
+        is_long.then(|| halves.into_iter().map(with).collect())
+    }
+}
+
 impl Shade<'_> {
     /// Returns `true` if no line through an opening reaches a triangle, or the triangles of an object, behind it.
     pub(crate) fn hides(&self, dir: usize, triangles: &[Triangle], bounds: &Aabb) -> bool {
@@ -59,10 +89,6 @@ impl Shade<'_> {
         if triangles.len() > MAX_TRIANGLES {
             return false;
         }
-        let near = Near {
-            strip: self.inset,
-            ..self.near()
-        };
         // Parts in the opening's plane are seen at most edge-on.
         let behind = |t: &Triangle| cut(t, opening.normal, height + self.inset);
         let to: Vec<_> = triangles
@@ -77,7 +103,7 @@ impl Shade<'_> {
         };
         // A line quickly finds most of what is visible.
         !both().any(|ends| self.has_line(ends, LINES.div_ceil(to.len()), true))
-            && both().all(|ends| self.closes(ends.map(Clone::clone), near, true))
+            && both().all(|ends| self.closes(ends.map(Clone::clone), self.inset, true))
     }
 
     /// Returns `true` if no line through an opening reaches a box behind it.
@@ -90,11 +116,6 @@ impl Shade<'_> {
         if Aabb::of_points(parts.clone().flatten()).overlaps(bounds) {
             return false;
         }
-        // A part of an object this little in front of a wall may as well lie in the wall.
-        let near = Near {
-            strip: self.slack,
-            ..self.near()
-        };
         let faces = bounds.faces();
         let center = bounds.center();
         for part in parts {
@@ -107,7 +128,8 @@ impl Shade<'_> {
                     continue;
                 }
                 if self.has_line([&from, &to], LINES, false)
-                    || !self.closes([from, to], near, false)
+                    // A part of an object this little in front of a wall may as well lie in the wall.
+                    || !self.closes([from, to], self.slack, false)
                 {
                     return false;
                 }
@@ -119,7 +141,6 @@ impl Shade<'_> {
     fn near(&self) -> Near {
         Near {
             apart: APART * self.rounding,
-            strip: self.inset,
             slack: self.slack,
         }
     }
@@ -135,14 +156,19 @@ impl Shade<'_> {
     }
 
     /// Returns `true` if walls close all lines from one polygon to the other, which may be part of a wall.
-    fn closes(&self, ends: [Vec<DVec3>; 2], near: Near, may_be_wall: bool) -> bool {
-        let mut beams = vec![ends];
+    fn closes(&self, ends: [Vec<DVec3>; 2], strip: f64, may_be_wall: bool) -> bool {
+        let near = self.near();
+        let mut beams = vec![Lines {
+            ends,
+            strips: [strip; 2],
+        }];
         let mut n_done = 0;
-        while let Some(ends) = beams.pop() {
+        while let Some(lines) = beams.pop() {
             n_done += 1;
             if n_done > MAX_BEAMS {
                 return false;
             }
+            let ends = &lines.ends;
             let line = [inner_point(&ends[0]), inner_point(&ends[1])];
             let mut hits: Vec<(f64, u32)> = Vec::new();
             let ray = Ray::segment(line[0], line[1]);
@@ -156,71 +182,89 @@ impl Shade<'_> {
                 return false;
             }
             hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            match self.close(&ends, &hits, line, near) {
+            match self.close(&lines, &hits, line, near) {
                 Cover::Closed => {}
                 Cover::Cuts(end, plane) => {
                     for (normal, least) in [(plane.normal, -plane.d), (-plane.normal, plane.d)] {
                         let part = cut(&ends[end], normal, least + 4.0 * near.apart);
-                        self.go_on(&mut beams, &ends, end, part);
-                    }
-                }
-                Cover::Open => {
-                    let end = usize::from(size(&ends[1]) > size(&ends[0]));
-                    for half in halves(&ends[end]) {
-                        if !half.is_empty() && size(&half) < 1e3 * near.apart {
-                            return false;
+                        if !part.is_empty() {
+                            beams.push(lines.with(end, part));
                         }
-                        self.go_on(&mut beams, &ends, end, half);
                     }
                 }
+                Cover::Gaps(_, gaps) => {
+                    for gap in gaps {
+                        let Some(ends) = narrowed([&ends[0], &ends[1]], &gap, near) else {
+                            continue;
+                        };
+                        let narrow = Lines { ends, ..lines };
+                        let Some(more) = self.followed(&narrow, gap.to_vec(), may_be_wall) else {
+                            return false;
+                        };
+                        beams.extend(more);
+                    }
+                }
+                Cover::Open => match lines.halves(SHORT * near.apart) {
+                    Some(halves) => beams.extend(halves),
+                    None => return false,
+                },
             }
         }
         true
     }
 
-    fn go_on(
-        &self,
-        beams: &mut Vec<[Vec<DVec3>; 2]>,
-        ends: &[Vec<DVec3>; 2],
-        end: usize,
-        part: Vec<DVec3>,
-    ) {
-        if part.is_empty() {
-            return;
-        }
-        let mut ends = ends.clone();
-        ends[end] = part;
-        beams.push(ends);
+    /// Returns lines of which all must be closed so that those through a gap are: on the side of the gap where a wall is in the
+    /// way, else from halves. `None` if there is nothing to halve.
+    fn followed(&self, lines: &Lines, gap: Vec<DVec3>, may_be_wall: bool) -> Option<Vec<Lines>> {
+        let apart = self.near().apart;
+        let [from, to] = &lines.ends;
+        let middle = inner_point(&gap);
+        let is_same = |i| may_be_wall && self.sheets.is_in_plane(i, to, self.slack);
+        let bvh = &self.sheets.bvh;
+        let end = if bvh.any_hit(middle, inner_point(to), is_same) {
+            0
+        } else if bvh.any_hit(inner_point(from), middle, |_| false) {
+            1
+        } else {
+            return lines.halves(SHORT * apart);
+        };
+        let mut lines = lines.with(end, gap);
+        // There is nothing beside a gap into which a part of it may be moved.
+        lines.strips[end] = 4.0 * apart;
+        Some(vec![lines])
     }
 
-    /// Returns the effect on a beam of the walls that its line `line` hits.
-    fn close(
-        &self,
-        ends: &[Vec<DVec3>; 2],
-        hits: &[(f64, u32)],
-        line: [DVec3; 2],
-        near: Near,
-    ) -> Cover {
-        let mut cuts = Cover::Open;
+    /// Returns the effect on lines of the walls that one of them, `line`, hits.
+    fn close(&self, lines: &Lines, hits: &[(f64, u32)], line: [DVec3; 2], near: Near) -> Cover {
+        let mut best = Cover::Open;
         for i in spread(hits.len()) {
-            match self.sheets.cover(hits[i].1, ends, near) {
-                Cover::Closed => return Cover::Closed,
-                Cover::Cuts(end, plane) => {
-                    if matches!(cuts, Cover::Open) {
-                        cuts = Cover::Cuts(end, plane);
-                    }
-                }
-                Cover::Open => {}
+            let found = self
+                .sheets
+                .cover(hits[i].1, &lines.ends, lines.strips, near);
+            let is_better = match (&found, &best) {
+                (Cover::Closed, _) => return Cover::Closed,
+                (Cover::Open, _) | (_, Cover::Cuts(..)) => false,
+                (Cover::Gaps(share, _), Cover::Gaps(least, _)) => share < least,
+                _ => true,
+            };
+            if is_better {
+                best = found;
             }
         }
+        if matches!(best, Cover::Gaps(share, _) if share < MUCH) {
+            return best;
+        }
         let beam = Beam {
-            ends: ends.clone(),
+            ends: lines.ends.clone(),
             what: Part::Open,
         };
         let hull = Hull::new(&beam, near.apart);
-        let is_closed =
-            spread(hits.len()).any(|i| self.sheets.grown(hits[i].1, &beam, &hull, line).is_some());
-        if is_closed { Cover::Closed } else { cuts }
+        let grows = |i: usize| self.sheets.grown(hits[i].1, &beam, &hull, line).is_some();
+        if spread(hits.len()).any(grows) {
+            Cover::Closed
+        } else {
+            best
+        }
     }
 }
 
@@ -297,6 +341,37 @@ mod tests {
     }
 
     #[test]
+    fn two_walls_that_meet_hide_what_neither_does() {
+        // Lines to what stands in a house cross its front, or pass above that and cross its roof.
+        let front = rectangle([-9.0, -9.0], [9.0, 0.25], 1.0);
+        let roof = |from: f64| {
+            let level = |p: DVec3| DVec3::new(p.x, p.z, p.y);
+            rectangle([-9.0, from], [9.0, 9.0], 0.25).map(|t| t.map(level))
+        };
+        let target = [[-0.3, 0.0, 4.0], [0.3, 0.0, 4.0], [0.0, 0.0, 4.4]].map(DVec3::from_array);
+        assert!(hides(&[front, roof(1.0)].concat(), &[target]));
+        assert!(!hides(&front, &[target]) && !hides(&roof(1.0), &[target]));
+        // A slit between them shows it.
+        assert!(!hides(&[front, roof(1.3)].concat(), &[target]));
+    }
+
+    #[test]
+    fn a_screen_behind_a_doorway_hides_what_is_beyond() {
+        let front = [
+            rectangle([-9.0, -9.0], [9.0, -0.3], 1.0),
+            rectangle([-9.0, 0.3], [9.0, 9.0], 1.0),
+            rectangle([-9.0, -0.3], [-0.2, 0.3], 1.0),
+            rectangle([0.2, -0.3], [9.0, 0.3], 1.0),
+        ];
+        let target = rectangle([-1.0, -1.0], [1.0, 1.0], 4.0);
+        let screen = |x: f64| rectangle([-x, -0.5], [x, 0.5], 1.5);
+        let walls = |x: f64| [front.concat(), screen(x).to_vec()].concat();
+        assert!(hides(&walls(0.4), &target));
+        // Lines from the edge of the opening pass a narrow one.
+        assert!(!hides(&walls(0.25), &target) && !hides(&screen(0.4), &target));
+    }
+
+    #[test]
     fn what_sticks_out_of_a_wall_is_seen_and_what_stands_behind_it_is_not() {
         let upright = |low: f64, high: f64| {
             let p = |y, z| DVec3::new(0.3, y, z);
@@ -318,12 +393,19 @@ mod tests {
             let mut rng = Rng::new(seed);
             let mut range = |low: f64, high: f64| low + (high - low) * rng.unit();
             let mut walls = Vec::new();
-            for _ in 0..6 {
+            for k in 0..8 {
                 let z = f64::round(range(1.0, 4.0)) * 0.5;
                 let [x, y] =
                     [range(-2.0, 0.5), range(-2.0, 0.5)].map(|x| f64::round(x * 4.0) / 4.0);
                 let size = [range(0.5, 4.0), range(0.5, 4.0)];
-                walls.extend(rectangle([x, y], [x + size[0], y + size[1]], z));
+                let wall = rectangle([x, y], [x + size[0], y + size[1]], z);
+                // Some stand across, from the plane of another on, as a floor meets a front.
+                let across = |p: DVec3| match k % 4 {
+                    2 => DVec3::new(p.z - 1.5, p.y, 0.5 + (p.x + 2.0) / 2.0),
+                    3 => DVec3::new(p.x, p.z - 1.5, 0.5 + (p.y + 2.0) / 2.0),
+                    _ => p,
+                };
+                walls.extend(wall.map(|t| t.map(across)));
             }
             let at = [range(-1.0, 1.0), range(-1.0, 1.0), range(0.4, 3.0)];
             let mut corner = || DVec3::from_array(at.map(|x| x + range(-0.5, 0.5)));

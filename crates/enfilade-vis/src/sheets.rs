@@ -110,6 +110,7 @@ impl<'a> Sheets<'a> {
             if sheet.len() == MAX_SHEET {
                 return None;
             }
+            n_crossed += u32::from(is_crossed(next)?);
             sheet.push(next);
             for e in self.edges[next as usize] {
                 match rim.iter().position(|&(r, _)| r == e) {
@@ -120,9 +121,6 @@ impl<'a> Sheets<'a> {
                     None => rim.push((e, next)),
                 }
             }
-        }
-        for &t in &sheet[1..] {
-            n_crossed += u32::from(is_crossed(t)?);
         }
         (n_crossed % 2 == 1).then_some(sheet)
     }
@@ -162,7 +160,7 @@ impl Hull {
             hull.add(-turn, p, q);
             for i in 0..n {
                 let (a, b) = (own[i], own[(i + 1) % n]);
-                for &c in other {
+                for c in extremes([a, b], turn, other) {
                     let normal = (b - a).cross(c - a).normalize_or_zero();
                     let touches = |x: &DVec3| normal.dot(*x - a);
                     let all = p.iter().chain(q).map(touches);
@@ -208,6 +206,29 @@ impl Hull {
         // Positions along the segment have no unit; their error is less than a millionth.
         first > last + 1e-6
     }
+}
+
+/// Returns the first and the last of some points that a plane meets as it turns about an edge of a polygon, whose normal is
+/// `turn`, from beyond the edge.
+fn extremes([a, b]: [DVec3; 2], turn: DVec3, points: &[DVec3]) -> [DVec3; 2] {
+    let inward = turn.cross(b - a).normalize_or_zero();
+    // Grows with the angle, from -2 to 2.
+    let angle = |p: DVec3| {
+        let (x, y) = (inward.dot(p - a), turn.dot(p - a));
+        let part = x / (x.abs() + y.abs()).max(f64::MIN_POSITIVE);
+        if y < 0.0 { part - 1.0 } else { 1.0 - part }
+    };
+    let mut ends = [(f64::INFINITY, a), (f64::NEG_INFINITY, a)];
+    for &p in points {
+        let at = angle(p);
+        if at < ends[0].0 {
+            ends[0] = (at, p);
+        }
+        if at > ends[1].0 {
+            ends[1] = (at, p);
+        }
+    }
+    ends.map(|end| end.1)
 }
 
 fn area_normal(points: &[DVec3]) -> DVec3 {

@@ -67,7 +67,14 @@ impl Basins {
                 n - 1
             }
         };
-        let labels = part_labels(air, division, allowance);
+        let (blocked, far) = air.solid.blocked(allowance);
+        let labelling = Labelling {
+            grid,
+            blocked: &blocked,
+            far: &far,
+            division,
+        };
+        let labels = labelling.labels(allowance);
         let alike = |a: u32, b: u32| a == b || is_outer(a) && is_outer(b);
         let labels = connected_labels(&labels, alike, name);
         let mut basins = Self {
@@ -167,30 +174,6 @@ impl Basins {
     }
 }
 
-/// Labels voxels by parts: 0 is matter, the border and what is far from everything is [`OUTDOORS`], and the rest follow.
-fn part_labels(air: &VoxelAir, division: &impl Division, allowance: &Allowance) -> Labels {
-    let [nx, ny, nz] = air.grid.dims;
-    let (blocked, far) = air.solid.blocked(allowance);
-    let labelling = Labelling {
-        grid: &air.grid,
-        blocked: &blocked,
-        far: &far,
-        division,
-    };
-    Labels::filled(air.grid.dims, |z, labels| {
-        let zs = z..nz.min(z + BLOCKS[1]);
-        for [xs, ys] in blocks([0..nx, 0..ny], BLOCKS[0]) {
-            let node = labelling.around(ROOT, [&xs, &ys, &zs]);
-            for [xs, ys] in blocks([xs, ys], BLOCKS[1]) {
-                if !allowance.spend((xs.len() * ys.len() * zs.len()) as u64) {
-                    return;
-                }
-                labelling.fill(node, [xs, ys, zs.clone()], labels);
-            }
-        }
-    })
-}
-
 /// The division of a grid, and the voxels whose label is known without it.
 struct Labelling<'a, D> {
     grid: &'a Grid,
@@ -200,6 +183,23 @@ struct Labelling<'a, D> {
 }
 
 impl<D: Division> Labelling<'_, D> {
+    /// Labels voxels by parts: 0 is matter, the border and what is far from everything is [`OUTDOORS`], and the rest follow.
+    fn labels(&self, allowance: &Allowance) -> Labels {
+        let [nx, ny, nz] = self.grid.dims;
+        Labels::filled(self.grid.dims, |z, labels| {
+            let zs = z..nz.min(z + BLOCKS[1]);
+            for [xs, ys] in blocks([0..nx, 0..ny], BLOCKS[0]) {
+                let node = self.around(ROOT, [&xs, &ys, &zs]);
+                for [xs, ys] in blocks([xs, ys], BLOCKS[1]) {
+                    if !allowance.spend((xs.len() * ys.len() * zs.len()) as u64) {
+                        return;
+                    }
+                    self.fill(node, [xs, ys, zs.clone()], labels);
+                }
+            }
+        })
+    }
+
     /// Returns the smallest node within one that holds a block.
     fn around(&self, node: DivisionNode, block: [&Range<usize>; 3]) -> DivisionNode {
         let corner = |at: [usize; 3]| self.grid.to_world(DVec3::from(at.map(|n| n as f64)));
@@ -243,4 +243,90 @@ fn blocks([xs, ys]: [Range<usize>; 2], edge: usize) -> impl Iterator<Item = [Ran
             .map(move |at| at..r.end.min(at + edge))
     };
     cut(ys).flat_map(move |ys| cut(xs.clone()).map(move |xs| [xs, ys.clone()]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use enfilade_geom::Plane;
+    use proptest::prelude::*;
+
+    /// A tree of planes, each node with one for both of its children; the parts below are 0 to 7, and every third is matter.
+    struct Planes([Plane; 7]);
+
+    impl Planes {
+        /// Returns the node below `node` in front of its plane or behind it; nodes from 7 on are parts.
+        fn below(node: i32, is_front: bool) -> i32 {
+            2 * node + 1 + i32::from(is_front)
+        }
+
+        fn descend(&self, node: i32, step: impl Fn(&Plane) -> Option<bool>) -> i32 {
+            let mut node = if node == ROOT { 0 } else { node };
+            while let Some(is_front) = self.0.get(node as usize).and_then(&step) {
+                node = Self::below(node, is_front);
+            }
+            node
+        }
+    }
+
+    impl Division for Planes {
+        fn around(&self, node: DivisionNode, center: DVec3, radius: f64) -> DivisionNode {
+            self.descend(node, |plane| {
+                let height = plane.signed_distance(center);
+                (height.abs() > radius).then_some(height > 0.0)
+            })
+        }
+
+        fn is_part(&self, node: DivisionNode) -> bool {
+            node != ROOT && node >= 7
+        }
+
+        fn part_at(&self, node: DivisionNode, p: DVec3) -> Option<u32> {
+            let part = self.descend(node, |plane| Some(plane.signed_distance(p) > 0.0)) - 7;
+            (part % 3 != 0).then_some(part as u32)
+        }
+    }
+
+    fn plane() -> impl Strategy<Value = Plane> {
+        let normal = prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array);
+        let normal = normal.prop_filter_map("direction", DVec3::try_normalize);
+        (prop::array::uniform3(0.0..12.0f64), normal)
+            .prop_map(|(p, normal)| Plane::through(DVec3::from_array(p), normal))
+    }
+
+    proptest! {
+        #[test]
+        fn blocks_have_the_labels_of_their_voxels(
+            dims in [3_usize..40, 3_usize..24, 3_usize..11],
+            planes in prop::array::uniform7(plane()),
+            seed in any::<u64>(),
+        ) {
+            let grid = Grid { origin: DVec3::new(-1.0, 0.5, 2.0), voxel: 0.5, dims };
+            let is_of = |i: usize, salt: u64| {
+                (i as u64 ^ seed ^ salt).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 60 == 0
+            };
+            let [mut blocked, mut far] = [BitVolume::new(dims), BitVolume::new(dims)];
+            let [nx, ny, nz] = dims;
+            let voxels = || (0..nx * ny * nz).map(|i| [i % nx, i / nx % ny, i / (nx * ny)]);
+            for (i, [x, y, z]) in voxels().enumerate() {
+                blocked.set(x, y, z, is_of(i, 1));
+                far.set(x, y, z, is_of(i, 2));
+            }
+            let division = Planes(planes);
+            let labelling = Labelling { grid: &grid, blocked: &blocked, far: &far, division: &division };
+            let labels = labelling.labels(&Allowance::default());
+            for [x, y, z] in voxels() {
+                let is_border = [x, y, z].iter().zip(dims).any(|(&at, n)| at == 0 || at + 1 == n);
+                let expected = if blocked.get(x, y, z) {
+                    0
+                } else if is_border || far.get(x, y, z) {
+                    OUTDOORS
+                } else {
+                    let part = division.part_at(ROOT, grid.center(x, y, z));
+                    part.map_or(0, |part| AFTER + part)
+                };
+                prop_assert_eq!(labels.at([x, y, z]), expected, "{:?}", [x, y, z]);
+            }
+        }
+    }
 }
