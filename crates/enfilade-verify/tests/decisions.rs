@@ -38,6 +38,34 @@ fn false_decisions_are_found_as_such() {
 }
 
 #[test]
+fn a_doorway_may_be_one_of_several_openings_that_are_one_portal() {
+    let mut world = HOUSE.clone();
+    let graph = &mut world.graph;
+    let doorway = |why: &Why| {
+        why.facts
+            .get(&Fact::Doorway)
+            .is_some_and(|&height| height > 0.0)
+    };
+    let cell = graph
+        .cells
+        .iter()
+        .find(|c| c.is_room() && c.why.iter().any(doorway));
+    let portals = cell.unwrap().portals.clone();
+    for p in &portals {
+        // One vertex of each goes up, as if there were a gap above.
+        let outline = &mut graph.portals[p.idx()].outline;
+        let top = outline.iter_mut().max_by(|a, b| a[1].total_cmp(&b[1]));
+        top.unwrap()[1] += 3.0;
+    }
+    let n_found = |world: &World| said(world).iter().filter(|p| p.contains("doorway")).count();
+    assert_eq!(n_found(&world), 0);
+    for p in portals {
+        world.graph.portals[p.idx()].area = 100.0;
+    }
+    assert!(n_found(&world) > 0);
+}
+
+#[test]
 fn a_room_that_is_told_as_a_void_with_all_that_belongs_to_it_is_found() {
     let mut world = HOUSE.clone();
     let rooms = world.graph.cells.iter_mut().filter(|c| c.is_room());
