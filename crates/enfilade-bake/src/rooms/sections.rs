@@ -118,6 +118,8 @@ fn measured(
             jambs.frame()
         }
     };
+    // Jambs are those before unless more space is beside them.
+    let mut n_beside = usize::MAX;
     // From the opening outward, as far sections are the large ones.
     for s in 0..=reach + at.abs() {
         let [before, after] = &mut sides;
@@ -129,7 +131,11 @@ fn measured(
             rayon::join(|| look(before, 0, at - s), || look(after, 1, at + s));
         }
         let n = smaller(&sides, a) as f64;
+        let n_before = n_beside;
         if extent == WantedSections::Enough && n > enough {
+            n_beside = sides[0].n_beside + sides[1].n_beside;
+        }
+        if n_beside != n_before {
             let frame = frame(slices.jambs(&sides));
             if frame >= FRAMED {
                 return OpeningSection {
@@ -173,6 +179,7 @@ struct Side {
     largest: [usize; 2],
     /// Points that the section of the cell on this side contains in any slice.
     beside: Vec<bool>,
+    n_beside: usize,
     flood: SliceFlood,
 }
 
@@ -181,6 +188,7 @@ impl Side {
         Self {
             largest: [0; 2],
             beside: vec![false; slices.seeds.len()],
+            n_beside: 0,
             flood: SliceFlood::of(slices),
         }
     }
@@ -197,7 +205,10 @@ impl Side {
         for (c, of) in cells.into_iter().enumerate() {
             let mut n = 0;
             let mark = |k: usize| {
-                self.beside[k] |= c == own;
+                if c == own && !self.beside[k] {
+                    self.beside[k] = true;
+                    self.n_beside += 1;
+                }
                 n += usize::from(!slices.above[k]);
             };
             self.flood.count(slices, |cell| cell == of, mark);
@@ -213,7 +224,8 @@ struct SliceFlood {
     cells: Vec<u32>,
     /// Points that are not [`UNREAD`].
     read: Vec<u32>,
-    stack: Vec<u32>,
+    /// Columns and rows of points whose neighbors are not looked at.
+    stack: Vec<[u32; 2]>,
     /// First point of the slice. [Units: vx]
     base: DVec3,
     /// The allowance is used up.
@@ -266,35 +278,35 @@ impl SliceFlood {
         } = self;
         let mut reader = slices.reader(*base);
         let [width, height] = slices.side.map(|n| n as u32);
-        let mut take = |k: u32, stack: &mut Vec<u32>| {
+        let mut take = |i: u32, j: u32, stack: &mut Vec<[u32; 2]>| {
+            let k = i + j * width;
             let cell = &mut cells[k as usize];
             if *cell == UNREAD {
-                *cell = reader.cell_at(k % width, k / width);
+                *cell = reader.cell_at(i, j);
                 read.push(k);
             }
             if *cell != COUNTED && is_own(*cell) {
                 *cell = COUNTED;
-                stack.push(k);
+                stack.push([i, j]);
             }
         };
         let mut n = 0;
         for &seed in &slices.opening {
-            take(seed, stack);
-            while let Some(k) = stack.pop() {
+            take(seed % width, seed / width, stack);
+            while let Some([i, j]) = stack.pop() {
                 n += 1;
-                mark(k as usize);
-                let (i, j) = (k % width, k / width);
+                mark((i + j * width) as usize);
                 if i > 0 {
-                    take(k - 1, stack);
+                    take(i - 1, j, stack);
                 }
                 if i + 1 < width {
-                    take(k + 1, stack);
+                    take(i + 1, j, stack);
                 }
                 if j > 0 {
-                    take(k - width, stack);
+                    take(i, j - 1, stack);
                 }
                 if j + 1 < height {
-                    take(k + width, stack);
+                    take(i, j + 1, stack);
                 }
             }
         }

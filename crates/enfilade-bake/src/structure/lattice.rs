@@ -1,7 +1,5 @@
 //! Counts on a lattice of points in a plane: connected points, and their surroundings.
 
-use std::collections::BTreeMap;
-
 /// Jambs that take a smaller part of the width of the space are pilasters, and what spans it between them is a beam.
 const PILASTERS: f64 = 0.125;
 
@@ -40,6 +38,33 @@ pub(crate) struct Jambs {
     pub(crate) share: f64,
 }
 
+/// A value for each of a range of bands, as far as they have one.
+struct Bands<T> {
+    first: i64,
+    values: Vec<Option<T>>,
+}
+
+impl<T: Copy> Bands<T> {
+    /// Makes room for the least to the greatest of some bands.
+    fn over(bands: impl Iterator<Item = i64> + Clone) -> Self {
+        let first = bands.clone().min().unwrap_or(0);
+        let n = bands.max().map_or(0, |last| last - first + 1);
+        Self {
+            first,
+            values: vec![None; n as usize],
+        }
+    }
+
+    fn entry(&mut self, band: i64) -> Option<&mut Option<T>> {
+        self.values
+            .get_mut(usize::try_from(band - self.first).ok()?)
+    }
+
+    fn get(&self, band: i64) -> Option<T> {
+        *self.values.get(usize::try_from(band - self.first).ok()?)?
+    }
+}
+
 impl Jambs {
     /// Returns the share of the lesser jamb, or of a jamb and the lintel, whichever is more: high for an opening in a wall, low for a
     /// bend, an alcove, an arm of a room, and for a beam across one, with or without pilasters.
@@ -76,18 +101,22 @@ impl Jambs {
         };
         // The opening may lean: its ends at each height, and its top at each place across.
         let band = |t: f64| t.round() as i64;
-        let mut ends: BTreeMap<i64, [f64; 2]> = BTreeMap::new();
-        let mut tops: BTreeMap<i64, f64> = BTreeMap::new();
-        for [across, height] in (0..mask.len()).filter(|&k| mask[k]).map(at) {
-            let of = ends.entry(band(height)).or_insert([across; 2]);
-            *of = [of[0].min(across), of[1].max(across)];
-            let top = tops.entry(band(across)).or_insert(height);
-            *top = top.max(height);
+        let open: Vec<[f64; 2]> = (0..mask.len()).filter(|&k| mask[k]).map(at).collect();
+        let mut ends = Bands::over(open.iter().map(|p| band(p[1])));
+        let mut tops = Bands::over(open.iter().map(|p| band(p[0])));
+        for [across, height] in open {
+            if let Some(of) = ends.entry(band(height)) {
+                let [least, most] = of.unwrap_or([across; 2]);
+                *of = Some([least.min(across), most.max(across)]);
+            }
+            if let Some(top) = tops.entry(band(across)) {
+                *top = Some(top.unwrap_or(height).max(height));
+            }
         }
         let n_open = mask.iter().filter(|&&is_open| is_open).count();
         let is_at_side = |k: usize| {
             let [across, height] = at(k);
-            let of = ends.get(&band(height));
+            let of = ends.get(band(height));
             of.is_some_and(|e| across < e[0] || across > e[1])
         };
         let n_beside = (0..mask.len()).filter(|&k| !mask[k] && is_beside(k) && is_at_side(k));
@@ -96,11 +125,11 @@ impl Jambs {
         let (mut rim, mut beside) = ([0_usize; 3], [0_usize; 3]);
         for_rim(mask, side, |k| {
             let [across, height] = at(k);
-            let of = ends.get(&band(height));
+            let of = ends.get(band(height));
             let is_there = [
                 of.is_some_and(|e| across < e[0]),
                 of.is_some_and(|e| across > e[1]),
-                tops.get(&band(across)).is_some_and(|top| height > *top),
+                tops.get(band(across)).is_some_and(|top| height > top),
             ];
             for (n, is_there) in is_there.into_iter().enumerate() {
                 rim[n] += usize::from(is_there);
