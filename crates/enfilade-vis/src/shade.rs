@@ -21,8 +21,6 @@ use crate::sheets::{Beam, Hull, Part, Sheets, cut, halves, inner_point, size};
 const MAX_BEAMS: usize = 24;
 /// Random lines tried first.
 const LINES: usize = 16;
-/// Walls in one plane that leave a larger share of the lines may belong to a curved face, which sheets follow.
-const MUCH: f64 = 0.5;
 /// Shortest polygon that is halved, in distances that count as apart.
 const SHORT: f64 = 1e3;
 /// Objects with more triangles are tested by their boxes alone.
@@ -250,9 +248,6 @@ impl Shade<'_> {
             if is_better {
                 best = found;
             }
-        }
-        if matches!(best, Cover::Gaps(share, _) if share < MUCH) {
-            return best;
         }
         let beam = Beam {
             ends: lines.ends.clone(),
