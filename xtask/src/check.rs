@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
 
 use crate::steps::Steps;
 use crate::{
-    GATE, add_scene_files, apt, cargo, dependencies, engines, features, name_of, node_path,
-    output_of, root, run_to_end, scenes, suites, target_dir, tidy, tools_dir, world_of,
+    GATE, add_scene_files, apt, cargo, dependencies, engines, features, installed, name_of,
+    node_path, output_of, root, run_to_end, scenes, suites, target_dir, tidy, tools_dir, world_of,
 };
 
 /// Segments and rays tested on each scene; the full 10⁷ are run by hand.
@@ -78,6 +78,7 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     })?;
     steps.step("package", package)?;
     steps.step("demo", demo)?;
+    steps.step("installed", || installed::run(&demo_world()))?;
     let scenes = scenes();
     for scene in &scenes {
         let name = name_of(scene);
@@ -186,8 +187,11 @@ fn verify(world: &Path, scene: Option<&Path>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Packs every crate that will be published, as if its dependencies were published already; builds none of them.
+/// Packs every crate that will be published, as if its dependencies were published already; builds none of them. A warning
+/// is an error.
 fn package() -> anyhow::Result<()> {
+    // Packages of an earlier version.
+    let _ = std::fs::remove_dir_all(target_dir().join("package"));
     let args = [
         "package",
         "--workspace",
@@ -197,7 +201,14 @@ fn package() -> anyhow::Result<()> {
         "--allow-dirty",
         "--quiet",
     ];
-    run_to_end(&mut cargo(&args))
+    let mut packages = cargo(&args);
+    let done = packages.output()?;
+    let said = String::from_utf8_lossy(&done.stderr);
+    ensure!(
+        done.status.success() && !said.contains("warning"),
+        "{packages:?}:\n{said}"
+    );
+    Ok(())
 }
 
 fn demo() -> anyhow::Result<()> {
@@ -206,9 +217,14 @@ fn demo() -> anyhow::Result<()> {
     let _ = std::fs::remove_dir_all(&dir);
     let mut demo = Command::new(GATE.binary("enfilade"));
     print!("{}", output_of(demo.arg("demo").arg("-o").arg(&dir))?);
-    let world = dir.join("world.glb");
+    let world = demo_world();
     validate(&world)?;
     verify(&world, None)
+}
+
+/// Path of the world that the step `demo` makes.
+fn demo_world() -> PathBuf {
+    target_dir().join("demo").join("world.glb")
 }
 
 fn check_scene(scene: &Path, name: &str) -> anyhow::Result<()> {

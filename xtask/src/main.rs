@@ -8,6 +8,7 @@ mod dependencies;
 mod engines;
 mod features;
 mod fuzzed;
+mod installed;
 mod lengths;
 mod mutual;
 mod names;

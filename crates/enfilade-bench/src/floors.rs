@@ -8,7 +8,9 @@ use anyhow::bail;
 use crate::table::Table;
 
 /// Names of the figures of a score.
-pub(crate) const COLUMNS: [&str; 6] = ["rooms", "doors", "windows", "cells", "extra", "mcc"];
+pub(crate) const COLUMNS: [&str; 7] = [
+    "rooms", "doors", "windows", "cells", "extra", "mcc", "areas",
+];
 
 /// A scene, and the minimum shares of rooms, doors and windows: the first three of [`COLUMNS`].
 type Floor = (&'static str, [f64; 3]);
@@ -25,7 +27,7 @@ const FLOORS: [Floor; 6] = [
 /// Fails with a line for each figure below its floor. Scenes without a floor pass, but are listed.
 pub(crate) fn check<'n>(
     out: &mut Table,
-    rows: impl Iterator<Item = (&'n str, [Option<f64>; 6])>,
+    rows: impl Iterator<Item = (&'n str, [Option<f64>; 7])>,
 ) -> anyhow::Result<()> {
     let mut low = Vec::new();
     for (name, [rooms, doors, windows, ..]) in rows {

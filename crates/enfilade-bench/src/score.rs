@@ -68,6 +68,9 @@ pub(crate) fn center_and_area(points: &[V3]) -> (V3, f64) {
 /// The volume from which a cell of kind room that holds no room of the truth counts. [Units: wu³]
 const SPARE: f64 = 1.0;
 
+/// Largest difference of a floor area that is right, as a share of the architect's.
+const AREA: f64 = 0.03;
+
 /// One row of the table; `None` if a scene has nothing of the kind.
 pub(crate) struct Score {
     pub(crate) name: String,
@@ -78,7 +81,7 @@ pub(crate) struct Score {
     /// Cells of the world, outdoors included.
     pub(crate) n_cells: usize,
     /// In the order of [`COLUMNS`].
-    pub(crate) figures: [Option<f64>; 6],
+    pub(crate) figures: [Option<f64>; 7],
     /// Indoor rooms of the world larger than [`SPARE`] that hold no point of a room, per room.
     pub(crate) spare: Option<f64>,
     /// Portals of kind crack.
@@ -275,6 +278,7 @@ pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Re
             per_n(samples.n_cells),
             per_n(extra),
             pair_mcc(&samples.rooms, &samples.groups, &samples.cells),
+            samples.areas(rooms, list(&graph["cells"]), &mut failed),
         ],
         spare: per_n(samples.n_spare(list(&graph["cells"]))),
         n_cracks: portals.iter().filter(|p| p.kind == "crack").count(),
@@ -337,6 +341,43 @@ impl Samples {
             c["outdoor"] != true && is_room && is_large && !held.contains(&*c["id"].to_string())
         };
         cells.iter().filter(is_spare).count()
+    }
+
+    /// Returns the share of rooms whose cell has their floor area within [`AREA`]; where several are one cell, their sum. Rooms of
+    /// which the truth has no area do not count; those in no cell do.
+    fn areas(&self, rooms: &[Value], cells: &[Value], failed: &mut Vec<String>) -> Option<f64> {
+        let mut of_cell = BTreeMap::<&str, (f64, usize, Vec<String>)>::new();
+        let mut points = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
+        for (room, cell) in self.rooms.iter().zip(&self.cells) {
+            *points.entry(room).or_default().entry(cell).or_default() += 1;
+        }
+        for room in rooms {
+            let Some(area) = room["floor_area"].as_f64().filter(|a| *a > 0.0) else {
+                continue;
+            };
+            let counts = points.get(text(&room["id"]).as_str());
+            let most = counts.and_then(|c| c.iter().max_by_key(|c| c.1));
+            let entry = of_cell.entry(most.map_or("-", |m| m.0)).or_default();
+            entry.0 += area;
+            entry.1 += 1;
+            entry.2.push(text(&room["name"]));
+        }
+        let (mut n_right, mut n) = (0, 0);
+        for (id, (area, n_rooms, names)) in of_cell {
+            let cell = cells.iter().find(|c| c["id"].to_string() == id);
+            let found = cell.and_then(|c| c["floor_area"].as_f64());
+            n += n_rooms;
+            if found.is_some_and(|found| (found / area - 1.0).abs() <= AREA) {
+                n_right += n_rooms;
+            } else {
+                let found = found.map_or("none".to_owned(), |found| format!("{found:.2}"));
+                failed.push(format!(
+                    "area of {}: {found} of {area:.2} m²",
+                    names.join(" and ")
+                ));
+            }
+        }
+        (n > 0).then(|| n_right as f64 / n as f64)
     }
 
     /// Counts rooms with nearly all points in one cell that has hardly any points of other groups.

@@ -20,7 +20,7 @@ use specials::SpecialReport;
 use crate::limits::Limits;
 use crate::screen::{At, Rounded, print_json, printed_at_once};
 use enfilade_cli::world::read_world;
-use enfilade_report::cells_in_words;
+use enfilade_report::{RoomFacts, cells_in_words, find_storeys, room_facts};
 
 /// Shows the cells, portals and statistics of a world.
 #[derive(clap::Args)]
@@ -84,6 +84,31 @@ struct CellReport<'a> {
     outdoor: bool,
     /// `room`, `outdoors` or `void`.
     kind: &'static str,
+    /// Absent if it is no room.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    room: Option<RoomReport>,
+}
+
+#[derive(Serialize)]
+struct RoomReport {
+    storeys: Vec<String>,
+    floor_area: f64,
+    height: f64,
+    doors: usize,
+    windows: usize,
+}
+
+impl RoomReport {
+    fn of(room: RoomFacts) -> Self {
+        let rounded = |n: f64| (1000.0 * n).round() / 1000.0;
+        Self {
+            storeys: room.storeys,
+            floor_area: rounded(room.floor_area),
+            height: rounded(room.height),
+            doors: room.n_doors,
+            windows: room.n_windows,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -135,6 +160,10 @@ struct Stats<'a> {
 
 fn report(world: &World) -> Inspection<'_> {
     let graph = &world.graph;
+    let mut rooms: BTreeMap<usize, RoomReport> = room_facts(world, &find_storeys(world))
+        .into_iter()
+        .map(|room| (room.cell.0 as usize, RoomReport::of(room)))
+        .collect();
     let cells = graph.cells.iter().enumerate().map(|(id, c)| CellReport {
         id,
         name: &c.name,
@@ -145,6 +174,7 @@ fn report(world: &World) -> Inspection<'_> {
         portals: c.portals.iter().map(|p| p.0).collect(),
         outdoor: c.outdoor,
         kind: cell_kind(c),
+        room: rooms.remove(&id),
     });
     let scores = portal_scores(world, &CostModel::default());
     let portals = graph
@@ -230,7 +260,7 @@ pub(crate) fn kind_name(kind: PortalKind) -> &'static str {
 }
 
 fn write_tables(out: &mut impl Write, world: &World, all: bool) -> io::Result<()> {
-    write_cells(out, &world.graph)?;
+    write_cells(out, world)?;
     writeln!(out)?;
     write_portals(out, world, all)?;
     writeln!(out)?;
@@ -243,31 +273,47 @@ fn write_tables(out: &mut impl Write, world: &World, all: bool) -> io::Result<()
 }
 
 /// The cells, the largest first.
-fn write_cells(out: &mut impl Write, graph: &CellPortalGraph) -> io::Result<()> {
+fn write_cells(out: &mut impl Write, world: &World) -> io::Result<()> {
+    let graph = &world.graph;
+    let rooms = room_facts(world, &find_storeys(world));
     let mut by_volume: Vec<(usize, &Cell)> = graph.cells.iter().enumerate().collect();
     // Ids break ties, so that the table is reproducible.
     by_volume.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
     writeln!(
         out,
-        "{:>6}  {:<16} {:<8} {:>12} {:>10} {:>10} {:>8}  size in m (x × y × z)",
-        "cell", "name", "kind", "volume m³", "triangles", "detail", "portals"
+        "{:>6}  {:<16} {:<8} {:>7} {:>9} {:>9} {:>11} {:>8} {:>10} {:>10}",
+        "cell",
+        "name",
+        "kind",
+        "storey",
+        "floor m²",
+        "height m",
+        "volume m³",
+        "portals",
+        "triangles",
+        "detail"
     )?;
     for (id, c) in by_volume {
-        let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
+        let room = rooms.iter().find(|room| room.cell.0 as usize == id);
+        let [storey, floor, height] = room.map_or(Default::default(), |room| {
+            let lengths = [room.floor_area, room.height].map(|n| format!("{n:.2}"));
+            let [floor, height] = lengths;
+            [room.storeys.join(" "), floor, height]
+        });
         writeln!(
             out,
-            "{id:>6}  {:<16} {:<8} {:>12.2} {:>10} {:>10} {:>8}  {x:.2} × {y:.2} × {z:.2}",
+            "{id:>6}  {:<16} {:<8} {storey:>7} {floor:>9} {height:>9} {:>11.2} {:>8} {:>10} {:>10}",
             c.name,
             cell_kind(c),
             c.volume,
+            c.portals.len(),
             c.n_triangles,
             c.n_detail_triangles,
-            c.portals.len()
         )?;
     }
     writeln!(
         out,
-        "triangles: of walls, seen without passing a portal; detail: of furniture and other objects in it"
+        "floor: as seen from above, without the recesses of doors and windows; height: over most of it; triangles: of walls, seen without passing a portal; detail: of furniture and other objects in it"
     )?;
     let is_void = graph.cells.iter().any(|c| c.is_void);
     if is_void {

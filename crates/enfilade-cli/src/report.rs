@@ -89,9 +89,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         walk: walk.as_deref().map(walk_page::address_of_page),
         ..ReportParts::default()
     };
-    parts
-        .notes
-        .push(Verdict::of(&world, &[]).untried().sentence());
+    parts.verdict = Some(Verdict::of(&world, &[]).untried());
     parts.visible = visible(&world, &mut parts.notes)?;
     let sight = Sight::build(&world).with_context(|| name_of(&args.world))?;
     let steps = measured(&world, &sight, args.views as usize);
@@ -103,7 +101,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     }
     if !args.no_pictures {
         match enfilade_cli::adapter::open(&args.adapter) {
-            Ok(gpu) => parts.figures = pictures(gpu, &world, &steps)?,
+            Ok(gpu) => parts.figures = pictures(gpu, &world)?,
             Err(why @ RenderError::NoAdapter) => {
                 let _ = writeln!(Warned, "enfilade: the report has no pictures: {why}");
                 parts.notes.push(format!("No pictures: {why}."));
@@ -162,7 +160,6 @@ fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
 
 /// One view of the walk.
 struct Step {
-    camera: Camera,
     frustum: u64,
     portals: u64,
     cells: usize,
@@ -180,7 +177,6 @@ fn measured(world: &World, sight: &Sight, views: usize) -> Vec<Step> {
         let frustum = viewer.see_through_walls(sight, &view).n_triangles();
         let seen = viewer.see(sight, &state, &view);
         steps.push(Step {
-            camera,
             frustum,
             portals: seen.n_triangles(),
             cells: seen.cells().len(),
@@ -278,7 +274,7 @@ fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
     }
 }
 
-fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figure>> {
+fn pictures(gpu: Gpu, world: &World) -> anyhow::Result<Vec<Figure>> {
     let mut studio = Studio::new(gpu, world)?;
     tell_of_pictures(&studio)?;
     light(&mut studio, world)?;
@@ -305,27 +301,5 @@ fn pictures(gpu: Gpu, world: &World, steps: &[Step]) -> anyhow::Result<Vec<Figur
         caption: "The same view from above: what is visible keeps its color; behind walls reddish, out of view gray, the portals looked through orange.".into(),
         png: picture.to_png()?,
     });
-    let mut worst: Vec<&Step> = steps.iter().collect();
-    worst.sort_by_key(|s| std::cmp::Reverse(s.portals));
-    let mut eyes: Vec<[f32; 3]> = Vec::new();
-    for step in worst {
-        let e = step.camera.eye;
-        // One picture of a place is enough.
-        let is_near = |o: &[f32; 3]| (0..3).map(|k| (o[k] - e[k]).powi(2)).sum::<f32>() < 9.0;
-        if eyes.len() == 3 || eyes.iter().any(is_near) {
-            continue;
-        }
-        eyes.push(e);
-        let picture = smooth(SIZE, |size| {
-            Ok(studio.picture(&step.camera, Culling::Portals, style, &[], size)?)
-        })?;
-        out.push(Figure {
-            caption: format!(
-                "Among the views with most to draw: {} triangles in {} rooms, at {:.1}, {:.1}, {:.1}.",
-                step.portals, step.cells, e[0], e[1], e[2]
-            ),
-            png: picture.to_png()?,
-        });
-    }
     Ok(out)
 }

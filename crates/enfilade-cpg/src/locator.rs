@@ -1,5 +1,6 @@
 //! Point to cell: a tree of planes whose leaves are cells.
 
+use enfilade_geom::poly::{self, Sides};
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
 use crate::CellId;
@@ -115,6 +116,79 @@ impl Locator {
                 }
             }
         }
+    }
+
+    /// Divides a convex polygon into its parts by cell, and passes on each; `None` is solid matter. What lies in a plane of
+    /// the tree goes to its positive side, as points do. O(parts × depth).
+    pub fn for_parts(&self, polygon: Winding, mut use_part: impl FnMut(Option<CellId>, Winding)) {
+        let mut rest = Some(polygon);
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            for (side, inward) in [(self.bounds.min, axis), (self.bounds.max, -axis)] {
+                rest =
+                    rest.and_then(
+                        |whole| match whole.split(&Plane::through(side, inward), 0.0) {
+                            (None, None) => Some(whole),
+                            (inside, beyond) => {
+                                beyond
+                                    .into_iter()
+                                    .for_each(|part| use_part(self.outside, part));
+                                inside
+                            }
+                        },
+                    );
+            }
+        }
+        let mut stack: Vec<(i32, Winding)> = rest.map(|w| (self.root, w)).into_iter().collect();
+        while let Some((at, polygon)) = stack.pop() {
+            if at < 0 {
+                use_part((at <= -2).then(|| CellId((-2 - at) as u32)), polygon);
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            let [x, y, z, d] = self.planes[node.plane as usize];
+            let normal = DVec3::new(x, y, z);
+            let plane = Plane { normal, d };
+            match poly::split(&polygon.points, &plane, 0.0) {
+                Sides::On | Sides::Front => stack.push((node.children[0], polygon)),
+                Sides::Back => stack.push((node.children[1], polygon)),
+                Sides::Both(front, back) => {
+                    let parts = node.children.into_iter().zip([front, back]);
+                    stack.extend(parts.map(|(child, part)| (child, Winding::new(part.to_vec()))));
+                }
+            }
+        }
+    }
+
+    /// Returns the share of the segment from `from` to `to` that lies in one cell, from its start on: 0 if its start does not,
+    /// 1 if all of it does. O(leaves on the way × depth).
+    #[must_use]
+    pub fn share_in(&self, cell: CellId, from: DVec3, to: DVec3) -> f64 {
+        let mut reached = 0.0;
+        let mut stack = vec![(self.root, 0.0, 1.0)];
+        while let Some((at, low, high)) = stack.pop() {
+            if at < 0 {
+                if at != Self::leaf(Some(cell)) {
+                    return reached;
+                }
+                reached = high;
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            let [x, y, z, d] = self.planes[node.plane as usize];
+            let side = |share: f64| from.lerp(to, share).dot(DVec3::new(x, y, z)) + d;
+            let (a, b) = (side(low), side(high));
+            let first = node.children[usize::from(a < 0.0)];
+            if (a < 0.0) == (b < 0.0) {
+                stack.push((first, low, high));
+                continue;
+            }
+            let middle = low + (high - low) * (a / (a - b));
+            let second = node.children[usize::from(b < 0.0)];
+            // The nearer part is popped first; a part without length is in neither.
+            stack.extend((middle < high).then_some((second, middle, high)));
+            stack.extend((low < middle).then_some((first, low, middle)));
+        }
+        reached
     }
 
     /// Adds the cells that the convex hull of `points`, grown by `margin`, may touch to `cells`, which stays

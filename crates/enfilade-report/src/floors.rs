@@ -65,6 +65,7 @@ struct Sample {
 /// Finds the floors of a world. O(floor area + triangles).
 pub(crate) fn find_floors(world: &World) -> Floors {
     let tile = tile_of(world);
+    let sizes = Sizes { tile, apart: APART };
     let samples = floor_samples(world);
     let mut out = Floors {
         levels: Vec::new(),
@@ -73,11 +74,31 @@ pub(crate) fn find_floors(world: &World) -> Floors {
     };
     for (cell, _) in world.graph.places() {
         match samples.get(&cell) {
-            Some(samples) => levels_of(cell, samples, tile, &mut out.levels),
+            Some(samples) => levels_of(cell, samples, sizes, &mut out.levels),
             None => out.unfloored.push(cell),
         }
     }
     out
+}
+
+/// Returns the levels of all rooms that differ in height by `apart` or more, the largest of a cell first. [Units: wu]
+pub(crate) fn find_levels(world: &World, apart: f64) -> Vec<Level> {
+    let sizes = Sizes {
+        tile: tile_of(world),
+        apart,
+    };
+    let mut out = Vec::new();
+    for (cell, samples) in &floor_samples(world) {
+        levels_of(*cell, samples, sizes, &mut out);
+    }
+    out
+}
+
+/// The side of a tile, and the least difference of two levels of a cell. [Units: wu]
+#[derive(Clone, Copy)]
+struct Sizes {
+    tile: f64,
+    apart: f64,
 }
 
 /// The tile of a point.
@@ -164,7 +185,7 @@ fn ask(
 }
 
 /// Adds the levels of one cell.
-fn levels_of(cell: CellId, samples: &[Sample], tile: f64, out: &mut Vec<Level>) {
+fn levels_of(cell: CellId, samples: &[Sample], sizes: Sizes, out: &mut Vec<Level>) {
     let sum = |only_level: bool| -> f64 {
         let counted = samples.iter().filter(|s| s.is_level || !only_level);
         counted.map(|s| s.area).sum()
@@ -197,10 +218,10 @@ fn levels_of(cell: CellId, samples: &[Sample], tile: f64, out: &mut Vec<Level>) 
             tiles: Tiles::new(),
         };
         for (taken, vote) in is_taken.iter_mut().zip(&votes) {
-            if !*taken && (vote.p.y - height).abs() < APART {
+            if !*taken && (vote.p.y - height).abs() < sizes.apart {
                 *taken = true;
                 level.area += vote.area;
-                level.tiles.insert(tile_at(vote.p.x, vote.p.z, tile));
+                level.tiles.insert(tile_at(vote.p.x, vote.p.z, sizes.tile));
             }
         }
         out.push(level);

@@ -10,10 +10,13 @@ use crate::drawing::Drawing;
 use crate::graph::graph_svg;
 use crate::label::shortened;
 use crate::matrix::{Order, matrix_svg};
+use crate::plain::cells_table;
 use crate::plan::{PlanOptions, Plans};
 use crate::reasons::reasons;
+use crate::rooms::RoomFacts;
 use crate::storeys::Storey;
 use crate::svg::escaped;
+use crate::verdict::Verdict;
 
 /// Most rows in the table of rooms.
 const MAX_ROWS: usize = 1000;
@@ -43,6 +46,8 @@ pub struct Table {
 pub struct ReportParts {
     /// The title, e.g. the file's name.
     pub title: String,
+    /// How far to trust the world.
+    pub verdict: Option<Verdict>,
     /// The cells visible from each cell, as computed by `enfilade pvs`.
     pub visible: Pvs,
     /// Address of the page of a walk, if there is one.
@@ -73,7 +78,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
          <title>{title}: rooms and doorways</title>\n<style>{STYLE}</style></head><body data-voids=\"{}\">\n\
          <header><p class=\"kind\">Rooms, doorways, and what can be seen from where</p><h1>{title}</h1>{}</header>\n",
         voids.join(" "),
-        facts(world, &storeys, voids.len())
+        facts(world, &plans)
     );
     if let Some(walk) = &parts.walk {
         let _ = writeln!(
@@ -81,6 +86,18 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
             "<p><a href=\"{}\">Walk through it</a> (from a server, such as <code>enfilade serve</code>: browsers let \
              no page read files beside it)</p>",
             escaped(walk)
+        );
+    }
+    if let Some(verdict) = &parts.verdict {
+        let class = if verdict.is_good() {
+            "note good"
+        } else {
+            "note"
+        };
+        let _ = writeln!(
+            out,
+            "<p class=\"{class}\">{}</p>",
+            escaped(&verdict.sentence())
         );
     }
     for note in &parts.notes {
@@ -99,9 +116,12 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
     out.push_str(
         "<section><h2>Plans</h2><p>Point at a room, here or below, to see it everywhere on this page and why it is there, at a line of the graph for its doorway; click to go to it.</p>\n",
     );
+    // All at one scale: they are scrolled rather than made smaller.
     let mut draw = |class: &str, drawing: &Drawing| {
         let svg = drawing.to_svg();
         let svg = svg.split_once("?>").map_or(svg.as_str(), |(_, svg)| svg);
+        let width = drawing.size()[0] / plans.on_page();
+        let svg = svg.replacen("<svg ", &format!("<svg style=\"width:{width:.0}px\" "), 1);
         let _ = writeln!(out, "<div class=\"drawing{class}\">{svg}</div>");
     };
     for (k, storey) in storeys.iter().enumerate() {
@@ -109,25 +129,19 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         draw(class, &plans.bare(k));
     }
     draw(" legend", &plans.legend());
-    let _ = write!(
-        out,
-        "</section>\n<section><h2>Graph</h2><p>A disk for each room, with its number and as large as its volume; a line for each \
-         doorway, as on the plan. A thick ring: there is a door, a window or an opening to the outdoors.</p>\
-         <div class=\"wide\">{}</div></section>\n",
-        graph_svg(world, &storeys)
-    );
-    if parts.visible.n_cells() > 0 {
-        matrix(&mut out, world, &plans, &parts.visible);
-    }
-    for t in &parts.tables {
-        table(&mut out, t, &[]);
-    }
+    out.push_str("</section>\n");
     let is_void = |c: CellId| plans.voids().any(|v| v == c);
-    let (rooms, cells) = rooms(world, &storeys, "Rooms", |c| !is_void(c));
-    table(&mut out, &rooms, &cells);
+    let (table, cells) = rooms(world, &plans, |c| !is_void(c));
+    rows(&mut out, &table, &cells);
+    let facts: Vec<RoomFacts> = plans.rooms().cloned().collect();
+    let _ = writeln!(
+        out,
+        "<p><a download=\"rooms.csv\" href=\"data:text/csv;base64,{}\">All rooms as a table for a spreadsheet (CSV)</a></p>",
+        BASE64_STANDARD.encode(cells_table(world, &facts, shortened))
+    );
     if !voids.is_empty() {
-        let (rows, cells) = self::rooms(world, &storeys, "Voids", is_void);
-        table(&mut out, &rows, &cells);
+        let (table, cells) = self::voids(world, is_void);
+        rows(&mut out, &table, &cells);
     }
     reasons(&mut out, world);
     if !rest.is_empty() {
@@ -135,6 +149,20 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         figures(&mut out, rest);
         out.push_str("</section>\n");
     }
+    let _ = write!(
+        out,
+        "<details><summary>For programs that draw it: graph, visibility, counts</summary>\n<section><h2>Graph</h2><p>A disk for each room, with its number and as large as its volume; a line for each \
+         doorway, as on the plan. A thick ring: there is a door, a window or an opening to the outdoors.</p>\
+         <div class=\"wide\">{}</div></section>\n",
+        graph_svg(world, &storeys)
+    );
+    if parts.visible.n_cells() > 0 {
+        matrix(&mut out, world, &plans, &parts.visible);
+    }
+    for table in &parts.tables {
+        rows(&mut out, table, &[]);
+    }
+    out.push_str("</details>\n");
     let p = &world.graph.provenance;
     let settings: Vec<String> = p
         .settings
@@ -161,11 +189,11 @@ body{font:16px/1.5 system-ui,sans-serif;color:#222;background:#fff;max-width:108
 h1{font-size:2rem;line-height:1.2;margin:0;overflow-wrap:anywhere}h2{font-size:1.2rem;border-bottom:2px solid #e8590c;padding-bottom:.2em}\
 header{border-bottom:1px solid #ddd;margin-bottom:1rem}.kind{color:#777;margin:0;letter-spacing:.04em}\
 dl{display:flex;flex-wrap:wrap;gap:.4rem 2.2rem;margin:.6rem 0 1.1rem}dl div{display:flex;flex-direction:column}\
-dd{margin:0;font-size:1.5rem;font-weight:600;line-height:1.2}dt{color:#666;font-size:.9rem}.note{background:#fff4e6;border-left:4px solid #e8590c;padding:.5em .8em}\
+dd{margin:0;font-size:1.5rem;font-weight:600;line-height:1.2}dt{color:#666;font-size:.9rem}.note{background:#fff4e6;border-left:4px solid #e8590c;padding:.5em .8em}.good{background:#ebfbee;border-color:#2b8a3e}\
 figure{margin:0 0 1rem}figure img{width:100%;height:auto;border-radius:6px;display:block}\
 figcaption{color:#555;font-size:.9rem}.gallery{display:grid;grid-template-columns:repeat(auto-fit,minmax(290px,1fr));gap:1rem}\
-.drawing svg{width:100%;height:auto;max-height:90vh;display:block}.legend svg{max-width:900px}\
-.graph,.matrix{width:100%;height:auto}\
+.drawing{overflow-x:auto}.drawing svg{height:auto;display:block}\
+.graph,.matrix{width:100%;height:auto}details{margin-top:1.5rem}summary{cursor:pointer;font-weight:600}\
 .wide{overflow-x:auto}table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-nums;min-width:60%}\
 th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}\
 th:first-child,td:first-child{text-align:left}th{background:#f4f4f2}\
@@ -178,20 +206,21 @@ td.why{text-align:left;white-space:normal}#why{position:fixed;left:0;right:0;bot
 border-top:2px solid #e8590c;padding:.4rem 1.2rem;font-size:.9rem;line-height:1.35}#why p{margin:.25em 0}#why b{margin-right:.5em}\
 footer{color:#777;font-size:.8rem;margin-top:2rem;overflow-wrap:anywhere}\
 @media print{#why{display:none}body{max-width:none;padding:0;font-size:11px}section{break-inside:avoid-page}\
-.wide{overflow:visible}h2{break-after:avoid}tr,figure{break-inside:avoid}th{-webkit-print-color-adjust:exact;print-color-adjust:exact}}";
+.wide{overflow:visible}details{display:none}.drawing svg{max-width:100%}h2{break-after:avoid}tr,figure{break-inside:avoid}th{-webkit-print-color-adjust:exact;print-color-adjust:exact}}";
 
 /// The main figures, each over its name; those that are zero are left out, except rooms.
-fn facts(world: &World, storeys: &[&Storey], n_voids: usize) -> String {
+fn facts(world: &World, plans: &Plans) -> String {
+    let n_voids = plans.voids().len();
     let graph = &world.graph;
     let indoors = graph.indoor_cells().map(|(_, c)| c);
     let n = |kind| graph.portals.iter().filter(|p| p.kind == kind).count();
     let volume: f32 = indoors.clone().map(|c| c.volume).sum();
-    let area: f64 = storeys.iter().map(|s| s.area).sum();
+    let area: f64 = plans.rooms().map(|room| room.floor_area).sum();
     let counted = |n: usize, one: &str, many: &str| {
         (n > 0).then(|| (n.to_string(), if n == 1 { one } else { many }.to_owned()))
     };
     let rooms = indoors.count() - n_voids;
-    let n_storeys = storeys.iter().filter(|s| !s.is_between).count();
+    let n_storeys = plans.storeys().filter(|s| !s.is_between).count();
     let all = [
         counted(rooms, "room", "rooms").or_else(|| Some(("0".into(), "rooms".into()))),
         counted(n_voids, "void", "voids"),
@@ -226,7 +255,7 @@ fn figures(out: &mut String, figures: &[Figure]) {
 }
 
 /// `cells` are the cells of the rows after the head, if the rows describe cells.
-fn table(out: &mut String, t: &Table, cells: &[CellId]) {
+fn rows(out: &mut String, t: &Table, cells: &[CellId]) {
     let _ = write!(
         out,
         "<section><h2>{}</h2><p>{}</p><div class=\"wide\"><table>",
@@ -249,54 +278,82 @@ fn table(out: &mut String, t: &Table, cells: &[CellId]) {
     out.push_str("</table></div></section>\n");
 }
 
-/// The table of those indoor cells that `is_listed` accepts, and the cells of its rows.
-fn rooms(
-    world: &World,
-    storeys: &[&Storey],
-    title: &str,
-    is_listed: impl Fn(CellId) -> bool,
-) -> (Table, Vec<CellId>) {
-    let indoors = world.graph.indoor_cells().filter(|c| is_listed(c.0));
-    let mut cells: Vec<_> = indoors.map(|(id, c)| (id.0, c)).collect();
-    cells.sort_by(|a: &(u32, _), b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
-    let n = cells.len();
-    cells.truncate(MAX_ROWS);
-    let of = |cell: u32| {
-        let on = storeys.iter().filter(|s| s.cells.contains(&CellId(cell)));
-        on.map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ")
+/// The table of the rooms on floors, storey by storey, and the cells of its rows.
+fn rooms(world: &World, plans: &Plans, is_listed: impl Fn(CellId) -> bool) -> (Table, Vec<CellId>) {
+    let mut rooms: Vec<&RoomFacts> = plans.rooms().filter(|r| is_listed(r.cell)).collect();
+    let place = |room: &&RoomFacts| {
+        let first = room.storeys.first();
+        plans.storeys().position(|s| Some(&s.name) == first)
     };
+    rooms.sort_by_key(|room| (place(room), room.cell));
+    let area: f64 = rooms.iter().map(|room| room.floor_area).sum();
+    let n = rooms.len();
+    rooms.truncate(MAX_ROWS);
     let head = [
         "name",
         "storey",
+        "floor m²",
+        "height m",
         "volume m³",
-        "size m",
-        "doorways",
-        "triangles",
-        "of objects",
+        "doors",
+        "windows",
     ];
     let mut rows = vec![head.map(String::from).to_vec()];
-    rows.extend(cells.iter().map(|&(id, c)| {
+    rows.extend(rooms.iter().map(|room| {
+        let cell = &world.graph[room.cell];
+        vec![
+            shortened(&cell.name).into_owned(),
+            room.storeys.join(", "),
+            format!("{:.1}", room.floor_area),
+            format!("{:.2}", room.height),
+            format!("{:.1}", cell.volume),
+            room.n_doors.to_string(),
+            room.n_windows.to_string(),
+        ]
+    }));
+    let mut note = "Floors as seen from above, without the recesses of doors and windows; the height over most of the floor.".to_owned();
+    if n > MAX_ROWS {
+        let _ = write!(note, " The first {MAX_ROWS} of {n}.");
+    } else if n > 1 {
+        rows.push(vec!["all".into(), String::new(), format!("{area:.1}")]);
+    }
+    let table = Table {
+        title: "Rooms".into(),
+        note,
+        rows,
+    };
+    (table, rooms.iter().map(|room| room.cell).collect())
+}
+
+/// The table of spaces in which nobody can stand, the largest first, and the cells of its rows.
+fn voids(world: &World, is_void: impl Fn(CellId) -> bool) -> (Table, Vec<CellId>) {
+    let mut cells: Vec<_> = world
+        .graph
+        .indoor_cells()
+        .filter(|c| is_void(c.0))
+        .collect();
+    cells.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
+    let n = cells.len();
+    cells.truncate(MAX_ROWS);
+    let mut rows = vec![["name", "volume m³", "size m"].map(String::from).to_vec()];
+    rows.extend(cells.iter().map(|(_, c)| {
         let [x, y, z] = [0, 1, 2].map(|k| c.aabb[1][k] - c.aabb[0][k]);
         vec![
             shortened(&c.name).into_owned(),
-            of(id),
             format!("{:.1}", c.volume),
             format!("{x:.1} × {y:.1} × {z:.1}"),
-            c.portals.len().to_string(),
-            c.n_triangles.to_string(),
-            c.n_detail_triangles.to_string(),
         ]
     }));
+    let note = match n > MAX_ROWS {
+        true => format!("The {MAX_ROWS} largest of {n}."),
+        false => "By volume.".into(),
+    };
     let table = Table {
-        title: title.into(),
-        note: if n > MAX_ROWS {
-            format!("The {MAX_ROWS} largest of {n}.")
-        } else {
-            "By volume.".into()
-        },
+        title: "Voids".into(),
+        note,
         rows,
     };
-    (table, cells.iter().map(|c| CellId(c.0)).collect())
+    (table, cells.iter().map(|c| c.0).collect())
 }
 
 /// Writes the matrix of visible pairs of rooms; if there are voids, twice: with and without them.

@@ -17,8 +17,6 @@ const SMALLER: f64 = 0.88;
 const AREA: f64 = 0.7;
 /// Space between a name and what stands beside it, as a fraction of the letters' height.
 const AROUND: f64 = 0.3;
-/// A number may shrink to this fraction of the least readable size rather than be left out.
-const TINY: f64 = 0.5;
 
 /// Most letters of a name in drawings and pages.
 const LONGEST: usize = 64;
@@ -87,13 +85,14 @@ pub(crate) fn fit(
     .or_else(|| tries.iter().find_map(|t| t.largest(&mask, sizes, 0.0)));
     found.unwrap_or_else(|| {
         let one = Try::new(&[number], false, false);
-        let tiny = Sizes {
-            least: TINY * sizes.least,
+        let small = Sizes {
             most: sizes.least,
+            ..sizes
         };
-        let mut out = one.largest(&mask, tiny, 0.0).unwrap_or_else(|| Fitted {
+        // Beyond the walls rather than too small to read.
+        let mut out = one.largest(&mask, small, 0.0).unwrap_or_else(|| Fitted {
             at: mask.middle(),
-            size: tiny.least,
+            size: sizes.least,
             ..one.fitted()
         });
         out.is_number = number != name;
@@ -167,7 +166,8 @@ impl Try {
     /// The largest size that fits with some space around it, in heights of its letters, with its place.
     fn largest(&self, mask: &Mask, sizes: Sizes, around: f64) -> Option<Fitted> {
         let extent = self.extent() + 2.0 * around;
-        let mut size = sizes.most;
+        let least = sizes.least / if self.has_area { AREA } else { 1.0 };
+        let mut size = sizes.most.max(least);
         loop {
             if let Some(at) = mask.place(extent * size) {
                 return Some(Fitted {
@@ -176,10 +176,10 @@ impl Try {
                     ..self.fitted()
                 });
             }
-            if size <= sizes.least {
+            if size <= least {
                 return None;
             }
-            size = (size * SMALLER).max(sizes.least);
+            size = (size * SMALLER).max(least);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Floor plans: a section of each storey with names, and sheets of several plans.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use enfilade_cpg::{CellId, World, cell_color};
 use enfilade_geom::{DVec2, shown};
@@ -10,6 +10,7 @@ use crate::drawing::{Class, Drawing, Item, Path, Words};
 use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
 use crate::marks::View;
 use crate::relief::Relief;
+use crate::rooms::{RoomFacts, room_facts};
 use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
 use crate::sheet::{COLUMN, MARGIN, Sheet};
@@ -19,6 +20,10 @@ use crate::storeys::{Page, Storey, find_pages};
 const NAME: f64 = 0.32;
 /// The smallest letters as a fraction of the longer side of a sheet: 1.2 mm on A4, 6.5 pixels of 1600.
 const LEGIBLE: f64 = 0.004;
+
+/// The longer side of a plan on a page, and the height of the smallest letters there. [Units: pixels]
+const PAGE: f64 = 1040.0;
+const LETTERS: f64 = 11.0;
 
 /// Settings for plans.
 #[derive(Clone, Debug)]
@@ -51,6 +56,7 @@ pub struct Plans<'a> {
     /// Cells that plans show only as a box.
     thin: BTreeSet<CellId>,
     voids: Vec<CellId>,
+    rooms: BTreeMap<CellId, RoomFacts>,
     doubts: Vec<Doubt>,
     min: DVec2,
     max: DVec2,
@@ -174,9 +180,12 @@ impl<'a> Plans<'a> {
         } else {
             Vec::new()
         };
+        let storeys: Vec<&Storey> = pages.iter().map(|p| &p.page.storey).collect();
+        let rooms = room_facts(world, &storeys).into_iter();
         Self {
             world,
             doubts,
+            rooms: rooms.map(|room| (room.cell, room)).collect(),
             cut_height: options.cut_height,
             thin: hidden_cells(world, &pages),
             pages,
@@ -189,6 +198,11 @@ impl<'a> Plans<'a> {
     /// Voids and rooms without a floor to stand on, ascending: shafts, spaces above ceilings, cavities.
     pub fn voids(&self) -> impl ExactSizeIterator<Item = CellId> {
         self.voids.iter().copied()
+    }
+
+    /// The facts of rooms, by cell.
+    pub fn rooms(&self) -> impl ExactSizeIterator<Item = &RoomFacts> {
+        self.rooms.values()
     }
 
     /// The storeys, in the order of the plans.
@@ -219,7 +233,13 @@ impl<'a> Plans<'a> {
         self.arranged(which, true)
     }
 
-    /// Draws one plan without a legend, for a page that has one.
+    /// The length of a pixel of a page, so that the longer side of a plan has [`PAGE`] of them. [Units: wu]
+    pub(crate) fn on_page(&self) -> f64 {
+        let margin = MARGIN * lettering(self.max - self.min, 1);
+        (self.max - self.min + 2.0 * margin).max_element() / PAGE
+    }
+
+    /// Draws one plan with a scale bar, but without a legend, for a page that has one.
     pub(crate) fn bare(&self, index: usize) -> Drawing {
         self.arranged(&[index], false)
     }
@@ -235,14 +255,14 @@ impl<'a> Plans<'a> {
             doubts: Vec::new(),
             title: 0.0,
             sizes: Sizes {
-                least: 0.0,
+                least: self.on_page() * LETTERS,
                 most: 0.0,
             },
         };
         let n = sheet.items.len();
         let margin = DVec2::splat(MARGIN * zoom);
         let room = 3.0 * COLUMN * sheet.legend();
-        let end = sheet.foot(self.world, margin, room);
+        let end = sheet.foot(self.world, margin, room, false);
         Drawing {
             title: "Legend".into(),
             size: DVec2::new(room + 2.0 * margin.x, end),
@@ -266,7 +286,10 @@ impl<'a> Plans<'a> {
             doubts: Vec::new(),
             title: 0.45 * zoom,
             sizes: Sizes {
-                least: LEGIBLE * (size.x * columns as f64).max(size.y * rows as f64),
+                least: match has_legend {
+                    true => LEGIBLE * (size.x * columns as f64).max(size.y * rows as f64),
+                    false => self.on_page() * LETTERS,
+                },
                 most: NAME * zoom,
             },
         };
@@ -285,7 +308,8 @@ impl<'a> Plans<'a> {
         if !has_legend {
             let at = DVec2::new(margin, whole.y);
             sheet.items.push(Item::Place { at, storey: None });
-            let names = sheet.numbers(self.world, 0.0, whole.x - 2.0 * margin);
+            let bar = sheet.bar();
+            let names = sheet.numbers(self.world, bar, whole.x - 2.0 * margin);
             return Drawing {
                 title: "Floor plan".into(),
                 size: whole + DVec2::Y * names,
@@ -305,7 +329,7 @@ impl<'a> Plans<'a> {
                 whole.x.max(sheet.legend_width()),
             )
         };
-        let end = sheet.foot(self.world, corner, room - 2.0 * margin) + margin;
+        let end = sheet.foot(self.world, corner, room - 2.0 * margin, true) + margin;
         Drawing {
             title: "Floor plans".into(),
             size: DVec2::new(whole.x.max(corner.x - margin + room), end.max(whole.y)),
@@ -334,10 +358,13 @@ impl<'a> Plans<'a> {
                 continue;
             };
             let name = shown(&shortened(&self.world.graph[cell].name)).to_string();
-            let area = if is_own {
-                format!("{:.1} m²", region.area)
-            } else {
-                String::new()
+            let area = match self.rooms.get(&cell) {
+                Some(room) if is_own && room.storeys.len() == 1 => room.floor_area,
+                _ => region.area,
+            };
+            let area = match is_own {
+                true => format!("{area:.1} m²"),
+                false => String::new(),
             };
             let number = cell.0.to_string();
             let words = [&*name, area.as_str(), number.as_str()];

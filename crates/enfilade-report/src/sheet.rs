@@ -61,10 +61,28 @@ impl Sheet {
         2.0 * MARGIN * self.zoom + (5.0 * self.zoom).max(COLUMN * self.legend())
     }
 
-    /// Draws the scale bar, the legend of what is on the sheet, and the names of numbered cells, within `room`. Returns
-    /// the y of their end. [Units: wu]
-    pub(crate) fn foot(&mut self, world: &World, at: DVec2, room: f64) -> f64 {
+    /// Draws the scale bar at the current place, and returns the y of its end. [Units: wu]
+    pub(crate) fn bar(&mut self) -> f64 {
         let (zoom, grown) = (self.zoom, self.legend());
+        for k in 0..5 {
+            let class = if k % 2 == 0 { Class::Bar } else { Class::Gap };
+            let (left, right) = (f64::from(k) * zoom, f64::from(k + 1) * zoom);
+            let high = 0.12 * grown;
+            let bar = [(left, 0.0), (right, 0.0), (right, high), (left, high)];
+            let bar = bar.map(|(x, z)| DVec2::new(x, z)).to_vec();
+            self.shape(class, vec![bar], true);
+        }
+        let under = 0.12 * grown + 1.2 * SMALL * grown;
+        self.words(DVec2::new(0.0, under), SMALL * grown, true, "0".into());
+        let words = format!("{} m", 5.0 * zoom);
+        self.words(DVec2::new(5.0 * zoom, under), SMALL * grown, true, words);
+        under + 0.6 * grown
+    }
+
+    /// Draws the scale bar, if the sheet has plans, the legend of what is on the sheet, and the names of numbered cells, within
+    /// `room`. Returns the y of their end. [Units: wu]
+    pub(crate) fn foot(&mut self, world: &World, at: DVec2, room: f64, has_bar: bool) -> f64 {
+        let grown = self.legend();
         let is_there = |class: Class| {
             let is = |i: &Item| matches!(i, Item::Path(p) if p.class == class);
             self.items.iter().any(is)
@@ -85,22 +103,15 @@ impl Sheet {
         .filter(|(class, _)| is_there(*class))
         .collect();
         self.items.push(Item::Place { at, storey: None });
-        for k in 0..5 {
-            let class = if k % 2 == 0 { Class::Bar } else { Class::Gap };
-            let (left, right) = (f64::from(k) * zoom, f64::from(k + 1) * zoom);
-            let high = 0.12 * grown;
-            let bar = [(left, 0.0), (right, 0.0), (right, high), (left, high)];
-            let bar = bar.map(|(x, z)| DVec2::new(x, z)).to_vec();
-            self.shape(class, vec![bar], true);
-        }
-        let under = 0.12 * grown + 1.2 * SMALL * grown;
-        self.words(DVec2::new(0.0, under), SMALL * grown, true, "0".into());
-        let words = format!("{} m", 5.0 * zoom);
-        self.words(DVec2::new(5.0 * zoom, under), SMALL * grown, true, words);
+        let top = match has_bar {
+            true => self.bar(),
+            false => 0.0,
+        };
         let columns = ((room / (COLUMN * grown)).floor() as usize).clamp(1, 3);
         let rows = entries.len().div_ceil(columns);
         for (k, (class, words)) in entries.iter().enumerate() {
-            let place = DVec2::new((k / rows) as f64 * COLUMN, 1.0 + 0.42 * (k % rows) as f64);
+            let down = 0.42 * (k % rows) as f64;
+            let place = DVec2::new((k / rows) as f64 * COLUMN, top / grown + down);
             let line = [place - DVec2::Y * 0.08, place + DVec2::new(0.45, -0.08)];
             let line = line.map(|p| p * grown).to_vec();
             if *class == Class::Beyond {
@@ -117,7 +128,7 @@ impl Sheet {
             let at = (place + DVec2::X * 0.6) * grown;
             self.words(at, SMALL * grown, false, (*words).into());
         }
-        let below = (1.0 + 0.42 * rows as f64) * grown;
+        let below = top + 0.42 * rows as f64 * grown;
         at.y + self.numbers(world, below, room)
     }
 

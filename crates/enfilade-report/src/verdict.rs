@@ -17,11 +17,11 @@ const GOOD: f32 = 0.1;
 const LOW: f32 = 0.4;
 /// Options that are tried before they are proposed.
 const TRIED: [&str; 3] = ["--unit", "--up", "--min-cost"];
-/// Close decisions that are named.
+/// Spaces that are named, and close decisions in JSON. The sentence names the closest alone.
 const NAMED: usize = 3;
 
 /// How far to trust a world, by the margins of the decisions that made its rooms, and by signs in it that it is another than was meant.
-#[derive(Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     trust: Trust,
     /// A sentence about what was found.
@@ -36,12 +36,15 @@ pub struct Verdict {
 }
 
 /// A place most in doubt.
-#[derive(Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct Close {
     position: [f32; 3],
     /// Chance that the decision is wrong, 0.5 at most.
     chance: f32,
     text: String,
+    /// The text without the facts that did not decide; `None` if a reason names the place.
+    #[serde(skip)]
+    short: Option<String>,
 }
 
 /// A doubt about the input that was reported before the bake.
@@ -54,7 +57,7 @@ pub struct InputDoubt {
 }
 
 /// Trust, the most first.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Trust {
     /// Nothing speaks against it.
@@ -68,7 +71,7 @@ enum Trust {
 }
 
 /// A reason for less trust.
-#[derive(Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct Reason {
     /// The sign, and the usual cause.
     text: String,
@@ -94,6 +97,8 @@ impl Verdict {
         let said: Vec<&InputDoubt> = said.iter().filter(|d| lies || !d.is_about_up).collect();
         let of_rooms = world.graph.room_doubt();
         let taken = taken(&world.graph);
+        let places = world.graph.places.iter().filter(|p| p.why.takes_room());
+        let is_taken = |at: [f32; 3]| places.clone().any(|place| place.at == at);
         let trust = if is_empty(world) {
             Trust::None
         } else if !said.is_empty() || doubts.iter().any(is_grave) || of_rooms.share >= LOW {
@@ -111,6 +116,7 @@ impl Verdict {
             position: close.at,
             chance: close.chance,
             text: close.why.to_string(),
+            short: (!is_taken(close.at)).then(|| format!("{:#}", close.why)),
         });
         Self {
             trust,
@@ -219,11 +225,13 @@ impl std::fmt::Display for Verdict {
             return Ok(());
         }
         let percent = (100.0 * self.doubt).ceil();
-        write!(f, "; {percent} % of the rooms in doubt, most of all:")?;
-        for (i, close) in self.close.iter().enumerate() {
-            let [x, y, z] = close.position;
-            let comma = if i == 0 { "" } else { ";" };
-            write!(f, "{comma} at {x:.2} {y:.2} {z:.2}, {}", close.text)?;
+        write!(f, "; {percent} % of the rooms in doubt")?;
+        let closest = self
+            .close
+            .iter()
+            .find_map(|c| Some((c.position, c.short.as_ref()?)));
+        if let Some(([x, y, z], text)) = closest {
+            write!(f, ", most of all at {x:.2} {y:.2} {z:.2}: {text}")?;
         }
         f.write_str(" (inspect --why all)")
     }

@@ -11,7 +11,7 @@ use enfilade::geom::{DVec3, Triangle};
 use enfilade::runtime::Sight;
 use enfilade::vis::{VisConfig, VisContext, VisMode, see_world};
 use enfilade::world::{Agent, Space, WalkMap};
-use enfilade_report::Verdict;
+use enfilade_report::{Verdict, find_storeys, room_facts};
 use enfilade_verify::structural_triangles;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyKeyboardInterrupt};
@@ -24,6 +24,9 @@ use crate::watch::run;
 
 /// Cell of points in matter, or outside of everything.
 const MATTER: i32 = -1;
+
+/// Facts of a room: cell, storeys, floor area, height, and the numbers of its doors and windows.
+type RoomRow = (u32, Vec<String>, f64, f64, (usize, usize));
 
 /// A world, and what queries keep of it.
 #[pyclass(frozen, module = "enfilade._native")]
@@ -263,6 +266,16 @@ impl World {
     fn portal_whys(&self) -> Vec<Vec<ToldWhy>> {
         let portals = self.world.graph.portals.iter();
         portals.map(|p| p.why.iter().map(told).collect()).collect()
+    }
+
+    /// Returns the facts of rooms: cell, storeys, floor area, height, doors, windows.
+    fn rooms(&self, py: Python<'_>) -> Vec<RoomRow> {
+        let facts = py.detach(|| room_facts(&self.world, &find_storeys(&self.world)));
+        let rows = facts.into_iter().map(|room| {
+            let counts = (room.n_doors, room.n_windows);
+            (room.cell.0, room.storeys, room.floor_area, room.height, counts)
+        });
+        rows.collect()
     }
 
     /// Returns points of places, and the decision about each.

@@ -54,6 +54,18 @@ def test_decisions_are_those_of_the_command(world, command, tmp_path):
         assert (why.reason, why.facts.keys()) == (found["reason"], found.get("facts", {}).keys())
 
 
+def test_rooms_have_the_facts_that_the_command_prints(world, command, tmp_path):
+    world.save(tmp_path / "w.glb")
+    told = {c["id"]: c for c in command.json("inspect", tmp_path / "w.glb")["cells"]}
+    assert [room.id for room in world.rooms] == [c.id for c in world.cells if c.kind == "room"]
+    for room in world.rooms:
+        cell = told[room.id]
+        assert (room.name, list(room.storeys)) == (cell["name"], cell["storeys"])
+        assert (room.doors, room.windows) == (cell["doors"], cell["windows"])
+        assert room.floor_area == pytest.approx(cell["floor_area"], abs=1e-3)
+        assert room.height == pytest.approx(cell["height"], abs=1e-3) and 2 < room.height < 4
+
+
 def test_points_are_located(world):
     middle = [2, 1, 2]
     cell = world.locate(middle)

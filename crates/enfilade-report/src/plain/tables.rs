@@ -1,21 +1,44 @@
 //! Cells and portals as tables of comma-separated values (RFC 4180), with a line of names.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 
 use enfilade_cpg::World;
 
 use super::{cell_kind, portal_kind};
+use crate::{RoomFacts, find_storeys, room_facts};
 
-/// Returns the cells of a world as a table: `id,name,kind,volume` and the box.
+/// Returns the cells of a world as a table: `id,name,kind,storey,floor_area,height,doors,windows,volume` and the box. What is
+/// no room has no storey, floor, height, doors or windows.
 #[must_use]
 pub fn cells_csv(world: &World) -> String {
-    let mut out = String::from("id,name,kind,volume,min_x,min_y,min_z,max_x,max_y,max_z\r\n");
+    let rooms = room_facts(world, &find_storeys(world));
+    cells_table(world, &rooms, |name| name.into())
+}
+
+/// Returns the table, given the facts of all rooms and what to write for a name.
+pub(crate) fn cells_table(
+    world: &World,
+    rooms: &[RoomFacts],
+    shown: impl Fn(&str) -> Cow<'_, str>,
+) -> String {
+    let mut out = String::from(
+        "id,name,kind,storey,floor_area,height,doors,windows,volume,min_x,min_y,min_z,max_x,max_y,max_z\r\n",
+    );
     for (id, cell) in world.graph.cells.iter().enumerate() {
-        let (name, kind, volume) = (field(&cell.name), cell_kind(cell), cell.volume);
+        let (name, kind, volume) = (field(&shown(&cell.name)), cell_kind(cell), cell.volume);
         let [[x0, y0, z0], [x1, y1, z1]] = cell.aabb;
+        let room = rooms.iter().find(|r| r.cell.0 as usize == id);
+        let room = room.map_or(",,,,".to_owned(), |r| {
+            let storeys = r.storeys.join(" ");
+            format!(
+                "{storeys},{:.3},{:.3},{},{}",
+                r.floor_area, r.height, r.n_doors, r.n_windows
+            )
+        });
         let _ = write!(
             out,
-            "{id},{name},{kind},{volume},{x0},{y0},{z0},{x1},{y1},{z1}\r\n"
+            "{id},{name},{kind},{room},{volume},{x0},{y0},{z0},{x1},{y1},{z1}\r\n"
         );
     }
     out

@@ -15,7 +15,7 @@ without Python's global lock, and an interrupt ends it.
 
 from ._bake import BakeWarning, Mesh, bake, bake_file, demo_house
 from ._native import BakeError, EnfiladeError, NoPathError, SceneError, WorldError
-from ._world import Cell, Cells, Path, Place, Portal, Portals, Pvs, Storey, View, Why, World, open
+from ._world import Cell, Cells, Path, Place, Portal, Portals, Pvs, Room, Storey, View, Why, World, open
 
 __version__ = "0.1.0"
 
@@ -32,6 +32,7 @@ __all__ = [
     "Portal",
     "Portals",
     "Pvs",
+    "Room",
     "SceneError",
     "Storey",
     "View",

@@ -38,6 +38,23 @@ class Place:
     why: Why
 
 
+@dataclass(frozen=True)
+class Room:
+    """What people ask of a room."""
+
+    id: int
+    """The id of its cell."""
+    name: str
+    storeys: Tuple[str, ...]
+    """The names of the storeys that it stands on, from below."""
+    floor_area: float
+    """In square meters, as seen from above, without the recesses of doors and windows."""
+    height: float
+    """The clear height over most of the floor, in meters."""
+    doors: int
+    windows: int
+
+
 @dataclass(frozen=True, eq=False)
 class Cell:
     """A connected region of air: a room, the outdoors, or a void in which nobody can stand."""
@@ -324,6 +341,13 @@ class World:
         if self._portals is None:
             self._portals = Portals(self._native)
         return self._portals
+
+    @property
+    def rooms(self) -> List[Room]:
+        """Floor area, height, storeys, doors and windows of each room, by the ids of their cells."""
+        names = self.cells.names
+        rows = self._native.rooms()
+        return [Room(id, names[id], tuple(on), area, height, *n) for id, on, area, height, n in rows]
 
     @property
     def places(self) -> List[Place]:
