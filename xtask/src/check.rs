@@ -197,6 +197,7 @@ fn package() -> anyhow::Result<()> {
         "--workspace",
         "--exclude=xtask",
         "--exclude=enfilade-bench",
+        "--exclude=enfilade-testkit",
         "--no-verify",
         "--allow-dirty",
         "--quiet",

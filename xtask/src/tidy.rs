@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 23] = [
+const FENCES: [Fence; 24] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -182,21 +182,26 @@ const FENCES: [Fence; 23] = [
         words: &["std::thread"],
     },
     Fence {
+        name: "enfilade-demo",
+        siblings: &["enfilade-geom"],
+        not: &["rayon"],
+        words: &["std::fs"],
+    },
+    Fence {
         name: "enfilade-testkit",
-        siblings: &["enfilade-geom", "enfilade-cpg"],
+        siblings: &["enfilade-geom", "enfilade-cpg", "enfilade-demo"],
         not: &["rayon"],
         words: &["std::fs"],
     },
     Fence {
         name: "enfilade-cli",
-        // The test kit generates the house of `demo`.
         siblings: &[
             "enfilade",
+            "enfilade-demo",
             "enfilade-render",
             "enfilade-report",
             "enfilade-verify",
             "enfilade-settings",
-            "enfilade-testkit",
         ],
         not: &[],
         words: &[],

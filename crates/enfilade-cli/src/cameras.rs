@@ -5,8 +5,8 @@ use std::path::Path;
 use anyhow::bail;
 use enfilade::cpg::{CellId, World};
 use enfilade::runtime::Sight;
+use enfilade_demo::Rng;
 use enfilade_render::Camera;
-use enfilade_testkit::Rng;
 
 use crate::input::read_text;
 

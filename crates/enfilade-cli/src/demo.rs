@@ -9,8 +9,8 @@ use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{MonitorCamera, PortalId, World};
 use enfilade::geom::{DVec3, shown};
 use enfilade::import::{ImportOptions, decode_gltf, export_glb};
-use enfilade_report::{PlanOptions, plan_svg};
-use enfilade_testkit::{Generated, furnished_house, impossible_house, lift_tower};
+use enfilade_demo::{Generated, furnished_house, impossible_house, lift_tower};
+use enfilade_report::{PlanOptions, Verdict, plan_svg};
 
 use crate::bake::{Summary, bake_scene, print_summary};
 use crate::formats::Format;
@@ -86,7 +86,12 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
         .iter()
         .map(|(path, _)| shown(path.display()).to_string());
     let names: Vec<String> = names.collect();
-    let mut hints = format!("\nwrote {}\n\nTry next:\n{}", names.join(", "), made.hints);
+    let verdict = Verdict::of(&made.world, &[]).untried();
+    let names_in_words = names.join(", ");
+    let mut hints = format!(
+        "\nwrote {names_in_words}\n{verdict}\n\nTry next:\n{}",
+        made.hints
+    );
     for (i, name) in names.iter().enumerate() {
         hints = hints.replace(&format!("{{{i}}}"), name);
     }
@@ -115,6 +120,7 @@ fn house() -> anyhow::Result<Made> {
         hints: "  enfilade inspect {1}\n  \
                 echo '2 1 2' | enfilade locate {1}\n  \
                 enfilade verify {1} --source {0}\n  \
+                enfilade report {1} -o report.html\n  \
                 enfilade view {1}\n  \
                 enfilade bake YOUR.glb -o your-world.glb\n\
                 and open {2} in a browser, {1} in any glTF viewer.",

@@ -2,7 +2,7 @@
 
 use enfilade::cpg::PortalId;
 use enfilade::runtime::{Sight, SightState};
-use enfilade_testkit::Rng;
+use enfilade_demo::Rng;
 
 /// Shuts a third of all portals with leaves, opens a third partly, and leaves the others as in the model; closes a
 /// tenth of the portals without leaves.

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::shown;
+use enfilade_demo::Rng;
 use enfilade_render::{
     AdapterChoice, Camera, Culling, LostPixel, Mark, MarkShape, Oracle, Picture, PixelContent,
     Studio, Style,
 };
-use enfilade_testkit::Rng;
 use serde::Serialize;
 
 use crate::formats::Format;

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::import::{ImportOptions, decode_gltf, export_glb};
 use enfilade::kit::{Assembly, Choice, Kit, Piece, generate};
-use enfilade_testkit::{PieceScene, dungeon_kit, maze_kit, office_kit};
+use enfilade_demo::{PieceScene, dungeon_kit, maze_kit, office_kit};
 
 use crate::formats::Format;
 use crate::kit::{bake_piece, write_level};

@@ -10,7 +10,7 @@ use enfilade::geom::Triangle;
 use enfilade::runtime::{Sight, SightState, Viewer};
 use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, FOV, Gpu, RenderError, Studio, Style, good_camera, walk_cameras,
+    AdapterChoice, Culling, FOV, Gpu, RenderError, Studio, Style, good_camera, walk_cameras,
 };
 use enfilade_report::{Figure, ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
@@ -49,7 +49,7 @@ pub(crate) struct Report {
     /// where it is now, from any server of files, such as `enfilade serve`.
     #[arg(long)]
     walk: bool,
-    /// Print a report on the page as JSON for machines; nothing is printed otherwise.
+    /// Print a report on the page as JSON for machines.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -114,15 +114,16 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
         walk_page::write(walk, &args.world)?;
     }
     write_whole(&args.output, page.as_bytes())?;
-    if args.json {
-        let report = PageReport {
-            written: Written::new(&args.output, page.as_bytes()),
-            pictures: parts.figures.len(),
-            notes: &parts.notes,
-        };
-        print_json(outputs.printed(), &report)?;
+    let written = Written::new(&args.output, page.as_bytes());
+    if !args.json {
+        return Ok(writeln!(outputs.printed(), "{written}")?);
     }
-    Ok(())
+    let report = PageReport {
+        written,
+        pictures: parts.figures.len(),
+        notes: &parts.notes,
+    };
+    print_json(outputs.printed(), &report)
 }
 
 /// Returns the name of a file in words: `town-hall_2.glb` is `Town hall 2`.

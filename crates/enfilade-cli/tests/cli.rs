@@ -56,7 +56,7 @@ fn inspect_prints_the_agreed_json() {
         report["cells"][1],
         json!({"id": 1, "name": "cell-1", "aabb": [[4.0, 0.0, 0.0], [8.0, 3.0, 5.0]],
             "volume": 60.0, "triangles": 2, "detail_triangles": 2, "portals": [0, 1],
-            "outdoor": false, "kind": "room"})
+            "outdoor": false, "kind": "room", "storeys": ["1"], "floor_area": 20.0, "height": 2.9, "doors": 0, "windows": 1})
     );
     assert_eq!(report["cells"][2]["outdoor"], json!(true));
     assert_eq!(report["cells"][2]["kind"], json!("outdoors"));
@@ -148,7 +148,7 @@ fn inspect_prints_a_table_for_people() {
         "window",
         "2 rooms and outdoors",
         "2 (1 open, 1 window)",
-        "4.00 × 3.00 × 5.00",
+        "20.00      2.90       60.00",
         "portal-0",
         "cell-0 – cell-1",
         "cell-1 – outdoors",

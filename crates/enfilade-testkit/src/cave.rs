@@ -3,10 +3,10 @@
 use enfilade_geom::scene::{Mesh, Role};
 use enfilade_geom::{Aabb, DMat4, DVec3, closest_point_on_segment};
 
-use crate::rng::Rng;
-use crate::site::{Generated, Site};
 use crate::surface_net::surface_net;
-use crate::truth::{Convex, Opening, OpeningKind, Room, Side};
+use enfilade_demo::Rng;
+use enfilade_demo::{Convex, Opening, OpeningKind, Room, Side};
+use enfilade_demo::{Generated, Site};
 
 const N_CHAMBERS: usize = 7;
 /// Region of the chambers' centers. [Units: wu]

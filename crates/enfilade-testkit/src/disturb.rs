@@ -6,8 +6,8 @@
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
-use crate::rng::Rng;
-use crate::site::Generated;
+use enfilade_demo::Generated;
+use enfilade_demo::Rng;
 
 /// The changes to a scene, applied in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

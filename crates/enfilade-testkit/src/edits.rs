@@ -7,7 +7,7 @@ use enfilade_geom::poly::{self, Poly, Sides};
 use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene, TriangleSource};
 use enfilade_geom::{Aabb, Bvh, DMat4, DVec3, Plane, Ray, Triangle, triangle_area_normal};
 
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// A kind of edit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

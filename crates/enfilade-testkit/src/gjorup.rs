@@ -23,12 +23,12 @@
 
 use enfilade_geom::{DMat3, DMat4, DVec3};
 
-use crate::interior::Interior;
-use crate::rng::Rng;
-use crate::site::{Generated, Site};
-use crate::solid::newell;
 use crate::transform::transformed;
-use crate::truth::{Convex, Opening, OpeningKind, Room, Side};
+use enfilade_demo::Rng;
+use enfilade_demo::interior::Interior;
+use enfilade_demo::solid::newell;
+use enfilade_demo::{Convex, Opening, OpeningKind, Room, Side};
+use enfilade_demo::{Generated, Site};
 
 /// Variant of the four-room model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

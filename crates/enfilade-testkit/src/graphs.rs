@@ -17,9 +17,9 @@ use std::collections::BTreeMap;
 use enfilade_cpg::{PortalKind, World};
 use enfilade_geom::{Aabb, DMat3, DVec3};
 
-use crate::rng::Rng;
 pub use doors::with_doors;
 pub use dwelling::{Dwelling, DwellingParams, dwelling};
+use enfilade_demo::Rng;
 use grid::{Face, Grid};
 pub use scale::scaled_world;
 pub use specials::{endless_room, linked_copies, traced_step, with_specials};

@@ -5,12 +5,12 @@
 
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::furniture::{Palette, glaze};
-use crate::roof::GableRoof;
-use crate::site::{Generated, Site};
-use crate::solid::{MeshBuilder, Steps, aabb};
-use crate::truth::OpeningKind::{Door, Opening, Window};
-use crate::truth::{Convex, OpeningKind, Room, Side};
+use enfilade_demo::OpeningKind::{Door, Opening, Window};
+use enfilade_demo::furniture::{Palette, glaze};
+use enfilade_demo::roof::GableRoof;
+use enfilade_demo::solid::{MeshBuilder, Steps, aabb};
+use enfilade_demo::{Convex, OpeningKind, Room, Side};
+use enfilade_demo::{Generated, Site};
 
 /// A building carved out of solid boxes.
 struct Carver {

@@ -6,7 +6,7 @@ use enfilade_geom::scene::{Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
 use crate::land::{hills, quads};
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Half the side of the land. [Units: wu]
 const HALF: f64 = 500.0;

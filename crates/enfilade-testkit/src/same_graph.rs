@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use enfilade_cpg::{CellId, Portal, World};
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Points that place a cell among those of the other world, and most tries to find them.
 const POINTS: [usize; 2] = [24, 4000];

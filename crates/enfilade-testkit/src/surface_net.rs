@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use enfilade_geom::scene::Primitive;
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::solid::newell;
+use enfilade_demo::solid::newell;
 
 /// Naive surface nets (Gibson 1998, "Constrained elastic surface nets"): a vertex in each cell of a grid that
 /// the surface passes, at the mean of its crossings with the cell's edges; a quadrangle for each edge of the

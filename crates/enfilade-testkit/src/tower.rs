@@ -7,11 +7,11 @@ mod wing;
 
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::furniture::{Furniture, Palette};
-use crate::rng::Rng;
-use crate::site::{Generated, Site};
-use crate::solid::{MeshBuilder, Steps, aabb, snapped};
-use crate::truth::{OpeningKind, Side};
+use enfilade_demo::Rng;
+use enfilade_demo::furniture::{Furniture, Palette};
+use enfilade_demo::solid::{MeshBuilder, Steps, aabb, snapped};
+use enfilade_demo::{Generated, Site};
+use enfilade_demo::{OpeningKind, Side};
 use model::{BAY, CORRIDOR, CORRIDOR_WALL, FACADE, PARTITION, SLAB, STAIRWELL, STOREY, Tower};
 use model::{WING, Wing};
 

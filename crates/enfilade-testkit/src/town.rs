@@ -7,7 +7,7 @@
 use enfilade_cpg::{SightGraph, SightPortal};
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Lengths of the plan. [Units: wu]
 const STREET: f64 = 80.0;

@@ -9,7 +9,7 @@ use enfilade_cpg::{MonitorCamera, SpecialId, Way, World};
 use enfilade_geom::scene::Material;
 use enfilade_geom::{Bvh, DMat3, DVec3, Ray, Triangle};
 
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Distance of the samples that must agree. [Units: px]
 const JITTER: f64 = 0.02;

@@ -2,8 +2,8 @@
 
 use enfilade_geom::{DMat4, DVec3};
 
-use crate::rng::Rng;
-use crate::site::Generated;
+use enfilade_demo::Generated;
+use enfilade_demo::Rng;
 
 /// Moves a scene by a rotation, uniform scaling and translation. Leaves meshes unchanged.
 #[must_use]

@@ -4,8 +4,8 @@ use enfilade_geom::scene::{Mesh, Role};
 use enfilade_geom::{Aabb, DMat4, DVec3};
 
 use crate::cave::distance_to_segment;
-use crate::site::{Generated, Site};
 use crate::surface_net::surface_net;
+use enfilade_demo::{Generated, Site};
 
 /// The points within `radius` of the segment between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,7 +17,7 @@ type DemoMesh<'py> = (
 /// Returns the meshes of the house where they stand.
 #[pyfunction]
 pub(crate) fn demo_meshes(py: Python<'_>) -> PyResult<Vec<DemoMesh<'_>>> {
-    let scene = enfilade_testkit::furnished_house().scene;
+    let scene = enfilade_demo::furnished_house().scene;
     let mut meshes = Vec::new();
     for object in &scene.objects {
         for primitive in &scene.meshes[object.mesh as usize].primitives {

@@ -70,7 +70,7 @@ pub(super) fn measure(
     }
     let graph = inspect(world)?;
     let row = score_world(dir, world, &graph)?;
-    let [rooms, doors, windows, _, extra, _] = row.figures;
+    let [rooms, doors, windows, _, extra, ..] = row.figures;
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)?;
     let matter: Vec<V3> = list(&truth["matter"]).iter().filter_map(vec3).collect();
     Ok(Measured {

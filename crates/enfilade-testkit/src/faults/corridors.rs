@@ -3,10 +3,10 @@
 use enfilade_geom::Aabb;
 
 use crate::faults::plan::OUT;
-use crate::site::{Generated, Site};
-use crate::solid::{MeshBuilder, aabb};
-use crate::truth::OpeningKind::{Door, Window};
-use crate::truth::{Convex, Room, Side};
+use enfilade_demo::OpeningKind::{Door, Window};
+use enfilade_demo::solid::{MeshBuilder, aabb};
+use enfilade_demo::{Convex, Room, Side};
+use enfilade_demo::{Generated, Site};
 
 /// Height of all rooms and corridors. [Units: wu]
 const CEILING: f64 = 2.7;

@@ -1,10 +1,10 @@
 //! Glass from wall to wall, between mullions.
 
 use crate::faults::plan::{Hole, OUT, OUTER, Plan, door, span, window};
-use crate::furniture::glaze;
-use crate::site::Generated;
-use crate::solid::aabb;
-use crate::truth::{OpeningKind, Side};
+use enfilade_demo::Generated;
+use enfilade_demo::furniture::glaze;
+use enfilade_demo::solid::aabb;
+use enfilade_demo::{OpeningKind, Side};
 
 /// Start of the bays of [`curtain_wall`] along the long sides, end of the last one, and position of the
 /// partition between hall and gallery. [Units: wu]

@@ -10,7 +10,7 @@ mod slabs;
 mod solids;
 mod walls;
 
-use crate::site::Generated;
+use enfilade_demo::Generated;
 
 /// A fault or difficulty of a building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

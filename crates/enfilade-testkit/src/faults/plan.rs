@@ -2,10 +2,10 @@
 
 use enfilade_geom::{Aabb, DVec3};
 
-use crate::furniture::{Palette, glaze, hang_door};
-use crate::site::{Generated, Site};
-use crate::solid::{MeshBuilder, aabb};
-use crate::truth::{Convex, OpeningKind, Room, Side};
+use enfilade_demo::furniture::{Palette, glaze, hang_door};
+use enfilade_demo::solid::{MeshBuilder, aabb};
+use enfilade_demo::{Convex, OpeningKind, Room, Side};
+use enfilade_demo::{Generated, Site};
 
 /// The side without a room.
 pub(super) const OUT: Side = Side::Outside;

@@ -1,8 +1,8 @@
 //! Walls, slabs and ceilings that do not meet, or meet in unexpected places.
 
 use crate::faults::plan::{CEILING, OFFICE, Office, Plan, office};
-use crate::site::Generated;
-use crate::solid::aabb;
+use enfilade_demo::Generated;
+use enfilade_demo::solid::aabb;
 
 /// Height of a wall's lower end above its slab. [Units: wu]
 const SLIT: f64 = 0.002;

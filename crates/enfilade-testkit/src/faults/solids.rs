@@ -3,9 +3,9 @@
 use enfilade_geom::{Aabb, DVec2};
 
 use crate::faults::plan::{CEILING, OFFICE, OUT, OUTER, Office, Plan, at, door, office, window};
-use crate::site::Generated;
-use crate::solid::{MeshBuilder, aabb};
-use crate::truth::{Convex, Room};
+use enfilade_demo::Generated;
+use enfilade_demo::solid::{MeshBuilder, aabb};
+use enfilade_demo::{Convex, Room};
 
 /// Blocks of houses on open land: streets of 5 m, two blocks that touch, one sunk a little into the
 /// ground and one hovering a little above it.

@@ -3,9 +3,9 @@
 use crate::faults::plan::{
     BESIDE, BETWEEN, CEILING, Hole, OFFICE, OUT, OUTER, Office, Plan, door, office, window,
 };
-use crate::site::Generated;
-use crate::solid::aabb;
-use crate::truth::Side;
+use enfilade_demo::Generated;
+use enfilade_demo::Side;
+use enfilade_demo::solid::aabb;
 
 /// Columns of 40 cm in walls of 12 and 30 cm, in their middle, at their ends and where they meet.
 pub(super) fn columns_in_walls(name: &str) -> Generated {

@@ -13,7 +13,7 @@ use enfilade_geom::{DMat3, DVec3};
 use super::furnished::{Spot, dress, furnish};
 use super::grid::{Face, Grid};
 use super::world::{FaceHole, world_of};
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Height of a storey, and of an eye above its floor. [Units: wu]
 const STOREY: f64 = 3.0;

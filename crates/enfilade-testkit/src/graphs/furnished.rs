@@ -8,8 +8,8 @@ use enfilade_geom::scene::{Image, Material, Mesh, Primitive, Texture};
 
 use super::turned::Turned;
 use super::world::box_indices;
-use crate::picture::oak_planks;
-use crate::rng::Rng;
+use enfilade_demo::Rng;
+use enfilade_demo::oak_planks;
 
 /// A place for furniture.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use enfilade_geom::{DMat4, DQuat, DVec3, Similarity};
 
 use super::{GridParams, room_grid, scaled_world};
 use crate::assembled::{Assembled, Standing, assembled};
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Distance of a made surface from the wall behind it. [Units: wu]
 const OFF_WALL: f64 = 1e-3;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Returns a GLB with its nodes, children, meshes, primitives, materials, textures, images, triangles and vertices in
 /// another order, and triangles that start at another vertex. Names, shapes and places stay.

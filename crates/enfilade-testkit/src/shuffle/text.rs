@@ -1,6 +1,6 @@
 //! Text scenes with lines and blocks in another order.
 
-use crate::rng::Rng;
+use enfilade_demo::Rng;
 
 /// Returns an OBJ file with its positions in another order, as well as the faces between two names or materials, each
 /// triangle starting at another vertex. Texture coordinates and normals stay in their places.

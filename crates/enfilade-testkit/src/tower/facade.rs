@@ -1,8 +1,8 @@
 //! The walls around the wings: facades with windows, and plain walls between wings.
 
 use super::model::{BuiltWing, FACADE, Tower, Wall};
-use crate::solid::{aabb, snapped};
-use crate::truth::{OpeningKind, Side};
+use enfilade_demo::solid::{aabb, snapped};
+use enfilade_demo::{OpeningKind, Side};
 
 impl Tower<'_> {
     /// Adds walls along x behind the rows: facades with windows, and plain walls between wings.

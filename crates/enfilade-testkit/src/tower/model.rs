@@ -3,11 +3,11 @@
 use enfilade_geom::{Aabb, DVec3};
 
 use super::params::TowerParams;
-use crate::furniture::{Furniture, Palette, glaze, hang_door};
-use crate::rng::Rng;
-use crate::site::Site;
-use crate::solid::{MeshBuilder, snapped};
-use crate::truth::{OpeningKind, Side};
+use enfilade_demo::Rng;
+use enfilade_demo::Site;
+use enfilade_demo::furniture::{Furniture, Palette, glaze, hang_door};
+use enfilade_demo::solid::{MeshBuilder, snapped};
+use enfilade_demo::{OpeningKind, Side};
 
 /// Height from floor to floor. [Units: wu]
 pub(super) const STOREY: f64 = 3.2;

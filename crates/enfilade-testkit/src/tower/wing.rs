@@ -5,8 +5,8 @@ use enfilade_geom::{Aabb, DVec3};
 use super::model::{
     BuiltWing, CORRIDOR, CORRIDOR_WALL, PARTITION, ROWS, STAIRWELL, Tower, Wall, Wing,
 };
-use crate::solid::{aabb, snapped};
-use crate::truth::{Convex, OpeningKind, Room, Side};
+use enfilade_demo::solid::{aabb, snapped};
+use enfilade_demo::{Convex, OpeningKind, Room, Side};
 
 impl Tower<'_> {
     /// Builds rooms, corridor, corridor walls and partitions of one wing on one storey.

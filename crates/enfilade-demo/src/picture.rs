@@ -4,7 +4,7 @@ use crate::rng::Rng;
 
 /// Oak planks, 64 × 64 pixels that repeat on all sides, as a PNG file.
 #[must_use]
-pub(crate) fn oak_planks() -> Vec<u8> {
+pub fn oak_planks() -> Vec<u8> {
     const SIZE: usize = 64;
     const PLANK: usize = 16;
     let mut pixels = Vec::with_capacity(SIZE * SIZE * 3);

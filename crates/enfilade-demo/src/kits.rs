@@ -275,7 +275,7 @@ pub fn maze_kit() -> Vec<PieceScene> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle::{n_open_edges, signed_volume, structural_triangles};
+    use enfilade_testkit::oracle::{n_open_edges, signed_volume, structural_triangles};
 
     #[test]
     fn all_pieces_are_closed_solids_with_names_of_their_own() {

@@ -353,7 +353,7 @@ fn planar_uv((p, n): (&[f32; 3], &[f32; 3])) -> [f32; 2] {
 }
 
 /// Returns the normal of a planar polygon with twice its area as length.
-pub(crate) fn newell(corners: &[DVec3]) -> DVec3 {
+pub fn newell(corners: &[DVec3]) -> DVec3 {
     let first = corners[0];
     (2..corners.len())
         .map(|i| (corners[i - 1] - first).cross(corners[i] - first))

@@ -345,7 +345,7 @@ fn place(site: &mut Site, mesh: Interior, plots: &[Plot]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle::{n_open_edges, object_triangles, signed_volume};
+    use enfilade_testkit::oracle::{n_open_edges, object_triangles, signed_volume};
 
     #[test]
     fn the_maze_has_the_counts_of_the_thesis() {

@@ -10,26 +10,28 @@ use crate::solid::{newell, triangulate};
 
 /// A triangle mesh with shared vertices.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interior {
-    pub(crate) corners: Vec<DVec3>,
-    pub(crate) triangles: Vec<[u32; 3]>,
+pub struct Interior {
+    /// Vertices. [Units: wu]
+    pub corners: Vec<DVec3>,
+    /// Triples of vertices.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 impl Interior {
     /// Adds a vertex and returns its index.
-    pub(crate) fn corner(&mut self, p: DVec3) -> u32 {
+    pub fn corner(&mut self, p: DVec3) -> u32 {
         self.corners.push(p);
         self.corners.len() as u32 - 1
     }
 
     /// Adds a quadrangle as two triangles, split from its first vertex.
-    pub(crate) fn quad(&mut self, q: [u32; 4]) {
+    pub fn quad(&mut self, q: [u32; 4]) {
         self.triangles
             .extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
     }
 
     /// Adds a simple polygon.
-    pub(crate) fn polygon(&mut self, corners: &[u32]) {
+    pub fn polygon(&mut self, corners: &[u32]) {
         let at: Vec<DVec3> = corners.iter().map(|&i| self.corners[i as usize]).collect();
         self.triangles
             .extend(triangulate(&at).iter().map(|t| t.map(|i| corners[i])));
@@ -39,7 +41,7 @@ impl Interior {
     ///
     /// Each split adds a vertex and two triangles, so the mesh must be closed, without T-junctions, and `n`
     /// even like the number of its triangles. O(n log n).
-    pub(crate) fn bisect_to(&mut self, n: usize) {
+    pub fn bisect_to(&mut self, n: usize) {
         let mut owner: HashMap<(u32, u32), usize> = HashMap::new();
         let mut longest = BinaryHeap::new();
         let corners = &mut self.corners;
@@ -89,7 +91,7 @@ impl Interior {
     }
 
     /// Returns the volume of the air inside, with its openings closed by `plugs` (quadrangles that face it).
-    pub(crate) fn air_volume(&self, triangles: &[[u32; 3]], plugs: &[[u32; 4]]) -> f64 {
+    pub fn air_volume(&self, triangles: &[[u32; 3]], plugs: &[[u32; 4]]) -> f64 {
         let at = |i: u32| self.corners[i as usize];
         let six = |a: u32, b: u32, c: u32| at(a).dot(at(b).cross(at(c)));
         let walls: f64 = triangles.iter().map(|t| six(t[0], t[1], t[2])).sum();
@@ -101,7 +103,7 @@ impl Interior {
     }
 
     /// Returns the mesh with one flat normal per triangle, or with shared vertices and no normals.
-    pub(crate) fn into_mesh(self, name: &str, material: u32, flat: bool) -> Mesh {
+    pub fn into_mesh(self, name: &str, material: u32, flat: bool) -> Mesh {
         let mut p = Primitive {
             material: Some(material),
             ..Primitive::default()
@@ -132,7 +134,7 @@ impl Interior {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle::{n_open_edges, signed_volume};
+    use enfilade_testkit::oracle::{n_open_edges, signed_volume};
 
     #[test]
     fn bisection_evens_out_the_triangles_and_keeps_the_surface() {

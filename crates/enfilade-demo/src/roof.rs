@@ -8,21 +8,21 @@ use crate::truth::Convex;
 
 /// Dimensions of a roof whose ridge runs along x, over a house with its minimum x and z at the origin.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct GableRoof {
+pub struct GableRoof {
     /// Outer size along x. [Units: wu]
-    pub(crate) length: f64,
+    pub length: f64,
     /// Outer size along z. [Units: wu]
-    pub(crate) depth: f64,
+    pub depth: f64,
     /// Thickness of the walls. [Units: wu]
-    pub(crate) wall: f64,
+    pub wall: f64,
     /// Floor of the attic. [Units: wu]
-    pub(crate) floor: f64,
+    pub floor: f64,
     /// Underside of the roof at the inner face of the eaves walls. [Units: wu]
-    pub(crate) eaves: f64,
+    pub eaves: f64,
     /// Rise per run.
-    pub(crate) slope: f64,
+    pub slope: f64,
     /// Sill and head of a window of 1 m in either gable. [Units: wu]
-    pub(crate) window: Option<[f64; 2]>,
+    pub window: Option<[f64; 2]>,
 }
 
 /// Vertical thickness of the roof, and its overhang. [Units: wu]
@@ -40,7 +40,7 @@ impl GableRoof {
     }
 
     /// Returns the air below the roof.
-    pub(crate) fn loft(&self) -> Convex {
+    pub fn loft(&self) -> Convex {
         let (low, high) = (self.wall, self.depth - self.wall);
         let section = [
             [self.floor, low],
@@ -54,7 +54,7 @@ impl GableRoof {
     }
 
     /// Returns the holes of the windows in the west and the east gable; flat if there are none.
-    pub(crate) fn gable_windows(&self) -> [Aabb; 2] {
+    pub fn gable_windows(&self) -> [Aabb; 2] {
         let middle = self.depth * 0.5;
         let [low, high] = self.window.unwrap_or([self.eaves; 2]);
         [0.0, self.length - self.wall]
@@ -62,7 +62,7 @@ impl GableRoof {
     }
 
     /// Adds the roof and the walls below it, from the attic floor up.
-    pub(crate) fn add_to(&self, site: &mut Site, tiles: u32, plaster: u32) {
+    pub fn add_to(&self, site: &mut Site, tiles: u32, plaster: u32) {
         let middle = self.depth * 0.5;
         let at = |lift: f64| move |z: f64| DVec3::new(-0.4, self.underside(z) + lift, z);
         let below = [-OVERHANG, middle, self.depth + OVERHANG].map(at(0.0));
