@@ -155,10 +155,10 @@ impl<'a> Structure<'a> {
         slabs_of(&self.walls, within)
     }
 
-    /// Returns the triangles of detail objects that may close an opening, in frame coordinates: shut door leaves,
-    /// panes. `surfaces` hold their rims.
-    pub(crate) fn blockers(&self, surfaces: &Bvh) -> Vec<Triangle> {
-        without_open_leaves(&plates(self.scene), self.frame, surfaces)
+    /// Calls `take` with the triangles of each detail object that may close an opening, in frame coordinates: shut door
+    /// leaves, panes. `surfaces` hold their rims.
+    pub(crate) fn for_blockers(&self, surfaces: &Bvh, take: impl FnMut(Vec<Triangle>)) {
+        without_open_leaves(&plates(self.scene), self.frame, surfaces).for_each(take);
     }
 
     /// Drops what only builders need, once their results are back in scene coordinates.
