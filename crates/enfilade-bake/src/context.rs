@@ -10,6 +10,9 @@ use crate::{BakeError, Budget, Method, Pieces, Resolution, Stage};
 
 /// Approximate memory of the complex for each structural triangle, from bakes of 20 buildings of 300 to 40,000. [Units: bytes]
 const BYTES_A_TRIANGLE: f64 = 3.5e3;
+/// … and for those beyond so many: larger models repeat their storeys, of simple walls. From towers of 100,000 and 775,000.
+const BYTES_A_FURTHER: f64 = 700.0;
+const MANY: f64 = 40_000.0;
 
 /// Receives the progress of a bake.
 pub trait Progress: Sync {
@@ -159,7 +162,9 @@ impl<'a> BakeContext<'a> {
             self.grant_voxels(n_voxels);
         }
         // Memory held by now, above all for the scene, stays; leaves of the complex and votes follow when the voxels are freed.
-        let of_complex = BYTES_A_TRIANGLE * self.n_triangles as f64 + of_votes;
+        let n = self.n_triangles as f64;
+        let of_triangles = BYTES_A_TRIANGLE * n.min(MANY) + BYTES_A_FURTHER * (n - MANY).max(0.0);
+        let of_complex = of_triangles + of_votes;
         let held = self.probe.and_then(|probe| probe()).unwrap_or(0) as f64;
         self.progress
             .resolution(resolution, held + of_flood.max(of_complex));

@@ -134,7 +134,9 @@ pub fn find_leak_trail(
         FLOODED,
     )?;
     // Includes leaves that stand open: a room ends at its doorways.
-    matter.extend(plates(scene).into_iter().flat_map(|p| p.triangles));
+    for plate in plates(scene) {
+        matter.extend_from_slice(&plate.triangles());
+    }
     let matter = frame.triangles_to_grid(&matter);
     context.grant_voxels(grid.n_voxels() as u64);
     let distances = distance_squared(&voxelize(&grid, &matter, allowance), allowance);

@@ -316,6 +316,23 @@ impl Scene {
         })
     }
 
+    /// Returns the triangles of an object, as [`Scene::world_triangle`] does each, in order of primitive and triangle.
+    #[must_use]
+    pub fn world_triangles_of(&self, object: u32) -> Vec<Triangle> {
+        let primitives = &self.meshes[self.objects[object as usize].mesh as usize].primitives;
+        let mut triangles = Vec::with_capacity(primitives.iter().map(|p| p.triples().len()).sum());
+        for (primitive, p) in (0..).zip(primitives) {
+            triangles.extend((0..p.triples().len() as u32).map(|triangle| {
+                self.world_triangle(TriangleSource {
+                    object,
+                    primitive,
+                    triangle,
+                })
+            }));
+        }
+        triangles
+    }
+
     /// Returns all triangles of objects with `role`, in order of object, primitive and triangle.
     pub fn triangle_sources(&self, role: Role) -> impl Iterator<Item = TriangleSource> + '_ {
         self.objects

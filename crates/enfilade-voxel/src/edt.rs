@@ -15,6 +15,7 @@ use enfilade_geom::Allowance;
 use rayon::prelude::*;
 
 use super::grid::{BitVolume, for_runs};
+use super::sparse::VoxelRows;
 
 /// Number of neighboring lines processed together.
 pub(super) const LANES: usize = 64;
@@ -238,8 +239,8 @@ impl<T: Squared> Tables<T> {
 
 /// Writes the squared distances of the voxels of slice `k` to those occupied in it.
 pub(super) fn within_slice<T: Squared>(
-    occupied: &BitVolume,
-    far: Option<&BitVolume>,
+    occupied: &impl VoxelRows,
+    far: Option<&impl VoxelRows>,
     k: usize,
     slice: &mut [T],
     tables: &Tables<T>,

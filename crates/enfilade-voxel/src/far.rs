@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::edt::distance_squared;
 use super::grid::BitVolume;
+use super::sparse::{SparseVolume, VoxelRows};
 use super::watershed::{WatershedOptions, watershed};
 use super::widest::border;
 
@@ -30,9 +31,9 @@ const NOISE: f64 = 0.5;
 
 /// Returns free voxels that are outdoors and at least eight voxels away from everything set in `blocked`; a subset.
 ///
-/// Linear in voxels; takes an eighth of a byte per voxel for the answer, and a tenth more during the search.
+/// Linear in voxels; takes a tenth of a byte per voxel during the search.
 #[must_use]
-pub fn far_outdoors(blocked: &BitVolume, allowance: &Allowance) -> BitVolume {
+pub fn far_outdoors(blocked: &impl VoxelRows, allowance: &Allowance) -> SparseVolume {
     let blocks = blocks_of(blocked);
     let dims = blocks.dims();
     let squared = distance_squared(&blocks, allowance);
@@ -56,11 +57,11 @@ pub fn far_outdoors(blocked: &BitVolume, allowance: &Allowance) -> BitVolume {
 }
 
 /// Returns the blocks with a voxel set, with a margin of one block around them.
-fn blocks_of(voxels: &BitVolume) -> BitVolume {
+fn blocks_of(voxels: &impl VoxelRows) -> BitVolume {
     let [nx, ny, nz] = voxels.dims();
     let mut out = BitVolume::new([nx, ny, nz].map(|n| n.div_ceil(EDGE) + 2));
     let [bx, by, bz] = out.dims();
-    let mut row = vec![0_u64; voxels.row_words()];
+    let mut row = vec![0_u64; nx.div_ceil(64)];
     for k in 0..bz - 2 {
         for j in 0..by - 2 {
             row.fill(0);
@@ -82,31 +83,20 @@ fn blocks_of(voxels: &BitVolume) -> BitVolume {
 }
 
 /// Returns the voxels of a box of `dims` whose blocks are set.
-fn voxels_of([nx, ny, nz]: [usize; 3], blocks: &BitVolume) -> BitVolume {
-    let mut out = BitVolume::new([nx, ny, nz]);
+fn voxels_of([nx, ny, nz]: [usize; 3], blocks: &BitVolume) -> SparseVolume {
     let [.., by, _] = blocks.dims();
     let tail = u64::MAX >> (63 - (nx + 63) % 64);
-    let mut row = vec![0_u64; out.row_words()];
-    for k in 0..nz.div_ceil(EDGE) {
-        for j in 0..ny.div_ceil(EDGE) {
-            row.fill(0);
-            let from = blocks.row(j + 1 + by * (k + 1));
-            for i in 0..nx.div_ceil(EDGE) {
-                if from[(i + 1) / 64] >> ((i + 1) % 64) & 1 != 0 {
-                    row[i / PER_WORD] |= ((1 << EDGE) - 1) << (i % PER_WORD * EDGE);
-                }
-            }
-            if let Some(last) = row.last_mut() {
-                *last &= tail;
-            }
-            for z in k * EDGE..nz.min((k + 1) * EDGE) {
-                for y in j * EDGE..ny.min((j + 1) * EDGE) {
-                    out.set_row(y + ny * z, &row);
-                }
+    SparseVolume::from_rows([nx, ny, nz], |row, words| {
+        let from = blocks.row(row % ny / EDGE + 1 + by * (row / ny / EDGE + 1));
+        for i in 0..nx.div_ceil(EDGE) {
+            if from[(i + 1) / 64] >> ((i + 1) % 64) & 1 != 0 {
+                words[i / PER_WORD] |= ((1 << EDGE) - 1) << (i % PER_WORD * EDGE);
             }
         }
-    }
-    out
+        if let Some(last) = words.last_mut() {
+            *last &= tail;
+        }
+    })
 }
 
 /// Replaces each value by the maximum over all values minus the steps to them, diagonal ones counting as one: cubes, which
@@ -220,7 +210,7 @@ mod tests {
             voxels in halls()
         ) {
             let squared = distance_squared(&voxels, &Allowance::default());
-            let far = far_outdoors(&voxels, &Allowance::default());
+            let far = far_outdoors(&voxels, &Allowance::default()).dense();
             prop_assert!(far.iter_set().all(|v| squared[v] >= 64), "eight voxels away");
             let open = flood(&voxels.complement(), &border(DIMS), Connectivity::Faces6);
             prop_assert!(far.iter_set().all(|v| open.get_index(v)), "open to the border");
@@ -256,7 +246,7 @@ mod tests {
     fn most_of_a_sky_is_found_and_nothing_of_a_closed_hall() {
         let mut voxels = BitVolume::new(DIMS);
         hall(&mut voxels, [20, 3, 20], [80, 40, 80], [20, 9]);
-        let far = far_outdoors(&voxels, &Allowance::default());
+        let far = far_outdoors(&voxels, &Allowance::default()).dense();
         let inside = far.iter_set().filter(|&v| {
             let at = [v % DIMS[0], v / DIMS[0] % DIMS[1], v / (DIMS[0] * DIMS[1])];
             (20..80).contains(&at[0]) && (3..40).contains(&at[1]) && (20..80).contains(&at[2])

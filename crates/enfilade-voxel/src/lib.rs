@@ -26,8 +26,8 @@ pub use enclosure::{ENCLOSED, ascend, deepest_enclosed, enclosure};
 pub use far::far_outdoors;
 pub use grid::{BitVolume, Grid, for_runs, set_bits};
 pub use labels::{Labels, Reader};
-pub use sparse::SparseVolume;
-pub use voxelize::voxelize;
+pub use sparse::{SparseVolume, VoxelRows};
+pub use voxelize::{add_voxels, voxelize};
 pub use watershed::{
     Basin, DistanceField, Saddle, Touching, Watershed, WatershedOptions, WidestOfBlocks,
     bytes_of_slabs, mark_dams, watershed,

@@ -37,9 +37,19 @@ const SLAB: usize = 8;
 #[must_use]
 pub fn voxelize(grid: &Grid, triangles: &[Triangle], allowance: &Allowance) -> BitVolume {
     let mut out = BitVolume::new(grid.dims);
+    add_voxels(&mut out, grid, triangles, allowance);
+    out
+}
+
+/// Sets what [`voxelize`] marks in a volume.
+///
+/// # Panics
+/// If the volume is not of the grid's size, or there are 2³² triangles or more.
+pub fn add_voxels(out: &mut BitVolume, grid: &Grid, triangles: &[Triangle], allowance: &Allowance) {
+    assert_eq!(out.dims(), grid.dims, "boxes of one size");
     let [nx, ny, nz] = grid.dims;
-    if out.words().is_empty() {
-        return out;
+    if out.words().is_empty() || triangles.is_empty() {
+        return;
     }
     assert!(
         u32::try_from(triangles.len()).is_ok(),
@@ -92,7 +102,6 @@ pub fn voxelize(grid: &Grid, triangles: &[Triangle], allowance: &Allowance) -> B
                 }
             }
         });
-    out
 }
 
 /// The test `low <= along * t + across · (others) <= high` for the cube's minimum.

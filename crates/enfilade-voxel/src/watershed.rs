@@ -41,6 +41,7 @@ use rayon::prelude::*;
 
 use super::grid::BitVolume;
 use super::labels::Labels;
+use super::sparse::SparseVolume;
 use crests::Crests;
 use levels::{Levels, Outdoors};
 use shape::Shape;
@@ -163,7 +164,7 @@ impl DistanceField {
     /// # Panics
     /// If the two boxes differ in size, or have 2³² voxels or more.
     #[must_use]
-    pub fn of(blocked: &BitVolume, far: &BitVolume, allowance: &Allowance) -> Self {
+    pub fn of(blocked: &SparseVolume, far: &SparseVolume, allowance: &Allowance) -> Self {
         let dims = blocked.dims();
         assert_eq!(dims, far.dims(), "boxes of one size");
         let n: usize = dims.iter().product();
@@ -213,7 +214,7 @@ fn first_outdoors_of(outdoors: &BitVolume, squared: &[u16]) -> usize {
 }
 
 /// Returns the first voxel outdoors that is not blocked, 0 if there is none.
-fn first_free(blocked: &BitVolume, outdoors: &Outdoors<'_>) -> usize {
+fn first_free(blocked: &SparseVolume, outdoors: &Outdoors<'_>) -> usize {
     let shape = Shape {
         dims: blocked.dims(),
     };

@@ -42,7 +42,7 @@ struct Filler {
 pub(super) fn divided(
     portal: &PartitionPortal,
     is_on_floor: bool,
-    plates: &[Plate],
+    plates: &[Plate<'_>],
     allowance: &Allowance,
 ) -> Vec<PartitionPortal> {
     let whole = || vec![portal.clone()];
@@ -73,8 +73,8 @@ pub(super) fn divided(
 }
 
 /// Returns the plate as a filler of the opening; `None` if it does not lie in it.
-fn filler(opening: &Rectangle, is_on_floor: bool, plate: &Plate) -> Option<Filler> {
-    let bounds = opening.bounds(&plate.triangles);
+fn filler(opening: &Rectangle, is_on_floor: bool, plate: &Plate<'_>) -> Option<Filler> {
+    let bounds = opening.bounds(&plate.triangles());
     let size = bounds.size();
     let z = (bounds.min.z + bounds.max.z) * 0.5 - opening.low.z;
     if size.z > DEEPEST || z.abs() > DEEPEST {
@@ -94,14 +94,11 @@ fn filler(opening: &Rectangle, is_on_floor: bool, plate: &Plate) -> Option<Fille
 }
 
 /// Returns `true` if one body of an object reaches to all of its sides, so that no frame runs around it.
-fn is_bare(plate: &Plate) -> bool {
-    let (shell_of, n) = shells(&plate.triangles);
+fn is_bare(plate: &Plate<'_>) -> bool {
+    let triangles = plate.triangles();
+    let (shell_of, n) = shells(&triangles);
     (0..n as u32).any(|shell| {
-        let of = plate
-            .triangles
-            .iter()
-            .zip(&shell_of)
-            .filter(|t| *t.1 == shell);
+        let of = triangles.iter().zip(&shell_of).filter(|t| *t.1 == shell);
         let body: Vec<Triangle> = of.map(|t| *t.0).collect();
         let frame = plate.around.size() - plate.around.bounds(&body).size();
         frame.x.max(frame.y) < 2.0 * FRAME && plate.around.mask(body).share() >= FILLED
@@ -205,12 +202,12 @@ mod tests {
         Aabb::new(low, DVec3::new(x1, y1, half_depth)).triangles()
     }
 
-    fn plate(triangles: Vec<Triangle>) -> Plate {
+    fn plate(triangles: Vec<Triangle>) -> Plate<'static> {
         Plate::of(triangles).unwrap()
     }
 
     /// A frame of four bars, and a pane in it.
-    fn window([x0, y0, x1, y1]: [f64; 4]) -> Plate {
+    fn window([x0, y0, x1, y1]: [f64; 4]) -> Plate<'static> {
         let b = 0.06;
         let bars = [
             [x0, y0, x0 + b, y1],
@@ -223,16 +220,16 @@ mod tests {
         plate(triangles)
     }
 
-    fn bare(r: [f64; 4]) -> Plate {
+    fn bare(r: [f64; 4]) -> Plate<'static> {
         plate(block(r, 0.02))
     }
 
     /// Returns the areas of the parts, in units of 0.01 m², ascending.
-    fn areas(plates: &[Plate]) -> Vec<i64> {
+    fn areas(plates: &[Plate<'_>]) -> Vec<i64> {
         areas_over(plates, false)
     }
 
-    fn areas_over(plates: &[Plate], is_on_floor: bool) -> Vec<i64> {
+    fn areas_over(plates: &[Plate<'_>], is_on_floor: bool) -> Vec<i64> {
         let parts = divided(&opening(), is_on_floor, plates, &Allowance::default());
         let mut areas: Vec<i64> = parts
             .iter()
@@ -269,7 +266,7 @@ mod tests {
             [960]
         );
         // Two rows of panes.
-        let grid: Vec<Plate> = (0..8)
+        let grid: Vec<Plate<'_>> = (0..8)
             .map(|i| (f64::from(i % 4), 1.2 * f64::from(i / 4)))
             .map(|(x, y)| bare([x, y, x + 1.0, y + 1.2]))
             .collect();

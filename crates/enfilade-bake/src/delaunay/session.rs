@@ -75,7 +75,9 @@ impl Session {
         // The result must not depend on the order of triangles in a file.
         let walls = in_own_order(&structure.walls);
         let bvh = Bvh::build(&walls);
-        let closures = in_own_order(&structure.blockers(&bvh));
+        let mut closures = Vec::new();
+        structure.for_blockers(&bvh, |own| closures.extend(own));
+        let closures = in_own_order(&closures);
         let shut = [closures.clone(), in_own_order(&structure.missing)].concat();
         let space = divide_within(
             &walls,

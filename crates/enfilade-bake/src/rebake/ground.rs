@@ -114,16 +114,16 @@ impl<'a> Ground<'a> {
         context: &'a BakeContext<'_>,
     ) -> Result<Result<Self, WholeBecause>, RebakeError> {
         let allowance = context.allowance();
-        let structure = Structure::of(scene, Method::Watershed, config, allowance)?;
+        let (structure, tree) = Structure::with_tree(scene, Method::Watershed, config, allowance)?;
         let frame = structure.frame;
         let of_scene = SceneStructure {
             scene,
             sources: structure.sources.clone(),
             triangles: structure.triangles.clone(),
-            bvh: if frame.is_scene() {
-                structure.bvh.clone()
-            } else {
-                Bvh::build(&structure.triangles)
+            bvh: match tree {
+                Some(tree) => tree,
+                None if frame.is_scene() => structure.bvh.clone(),
+                None => Bvh::build(&structure.triangles),
             },
             missing: structure
                 .missing

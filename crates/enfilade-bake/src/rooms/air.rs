@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use enfilade_geom::Allowance;
+use enfilade_geom::{Allowance, Triangle};
 
 use super::lids::{Lids, find_lids};
 use super::rims::rim_caps;
@@ -10,7 +10,8 @@ use super::votes::n_votes;
 use crate::complex::Vote;
 use crate::structure::{Site, Structure};
 use crate::voxel::{
-    BitVolume, DistanceField, Grid, SparseVolume, bytes_of_slabs, far_outdoors, voxelize,
+    BitVolume, DistanceField, Grid, SparseVolume, add_voxels, bytes_of_slabs, far_outdoors,
+    voxelize,
 };
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
@@ -43,6 +44,9 @@ pub(crate) const FLOODED: f64 = 2.2;
 /// Memory of the distances, labels and bits of a flood, beside its slabs: from bakes of 20 buildings of 1 to 326 million voxels.
 /// [Units: bytes/vx]
 const KEPT: f64 = 0.9;
+
+/// Triangles of detail objects that are voxelized at once: all of a building's would take more memory than its voxels.
+const BATCH: usize = 1 << 18;
 
 /// Memory of a vote: itself, and its leaf. [Units: bytes]
 const BYTES_A_VOTE: usize = size_of::<Vote>() + size_of::<Option<u32>>();
@@ -137,7 +141,7 @@ pub(crate) fn measure(
 
 /// Voxels that are not air, or are closed to the flood.
 pub(crate) struct Solid {
-    pub(super) occupied: BitVolume,
+    pub(super) occupied: SparseVolume,
     /// Voxels that door leaves and panes fill.
     pub(super) closures: SparseVolume,
     pub(super) lids: Lids,
@@ -148,20 +152,29 @@ pub(crate) struct Solid {
 impl Solid {
     pub(super) fn of(structure: &Structure<'_>, grid: &Grid, config: &BakeConfig) -> Self {
         let allowance = structure.allowance;
-        let occupied = voxelize(grid, &structure.walls, allowance);
-        let closures = voxelize(grid, &structure.blockers(&structure.bvh), allowance);
+        let occupied = SparseVolume::of(&voxelize(grid, &structure.walls, allowance));
         // Lids and caps replace missing roofs, floors and ends of tubes.
         let lids = find_lids(grid, &occupied, allowance);
+        let mut shut = BitVolume::new(grid.dims);
+        let mut batch: Vec<Triangle> = Vec::new();
+        structure.for_blockers(&structure.bvh, |plate| {
+            batch.extend(plate);
+            if batch.len() >= BATCH {
+                add_voxels(&mut shut, grid, &batch, allowance);
+                batch.clear();
+            }
+        });
+        add_voxels(&mut shut, grid, &batch, allowance);
+        let closures = SparseVolume::of(&shut);
         let mut caps = rim_caps(&structure.rims, config.min_opening.powi(2));
         caps.extend(&structure.missing);
-        let mut shut = voxelize(grid, &caps, allowance);
-        shut.union_with(&closures);
+        add_voxels(&mut shut, grid, &caps, allowance);
         for voxels in lids.lids.iter().chain(&lids.floors) {
-            shut.union_with(voxels);
+            voxels.add_to(&mut shut);
         }
         Self {
             occupied,
-            closures: SparseVolume::of(&closures),
+            closures,
             lids,
             shut: SparseVolume::of(&shut),
         }
@@ -174,12 +187,13 @@ impl Solid {
     }
 
     /// Returns all voxels that stop a flood, and the outdoor voxels far from them.
-    pub(super) fn blocked(&self, allowance: &Allowance) -> (Cow<'_, BitVolume>, BitVolume) {
-        let mut blocked = Cow::Borrowed(&self.occupied);
-        if !self.shut.is_empty() {
-            self.shut.add_to(blocked.to_mut());
-        }
-        let far = far_outdoors(&blocked, allowance);
+    pub(super) fn blocked(&self, allowance: &Allowance) -> (Cow<'_, SparseVolume>, SparseVolume) {
+        let blocked = if self.shut.is_empty() {
+            Cow::Borrowed(&self.occupied)
+        } else {
+            Cow::Owned(self.occupied.union(&self.shut))
+        };
+        let far = far_outdoors(&*blocked, allowance);
         (blocked, far)
     }
 }

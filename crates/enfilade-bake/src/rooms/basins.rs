@@ -12,7 +12,7 @@ use super::regions::{Regions, merge_basins};
 use super::slabs::cut_at_slabs;
 use crate::BakeConfig;
 use crate::structure::OUTDOORS;
-use crate::voxel::{BitVolume, DistanceField, Grid, Labels, SparseVolume, connected_labels};
+use crate::voxel::{DistanceField, Grid, Labels, SparseVolume, connected_labels};
 
 /// Label of part 0, before parts have basins.
 const AFTER: u32 = OUTDOORS + 1;
@@ -150,7 +150,7 @@ impl Basins {
     }
 
     /// Gives the air inside closures to the basins beside it.
-    pub(super) fn refill(&mut self, occupied: &BitVolume) {
+    pub(super) fn refill(&mut self, occupied: &SparseVolume) {
         flood_closures(&mut self.labels, occupied);
     }
 
@@ -177,8 +177,8 @@ impl Basins {
 /// The division of a grid, and the voxels whose label is known without it.
 struct Labelling<'a, D> {
     grid: &'a Grid,
-    blocked: &'a BitVolume,
-    far: &'a BitVolume,
+    blocked: &'a SparseVolume,
+    far: &'a SparseVolume,
     division: &'a D,
 }
 
@@ -248,6 +248,7 @@ fn blocks([xs, ys]: [Range<usize>; 2], edge: usize) -> impl Iterator<Item = [Ran
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::voxel::BitVolume;
     use enfilade_geom::Plane;
     use proptest::prelude::*;
 
@@ -312,6 +313,7 @@ mod tests {
                 blocked.set(x, y, z, is_of(i, 1));
                 far.set(x, y, z, is_of(i, 2));
             }
+            let [blocked, far] = [blocked, far].map(|v| SparseVolume::of(&v));
             let division = Planes(planes);
             let labelling = Labelling { grid: &grid, blocked: &blocked, far: &far, division: &division };
             let labels = labelling.labels(&Allowance::default());

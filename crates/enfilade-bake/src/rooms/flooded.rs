@@ -49,11 +49,18 @@ pub(super) fn contact_faces(labels: &Labels) -> BTreeMap<(u32, u32), Faces> {
             faces.push((4 * i + axis) as u64);
         });
         found.entry(last).or_default().append(&mut faces);
+        found.values_mut().for_each(Faces::shrink_to_fit);
         found
     };
     let layers = (0..labels.n_layers()).into_par_iter();
     let of_layers: Vec<Contacts> = layers.map(of_layer).collect();
-    let mut all = Contacts::new();
+    // Lists that grow would take twice as much memory.
+    let mut n_faces: BTreeMap<(u32, u32), usize> = BTreeMap::new();
+    for (&pair, faces) in of_layers.iter().flatten() {
+        *n_faces.entry(pair).or_default() += faces.len();
+    }
+    let of_pair = |(pair, n)| (pair, Faces::with_capacity(n));
+    let mut all: Contacts = n_faces.into_iter().map(of_pair).collect();
     for (pair, mut faces) in of_layers.into_iter().flatten() {
         all.entry(pair).or_default().append(&mut faces);
     }

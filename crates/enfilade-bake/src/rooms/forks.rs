@@ -87,7 +87,7 @@ pub(super) fn split_forks(
     if n_in_tubes == 0 {
         return [0.0; 2];
     }
-    regions.contacts = contacts_of(regions, &contact_faces(labels));
+    regions.contacts = contacts_of(regions, contact_faces(labels));
     let mut n_in_rooms = 0;
     labels.for_runs(0..labels.len(), |run, label| {
         if regions.region_of_basin[label as usize] > OUTDOORS {

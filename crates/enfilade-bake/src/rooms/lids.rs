@@ -19,7 +19,7 @@ use enfilade_cpg::{Reason, Why};
 use enfilade_geom::{Allowance, DVec3, Plane, Winding};
 
 use crate::judge::NARROW;
-use crate::voxel::{BitVolume, Grid};
+use crate::voxel::{BitVolume, Grid, SparseVolume};
 
 use crate::structure::Candidate;
 
@@ -42,9 +42,9 @@ const MIN_AREA: f64 = 1.0;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lids {
     /// Below the tops of walls.
-    pub(crate) lids: Option<BitVolume>,
+    pub(crate) lids: Option<SparseVolume>,
     /// Above the feet of walls.
-    pub(crate) floors: Option<BitVolume>,
+    pub(crate) floors: Option<SparseVolume>,
 }
 
 impl Lids {
@@ -64,7 +64,7 @@ impl Lids {
     /// Describes the lids and floors.
     #[must_use]
     pub(crate) fn notes(&self, grid: &Grid) -> Vec<String> {
-        let note = |what: &str, ends: &str, voxels: &BitVolume| {
+        let note = |what: &str, ends: &str, voxels: &SparseVolume| {
             let area = voxels.count() as f64 * grid.voxel * grid.voxel;
             format!(
                 "{what} of {area:.0} m² are missing, where walls end at {ends} with nothing {}: open portals stand in for them",
@@ -78,7 +78,7 @@ impl Lids {
 }
 
 /// Returns the row of the lid or floor that contains nearly all of the faces, if any.
-fn row_of(voxels: &BitVolume, grid: &Grid, faces: &[u64]) -> Option<usize> {
+fn row_of(voxels: &SparseVolume, grid: &Grid, faces: &[u64]) -> Option<usize> {
     let mut rows: Vec<usize> = Vec::new();
     for &face in faces {
         let [x, y, z] = grid.coords((face / 4) as usize);
@@ -117,25 +117,15 @@ fn level_candidate(grid: &Grid, faces: &[u64], row: usize, height: f64) -> Candi
 
 /// Lays the lids and floors of a scene whose structure fills `occupied`.
 #[must_use]
-pub(crate) fn find_lids(grid: &Grid, occupied: &BitVolume, allowance: &Allowance) -> Lids {
+pub(crate) fn find_lids(grid: &Grid, occupied: &SparseVolume, allowance: &Allowance) -> Lids {
+    let floors = lids_of(grid, &occupied.upside_down(), allowance);
     Lids {
         lids: lids_of(grid, occupied, allowance),
-        floors: lids_of(grid, &upside_down(occupied), allowance).map(|v| upside_down(&v)),
+        floors: floors.map(|v| v.upside_down()),
     }
 }
 
-fn upside_down(volume: &BitVolume) -> BitVolume {
-    let [nx, ny, nz] = volume.dims();
-    let mut out = BitVolume::new([nx, ny, nz]);
-    for z in 0..nz {
-        for y in 0..ny {
-            out.set_row(ny - 1 - y + ny * z, volume.row(y + ny * z));
-        }
-    }
-    out
-}
-
-fn lids_of(grid: &Grid, occupied: &BitVolume, allowance: &Allowance) -> Option<BitVolume> {
+fn lids_of(grid: &Grid, occupied: &SparseVolume, allowance: &Allowance) -> Option<SparseVolume> {
     let columns = Columns::of(grid, occupied);
     let mut lids: Option<BitVolume> = None;
     let mut is_lidded = vec![false; columns.top.len()];
@@ -150,7 +140,7 @@ fn lids_of(grid: &Grid, occupied: &BitVolume, allowance: &Allowance) -> Option<B
             }
         }
     }
-    lids
+    lids.as_ref().map(SparseVolume::of)
 }
 
 /// The scene seen from above, by column `x + nx * z`.
@@ -162,7 +152,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(grid: &Grid, occupied: &BitVolume) -> Self {
+    fn of(grid: &Grid, occupied: &SparseVolume) -> Self {
         let [nx, ny, nz] = grid.dims;
         let mut top = vec![0_u32; nx * nz];
         let mut run = vec![0_u32; nx * nz];
@@ -212,7 +202,7 @@ impl Columns {
     }
 
     /// Returns the columns that need a lid at the height of `row`.
-    fn enclosed(&self, grid: &Grid, occupied: &BitVolume, row: usize) -> Vec<usize> {
+    fn enclosed(&self, grid: &Grid, occupied: &SparseVolume, row: usize) -> Vec<usize> {
         let [nx, ny, nz] = grid.dims;
         let n = nx * nz;
         // Just below the lid: the tops themselves may be rounded away.
@@ -400,10 +390,12 @@ mod tests {
         v
     }
 
+    fn lids_in(volume: &BitVolume) -> Lids {
+        find_lids(&grid(), &SparseVolume::of(volume), &Allowance::default())
+    }
+
     fn lidded(volume: &BitVolume) -> usize {
-        find_lids(&grid(), volume, &Allowance::default())
-            .lids
-            .map_or(0, |v| v.count())
+        lids_in(volume).lids.map_or(0, |v| v.count())
     }
 
     #[test]
@@ -416,22 +408,14 @@ mod tests {
                 }
             }
         }
-        let both = find_lids(&grid(), &walls, &Allowance::default());
+        let both = lids_in(&walls);
         let (lids, floors) = (both.lids.unwrap(), both.floors.unwrap());
         assert_eq!((lids.count(), floors.count()), (94 * 76, 94 * 76));
-        assert!(floors.iter_set().all(|i| grid().coords(i)[1] == 11));
+        assert!(floors.dense().iter_set().all(|i| grid().coords(i)[1] == 11));
         // A floor 1.2 m above the feet of the walls: the space below belongs to the land.
         fill(&mut walls, [10, 22, 10], [110, 23, 90]);
-        assert!(
-            find_lids(&grid(), &walls, &Allowance::default())
-                .floors
-                .is_none()
-        );
-        assert!(
-            find_lids(&grid(), &roofless(), &Allowance::default())
-                .floors
-                .is_none()
-        );
+        assert!(lids_in(&walls).floors.is_none());
+        assert!(lids_in(&roofless()).floors.is_none());
     }
 
     #[test]
@@ -444,11 +428,15 @@ mod tests {
                 v.set(11, y, z, false);
             }
         }
-        let lids = find_lids(&grid(), &v, &Allowance::default()).lids.unwrap();
+        let lids = lids_in(&v).lids.unwrap();
         let inner = (48 + 46) * 76;
         // Half of the gap (2 × 9 columns) may count as inside.
         assert!((inner..=inner + 18).contains(&lids.count()));
-        let rows: Vec<usize> = lids.iter_set().map(|i| grid().coords(i)[1]).collect();
+        let rows: Vec<usize> = lids
+            .dense()
+            .iter_set()
+            .map(|i| grid().coords(i)[1])
+            .collect();
         assert!(rows.iter().all(|&y| y == 34));
     }
 

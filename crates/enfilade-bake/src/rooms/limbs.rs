@@ -95,8 +95,8 @@ pub(crate) fn split_limbs(
         }
     }
     regions.region_of_basin.extend(n as u32..peaks.len() as u32);
-    let by_basin = contact_faces(labels);
-    regions.contacts = contacts_of(regions, &by_basin);
+    regions.contacts.clear();
+    regions.contacts = contacts_of(regions, contact_faces(labels));
     let flooded = Flooded {
         grid,
         labels,
@@ -106,27 +106,25 @@ pub(crate) fn split_limbs(
         allowance,
     };
     let first = n as u32;
-    if join_limbs(
+    join_limbs(
         flooded,
         regions,
         &thickness,
         (first, rule.thicker),
         settings,
-    ) {
-        regions.contacts = contacts_of(regions, &by_basin);
-    }
+    );
 }
 
 pub(super) type Contacts = BTreeMap<(u32, u32), Vec<u64>>;
 
 /// Returns the faces between regions, given those between basins.
-pub(super) fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
+pub(super) fn contacts_of(regions: &Regions, by_basin: Contacts) -> Contacts {
     let mut contacts = Contacts::new();
-    for (&(a, b), faces) in by_basin {
+    for ((a, b), mut faces) in by_basin {
         let [a, b] = [a, b].map(|l| regions.region_of_basin[l as usize]);
         if a != b {
             let of = contacts.entry((a.min(b), a.max(b))).or_default();
-            of.extend_from_slice(faces);
+            of.append(&mut faces);
         }
     }
     contacts.values_mut().for_each(|f| f.sort_unstable());
@@ -135,14 +133,14 @@ pub(super) fn contacts_of(regions: &Regions, by_basin: &Contacts) -> Contacts {
 
 /// Joins limbs (from label `first` on) with neighbors that they open to over their whole width and that are not
 /// thick enough to be a room beside them: the halves of a corridor in whose middle two floods
-/// met, the arms of a crossing. Returns `true` if there were any.
+/// met, the arms of a crossing.
 fn join_limbs(
     flooded: Flooded<'_>,
     regions: &mut Regions,
     thickness: &BTreeMap<u32, f64>,
     (first, thicker): (u32, f64),
     settings: &MergeSettings,
-) -> bool {
+) {
     let region_of = |basin: u32| regions.region_of_basin[basin as usize];
     let mut sets = Sets::new(regions.region_of_basin.len());
     let mut any = false;
@@ -166,10 +164,10 @@ fn join_limbs(
             any = true;
         }
     }
-    for region in regions.region_of_basin.iter_mut().filter(|r| **r != 0) {
-        *region = sets.find(*region);
+    if any {
+        let least = sets.into_least();
+        regions.rename(|region| least[region as usize]);
     }
-    any
 }
 
 /// The largest layer of a region.
@@ -225,7 +223,8 @@ impl Layer {
 
 /// Returns the plan of each region except the outdoors.
 fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
-    type Layers = BTreeMap<u32, Vec<Layer>>;
+    // Layers by row: in a tower, a list of all rows for each room would be the largest thing in memory.
+    type Layers = BTreeMap<u32, BTreeMap<usize, Layer>>;
     let [nx, ny, nz] = grid.dims;
     let add = |mut layers: Layers, z: usize| {
         for y in 0..ny {
@@ -233,9 +232,9 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
             labels.for_runs(from..from + nx, |run, label| {
                 let region = regions.region_of_basin[label as usize];
                 if region > OUTDOORS {
-                    let of = layers.entry(region);
-                    let of = of.or_insert_with(|| vec![Layer::EMPTY; ny]);
-                    of[y].add(run.start - from..run.end - from, z);
+                    let of = layers.entry(region).or_default();
+                    let of = of.entry(y).or_insert(Layer::EMPTY);
+                    of.add(run.start - from..run.end - from, z);
                 }
             });
         }
@@ -243,9 +242,10 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
     };
     let unite = |mut all: Layers, part: Layers| {
         for (region, layers) in part {
-            let of = all.entry(region);
-            let of = of.or_insert_with(|| vec![Layer::EMPTY; ny]);
-            of.iter_mut().zip(&layers).for_each(|(of, l)| of.unite(l));
+            let of = all.entry(region).or_default();
+            for (y, layer) in &layers {
+                of.entry(*y).or_insert(Layer::EMPTY).unite(layer);
+            }
         }
         all
     };
@@ -254,11 +254,11 @@ fn plans(grid: &Grid, labels: &Labels, regions: &Regions) -> Vec<(u32, Plan)> {
     let region_at = |at| regions.region_of_basin[labels.at(at) as usize];
     layers
         .into_par_iter()
-        .map(|(region, of)| {
-            let most = of.iter().map(|l| l.n_voxels).max().unwrap_or(0);
-            let row = of.iter().position(|l| l.n_voxels == most).unwrap_or(0);
+        .filter_map(|(region, of)| {
+            // The lowest of several.
+            let (row, largest) = of.into_iter().rev().max_by_key(|(_, l)| l.n_voxels)?;
             let is_free = |x: usize, z: usize| region_at([x, row, z]) == region;
-            (region, Plan::of(row, of[row].columns, &is_free))
+            Some((region, Plan::of(row, largest.columns, &is_free)))
         })
         .collect()
 }

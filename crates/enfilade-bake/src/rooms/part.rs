@@ -6,7 +6,7 @@ use super::air::{Solid, VoxelAir, plots};
 use super::lids::Lids;
 use super::votes::block_of;
 use crate::structure::{Site, Structure};
-use crate::voxel::{BitVolume, Grid, SparseVolume, distance_squared};
+use crate::voxel::{Grid, SparseVolume, distance_squared};
 use crate::{BakeConfig, BakeContext, BakeError, Resolution, Stage};
 
 /// Surfaces farther than this from a voxel do not count for its distance, beside a part's border. [Units: vx]
@@ -16,9 +16,9 @@ const AROUND: usize = 16;
 pub(crate) struct WholeAir {
     pub(crate) grid: Grid,
     /// Surfaces, closures, and all that stops a flood besides surfaces.
-    occupied: BitVolume,
-    closures: BitVolume,
-    shut: BitVolume,
+    occupied: SparseVolume,
+    closures: SparseVolume,
+    shut: SparseVolume,
     pub(crate) slabs: Vec<f64>,
     resolution: Resolution,
 }
@@ -45,15 +45,10 @@ impl WholeAir {
         if solid.lids.lids.is_some() || solid.lids.floors.is_some() {
             return Ok(None);
         }
-        let whole = |voxels: &SparseVolume| {
-            let mut out = BitVolume::new(grid.dims);
-            voxels.add_to(&mut out);
-            out
-        };
         Ok(Some(Self {
             slabs: structure.slabs(&site.core),
-            closures: whole(&solid.closures),
-            shut: whole(&solid.shut),
+            closures: solid.closures,
+            shut: solid.shut,
             occupied: solid.occupied,
             grid,
             resolution,
@@ -78,8 +73,8 @@ impl WholeAir {
     /// Time and memory are linear in its voxels.
     pub(crate) fn part(&self, range: &VoxelRange, allowance: &Allowance) -> (VoxelAir, Vec<u16>) {
         let wide = range.grown(AROUND, self.grid.dims);
-        let mut blocked = cut(&self.occupied, &wide);
-        blocked.union_with(&cut(&self.shut, &wide));
+        let mut blocked = cut(&self.occupied, &wide).dense();
+        cut(&self.shut, &wide).add_to(&mut blocked);
         let around = distance_squared(&blocked, allowance);
         let [nx, ny, _] = wide.dims();
         let dims = range.dims();
@@ -101,9 +96,9 @@ impl WholeAir {
         let air = VoxelAir {
             solid: Solid {
                 occupied: cut(&self.occupied, range),
-                closures: SparseVolume::of(&cut(&self.closures, range)),
+                closures: cut(&self.closures, range),
                 lids: Lids::default(),
-                shut: SparseVolume::of(&cut(&self.shut, range)),
+                shut: cut(&self.shut, range),
             },
             slabs: self.slabs.clone(),
             // A little more, so that rounding does not make blocks of votes larger.
@@ -136,37 +131,34 @@ impl VoxelRange {
 }
 
 /// Returns the bits of a part.
-fn cut(whole: &BitVolume, range: &VoxelRange) -> BitVolume {
+fn cut(whole: &SparseVolume, range: &VoxelRange) -> SparseVolume {
     let dims = range.dims();
-    let mut out = BitVolume::new(dims);
     let [_, ny, _] = whole.dims();
     let (skip, shift) = (range.from[0] / 64, range.from[0] % 64);
-    let n_words = dims[0].div_ceil(64);
     let last = u64::MAX >> (63 - (dims[0] + 63) % 64);
-    let mut words = vec![0; n_words];
-    for z in 0..dims[2] {
-        for y in 0..dims[1] {
-            let row = whole.row(y + range.from[1] + ny * (z + range.from[2]));
-            for (i, word) in words.iter_mut().enumerate() {
-                let at = |k: usize| row.get(k).copied().unwrap_or(0);
-                let low = at(skip + i) >> shift;
-                let high = if shift == 0 {
-                    0
-                } else {
-                    at(skip + i + 1) << (64 - shift)
-                };
-                *word = low | high;
-            }
-            words[n_words - 1] &= last;
-            out.set_row(y + dims[1] * z, &words);
+    SparseVolume::from_rows(dims, |row, words| {
+        let [y, z] = [row % dims[1], row / dims[1]];
+        let row = whole.row(y + range.from[1] + ny * (z + range.from[2]));
+        for (i, word) in words.iter_mut().enumerate() {
+            let at = |k: usize| row.get(k).copied().unwrap_or(0);
+            let low = at(skip + i) >> shift;
+            let high = if shift == 0 {
+                0
+            } else {
+                at(skip + i + 1) << (64 - shift)
+            };
+            *word = low | high;
         }
-    }
-    out
+        if let Some(word) = words.last_mut() {
+            *word &= last;
+        }
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::voxel::BitVolume;
 
     #[test]
     fn a_part_has_the_bits_of_the_whole() {
@@ -178,7 +170,7 @@ mod tests {
             ([3, 1, 2], [149, 6, 4]),
             ([64, 2, 0], [130, 3, 5]),
         ] {
-            let part = cut(&whole, &VoxelRange { from, to });
+            let part = cut(&SparseVolume::of(&whole), &VoxelRange { from, to });
             for z in from[2]..to[2] {
                 for y in from[1]..to[1] {
                     for x in from[0]..to[0] {
@@ -188,8 +180,7 @@ mod tests {
                 }
             }
             // Bits past the end of a row stay clear.
-            let n = part.iter_set().count();
-            assert_eq!(n, part.count());
+            assert_eq!(part.dense().iter_set().count(), part.count());
         }
     }
 }

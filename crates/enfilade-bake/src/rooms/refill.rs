@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::voxel::{BitVolume, Labels};
+use crate::voxel::{Labels, SparseVolume};
 
 /// Labels the voxels that only closures fill: walls to the flood, but air. The basins
 /// on both sides grow into them at the same pace and meet in the middle of the leaf or pane.
-pub(crate) fn flood_closures(labels: &mut Labels, occupied: &BitVolume) {
+pub(crate) fn flood_closures(labels: &mut Labels, occupied: &SparseVolume) {
     let [nx, ny, nz] = labels.dims();
     let neighbors = |[x, y, z]: [usize; 3]| {
         [

@@ -9,7 +9,7 @@ use super::regions::Regions;
 use crate::budget::WORK_A_LOOK;
 use crate::complex::{Label, Vote};
 use crate::structure::Frame;
-use crate::voxel::{BitVolume, Grid, Labels, voxelize};
+use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, voxelize};
 
 /// Approximate upper limit on the number of votes.
 const MAX_VOTES: usize = 1_000_000;
@@ -47,7 +47,7 @@ impl Ballots {
         grid: &Grid,
         labels: &Labels,
         regions: &Regions,
-        (hollow, solid): (&[u32], &BitVolume),
+        (hollow, solid): (&[u32], &SparseVolume),
         share: f64,
         allowance: &Allowance,
     ) -> Self {
@@ -171,7 +171,7 @@ pub(super) fn inside_of(
     grid: &Grid,
     bvh: &Bvh,
     allowance: &Allowance,
-) -> BitVolume {
+) -> SparseVolume {
     let mut filled = voxelize(grid, stairs, allowance);
     let columns = columns_of(stairs, grid);
     let is_free = |&[x, y, z]: &[usize; 3]| !filled.get(x, y, z);
@@ -200,5 +200,5 @@ pub(super) fn inside_of(
     for [x, y, z] in inner {
         filled.set(x, y, z, true);
     }
-    filled
+    SparseVolume::of(&filled)
 }

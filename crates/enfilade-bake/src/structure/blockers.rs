@@ -6,10 +6,12 @@
 //! object fills. The object need not be named a door. A flat object elsewhere (a shelf against a wall,
 //! a table top) fills no opening between two rooms, so it changes nothing.
 
+use std::borrow::Cow;
+
 use enfilade_geom::filler::{DEEPEST, Filler, FillerFacts, HELD};
-use enfilade_geom::scene::{Role, Scene, TriangleSource};
+use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{
-    Aabb, Bvh, DVec3, NearSeries, Rectangle, Triangle, facing, triangle_area_normal,
+    Aabb, BoxTree, Bvh, DVec3, NearSeries, Rectangle, Triangle, facing, triangle_area_normal,
 };
 
 use super::Frame;
@@ -22,9 +24,8 @@ const RIM_SAMPLES: usize = 8;
 const MOST: f64 = 0.5;
 
 /// A detail object flat enough to close an opening, or the leaf in one that reaches farther.
-pub(crate) struct Plate {
-    /// Its triangles, or the rectangle in the middle of a gate so thick that its inside would be a room.
-    pub(crate) triangles: Vec<Triangle>,
+pub(crate) struct Plate<'a> {
+    surface: PlateSurface<'a>,
     pub(crate) aabb: Aabb,
     /// Along its own faces.
     pub(crate) around: Rectangle,
@@ -32,7 +33,39 @@ pub(crate) struct Plate {
     pub(crate) is_leaf: bool,
 }
 
-impl Plate {
+/// The triangles of a plate.
+enum PlateSurface<'a> {
+    /// All of an object. A building has millions of them in all, and few are asked for.
+    Object(&'a Scene, u32),
+    Own(Vec<Triangle>),
+}
+
+impl<'a> Plate<'a> {
+    /// Returns its triangles, or the rectangle in the middle of a gate so thick that its inside would be a room.
+    pub(crate) fn triangles(&self) -> Cow<'_, [Triangle]> {
+        match &self.surface {
+            PlateSurface::Object(scene, object) => Cow::Owned(scene.world_triangles_of(*object)),
+            PlateSurface::Own(triangles) => Cow::Borrowed(triangles),
+        }
+    }
+
+    /// Returns an object of a scene as a plate, or its leaf if it reaches farther: the panels of an overhead door without its
+    /// rails.
+    fn of_object(scene: &'a Scene, object: u32) -> Option<Self> {
+        let own = scene.world_triangles_of(object);
+        if own.is_empty() {
+            return None;
+        }
+        let leaf = leaf_among(&own);
+        match Self::of(own) {
+            Some(whole) if whole.around.size().z <= DEEPEST => Some(Self {
+                surface: PlateSurface::Object(scene, object),
+                ..whole
+            }),
+            whole => leaf.or(whole),
+        }
+    }
+
     /// Returns an object as a plate; `None` if it is not flat, or too narrow.
     pub(crate) fn of(triangles: Vec<Triangle>) -> Option<Self> {
         // The bars of a railing face along it, so it is deep, and shuts nothing.
@@ -43,67 +76,70 @@ impl Plate {
         (!matches!(shape, Filler::Deep | Filler::Narrow)).then(|| Self {
             aabb: Aabb::of_points(triangles.as_flattened()),
             is_leaf: shape == Filler::Leaf,
-            triangles: if is_stout {
+            surface: PlateSurface::Own(if is_stout {
                 around.middle().to_vec()
             } else {
                 triangles
-            },
+            }),
             around,
         })
     }
 }
 
-/// Returns the plates among the detail objects, and the leaves of those that reach farther: the panels of an overhead door
-/// without its rails.
+/// Returns the plates among the detail objects.
 #[must_use]
-pub(crate) fn plates(scene: &Scene) -> Vec<Plate> {
-    let sources: Vec<TriangleSource> = scene.triangle_sources(Role::Detail).collect();
-    let objects = sources.chunk_by(|a, b| a.object == b.object);
-    let plates = objects.filter_map(|own| {
-        let own: Vec<Triangle> = own.iter().map(|&s| scene.world_triangle(s)).collect();
-        let leaf = leaf_among(&own);
-        let whole = Plate::of(own);
-        match leaf {
-            Some(leaf) if whole.as_ref().is_none_or(|w| w.around.size().z > DEEPEST) => Some(leaf),
-            _ => whole,
-        }
-    });
+pub(crate) fn plates(scene: &Scene) -> Vec<Plate<'_>> {
+    let objects = (0..).zip(&scene.objects);
+    let details = objects.filter(|(_, o)| o.role == Role::Detail);
+    let plates = details.filter_map(|(i, _)| Plate::of_object(scene, i));
     plates.collect()
 }
 
-/// Returns the triangles of all plates, turned by `frame`, except door leaves that stand open. The rim of an open leaf does
+/// Returns the triangles of each plate, turned by `frame`, but for door leaves that stand open. The rim of an open leaf does
 /// not run along `walls` or other plates nearly all around, but is held only below and at the hinges. Such leaves shut
 /// nothing, and would cut a corridor in two.
 ///
-/// Eight box tree queries for each side of a plate.
-#[must_use]
-pub(crate) fn without_open_leaves(plates: &[Plate], frame: Frame, walls: &Bvh) -> Vec<Triangle> {
-    let of = |p: &Plate| frame.triangles_to_grid(&p.triangles).into_owned();
-    let turned: Vec<Vec<Triangle>> = plates.iter().map(of).collect();
-    let owner: Vec<usize> = (0..plates.len())
-        .flat_map(|i| std::iter::repeat_n(i, turned[i].len()))
-        .collect();
-    let all = Bvh::build(&turned.concat());
-    let shuts = |i: usize| {
-        let is_near = |p: &DVec3| {
-            let reach = Aabb::new(*p, *p).expanded(HELD_WITHIN);
-            let mut is_near_other = false;
-            all.for_each_in_box(&reach, |t| is_near_other |= owner[t as usize] != i);
-            let near = || walls.any_within(*p, HELD_WITHIN, &mut NearSeries::default());
-            is_near_other || near().is_some()
-        };
-        let rim = plates[i].around.rim(RIM_SAMPLES).map(|p| frame.to_grid(p));
-        let n_held = rim.filter(is_near).count();
-        !plates[i].is_leaf || n_held as f64 >= HELD * (4 * RIM_SAMPLES) as f64
+/// Eight box tree queries for each side of a leaf.
+pub(crate) fn without_open_leaves<'a>(
+    plates: &'a [Plate<'a>],
+    frame: Frame,
+    walls: &'a Bvh,
+) -> impl Iterator<Item = Vec<Triangle>> + 'a {
+    let turned = move |i: usize| -> Vec<Triangle> {
+        frame.triangles_to_grid(&plates[i].triangles()).into_owned()
     };
-    let shut = (0..plates.len()).filter(|&i| shuts(i));
-    shut.flat_map(|i| turned[i].iter().copied()).collect()
+    let boxes = (0..plates.len()).map(|i| Aabb::of_points(turned(i).as_flattened()));
+    let tree = BoxTree::new(&boxes.collect::<Vec<Aabb>>());
+    let shuts = move |i: usize| {
+        if !plates[i].is_leaf {
+            return true;
+        }
+        let rim: Vec<DVec3> = (plates[i].around.rim(RIM_SAMPLES))
+            .map(|p| frame.to_grid(p))
+            .collect();
+        let mut others: Vec<Triangle> = Vec::new();
+        let reach = Aabb::of_points(&rim).expanded(HELD_WITHIN);
+        tree.for_each_in_box(&reach, |other| {
+            if other as usize != i {
+                others.extend(turned(other as usize));
+            }
+        });
+        let others = Bvh::build(&others);
+        let is_near = |p: &&DVec3| {
+            let reach = Aabb::new(**p, **p).expanded(HELD_WITHIN);
+            let near = || walls.any_within(**p, HELD_WITHIN, &mut NearSeries::default());
+            others.any_in_box(&reach, |_| true) || near().is_some()
+        };
+        let n_held = rim.iter().filter(is_near).count();
+        n_held as f64 >= HELD * (4 * RIM_SAMPLES) as f64
+    };
+    (0..plates.len()).filter(move |&i| shuts(i)).map(turned)
 }
 
 /// Returns the triangles in the sheet that holds most of an object's surface, if it is a leaf.
 ///
 /// `O(n log n)`.
-fn leaf_among(triangles: &[Triangle]) -> Option<Plate> {
+fn leaf_among<'a>(triangles: &[Triangle]) -> Option<Plate<'a>> {
     let area = |t: &Triangle| 0.5 * triangle_area_normal(t).length();
     let n = facing(triangles);
     let range = |t: &Triangle| {
@@ -160,9 +196,20 @@ mod tests {
         let low = at(DVec3::ZERO, DVec3::new(0.04, 1.0, 0.9));
         for (plate, stays) in [(shut, true), (ajar, false), (low, true)] {
             assert_eq!(
-                !without_open_leaves(&[Plate::of(plate).unwrap()], Frame::SCENE, &walls).is_empty(),
-                stays
+                without_open_leaves(&[Plate::of(plate).unwrap()], Frame::SCENE, &walls).count(),
+                usize::from(stays)
             );
+        }
+    }
+
+    #[test]
+    fn plates_of_a_scene_have_the_triangles_of_their_objects() {
+        let scene = enfilade_testkit::furnished_house().scene;
+        let plates = plates(&scene);
+        assert!(plates.iter().any(|p| p.is_leaf));
+        for plate in plates {
+            let triangles = plate.triangles();
+            assert_eq!(Aabb::of_points(triangles.as_flattened()), plate.aabb);
         }
     }
 
@@ -177,11 +224,16 @@ mod tests {
     fn a_thick_gate_is_the_rectangle_in_its_middle() {
         let gate = Plate::of(box_triangles(DVec3::new(4.0, 3.9, 1.0))).unwrap();
         assert!(gate.is_leaf);
-        let middle = gate.triangles.as_flattened();
-        assert!(middle.iter().all(|p| (p.z - 0.5).abs() < 1e-9));
+        let middle = gate.triangles().into_owned();
+        assert!(
+            middle
+                .as_flattened()
+                .iter()
+                .all(|p| (p.z - 0.5).abs() < 1e-9)
+        );
         assert_eq!(gate.aabb.size(), DVec3::new(4.0, 3.9, 1.0));
         let door = Plate::of(box_triangles(DVec3::new(4.0, 3.9, 0.3))).unwrap();
-        assert_eq!(door.triangles.len(), 12);
+        assert_eq!(door.triangles().len(), 12);
     }
 
     #[test]
@@ -199,7 +251,7 @@ mod tests {
         let rails = rails.as_flattened().as_flattened();
         for door in [[rails, &leaf].concat(), [&leaf, rails].concat()] {
             assert!(!is_flat(door.clone()));
-            assert_eq!(leaf_among(&door).unwrap().triangles, leaf);
+            assert_eq!(*leaf_among(&door).unwrap().triangles(), leaf);
         }
         let wardrobe = box_triangles(DVec3::new(1.2, 2.0, 0.6));
         assert!(leaf_among(&wardrobe).is_none());

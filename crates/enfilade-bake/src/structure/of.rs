@@ -76,12 +76,27 @@ impl<'a> Structure<'a> {
         config: &BakeConfig,
         allowance: &'a Allowance,
     ) -> Result<Self, BakeError> {
+        Self::with_tree(scene, method, config, allowance).map(|(structure, _)| structure)
+    }
+
+    /// Does [`Self::of`], and returns a tree over the triangles in scene coordinates, if it is at hand and is not `bvh`.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(crate) fn with_tree(
+        scene: &'a Scene,
+        method: Method,
+        config: &BakeConfig,
+        allowance: &'a Allowance,
+    ) -> Result<(Self, Option<Bvh>), BakeError> {
         let (mut sources, mut triangles) = structural_triangles(scene);
         allowance.spend(WORK_A_LOOK * triangles.len() as u64);
-        let misfit = misfit(&triangles, &Bvh::build(&triangles), allowance);
+        let mut tree = Some(Bvh::build(&triangles));
+        let misfit = (tree.as_ref()).map_or(0.0, |tree| misfit(&triangles, tree, allowance));
         let reach = config.smallest_hole.reach(misfit);
         // Brushes are exact.
         if reach > 0.0 && scene.solids.is_empty() {
+            tree = None;
             let closes_gaps = config.smallest_hole.has_seals();
             settle(&mut triangles, reach, closes_gaps, allowance);
             (sources, triangles) = std::iter::zip(sources, triangles)
@@ -117,9 +132,12 @@ impl<'a> Structure<'a> {
         let at = |numbers: &[u32]| numbers.iter().map(|&t| framed[t as usize]).collect();
         let wall_numbers = numbers(false);
         let walls: Vec<Triangle> = at(&wall_numbers);
-        let bvh = Bvh::build(&framed);
+        let bvh = match tree.take_if(|_| frame.is_scene()) {
+            Some(tree) => tree,
+            None => Bvh::build(&framed),
+        };
         let rims = Rims::of(&walls);
-        Ok(Self {
+        let structure = Self {
             missing: rims.missing_triangles(config.min_opening.powi(2)),
             hole: config.smallest_hole.resolved(misfit),
             rims,
@@ -132,7 +150,8 @@ impl<'a> Structure<'a> {
             sources,
             triangles,
             allowance,
-        })
+        };
+        Ok((structure, tree))
     }
 
     /// Returns the box around everything structural, in frame coordinates.
@@ -155,10 +174,10 @@ impl<'a> Structure<'a> {
         slabs_of(&self.walls, within)
     }
 
-    /// Returns the triangles of detail objects that may close an opening, in frame coordinates: shut door leaves,
-    /// panes. `surfaces` hold their rims.
-    pub(crate) fn blockers(&self, surfaces: &Bvh) -> Vec<Triangle> {
-        without_open_leaves(&plates(self.scene), self.frame, surfaces)
+    /// Calls `take` with the triangles of each detail object that may close an opening, in frame coordinates: shut door
+    /// leaves, panes. `surfaces` hold their rims.
+    pub(crate) fn for_blockers(&self, surfaces: &Bvh, take: impl FnMut(Vec<Triangle>)) {
+        without_open_leaves(&plates(self.scene), self.frame, surfaces).for_each(take);
     }
 
     /// Drops what only builders need, once their results are back in scene coordinates.

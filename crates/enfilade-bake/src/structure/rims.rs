@@ -34,6 +34,7 @@ impl Rims {
         let mut points: Vec<DVec3> = triangles.iter().flatten().copied().collect();
         points.par_sort_by_cached_key(key);
         points.dedup();
+        points.shrink_to_fit();
         let keys: Vec<[u64; 3]> = points.iter().map(key).collect();
         let index = |p: &DVec3| keys.partition_point(|k| *k < key(p)) as u32;
         let mut edges: Vec<[u32; 3]> = triangles

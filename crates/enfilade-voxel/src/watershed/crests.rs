@@ -26,11 +26,15 @@ const AROUND: u8 = 0b11_1111;
 pub(super) struct Crests {
     /// The crest voxels.
     crests: Ranked,
-    /// For each crest voxel the steps along its plateau to a voxel with a higher neighbor; [`FAR`] on a peak.
+    /// Those of them that are inside of plateaus with a rim, by their position among all.
+    inner: Ranked,
+    /// For each of these the steps along its plateau to a voxel with a higher neighbor, 2 or more.
     steps: Vec<u8>,
-    /// Those of them that are on peaks, by their position among all.
+    /// Those of the crest voxels that are on peaks, by their position among all.
     summits: Ranked,
-    /// The number of the peak of each of these.
+    /// Those of these that begin a run of voxels on one peak along x, by their position among them.
+    runs: Ranked,
+    /// The number of the peak of each run.
     peak_of: Vec<u32>,
     /// Deepest first, then by voxel.
     pub(super) peaks: Vec<Peak>,
@@ -43,88 +47,132 @@ type Alike = Vec<u8>;
 #[derive(Default)]
 struct Ranked {
     bits: Vec<u64>,
-    /// Number of members before each word of `bits`.
+    /// Number of members before each [`BLOCK`] of `bits`.
     before: Vec<u32>,
+    n: usize,
 }
+
+/// Words between two counts. With 8, a flood took half as long again: counting bits takes a dozen instructions a word.
+const BLOCK: usize = 2;
 
 impl Ranked {
     fn of(bits: Vec<u64>) -> Self {
         let mut n = 0;
-        let before = bits
-            .iter()
-            .map(|word| {
-                n += word.count_ones();
-                n - word.count_ones()
-            })
-            .collect();
-        Self { bits, before }
+        let count = |words: &[u64]| {
+            n += count_ones(words);
+            n - count_ones(words)
+        };
+        let before = bits.chunks(BLOCK).map(count).collect();
+        Self {
+            n: n as usize,
+            bits,
+            before,
+        }
+    }
+
+    /// Returns the places at which `is_in` holds. Threads share the work.
+    fn where_in(all: &[u8], is_in: impl Fn(u8) -> bool + Sync) -> Self {
+        let word = |part: &[u8]| {
+            let bits = (0..).zip(part.iter().map(|&s| u64::from(is_in(s))));
+            bits.fold(0, |word, (k, bit)| word | bit << k)
+        };
+        Self::of(all.par_chunks(64).map(word).collect())
+    }
+
+    fn contains(&self, index: usize) -> bool {
+        self.bits[index / 64] >> (index % 64) & 1 != 0
     }
 
     /// Returns the position of an index among all members.
     fn position(&self, index: usize) -> Option<usize> {
-        let (word, bit) = (self.bits[index / 64], index % 64);
-        let below = word & ((1 << bit) - 1);
-        (word >> bit & 1 != 0)
-            .then(|| self.before[index / 64] as usize + below.count_ones() as usize)
+        self.contains(index).then(|| self.n_below(index))
     }
 
-    /// Returns the number of members.
-    fn len(&self) -> usize {
-        let last = self.bits.last().zip(self.before.last());
-        last.map_or(0, |(word, before)| (word.count_ones() + before) as usize)
+    /// Returns the number of members below an index.
+    fn n_below(&self, index: usize) -> usize {
+        let (at, block) = (index / 64, index / 64 / BLOCK);
+        let below = self.bits[at] & ((1 << (index % 64)) - 1);
+        let n = count_ones(&self.bits[block * BLOCK..at]) + below.count_ones();
+        (self.before[block] + n) as usize
     }
 
     /// Returns all members, each with its position, in order. Threads share the work.
     fn all(&self) -> impl ParallelIterator<Item = (usize, usize)> + '_ {
-        let words = self.bits.par_iter().zip(&self.before).enumerate();
-        words.flat_map_iter(|(w, (&word, &before))| members_of(w, word, before))
+        let blocks = self.bits.par_chunks(BLOCK).zip(&self.before).enumerate();
+        blocks.flat_map_iter(|(b, (words, &before))| members_of(b, words, before))
     }
 
     /// Returns all members, each with its position, one after the other.
     fn iter(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let words = self.bits.iter().zip(&self.before).enumerate();
-        words.flat_map(|(w, (&word, &before))| members_of(w, word, before))
+        let blocks = self.bits.chunks(BLOCK).zip(&self.before).enumerate();
+        blocks.flat_map(|(b, (words, &before))| members_of(b, words, before))
     }
 }
 
-/// Returns the members in word `w` of a set, each with its position, given the number of members before it.
-fn members_of(w: usize, mut word: u64, before: u32) -> impl Iterator<Item = (usize, usize)> {
-    let next = move || {
-        let bit = word.trailing_zeros() as usize;
-        word &= word.wrapping_sub(1);
-        (bit < 64).then_some(w * 64 + bit)
+fn count_ones(words: &[u64]) -> u32 {
+    words.iter().map(|word| word.count_ones()).sum()
+}
+
+/// Returns the members in block `b` of a set, each with its position, given the number of members before it.
+fn members_of(b: usize, words: &[u64], before: u32) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let of_word = move |(w, &word): (usize, &u64)| {
+        let mut rest = word;
+        std::iter::from_fn(move || {
+            let bit = rest.trailing_zeros() as usize;
+            rest &= rest.wrapping_sub(1);
+            (bit < 64).then_some((b * BLOCK + w) * 64 + bit)
+        })
     };
-    (before as usize..).zip(std::iter::from_fn(next))
+    let members = words.iter().enumerate().flat_map(of_word);
+    (before as usize..).zip(members)
 }
 
 impl Crests {
     /// Finds the crests, in slabs of `thick` layers.
     ///
-    /// Linear in voxels; a fifth of a byte a voxel, and 2 bytes for each crest voxel, one of them to stay, and 8 for those
-    /// inside plateaus.
+    /// Linear in voxels; an eighth of a byte a voxel, and 2 bytes for each crest voxel for the time of the search.
     pub(super) fn of(shape: Shape, levels: &Levels, thick: usize, allowance: &Allowance) -> Self {
         let (bits, alike) = find(shape, levels, thick, allowance);
         let mut crests = Self {
             crests: Ranked::of(bits),
+            inner: Ranked::default(),
             steps: Vec::new(),
             summits: Ranked::default(),
+            runs: Ranked::default(),
             peak_of: Vec::new(),
             peaks: Vec::new(),
         };
-        crests.measure(shape, &alike, allowance);
-        let peaks = crests.number(shape, &alike);
+        let steps = crests.measure(shape, &alike, allowance);
+        let peaks = crests.number(shape, &steps, &alike);
         drop(alike);
+        crests.keep(steps);
         crests.rank(shape, levels, &peaks);
         crests
     }
 
     /// Returns the steps from a voxel to one with a higher neighbor; 0 if it has one itself.
     fn steps_of(&self, voxel: usize) -> u8 {
-        self.crests.position(voxel).map_or(0, |at| self.steps[at])
+        let Some(at) = self.crests.position(voxel) else {
+            return 0;
+        };
+        match self.inner.position(at) {
+            Some(inner) => self.steps[inner],
+            None if self.summits.contains(at) => FAR,
+            None => 1,
+        }
     }
 
-    /// Measures the steps breadth first, from the rims of plateaus inward.
-    fn measure(&mut self, shape: Shape, alike: &Alike, allowance: &Allowance) {
+    /// Keeps the steps of those crest voxels that neither are on a rim nor on a peak.
+    fn keep(&mut self, mut steps: Vec<u8>) {
+        let is_inner = |s: u8| s != 1 && s != FAR;
+        self.inner = Ranked::where_in(&steps, is_inner);
+        steps.retain(|&s| is_inner(s));
+        steps.shrink_to_fit();
+        self.steps = steps;
+    }
+
+    /// Measures the steps of all crest voxels breadth first, from the rims of plateaus inward; [`FAR`] on a peak.
+    fn measure(&self, shape: Shape, alike: &Alike, allowance: &Allowance) -> Vec<u8> {
         let around = |at: usize, voxel: usize| beside(shape, voxel, alike[at] & AROUND);
         // Most crest voxels are rims, so these are never listed.
         let of_rim =
@@ -132,29 +180,30 @@ impl Crests {
                 true => 1,
                 false => FAR,
             };
-        self.steps = self.crests.all().map(of_rim).collect();
-        if !allowance.spend(1 + self.steps.len() as u64 / 2) {
-            return;
+        let mut steps: Vec<u8> = self.crests.all().map(of_rim).collect();
+        if !allowance.spend(1 + steps.len() as u64 / 2) {
+            return steps;
         }
+        let steps_of = |steps: &[u8], q: usize| self.crests.position(q).map_or(0, |at| steps[at]);
         let is_next = |&(at, voxel): &(usize, usize)| {
-            self.steps[at] == FAR && around(at, voxel).any(|q| self.steps_of(q) == 1)
+            steps[at] == FAR && around(at, voxel).any(|q| steps_of(&steps, q) == 1)
         };
         let next = self.crests.all().filter(is_next);
         let mut front: Vec<u32> = next.map(|(_, voxel)| voxel as u32).collect();
-        for steps in 2..FAR {
+        for n in 2..FAR {
             for &voxel in &front {
                 if let Some(at) = self.crests.position(voxel as usize) {
-                    self.steps[at] = steps;
+                    steps[at] = n;
                 }
             }
             if front.is_empty() || !allowance.spend(1 + front.len() as u64 / 2) {
-                return;
+                return steps;
             }
             let onward = |&voxel: &u32| {
                 let voxel = voxel as usize;
                 let inner = self.crests.position(voxel).into_iter();
                 let around = inner.flat_map(move |at| around(at, voxel));
-                let is_next = |&q: &usize| self.steps_of(q) == FAR;
+                let is_next = |&q: &usize| steps_of(&steps, q) == FAR;
                 around.filter(is_next).map(|q| q as u32)
             };
             let many = front.par_iter().with_min_len(1 << 12);
@@ -163,48 +212,61 @@ impl Crests {
             next.dedup();
             front = next;
         }
+        steps
     }
 
     /// Finds the peaks: sets of crest voxels at one level that the rims do not reach. Returns the first voxel of each, and
     /// leaves the numbers in this order.
-    fn number(&mut self, shape: Shape, alike: &Alike) -> Vec<usize> {
-        let of_peaks = |steps: &[u8]| {
-            let bits = (0..).zip(steps.iter().map(|&s| u64::from(s == FAR)));
-            bits.fold(0, |word, (k, bit)| word | bit << k)
-        };
-        self.summits = Ranked::of(self.steps.par_chunks(64).map(of_peaks).collect());
+    fn number(&mut self, shape: Shape, steps: &[u8], alike: &Alike) -> Vec<usize> {
+        self.summits = Ranked::where_in(steps, |s| s == FAR);
         // Never listed: on large plateaus, a list would be the largest thing in memory.
-        let on_peaks = || self.crests.iter().filter(|&(at, _)| self.steps[at] == FAR);
-        let mut plateaus = Sets::new(self.summits.len());
-        let after = [
-            (1, 1 << 3),
-            (shape.dims[0], 1 << 4),
-            (shape.layer(), 1 << 5),
-        ];
-        for (k, (at, voxel)) in (0..).zip(on_peaks()) {
+        let on_peaks = || self.crests.iter().filter(|&(at, _)| steps[at] == FAR);
+        let mut starts = vec![0_u64; self.summits.n.div_ceil(64)];
+        let mut next = usize::MAX;
+        for (k, (at, voxel)) in on_peaks().enumerate() {
+            let goes_on = voxel == next && alike[at] & 1 << 2 != 0;
+            starts[k / 64] |= u64::from(!goes_on) << (k % 64);
+            next = voxel + 1;
+        }
+        self.runs = Ranked::of(starts);
+        let mut plateaus = Sets::new(self.runs.n);
+        let after = [(shape.dims[0], 1 << 4), (shape.layer(), 1 << 5)];
+        let mut n_runs = 0;
+        for (k, (at, voxel)) in on_peaks().enumerate() {
+            n_runs += u32::from(self.runs.contains(k));
             // Both voxels of a pair ascend.
             let alike = after.into_iter().filter(|a| alike[at] & a.1 != 0);
             for (step, _) in alike {
                 let other = self.crests.position(voxel + step);
                 if let Some(other) = other.and_then(|at| self.summits.position(at)) {
-                    plateaus.join(k, other as u32);
+                    plateaus.join(n_runs - 1, self.run_of(other) as u32);
                 }
             }
         }
-        // The least member of a set is its first voxel. The number of each voxel's peak takes its place.
+        // The least member of a set begins with its first voxel. The number of each run's peak takes its place.
         let mut number_of = plateaus.into_least();
         let mut peaks = Vec::new();
-        for (k, (_, voxel)) in on_peaks().enumerate() {
-            let first = number_of[k] as usize;
-            if first == k {
-                number_of[k] = peaks.len() as u32;
+        let starts = on_peaks()
+            .enumerate()
+            .filter(|(k, _)| self.runs.contains(*k));
+        for (run, (_, (_, voxel))) in starts.enumerate() {
+            let first = number_of[run] as usize;
+            if first == run {
+                number_of[run] = peaks.len() as u32;
                 peaks.push(voxel);
             } else {
-                number_of[k] = number_of[first];
+                number_of[run] = number_of[first];
             }
         }
         self.peak_of = number_of;
         peaks
+    }
+
+    /// Returns the run of a summit voxel.
+    fn run_of(&self, summit: usize) -> usize {
+        self.runs
+            .position(summit)
+            .unwrap_or_else(|| self.runs.n_below(summit) - 1)
     }
 
     /// Sorts the peaks, given the first voxel of each in ascending order.
@@ -247,7 +309,7 @@ impl Crests {
         if steps == FAR {
             let at = self.crests.position(voxel);
             let summit = at.and_then(|at| self.summits.position(at));
-            return Err(summit.map_or(0, |k| self.peak_of[k]));
+            return Err(summit.map_or(0, |k| self.peak_of[self.run_of(k)]));
         }
         let here = level(voxel);
         let is_nearer = |&q: &usize| level(q) == here && self.steps_of(q) < steps;

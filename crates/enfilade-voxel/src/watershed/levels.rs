@@ -5,7 +5,6 @@
 //! where a voxel's nearest surface could lie beyond the slices read, more are read.
 
 use std::borrow::Cow;
-use std::collections::VecDeque;
 use std::ops::Range;
 
 use enfilade_geom::Allowance;
@@ -13,6 +12,7 @@ use rayon::prelude::*;
 
 use super::super::edt::{LANES, Span, Tables, along_rows, load, within_slice, work_of};
 use super::super::grid::{BitVolume, for_runs};
+use super::super::sparse::SparseVolume;
 use super::basins::STEPS;
 use super::shape::Shape;
 
@@ -52,15 +52,19 @@ impl Levels {
     }
 
     /// Measures the distances to what `blocked` holds, with less work in `far`.
-    pub(super) fn measured(blocked: &BitVolume, far: &BitVolume, allowance: &Allowance) -> Self {
+    pub(super) fn measured(
+        blocked: &SparseVolume,
+        far: &SparseVolume,
+        allowance: &Allowance,
+    ) -> Self {
         Self::measured_in(THICK, blocked, far, allowance)
     }
 
     /// Does [`Self::measured`] in slabs of `thick` layers.
     fn measured_in(
         thick: usize,
-        blocked: &BitVolume,
-        far: &BitVolume,
+        blocked: &SparseVolume,
+        far: &SparseVolume,
         allowance: &Allowance,
     ) -> Self {
         let shape = Shape {
@@ -73,9 +77,9 @@ impl Levels {
         let (table, tables) = (table(), Tables::of(nx));
         let outdoors = Outdoors::AtBorder(far);
         let mut near = Slices {
-            first: 0,
-            slices: VecDeque::new(),
-            spare: Vec::new(),
+            of: 0..0,
+            room: 0,
+            words: Vec::new(),
         };
         let mut halo = HALO;
         let mut layers: Vec<PackedLayer> = Vec::with_capacity(nz);
@@ -187,7 +191,7 @@ pub(super) enum Outdoors<'a> {
     Nothing,
     Only(&'a BitVolume),
     /// These, and all at the border of the box.
-    AtBorder(&'a BitVolume),
+    AtBorder(&'a SparseVolume),
 }
 
 impl Outdoors<'_> {
@@ -219,60 +223,64 @@ fn to_levels(shape: Shape, row: usize, words: &mut [u16], table: &[u16], outdoor
     });
 }
 
-/// Squared distances within slices, those from `first` on.
+/// Squared distances within slices one after the other, in a ring: pieces of memory for each would lie between the packed
+/// layers, of no use to what comes later.
 struct Slices {
-    first: usize,
-    slices: VecDeque<Vec<u16>>,
-    /// Slices no longer needed, whose memory is.
-    spare: Vec<Vec<u16>>,
+    of: Range<usize>,
+    /// Number of slices that the ring holds.
+    room: usize,
+    words: Vec<u16>,
 }
 
 impl Slices {
-    /// Ensures that the slices `from..to` are there, and no others before them.
+    /// Ensures that the slices `from..to` are there, and no others.
     fn read(
         &mut self,
-        blocked: &BitVolume,
-        far: &BitVolume,
+        blocked: &SparseVolume,
+        far: &SparseVolume,
         [from, to]: [usize; 2],
         tables: &Tables<u16>,
         allowance: &Allowance,
     ) {
         let [nx, ny, _] = blocked.dims();
-        while self.first < from
-            && let Some(slice) = self.slices.pop_front()
-        {
-            self.spare.push(slice);
-            self.first += 1;
+        if to - from > self.room {
+            self.widen(from..to, nx * ny);
         }
-        if self.slices.is_empty() {
-            self.first = from;
-        }
-        let measure = |scratch: &mut Vec<[u16; LANES]>, (k, mut slice): (usize, Vec<u16>)| {
-            slice.clear();
-            slice.resize(nx * ny, 0); // only free voxels are written
-            if allowance.spend(work_of(nx * ny)) {
-                within_slice(blocked, Some(far), k, &mut slice, tables, scratch);
+        let (room, before) = (self.room, self.of.clone());
+        let measure = |scratch: &mut Vec<[u16; LANES]>, (at, slice): (usize, &mut [u16])| {
+            let k = from + (at + room - from % room) % room;
+            if k < to && !before.contains(&k) {
+                slice.fill(0); // only free voxels are written
+                if allowance.spend(work_of(nx * ny)) {
+                    within_slice(blocked, Some(far), k, slice, tables, scratch);
+                }
             }
-            slice
         };
-        let spare = &mut self.spare;
-        let mut of = |range: Range<usize>| -> Vec<Vec<u16>> {
-            let asked: Vec<(usize, Vec<u16>)> = range
-                .map(|k| (k, spare.pop().unwrap_or_default()))
-                .collect();
-            let slices = asked.into_par_iter().map_init(Vec::new, measure);
-            slices.collect()
-        };
-        for slice in of(from..self.first).into_iter().rev() {
-            self.slices.push_front(slice);
-            self.first -= 1;
+        let ring = self.words.par_chunks_mut(nx * ny).enumerate();
+        ring.for_each_init(Vec::new, measure);
+        self.of = from..to;
+    }
+
+    /// Makes room for all slices of a range, and keeps those of them that are there.
+    fn widen(&mut self, range: Range<usize>, n: usize) {
+        let room = range.len();
+        let mut words = vec![0; room * n];
+        let kept = self.of.start.max(range.start)..self.of.end.min(range.end);
+        for k in kept.clone() {
+            let slice = &self.words[k % self.room * n..][..n];
+            words[k % room * n..][..n].copy_from_slice(slice);
         }
-        let end = self.first + self.slices.len();
-        self.slices.extend(of(end..to.max(end)));
+        (self.of, self.room, self.words) = (kept, room, words);
     }
 
     /// Writes the squared distances of a slab; returns `false` if more slices could matter.
-    fn sweep(&self, far: &BitVolume, span: Span, words: &mut [u16], allowance: &Allowance) -> bool {
+    fn sweep(
+        &self,
+        far: &SparseVolume,
+        span: Span,
+        words: &mut [u16],
+        allowance: &Allowance,
+    ) -> bool {
         let [nx, ny, _] = far.dims();
         let n_own = span.own[1] - span.own[0];
         let mut columns: Vec<Vec<&mut [u16]>> =
@@ -280,8 +288,8 @@ impl Slices {
         for (row, words) in words.chunks_mut(nx).enumerate() {
             columns[row % ny].push(words);
         }
-        let from = span.read[0] - self.first;
-        let read = from..from + span.read[1] - span.read[0];
+        let slice = |k: usize| &self.words[k % self.room * nx * ny..][..nx * ny];
+        let read = span.read[0]..span.read[1];
         columns
             .par_iter_mut()
             .enumerate()
@@ -289,8 +297,8 @@ impl Slices {
                 if !allowance.spend(work_of(nx * n_own)) {
                     return true;
                 }
-                let slices = self.slices.range(read.clone());
-                load(slices.map(|slice| &slice[j * nx..][..nx]), scratch);
+                let around = read.clone().map(|k| &slice(k)[j * nx..][..nx]);
+                load(around, scratch);
                 along_rows(rows, span, scratch, &|k, b| far.row(j + ny * k)[b])
             })
             .reduce(|| true, |a, b| a && b)
@@ -320,9 +328,10 @@ mod tests {
             let allowance = Allowance::default();
             let far = far_outdoors(&blocked, &allowance);
             let mut outdoors = border(dims);
-            outdoors.union_with(&far);
-            let whole = distance_squared_near(&blocked, &far, &allowance);
+            far.add_to(&mut outdoors);
+            let whole = distance_squared_near(&blocked, &far.dense(), &allowance);
             let whole = Levels::of(shape, whole, &Outdoors::Only(&outdoors));
+            let blocked = SparseVolume::of(&blocked);
             let slabs = Levels::measured_in(thick, &blocked, &far, &allowance);
             let (mut a, mut b) = (Vec::new(), Vec::new());
             let all = [0, dims[2]];

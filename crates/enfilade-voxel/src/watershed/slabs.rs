@@ -74,16 +74,27 @@ pub(super) fn merged(mut contacts: Vec<Contact>) -> Vec<Contact> {
     contacts
 }
 
-/// Roots of a layer as runs.
-struct RootRuns(Vec<RootRun>);
+/// Roots of a layer as runs, and its number of voxels.
+struct RootRuns(Vec<RootRun>, u32);
 
 /// Voxels one after the other with one root, or with exits one after the other.
 struct RootRun {
     root: u32,
-    /// Difference from each root to the next: 0 or 1.
-    step: u32,
-    /// First voxel, and the one at which the next run begins.
-    span: [u32; 2],
+    /// First voxel, and in the highest bit the difference from each root to the next. The run ends where the next one begins.
+    start: u32,
+}
+
+/// Marks a run whose roots differ by 1.
+const RISING: u32 = 1 << 31;
+
+impl RootRun {
+    fn first(&self) -> u32 {
+        self.start & !RISING
+    }
+
+    fn get(&self, at: u32) -> u32 {
+        self.root + (self.start >> 31) * (at - self.first())
+    }
 }
 
 impl RootRuns {
@@ -91,37 +102,42 @@ impl RootRuns {
         let mut runs: Vec<RootRun> = Vec::new();
         for (at, &root) in (0..).zip(roots) {
             if let Some(run) = runs.last_mut() {
-                let is_second = run.span[1] - run.span[0] == 1;
+                let is_second = at - run.first() == 1;
                 if is_second && is_exit(root) && root == run.root.wrapping_add(1) {
-                    run.step = 1;
+                    run.start |= RISING;
                 }
-                if root == run.root + run.step * (at - run.span[0]) {
-                    run.span[1] = at + 1;
+                if root == run.get(at) {
                     continue;
                 }
             }
-            runs.push(RootRun {
-                root,
-                step: 0,
-                span: [at, at + 1],
-            });
+            runs.push(RootRun { root, start: at });
         }
         runs.shrink_to_fit();
-        Self(runs)
+        Self(runs, roots.len() as u32)
     }
 
     fn get(&self, at: u32) -> u32 {
-        let run = &self.0[self.0.partition_point(|run| run.span[1] <= at)];
-        run.root + run.step * (at - run.span[0])
+        let after = self.0.partition_point(|run| run.first() <= at);
+        self.0[after - 1].get(at)
     }
 
     fn write(&self, roots: &mut [u32]) {
-        for run in &self.0 {
-            let [from, to] = run.span;
-            for (k, root) in (0..).zip(&mut roots[from as usize..to as usize]) {
-                *root = run.root + run.step * k;
+        let ends = self.0.iter().skip(1).map(RootRun::first);
+        for (run, end) in self.0.iter().zip(ends.chain([self.1])) {
+            for (at, root) in (run.first()..end).zip(&mut roots[run.first() as usize..]) {
+                *root = run.get(at);
             }
         }
+    }
+
+    /// Returns the roots behind these of slab `s`: with exits, there are many more runs.
+    fn resolved(&self, s: usize, borders: &[[Self; 2]]) -> Self {
+        let mut roots = vec![0; self.1 as usize];
+        self.write(&mut roots);
+        for root in &mut roots {
+            *root = behind(borders, s, *root);
+        }
+        Self::of(&roots)
     }
 }
 
@@ -157,6 +173,9 @@ pub(super) fn label(
     if borders.len() < n_slabs {
         return None;
     }
+    let resolved =
+        |(s, of): (usize, &[RootRuns; 2])| [0, 1].map(|side| of[side].resolved(s, &borders));
+    let borders: Vec<[RootRuns; 2]> = borders.par_iter().enumerate().map(resolved).collect();
     let all_of = |slab: &mut Slab<'_>, s: usize| {
         slab.enter(s, &borders);
         slab.ascend(slab.own());
@@ -404,17 +423,13 @@ impl<'a> Slab<'a> {
         })
     }
 
-    /// Puts the roots of the layers beside slab `s` in place.
+    /// Puts the roots of the layers beside slab `s` in place, given those of all borders.
     fn enter(&mut self, s: usize, borders: &[[RootRuns; 2]]) {
         let (layer, end) = (self.shape.layer(), self.own().end);
         let below = s.checked_sub(1).map(|s| (s, 1, 0..layer));
         let above = (s + 1 < borders.len()).then(|| (s + 1, 0, end..end + layer));
         for (of, side, range) in below.into_iter().chain(above) {
-            let roots = &mut self.buffers.roots[range];
-            borders[of][side].write(roots);
-            for root in roots {
-                *root = behind(borders, of, *root);
-            }
+            borders[of][side].write(&mut self.buffers.roots[range]);
         }
     }
 

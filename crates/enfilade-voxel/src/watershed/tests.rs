@@ -390,7 +390,7 @@ fn outdoors_takes_the_space_around_it() {
 #[test]
 fn empty_and_full_boxes_have_no_basins() {
     for dims in [[0, 4, 4], [4, 0, 4], [4, 4, 0]] {
-        let empty = BitVolume::new(dims);
+        let empty = SparseVolume::of(&BitVolume::new(dims));
         let field = DistanceField::of(&empty, &empty, &Allowance::default());
         let flood = field.watershed(1.0, &Allowance::default());
         assert_eq!(flood, Watershed::unflooded(dims));
@@ -472,7 +472,11 @@ fn the_widest_place_of_each_block_is_that_of_its_voxels() {
     let blocked = BitVolume::from_fn(dims, |v| v % 11 == 0);
     let allowance = Allowance::default();
     let squared = distance_squared(&blocked, &allowance);
-    let field = DistanceField::of(&blocked, &BitVolume::new(dims), &allowance);
+    let field = DistanceField::of(
+        &SparseVolume::of(&blocked),
+        &SparseVolume::of(&BitVolume::new(dims)),
+        &allowance,
+    );
     let mut widest = field.widest_of_blocks();
     for edge in [2, 4] {
         assert_eq!(widest.dims, dims.map(|n| n.div_ceil(edge)));

@@ -90,7 +90,7 @@ impl DistanceField {
 mod tests {
     use super::*;
     use crate::grid::BitVolume;
-    use crate::{WatershedOptions, distance_squared, watershed};
+    use crate::{SparseVolume, WatershedOptions, distance_squared, watershed};
 
     /// Two rooms of 9 × 9 × 20 voxels, a wall with a doorway 5 wide between them.
     fn two_rooms() -> (BitVolume, BitVolume) {
@@ -120,8 +120,9 @@ mod tests {
         };
         let flood = watershed(occupied.dims(), squared.clone(), &options, &allowance);
         assert_eq!(flood.basins.len(), 2);
+        let [blocked, far] = [&occupied, &outdoors].map(SparseVolume::of);
         for field in [
-            DistanceField::of(&occupied, &outdoors, &allowance),
+            DistanceField::of(&blocked, &far, &allowance),
             DistanceField::of_squared(occupied.dims(), squared, &outdoors),
         ] {
             let all = field.touching(&flood.labels, |_| true, &allowance);
