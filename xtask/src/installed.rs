@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 
 use crate::{cargo, output_of, root, run_to_end, target_dir};
 
-/// What the program of the README prints in the world of the demo.
+/// Words that the program of the README prints in the world of the demo.
 const SAYS: &str = "a leaf of portal-";
 
 /// Unpacks all packages, which `cargo package` left in the folder of builds, and runs the README's program with them on a world.

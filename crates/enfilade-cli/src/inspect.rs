@@ -84,7 +84,7 @@ struct CellReport<'a> {
     outdoor: bool,
     /// `room`, `outdoors` or `void`.
     kind: &'static str,
-    /// Absent if it is no room.
+    /// Absent for all but rooms.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     room: Option<RoomReport>,
 }

@@ -65,7 +65,7 @@ struct Sample {
 /// Finds the floors of a world. O(floor area + triangles).
 pub(crate) fn find_floors(world: &World) -> Floors {
     let tile = tile_of(world);
-    let sizes = Sizes { tile, apart: APART };
+    let sizes = LevelSizes { tile, apart: APART };
     let samples = floor_samples(world);
     let mut out = Floors {
         levels: Vec::new(),
@@ -83,7 +83,7 @@ pub(crate) fn find_floors(world: &World) -> Floors {
 
 /// Returns the levels of all rooms that differ in height by `apart` or more, the largest of a cell first. [Units: wu]
 pub(crate) fn find_levels(world: &World, apart: f64) -> Vec<Level> {
-    let sizes = Sizes {
+    let sizes = LevelSizes {
         tile: tile_of(world),
         apart,
     };
@@ -96,7 +96,7 @@ pub(crate) fn find_levels(world: &World, apart: f64) -> Vec<Level> {
 
 /// The side of a tile, and the least difference of two levels of a cell. [Units: wu]
 #[derive(Clone, Copy)]
-struct Sizes {
+struct LevelSizes {
     tile: f64,
     apart: f64,
 }
@@ -185,7 +185,7 @@ fn ask(
 }
 
 /// Adds the levels of one cell.
-fn levels_of(cell: CellId, samples: &[Sample], sizes: Sizes, out: &mut Vec<Level>) {
+fn levels_of(cell: CellId, samples: &[Sample], sizes: LevelSizes, out: &mut Vec<Level>) {
     let sum = |only_level: bool| -> f64 {
         let counted = samples.iter().filter(|s| s.is_level || !only_level);
         counted.map(|s| s.area).sum()

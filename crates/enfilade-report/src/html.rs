@@ -67,8 +67,46 @@ pub struct ReportParts {
 #[must_use]
 pub fn report_html(world: &World, parts: &ReportParts) -> String {
     let plans = Plans::new(world, &PlanOptions::default());
-    let storeys: Vec<&Storey> = plans.storeys().collect();
     let mut out = String::new();
+    head(&mut out, world, &plans, parts);
+    let (first, rest) = parts.figures.split_at(parts.figures.len().min(1));
+    figures(&mut out, first);
+    drawings(&mut out, &plans);
+    let is_void = |c: CellId| plans.voids().any(|v| v == c);
+    let (table, cells) = rooms(world, &plans, |c| !is_void(c));
+    rows(&mut out, &table, &cells);
+    let facts: Vec<RoomFacts> = plans.rooms().cloned().collect();
+    let _ = writeln!(
+        out,
+        "<p><a download=\"rooms.csv\" href=\"data:text/csv;base64,{}\">All rooms as a table for a spreadsheet (CSV)</a></p>",
+        BASE64_STANDARD.encode(cells_table(world, &facts, shortened))
+    );
+    if plans.voids().len() > 0 {
+        let (table, cells) = voids(world, is_void);
+        rows(&mut out, &table, &cells);
+    }
+    reasons(&mut out, world);
+    if !rest.is_empty() {
+        out.push_str("<section><h2>Pictures</h2>\n");
+        figures(&mut out, rest);
+        out.push_str("</section>\n");
+    }
+    for_programs(&mut out, world, &plans, parts);
+    let p = &world.graph.provenance;
+    let settings = p.settings.iter().map(|(k, v)| format!("{k} = {v}"));
+    let _ = write!(
+        out,
+        "<footer>Baked by {} ({}), input {}. {}</footer>\n<script>{SCRIPT}</script>\n</body></html>\n",
+        escaped(&p.generator),
+        escaped(&p.method),
+        escaped(&p.input_hash),
+        escaped(&settings.collect::<Vec<_>>().join(", "))
+    );
+    out
+}
+
+/// Writes the title, the main figures, the verdict and the notes.
+fn head(out: &mut String, world: &World, plans: &Plans, parts: &ReportParts) {
     let title = escaped(&parts.title);
     let voids: Vec<String> = plans.voids().map(|c| c.0.to_string()).collect();
     let _ = write!(
@@ -78,7 +116,7 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
          <title>{title}: rooms and doorways</title>\n<style>{STYLE}</style></head><body data-voids=\"{}\">\n\
          <header><p class=\"kind\">Rooms, doorways, and what can be seen from where</p><h1>{title}</h1>{}</header>\n",
         voids.join(" "),
-        facts(world, &plans)
+        facts(world, plans)
     );
     if let Some(walk) = &parts.walk {
         let _ = writeln!(
@@ -89,16 +127,12 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         );
     }
     if let Some(verdict) = &parts.verdict {
-        let class = if verdict.is_good() {
-            "note good"
-        } else {
-            "note"
+        let class = match verdict.is_good() {
+            true => "note good",
+            false => "note",
         };
-        let _ = writeln!(
-            out,
-            "<p class=\"{class}\">{}</p>",
-            escaped(&verdict.sentence())
-        );
+        let sentence = verdict.sentence();
+        let _ = writeln!(out, "<p class=\"{class}\">{}</p>", escaped(&sentence));
     }
     for note in &parts.notes {
         let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(note));
@@ -111,12 +145,13 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
             voids.len()
         );
     }
-    let (first, rest) = parts.figures.split_at(parts.figures.len().min(1));
-    figures(&mut out, first);
+}
+
+/// Writes the plans and their legend, all at one scale: they are scrolled rather than made smaller.
+fn drawings(out: &mut String, plans: &Plans) {
     out.push_str(
         "<section><h2>Plans</h2><p>Point at a room, here or below, to see it everywhere on this page and why it is there, at a line of the graph for its doorway; click to go to it.</p>\n",
     );
-    // All at one scale: they are scrolled rather than made smaller.
     let mut draw = |class: &str, drawing: &Drawing| {
         let svg = drawing.to_svg();
         let svg = svg.split_once("?>").map_or(svg.as_str(), |(_, svg)| svg);
@@ -124,60 +159,31 @@ pub fn report_html(world: &World, parts: &ReportParts) -> String {
         let svg = svg.replacen("<svg ", &format!("<svg style=\"width:{width:.0}px\" "), 1);
         let _ = writeln!(out, "<div class=\"drawing{class}\">{svg}</div>");
     };
-    for (k, storey) in storeys.iter().enumerate() {
+    for (k, storey) in plans.storeys().enumerate() {
         let class = if storey.is_between { " between" } else { "" };
         draw(class, &plans.bare(k));
     }
     draw(" legend", &plans.legend());
     out.push_str("</section>\n");
-    let is_void = |c: CellId| plans.voids().any(|v| v == c);
-    let (table, cells) = rooms(world, &plans, |c| !is_void(c));
-    rows(&mut out, &table, &cells);
-    let facts: Vec<RoomFacts> = plans.rooms().cloned().collect();
-    let _ = writeln!(
-        out,
-        "<p><a download=\"rooms.csv\" href=\"data:text/csv;base64,{}\">All rooms as a table for a spreadsheet (CSV)</a></p>",
-        BASE64_STANDARD.encode(cells_table(world, &facts, shortened))
-    );
-    if !voids.is_empty() {
-        let (table, cells) = self::voids(world, is_void);
-        rows(&mut out, &table, &cells);
-    }
-    reasons(&mut out, world);
-    if !rest.is_empty() {
-        out.push_str("<section><h2>Pictures</h2>\n");
-        figures(&mut out, rest);
-        out.push_str("</section>\n");
-    }
+}
+
+/// Writes what readers of plans do without, folded away: the graph, what is visible from where, counts.
+fn for_programs(out: &mut String, world: &World, plans: &Plans, parts: &ReportParts) {
+    let storeys: Vec<&Storey> = plans.storeys().collect();
     let _ = write!(
         out,
-        "<details><summary>For programs that draw it: graph, visibility, counts</summary>\n<section><h2>Graph</h2><p>A disk for each room, with its number and as large as its volume; a line for each \
-         doorway, as on the plan. A thick ring: there is a door, a window or an opening to the outdoors.</p>\
-         <div class=\"wide\">{}</div></section>\n",
+        "<details><summary>For programs that draw it: graph, visibility, counts</summary>\n<section><h2>Graph</h2><p>A disk for each \
+         room, with its number and as large as its volume; a line for each doorway, as on the plan. A thick ring: there is a door, a \
+         window or an opening to the outdoors.</p><div class=\"wide\">{}</div></section>\n",
         graph_svg(world, &storeys)
     );
     if parts.visible.n_cells() > 0 {
-        matrix(&mut out, world, &plans, &parts.visible);
+        matrix(out, world, plans, &parts.visible);
     }
     for table in &parts.tables {
-        rows(&mut out, table, &[]);
+        rows(out, table, &[]);
     }
     out.push_str("</details>\n");
-    let p = &world.graph.provenance;
-    let settings: Vec<String> = p
-        .settings
-        .iter()
-        .map(|(k, v)| format!("{k} = {v}"))
-        .collect();
-    let _ = write!(
-        out,
-        "<footer>Baked by {} ({}), input {}. {}</footer>\n<script>{SCRIPT}</script>\n</body></html>\n",
-        escaped(&p.generator),
-        escaped(&p.method),
-        escaped(&p.input_hash),
-        escaped(&settings.join(", "))
-    );
-    out
 }
 
 /// Highlights the elements of a cell, shows why it is there, and hides voids. The page is complete without it.

@@ -1,4 +1,4 @@
-//! What people ask of a room: floor area, height, storey, doors and windows.
+//! Facts of rooms that people ask for: floor area, height, storey, doors and windows.
 //!
 //! A floor area is the area that a room covers as seen from above, with galleries in it, divided exactly by the tree of the
 //! world's cells. The recesses of doorways and windows between a portal and the face of its wall do not count: they belong
@@ -31,7 +31,7 @@ const STEP: f64 = 0.01;
 /// A portal whose normal rises more is a hatch, which has no jambs.
 const UPRIGHT: f32 = 0.5;
 
-/// What people ask of a room. [Units: wu, wu²]
+/// Facts of a room that people ask for. [Units: wu, wu²]
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoomFacts {
     /// The room.
@@ -201,7 +201,7 @@ impl<'w> Footprint<'w> {
         own
     }
 
-    /// What of `parts`, all at one height, is over none of the sections at `heights`.
+    /// Returns the parts of `parts`, all at one height, that are over none of the sections at `heights`.
     fn not_over(&self, mut parts: Vec<Winding>, heights: &[f64]) -> Vec<Winding> {
         let locator = &self.world.graph.locator;
         for &height in heights.iter().rev() {
