@@ -239,7 +239,8 @@ fn recess(world: &World, cell: CellId, portal: &Portal) -> Option<Recess> {
     let ends = [low, high].map(|x| middle + across * x);
     let jambs = [ends[0] - across * IN_JAMB, ends[1] + across * IN_JAMB].map(|start| {
         let at = |depth: f64| world.graph.locator.locate(start + into * depth);
-        let steps = (0..(DEEPEST / STEP) as usize).map(|k| k as f64 * STEP);
+        // Beside the portal itself, which may lie in the face of the wall.
+        let steps = (0..(DEEPEST / STEP) as usize).map(|k| (k as f64 + 0.5) * STEP);
         let end = steps.take_while(|&depth| at(depth).is_none()).last();
         let is_face = |depth: &f64| at(*depth + STEP) == Some(cell);
         let Some(end) = end.filter(is_face) else {
@@ -284,6 +285,10 @@ mod tests {
 
     /// Cell 0 of the boxes; all else is solid.
     fn world(boxes: &[[[f64; 3]; 2]]) -> World {
+        world_of(boxes, |_| CellId(0))
+    }
+
+    fn world_of(boxes: &[[[f64; 3]; 2]], cell_of: impl Fn(usize) -> CellId) -> World {
         let mut world = World::default();
         let locator = &mut world.graph.locator;
         let bounds: Vec<DVec3> = boxes.iter().flatten().map(|p| DVec3::from(*p)).collect();
@@ -300,7 +305,7 @@ mod tests {
                     false => (-1.0, max[k - 3]),
                 };
                 let inside = match k {
-                    5 => Locator::leaf(Some(CellId(0))),
+                    5 => Locator::leaf(Some(cell_of(n))),
                     _ => locator.nodes.len() as i32 + 1,
                 };
                 locator.nodes.push(LocatorNode {
@@ -370,11 +375,13 @@ mod tests {
 
     #[test]
     fn the_recess_of_an_opening_belongs_to_the_wall() {
-        // A doorway 1 m wide in a wall of 0.3 m, and the portal at its far side.
-        let mut world = world(&[
+        // A doorway 1 m wide in a wall of 0.3 m, and the portal at its far side, where another cell begins.
+        let boxes = [
             [[0.0; 3], [5.0, 3.0, 4.0]],
             [[2.0, 0.0, -0.3], [3.0, 2.0, 0.0]],
-        ]);
+            [[-5.0, 0.0, -5.0], [9.0, 3.0, -0.3]],
+        ];
+        let mut world = world_of(&boxes, |n| CellId(u32::from(n == 2)));
         near(facts(&world), [20.3, 3.0]);
         world.graph.portals.push(Portal {
             cells: [CellId(0), CellId(1)],

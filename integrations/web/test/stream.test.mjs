@@ -46,6 +46,18 @@ test('the walk opens the packed world and the whole one beside it, walks, and op
     await walk.waitForFunction(() => globalThis.walk?.culler.counts.cells > 0, undefined, { timeout: 60_000 });
     const at = () => walk.evaluate(() => [...globalThis.walk.walker.eye]);
     const begin = await at();
+    // It begins with three meters or more ahead, and without counters, which a key shows.
+    const free = () => {
+      const { world, walker, controls } = globalThis.walk;
+      const [x, y, z] = walker.eye;
+      const ahead = (far) => [x - far * Math.sin(controls.yaw), y, z - far * Math.cos(controls.yaw)];
+      return [1, 2, 3].every((far) => !world.step(ahead(far - 1), ahead(far)).isRelocated);
+    };
+    assert.ok(await walk.evaluate(free));
+    const hasCounters = () => walk.evaluate(() => !document.getElementById('panel').hidden);
+    assert.equal(await hasCounters(), false);
+    await walk.keyboard.press('KeyI');
+    assert.equal(await hasCounters(), true);
     await walk.keyboard.down('KeyW');
     await walk.waitForTimeout(700);
     await walk.keyboard.up('KeyW');

@@ -39,6 +39,20 @@ export class Walker {
     return walker;
   }
 
+  /** Returns the yaw of the direction, of 32, in which the way is free farthest at the height of the eye, up to 20 m. */
+  widestView(): number {
+    const { eye } = this;
+    let [best, farthest] = [0, 0];
+    for (let i = 0; i < 32; i++) {
+      const yaw = (i / 16) * Math.PI;
+      const at = (far: number): number[] => [eye[0] - far * Math.sin(yaw), eye[1], eye[2] - far * Math.cos(yaw)];
+      let far = 0;
+      while (far < 20 && this.passes(at(far), at(far + 0.5))) far += 0.5;
+      if (far > farthest) [best, farthest] = [yaw, far];
+    }
+    return best;
+  }
+
   /** Returns true if a body passes from one point to another. */
   private passes(from: number[], to: number[]): boolean {
     const { world } = this;

@@ -49,7 +49,11 @@ async function open(scene: Scene): Promise<Opened> {
 
 const megabytes = (bytes: number): string => `${(bytes / 1e6).toFixed(2)} MB`;
 
+/** Longest time that a frame makes up for, and the longest step of a walker, who must not jump through a wall. [s] */
+const [LONGEST, STEP] = [1, 1 / 30];
+
 async function main(): Promise<void> {
+  element('help').textContent = 'loading …';
   const scene = new Scene();
   scene.background = new Color(0xcfd6dd);
   const { culler, streamed, name } = await open(scene);
@@ -77,10 +81,11 @@ async function main(): Promise<void> {
 
   const walker = Walker.inMiddle(world);
   const controls = new Controls(renderer.domElement);
+  controls.yaw = walker.widestView();
   const map = new RoomMap(element('map') as HTMLCanvasElement, world);
   element('help').textContent = controls.isTouch
     ? 'left thumb walks · right thumb looks · tap a door'
-    : 'click to look · W A S D walk · E door · F fly · C culling';
+    : 'click to look · W A S D walk · E door · F fly · M map · I counters';
   const direction = new Vector3();
   const openDoor = (x: number, y: number): void => {
     direction.set(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
@@ -92,17 +97,22 @@ async function main(): Promise<void> {
     if (key === 'KeyE') openDoor(0, 0);
     if (key === 'KeyF') walker.flies = !walker.flies;
     if (key === 'KeyC') culler.enabled = !culler.enabled;
+    if (key === 'KeyI') element('panel').hidden = !element('panel').hidden;
     if (key === 'KeyM') element('map').hidden = !element('map').hidden;
   };
 
   let before = performance.now();
   let sinceText = 1;
   const frame = (now: number): void => {
-    const seconds = Math.min(0.1, (now - before) / 1000);
+    const seconds = Math.min(LONGEST, (now - before) / 1000);
     before = now;
-    const [x, up, z] = controls.motion(seconds);
-    walker.move(x, up, z);
-    walker.fall(seconds);
+    // As fast on slow machines: more steps a frame.
+    const steps = Math.ceil(seconds / STEP);
+    for (let i = 0; i < steps; i++) {
+      const [x, up, z] = controls.motion(seconds / steps);
+      walker.move(x, up, z);
+      walker.fall(seconds / steps);
+    }
     culler.animate(seconds);
     camera.position.set(...walker.eye);
     camera.rotation.set(controls.pitch, controls.yaw, 0, 'YXZ');
