@@ -126,6 +126,8 @@ fn the_demo_makes_a_house_and_its_hints_work() {
         let tried = Command::new("sh")
             .args(["-c", &hint.replace("enfilade ", "\"$ENFILADE\" ")])
             .env("ENFILADE", &bin)
+            // Where the report goes.
+            .current_dir(&dir)
             .output()
             .unwrap();
         assert!(
