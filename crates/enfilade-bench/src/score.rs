@@ -364,7 +364,7 @@ impl Samples {
         }
         let (mut n_right, mut n) = (0, 0);
         for (id, (area, n_rooms, names)) in of_cell {
-            let cell = cells.iter().find(|c| c["id"].to_string() == id);
+            let cell = cells.iter().find(|c| id.parse().ok() == c["id"].as_u64());
             let found = cell.and_then(|c| c["floor_area"].as_f64());
             n += n_rooms;
             if found.is_some_and(|found| (found / area - 1.0).abs() <= AREA) {
