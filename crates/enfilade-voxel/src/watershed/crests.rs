@@ -26,9 +26,8 @@ const AROUND: u8 = 0b11_1111;
 pub(super) struct Crests {
     /// The crest voxels.
     crests: Ranked,
-    /// Those of them that are inside of plateaus with a rim, by their position among all.
-    inner: Ranked,
-    /// For each of these the steps along its plateau to a voxel with a higher neighbor, 2 or more.
+    /// For each crest voxel the steps along its plateau to a voxel with a higher neighbor; [`FAR`] on a peak. A byte each: to keep
+    /// only those inside plateaus took a tenth longer.
     steps: Vec<u8>,
     /// Those of the crest voxels that are on peaks, by their position among all.
     summits: Ranked,
@@ -135,7 +134,6 @@ impl Crests {
         let (bits, alike) = find(shape, levels, thick, allowance);
         let mut crests = Self {
             crests: Ranked::of(bits),
-            inner: Ranked::default(),
             steps: Vec::new(),
             summits: Ranked::default(),
             runs: Ranked::default(),
@@ -145,30 +143,14 @@ impl Crests {
         let steps = crests.measure(shape, &alike, allowance);
         let peaks = crests.number(shape, &steps, &alike);
         drop(alike);
-        crests.keep(steps);
+        crests.steps = steps;
         crests.rank(shape, levels, &peaks);
         crests
     }
 
     /// Returns the steps from a voxel to one with a higher neighbor; 0 if it has one itself.
     fn steps_of(&self, voxel: usize) -> u8 {
-        let Some(at) = self.crests.position(voxel) else {
-            return 0;
-        };
-        match self.inner.position(at) {
-            Some(inner) => self.steps[inner],
-            None if self.summits.contains(at) => FAR,
-            None => 1,
-        }
-    }
-
-    /// Keeps the steps of those crest voxels that neither are on a rim nor on a peak.
-    fn keep(&mut self, mut steps: Vec<u8>) {
-        let is_inner = |s: u8| s != 1 && s != FAR;
-        self.inner = Ranked::where_in(&steps, is_inner);
-        steps.retain(|&s| is_inner(s));
-        steps.shrink_to_fit();
-        self.steps = steps;
+        self.crests.position(voxel).map_or(0, |at| self.steps[at])
     }
 
     /// Measures the steps of all crest voxels breadth first, from the rims of plateaus inward; [`FAR`] on a peak.
