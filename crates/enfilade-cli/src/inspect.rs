@@ -20,7 +20,7 @@ use specials::SpecialReport;
 use crate::limits::Limits;
 use crate::screen::{At, Rounded, print_json, printed_at_once};
 use enfilade_cli::world::read_world;
-use enfilade_report::{RoomFacts, cells_in_words, find_storeys, room_facts};
+use enfilade_report::{RoomFacts, cells_in_words, room_facts};
 
 /// Shows the cells, portals and statistics of a world.
 #[derive(clap::Args)]
@@ -160,7 +160,7 @@ struct Stats<'a> {
 
 fn report(world: &World) -> Inspection<'_> {
     let graph = &world.graph;
-    let mut rooms: BTreeMap<usize, RoomReport> = room_facts(world, &find_storeys(world))
+    let mut rooms: BTreeMap<usize, RoomReport> = room_facts(world)
         .into_iter()
         .map(|room| (room.cell.0 as usize, RoomReport::of(room)))
         .collect();
@@ -275,7 +275,7 @@ fn write_tables(out: &mut impl Write, world: &World, all: bool) -> io::Result<()
 /// The cells, the largest first.
 fn write_cells(out: &mut impl Write, world: &World) -> io::Result<()> {
     let graph = &world.graph;
-    let rooms = room_facts(world, &find_storeys(world));
+    let rooms = room_facts(world);
     let mut by_volume: Vec<(usize, &Cell)> = graph.cells.iter().enumerate().collect();
     // Ids break ties, so that the table is reproducible.
     by_volume.sort_by(|a, b| b.1.volume.total_cmp(&a.1.volume).then(a.0.cmp(&b.0)));
@@ -294,7 +294,8 @@ fn write_cells(out: &mut impl Write, world: &World) -> io::Result<()> {
         "detail"
     )?;
     for (id, c) in by_volume {
-        let room = rooms.iter().find(|room| room.cell.0 as usize == id);
+        let at = rooms.binary_search_by_key(&id, |room| room.cell.0 as usize);
+        let room = at.ok().map(|at| &rooms[at]);
         let [storey, floor, height] = room.map_or(Default::default(), |room| {
             let lengths = [room.floor_area, room.height].map(|n| format!("{n:.2}"));
             let [floor, height] = lengths;

@@ -38,7 +38,7 @@ pub use graph::{
 };
 pub use holes::{Hole, HoleReason};
 pub use ids::{CellId, PortalId};
-pub use locator::{Locator, LocatorNode};
+pub use locator::{Around, Locator, LocatorNode};
 pub use look::{shifted_textures, used_textures};
 pub use palette::{cell_color, cell_paint};
 pub use parts::{PartNumbers, VisibleParts, VisibleVolumes};

@@ -276,7 +276,39 @@ impl Locator {
         if !self.bounds.contains(p) {
             return self.outside;
         }
+        self.locate_below(self.root, p)
+    }
+
+    /// Returns the smallest part of the tree that answers for all points of a convex hull, so that many points close to one
+    /// another share the walk from the root. O(points × depth).
+    #[must_use]
+    pub fn around(&self, hull: &[DVec3]) -> Around<'_> {
+        let is_inside = |p: &DVec3| p.is_finite() && self.bounds.contains(*p);
+        if !hull.iter().all(is_inside) {
+            return Around {
+                locator: self,
+                top: None,
+            };
+        }
         let mut at = self.root;
+        while at >= 0 {
+            let node = &self.nodes[at as usize];
+            let [x, y, z, d] = self.planes[node.plane as usize];
+            let is_behind = |p: &DVec3| x * p.x + y * p.y + z * p.z + d < 0.0;
+            let n_behind = hull.iter().filter(|p| is_behind(p)).count();
+            if n_behind != 0 && n_behind != hull.len() {
+                break;
+            }
+            at = node.children[usize::from(n_behind != 0)];
+        }
+        Around {
+            locator: self,
+            top: Some(at),
+        }
+    }
+
+    fn locate_below(&self, top: i32, p: DVec3) -> Option<CellId> {
+        let mut at = top;
         while at >= 0 {
             let node = &self.nodes[at as usize];
             let [x, y, z, d] = self.planes[node.plane as usize];
@@ -284,5 +316,24 @@ impl Locator {
             at = node.children[usize::from(side < 0.0)];
         }
         (at <= -2).then(|| CellId((-2 - at) as u32))
+    }
+}
+
+/// A part of a [`Locator`], made by [`Locator::around`].
+#[derive(Clone, Copy, Debug)]
+pub struct Around<'l> {
+    locator: &'l Locator,
+    /// `None` if the hull leaves the box of the tree.
+    top: Option<i32>,
+}
+
+impl Around<'_> {
+    /// Returns the cell of a point of the hull, as [`Locator::locate`] does.
+    #[must_use]
+    pub fn locate(&self, p: DVec3) -> Option<CellId> {
+        match self.top {
+            Some(top) => self.locator.locate_below(top, p),
+            None => self.locator.locate(p),
+        }
     }
 }

@@ -20,6 +20,8 @@ const LEAST_LEVEL: f64 = 1.0;
 const SPACING: f64 = 0.5;
 /// Most rows of points on one triangle: enough to sample a floor 64 m long every half meter.
 const MAX_ROWS: usize = 128;
+/// Points located together.
+const RUN: usize = 16;
 /// Most tiles along a side of the world.
 const MAX_TILES: f64 = 1000.0;
 /// Height above a floor that must be in the same cell for a person to stand there: the usual height of a cut.
@@ -55,18 +57,20 @@ pub(crate) struct Floors {
     pub(crate) tile: f64,
 }
 
+/// Points of floors, by the cell that stands on them.
+pub(crate) type Samples = BTreeMap<CellId, Vec<Sample>>;
+
 /// A point of a floor.
-struct Sample {
+pub(crate) struct Sample {
     p: DVec3,
     area: f64,
     is_level: bool,
 }
 
-/// Finds the floors of a world. O(floor area + triangles).
-pub(crate) fn find_floors(world: &World) -> Floors {
+/// Finds the floors of a world. O(samples).
+pub(crate) fn find_floors(world: &World, samples: &Samples) -> Floors {
     let tile = tile_of(world);
     let sizes = LevelSizes { tile, apart: APART };
-    let samples = floor_samples(world);
     let mut out = Floors {
         levels: Vec::new(),
         unfloored: Vec::new(),
@@ -82,13 +86,13 @@ pub(crate) fn find_floors(world: &World) -> Floors {
 }
 
 /// Returns the levels of all rooms that differ in height by `apart` or more, the largest of a cell first. [Units: wu]
-pub(crate) fn find_levels(world: &World, apart: f64) -> Vec<Level> {
+pub(crate) fn find_levels(world: &World, samples: &Samples, apart: f64) -> Vec<Level> {
     let sizes = LevelSizes {
         tile: tile_of(world),
         apart,
     };
     let mut out = Vec::new();
-    for (cell, samples) in &floor_samples(world) {
+    for (cell, samples) in samples {
         levels_of(*cell, samples, sizes, &mut out);
     }
     out
@@ -120,9 +124,9 @@ fn tile_of(world: &World) -> f64 {
     SPACING.max(reach / MAX_ROWS as f64).max(whole / MAX_TILES)
 }
 
-/// Sample points on the surfaces that a room stands on, by cell.
-fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
-    let mut out = BTreeMap::new();
+/// Returns points on the surfaces that a room stands on. O(floor area + triangles).
+pub(crate) fn floor_samples(world: &World) -> Samples {
+    let mut out = Samples::new();
     for batch in &world.batches {
         let is_room = |c: &CellId| world.graph[*c].is_place();
         if !batch.cells.iter().any(is_room) {
@@ -142,13 +146,7 @@ fn floor_samples(world: &World) -> BTreeMap<CellId, Vec<Sample>> {
 }
 
 /// Samples points spread over the triangle; those with headroom are assigned to the cell above them.
-fn ask(
-    world: &World,
-    t: &Triangle,
-    area: f64,
-    is_level: bool,
-    out: &mut BTreeMap<CellId, Vec<Sample>>,
-) {
+fn ask(world: &World, t: &Triangle, area: f64, is_level: bool, out: &mut Samples) {
     let longest = t[0]
         .distance(t[1])
         .max(t[1].distance(t[2]))
@@ -157,29 +155,45 @@ fn ask(
     let side = longest.min(4.0 * area.sqrt());
     let n = ((side / SPACING).ceil() as usize).clamp(1, MAX_ROWS);
     let each = area / (n * n) as f64;
-    let locator = &world.graph.locator;
+    // Centroids of the n² small triangles, upright and inverted alternately.
+    let point = |i: usize, j: usize| {
+        let (row, column, third) = (i as f64, (j / 2) as f64, if j % 2 == 0 { 1.0 } else { 2.0 });
+        let (u, v) = (
+            (row + third / 3.0) / n as f64,
+            (column + third / 3.0) / n as f64,
+        );
+        t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v
+    };
+    let mut run: Vec<DVec3> = Vec::with_capacity(RUN);
     for i in 0..n {
-        for j in 0..2 * (n - i) - 1 {
-            // Centroids of the n² small triangles, upright and inverted alternately.
-            let (row, column, third) =
-                (i as f64, (j / 2) as f64, if j % 2 == 0 { 1.0 } else { 2.0 });
-            let (u, v) = (
-                (row + third / 3.0) / n as f64,
-                (column + third / 3.0) / n as f64,
-            );
-            let p = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
-            let above = |up: f64| locator.locate(p + DVec3::Y * up);
-            let Some(cell) = above(JUST_ABOVE).filter(|&c| world.graph[c].is_place()) else {
-                continue;
-            };
-            // The top of a suspended ceiling, or of a wall under the roof, is not a floor of either cell.
-            if above(HEADROOM) == Some(cell) && above(0.5 * HEADROOM).is_some() {
-                out.entry(cell).or_default().push(Sample {
-                    p,
-                    area: each,
-                    is_level,
-                });
-            }
+        let n_of_row = 2 * (n - i) - 1;
+        for first in (0..n_of_row).step_by(RUN) {
+            run.clear();
+            run.extend((first..n_of_row.min(first + RUN)).map(|j| point(i, j)));
+            ask_run(world, &run, each, is_level, out);
+        }
+    }
+}
+
+/// Assigns neighboring points of two lines to the cells above them, if there is headroom.
+fn ask_run(world: &World, run: &[DVec3], each: f64, is_level: bool, out: &mut Samples) {
+    // The corners of their hull: both ends of both lines.
+    let last = run.len() - 1;
+    let ends = [0, last.min(1), last.saturating_sub(1), last].map(|k| run[k]);
+    let hull = [JUST_ABOVE, HEADROOM].map(|up| ends.map(|p| p + DVec3::Y * up));
+    let locator = world.graph.locator.around(hull.as_flattened());
+    for &p in run {
+        let above = |up: f64| locator.locate(p + DVec3::Y * up);
+        let Some(cell) = above(JUST_ABOVE).filter(|&c| world.graph[c].is_place()) else {
+            continue;
+        };
+        // The top of a suspended ceiling, or of a wall under the roof, is not a floor of either cell.
+        if above(HEADROOM) == Some(cell) && above(0.5 * HEADROOM).is_some() {
+            out.entry(cell).or_default().push(Sample {
+                p,
+                area: each,
+                is_level,
+            });
         }
     }
 }

@@ -7,10 +7,11 @@ use enfilade_geom::{DVec2, shown};
 
 use crate::doubts::{Doubt, doubts, rings};
 use crate::drawing::{Class, Drawing, Item, Path, Words};
+use crate::floors::floor_samples;
 use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
 use crate::marks::View;
 use crate::relief::Relief;
-use crate::rooms::{RoomFacts, room_facts};
+use crate::rooms::{RoomFacts, facts_of_rooms};
 use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
 use crate::sheet::{COLUMN, MARGIN, Sheet};
@@ -151,7 +152,8 @@ impl<'a> Plans<'a> {
     #[must_use]
     pub fn new(world: &'a World, options: &PlanOptions) -> Self {
         let (min, max) = extent(world);
-        let (pages, mut voids) = find_pages(world);
+        let samples = floor_samples(world);
+        let (pages, mut voids) = find_pages(world, &samples);
         voids.extend(
             world
                 .graph
@@ -181,7 +183,7 @@ impl<'a> Plans<'a> {
             Vec::new()
         };
         let storeys: Vec<&Storey> = pages.iter().map(|p| &p.page.storey).collect();
-        let rooms = room_facts(world, &storeys).into_iter();
+        let rooms = facts_of_rooms(world, &samples, &storeys).into_iter();
         Self {
             world,
             doubts,

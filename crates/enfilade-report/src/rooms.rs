@@ -4,15 +4,14 @@
 //! world's cells. The recesses of doorways and windows between a portal and the face of its wall do not count: they belong
 //! to the wall, as in the rules by which architects measure.
 
-use std::borrow::Borrow;
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, Portal, PortalKind, World};
 use enfilade_geom::poly::cut_out;
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
-use crate::floors::{Level, find_levels};
-use crate::storeys::Storey;
+use crate::floors::{Level, Samples, find_levels, floor_samples};
+use crate::storeys::{Storey, find_pages};
 
 /// Distance of level sections: floors that differ by less are one. [Units: wu]
 const BAND: f64 = 0.24;
@@ -48,13 +47,25 @@ pub struct RoomFacts {
     pub n_windows: usize,
 }
 
-/// Returns the facts of all rooms, by cell. The world must be valid; `storeys` are its own.
+/// Returns the facts of all rooms, by cell. The world must be valid.
 ///
 /// O(floor area + triangles + parts of the tree that sections each 0.24 m meet).
 #[must_use]
-pub fn room_facts<S: Borrow<Storey>>(world: &World, storeys: &[S]) -> Vec<RoomFacts> {
+pub fn room_facts(world: &World) -> Vec<RoomFacts> {
+    let samples = floor_samples(world);
+    let (pages, _) = find_pages(world, &samples);
+    let storeys: Vec<&Storey> = pages.iter().map(|p| &p.storey).collect();
+    facts_of_rooms(world, &samples, &storeys)
+}
+
+/// Returns what [`room_facts`] does, of a world whose floors and storeys are known.
+pub(crate) fn facts_of_rooms(
+    world: &World,
+    samples: &Samples,
+    storeys: &[&Storey],
+) -> Vec<RoomFacts> {
     let mut levels: BTreeMap<CellId, Vec<Level>> = BTreeMap::new();
-    for level in find_levels(world, BAND) {
+    for level in find_levels(world, samples, BAND) {
         levels.entry(level.cell).or_default().push(level);
     }
     let rooms = world.graph.rooms();
@@ -64,8 +75,7 @@ pub fn room_facts<S: Borrow<Storey>>(world: &World, storeys: &[S]) -> Vec<RoomFa
                 let portals = cell.portals.iter().map(|&p| &world.graph[p]);
                 portals.filter(|p| p.kind == kind).count()
             };
-            let on = storeys.iter().map(S::borrow);
-            let on = on.filter(|s| s.cells.contains(&id));
+            let on = (storeys.iter()).filter(|s| s.cells.binary_search(&id).is_ok());
             let own = levels.get(&id).map_or(&[][..], Vec::as_slice);
             let (floor_area, height) = floor_of(world, id, own);
             RoomFacts {
@@ -238,7 +248,8 @@ fn recess(world: &World, cell: CellId, portal: &Portal) -> Option<Recess> {
     let [low, high] = wide.fold([0.0_f64; 2], |[l, h], x| [l.min(x), h.max(x)]);
     let ends = [low, high].map(|x| middle + across * x);
     let jambs = [ends[0] - across * IN_JAMB, ends[1] + across * IN_JAMB].map(|start| {
-        let at = |depth: f64| world.graph.locator.locate(start + into * depth);
+        let locator = (world.graph.locator).around(&[start, start + into * (DEEPEST + STEP)]);
+        let at = |depth: f64| locator.locate(start + into * depth);
         // Beside the portal itself, which may lie in the face of the wall.
         let steps = (0..(DEEPEST / STEP) as usize).map(|k| (k as f64 + 0.5) * STEP);
         let end = steps.take_while(|&depth| at(depth).is_none()).last();
@@ -325,7 +336,7 @@ mod tests {
     }
 
     fn facts(world: &World) -> [f64; 2] {
-        let facts = room_facts::<Storey>(world, &[]);
+        let facts = facts_of_rooms(world, &floor_samples(world), &[]);
         [facts[0].floor_area, facts[0].height]
     }
 

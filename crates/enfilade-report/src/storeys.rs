@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, PortalKind, World};
 
-use crate::floors::{Floors, Level, Tiles, find_floors};
+use crate::floors::{Floors, Level, Samples, Tiles, find_floors, floor_samples};
 use crate::shafts::{Shaft, find_shafts};
 
 /// Largest difference of floors that meet without a stair: a threshold, a ramp's end, a tall step of a game.
@@ -81,12 +81,13 @@ pub(crate) struct Page {
 /// O(floor area + triangles + levels²) where nothing connects the levels, much less where doorways do.
 #[must_use]
 pub fn find_storeys(world: &World) -> Vec<Storey> {
-    find_pages(world).0.into_iter().map(|p| p.storey).collect()
+    let pages = find_pages(world, &floor_samples(world)).0;
+    pages.into_iter().map(|p| p.storey).collect()
 }
 
 /// Like [`find_storeys`], with the cuts; and the rooms without a floor to stand on, ascending.
-pub(crate) fn find_pages(world: &World) -> (Vec<Page>, Vec<CellId>) {
-    let floors = find_floors(world);
+pub(crate) fn find_pages(world: &World, samples: &Samples) -> (Vec<Page>, Vec<CellId>) {
+    let floors = find_floors(world, samples);
     let groups = grouped(world, &floors);
     let mut pages: Vec<Page> = groups.iter().map(|g| page(world, &floors, g)).collect();
     drop_landings(&mut pages);
@@ -289,7 +290,8 @@ fn page(world: &World, floors: &Floors, group: &Group) -> Page {
     for k in order {
         let Level { cell, height, .. } = *level(k);
         // The cell is shown here up to its next floor.
-        let own = floors.levels.iter().filter(|l| l.cell == cell);
+        let first = floors.levels.partition_point(|l| l.cell < cell);
+        let own = (floors.levels[first..].iter()).take_while(|l| l.cell == cell);
         let next = own.map(|l| l.height).filter(|&h| h > height + SAME_CUT);
         let top = next.fold(f64::from(world.graph[cell].aabb[1][1]), f64::min);
         let cut = match cuts

@@ -1,7 +1,7 @@
 //! The layout agrees with the graph about each cell and portal.
 
 use enfilade_cpg::PortalId;
-use enfilade_geom::DVec3;
+use enfilade_geom::{Aabb, DVec3};
 use enfilade_testkit::{GridParams, Rng, room_grid};
 use enfilade_world::Layout;
 
@@ -87,4 +87,23 @@ fn within_the_room_that_a_point_has_the_cell_is_the_same() {
         assert_eq!(layout.locate(p + step * room * 0.999), cell, "{p} {room}");
     }
     assert!(n_wide > 5000, "{n_wide}");
+}
+
+#[test]
+fn a_part_of_the_tree_answers_for_the_hull_of_its_points() {
+    let (_, world) = layout_and_graph();
+    let locator = &world.graph.locator;
+    let mut rng = Rng::new(5);
+    let around = locator.bounds.expanded(0.5);
+    for _ in 0..2000 {
+        let first = rng.point_in(&around);
+        let near = Aabb::new(first, first).expanded(rng.range(0.0, 2.0));
+        let hull = [(); 4].map(|()| rng.point_in(&near));
+        let part = locator.around(&hull);
+        let share = rng.unit();
+        let between = (0..4).map(|k| hull[k].lerp(hull[(k + 1) % 4], share));
+        for p in hull.into_iter().chain(between) {
+            assert_eq!(part.locate(p), locator.locate(p), "{p} of {hull:?}");
+        }
+    }
 }

@@ -11,7 +11,7 @@ use enfilade::geom::{DVec3, Triangle};
 use enfilade::runtime::Sight;
 use enfilade::vis::{VisConfig, VisContext, VisMode, see_world};
 use enfilade::world::{Agent, Space, WalkMap};
-use enfilade_report::{Verdict, find_storeys, room_facts};
+use enfilade_report::{Verdict, room_facts};
 use enfilade_verify::structural_triangles;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyKeyboardInterrupt};
@@ -270,7 +270,7 @@ impl World {
 
     /// Returns the facts of rooms: cell, storeys, floor area, height, doors, windows.
     fn rooms(&self, py: Python<'_>) -> Vec<RoomRow> {
-        let facts = py.detach(|| room_facts(&self.world, &find_storeys(&self.world)));
+        let facts = py.detach(|| room_facts(&self.world));
         let rows = facts.into_iter().map(|room| {
             let counts = (room.n_doors, room.n_windows);
             (room.cell.0, room.storeys, room.floor_area, room.height, counts)

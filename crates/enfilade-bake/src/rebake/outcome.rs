@@ -53,7 +53,7 @@ pub enum WholeBecause {
     Grid,
     /// Storeys end elsewhere.
     Storeys,
-    /// The part to bake is most of the scene.
+    /// The part to bake is a fifth of the scene's voxels or more.
     Extent,
     /// The part and the world do not agree at the seam.
     Seam,
@@ -73,7 +73,7 @@ impl fmt::Display for WholeBecause {
             Self::Bounds => "it is larger or smaller than before",
             Self::Grid => "its voxels are of another size than before",
             Self::Storeys => "storeys end elsewhere than before",
-            Self::Extent => "the change reaches most of it",
+            Self::Extent => "the change reaches a fifth of it or more",
             Self::Seam => "the changed part does not fit what is around it",
         })
     }

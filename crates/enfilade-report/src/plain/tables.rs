@@ -6,13 +6,13 @@ use std::fmt::Write;
 use enfilade_cpg::World;
 
 use super::{cell_kind, portal_kind};
-use crate::{RoomFacts, find_storeys, room_facts};
+use crate::{RoomFacts, room_facts};
 
 /// Returns the cells of a world as a table: `id,name,kind,storey,floor_area,height,doors,windows,volume` and the box. What is
 /// no room has no storey, floor, height, doors or windows.
 #[must_use]
 pub fn cells_csv(world: &World) -> String {
-    let rooms = room_facts(world, &find_storeys(world));
+    let rooms = room_facts(world);
     cells_table(world, &rooms, |name| name.into())
 }
 
