@@ -24,8 +24,10 @@ pub(crate) use balance::sun_of;
 const ROW: u32 = 1024;
 /// Mean brightness of a room in its pictures, relative to the outdoors.
 const MIDDLE: f32 = 0.7;
-/// The longest exposure, relative to the shortest.
+/// The longest exposure, relative to that of the outdoors.
 const LONGEST: f32 = 4.0;
+/// … and the shortest: of a court with white walls, in the sun.
+const SHORTEST: f32 = 0.3;
 /// Texels of a cell in the table.
 const CELL_TEXELS: usize = 4;
 
@@ -286,7 +288,7 @@ impl Light {
     /// `surroundings` is the [brightness](Light::brightness_at) around the world, relative to the outdoors.
     pub(crate) fn exposure(&self, eye: Vec3, surroundings: f32) -> f32 {
         match self.brightness_at(eye) {
-            Some(b) => (MIDDLE / (b * surroundings)).clamp(1.0, LONGEST),
+            Some(b) => (MIDDLE / (b * surroundings)).clamp(SHORTEST, LONGEST),
             None if surroundings < 1.0 => (MIDDLE / surroundings).clamp(1.0, LONGEST),
             None => 1.0,
         }

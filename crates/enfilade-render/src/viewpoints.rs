@@ -1,11 +1,14 @@
 //! Viewpoints: found automatically, or on a walk.
 
-use enfilade_cpg::{Cell, CellId, PortalId, World};
+use std::collections::{BTreeMap, BTreeSet};
+
+use enfilade_cpg::{Cell, CellId, DetailObject, PortalId, World};
 use enfilade_geom::DVec3;
-use enfilade_runtime::{Sight, Sightlines};
+use enfilade_runtime::{DetailId, Sight, Sightlines};
 use enfilade_world::{PartId, Space};
 
 use crate::camera::Camera;
+use crate::frame::Style;
 use crate::gpu::RenderError;
 use crate::ids::PixelContent;
 use crate::studio::{Culling, Studio};
@@ -35,6 +38,8 @@ fn standing(lines: &Sightlines, p: [f32; 3]) -> Option<[f32; 3]> {
 const ROOMS: usize = 8;
 /// Least distance of a photographer from walls. [Units: wu]
 const ELBOW: f32 = 0.3;
+/// Size of the pictures by which views are compared. [Units: px]
+const SMALL: [u32; 2] = [48, 27];
 /// Directions probed for the longest view.
 const HEADINGS: usize = 24;
 
@@ -49,8 +54,8 @@ const HEADINGS: usize = 24;
 pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderError> {
     let lines = Sightlines::build(world);
     let mut best = (f32::NEG_INFINITY, overview(studio));
-    for (id, cell, worth) in rooms(world) {
-        let objects = objects_in(studio, world, id);
+    for (id, cell, worth) in rooms(&studio.sight, world) {
+        let objects = objects_in(&studio.sight, world, id);
         for eye in corners(&studio.sight, &lines, id, cell) {
             for toward in headings(&lines, cell, eye, &objects) {
                 let camera = Camera {
@@ -58,7 +63,7 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
                     toward,
                     fov_y: PHOTO_FOV,
                 };
-                let score = interest(studio, &camera)? + 0.5 * worth.ln_1p();
+                let score = interest(studio, world, &camera)? + 0.5 * worth.ln_1p();
                 if score > best.0 {
                     best = (score, camera);
                 }
@@ -68,18 +73,25 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
     Ok(best.1)
 }
 
+/// Returns the details that are no door leaves.
+fn furniture<'a>(sight: &'a Sight, world: &'a World) -> impl Iterator<Item = &'a DetailObject> {
+    let is_leaf = |k: u32| sight.portals_of(DetailId(k)).next().is_some();
+    let numbered = (0..).zip(&world.details);
+    numbered.filter(move |(k, _)| !is_leaf(*k)).map(|(_, d)| d)
+}
+
 /// The centers of the objects that stand in a room.
-fn objects_in(studio: &Studio, world: &World, id: CellId) -> Vec<[f32; 3]> {
-    let here = world.details.iter().filter(|d| d.cells.contains(&id));
+fn objects_in(sight: &Sight, world: &World, id: CellId) -> Vec<[f32; 3]> {
+    let here = furniture(sight, world).filter(|d| d.cells.contains(&id));
     here.map(|d| [d.transform[12], d.transform[13], d.transform[14]])
-        .filter(|&p| studio.sight.locate([p[0], p[1] + 0.3, p[2]]) == Some(id))
+        .filter(|&p| sight.locate([p[0], p[1] + 0.3, p[2]]) == Some(id))
         .collect()
 }
 
 /// The rooms with the most floor, with their worth: floor area, increased by each object.
-fn rooms(world: &World) -> Vec<(CellId, &Cell, f32)> {
+fn rooms<'w>(sight: &Sight, world: &'w World) -> Vec<(CellId, &'w Cell, f32)> {
     let mut objects = vec![0_u32; world.graph.cells.len()];
-    for cell in world.details.iter().flat_map(|d| &d.cells) {
+    for cell in furniture(sight, world).flat_map(|d| &d.cells) {
         objects[cell.idx()] += 1;
     }
     let worth = |id: CellId, cell: &Cell| {
@@ -203,15 +215,20 @@ fn overview(studio: &Studio) -> Camera {
 
 /// The interest of a picture: objects above all, openings of the room, depth; less if something is right before the
 /// eye.
-fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
-    const SMALL: [u32; 2] = [48, 27];
+fn interest(studio: &mut Studio, world: &World, camera: &Camera) -> Result<f32, RenderError> {
     let [solid, _] = studio.ids(camera, Culling::Portals, SMALL)?;
     let (mut walls, mut objects) = (Vec::new(), Vec::new());
+    let mut shut = BTreeSet::new();
     let (mut near, mut sky, mut cropped, mut depths) = (0_u32, 0_u32, 0_u32, Vec::new());
     for (i, (shown, depth)) in (0_u32..).zip(&solid.pixels) {
         let [x, y] = [i % SMALL[0], i / SMALL[0]];
         let is_edge = x == 0 || y == 0 || x + 1 == SMALL[0] || y + 1 == SMALL[1];
-        let is_object = matches!(shown, PixelContent::Detail { .. });
+        let leaf_of = match *shown {
+            PixelContent::Plug { portal } => Some(portal),
+            PixelContent::Detail { detail, .. } => studio.sight.portals_of(DetailId(detail)).next(),
+            _ => None,
+        };
+        let is_object = matches!(shown, PixelContent::Detail { .. }) && leaf_of.is_none();
         cropped += u32::from(is_edge && is_object);
         match *shown {
             PixelContent::Sky => sky += 1,
@@ -219,9 +236,13 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
                 let chunk = studio.world.chunk_of_triangle(triangle);
                 walls.push(chunk.and_then(|c| studio.world.batch_of_chunk(c)));
             }
-            PixelContent::Detail { detail, .. } => objects.push(detail),
             // A shut door is as dull as a wall.
-            PixelContent::Plug { .. } => walls.push(None),
+            _ if leaf_of.is_some() => {
+                walls.push(None);
+                shut.extend(leaf_of);
+            }
+            PixelContent::Detail { detail, .. } => objects.push(detail),
+            PixelContent::Plug { .. } => {}
         }
         if *depth > 0.0 {
             let distance = Camera::distance_of(*depth);
@@ -241,9 +262,22 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     // Openings of a few pixels are not visible as such.
     let is_wide = |r: [f32; 4]| (r[2] - r[0]) * (r[3] - r[1]) > 0.01;
-    let openings = (seen.visits().iter())
-        .filter(|v| v.via.is_some() && is_wide(v.rectangle))
-        .count();
+    let mut reached: BTreeSet<CellId> = BTreeSet::new();
+    let mut openings = 0;
+    for visit in seen.visits() {
+        // What lies behind a shut door is not in the picture, whatever lets see it.
+        let is_open = visit.via.is_none_or(|via| {
+            let from = world.graph[via]
+                .cells
+                .into_iter()
+                .find(|&c| c != visit.cell);
+            !shut.contains(&via) && from.is_some_and(|from| reached.contains(&from))
+        });
+        if is_open {
+            reached.insert(visit.cell);
+            openings += usize::from(visit.via.is_some() && is_wide(visit.rectangle));
+        }
+    }
     let n = (SMALL[0] * SMALL[1]) as f32;
     let share = |count: u32| count as f32 / n;
     Ok(1.2 * (objects.len() as f32).ln_1p()
@@ -252,9 +286,55 @@ fn interest(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
         + 1.5 * depths.iter().sum::<f32>() / n
         + 1.5 * quarter
         + 2.0 * share(furnished).min(0.4)
+        + 15.0 * contrast(studio, camera)?
         - 5.0 * share(near)
+        - 8.0 * (largest_wall(camera, &solid.pixels) - 0.2).max(0.0)
         - 2.5 * (cropped as f32 / (2 * (SMALL[0] + SMALL[1])) as f32)
         - share(sky))
+}
+
+/// Returns the standard deviation of a picture's brightness: greater where the sun shines in. [0, 0.5]
+fn contrast(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
+    let style = Style {
+        dark_corners: false,
+        ..Style::default()
+    };
+    let picture = studio.picture(camera, Culling::Portals, style, &[], SMALL)?;
+    let brightness = |p: &[u8]| {
+        let [r, g, b] = [0, 1, 2].map(|k| f32::from(p[k]) / 255.0);
+        0.3 * r + 0.59 * g + 0.11 * b
+    };
+    let values: Vec<f32> = picture.rgba.chunks_exact(4).map(brightness).collect();
+    let mean = values.iter().sum::<f32>() / values.len() as f32;
+    let off = values.iter().map(|v| (v - mean).powi(2)).sum::<f32>();
+    Ok((off / values.len() as f32).sqrt())
+}
+
+/// Returns the share of a picture that its largest flat upright surface fills.
+fn largest_wall(camera: &Camera, pixels: &[(PixelContent, f32)]) -> f32 {
+    let [width, height] = SMALL.map(|n| n as usize);
+    let [right, up, forward] = camera.axes();
+    let tan = (camera.fov_y * 0.5).tan();
+    let point = |x: usize, y: usize| {
+        let depth = pixels[x + y * width].1;
+        let across = (x as f32 + 0.5 - 0.5 * width as f32) * 2.0 / height as f32;
+        let above = 1.0 - (y as f32 + 0.5) * 2.0 / height as f32;
+        let ray = forward + right * (across * tan) + up * (above * tan);
+        (depth > 0.0).then(|| ray * Camera::distance_of(depth))
+    };
+    let mut walls: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+    for (x, y) in (0..height - 1).flat_map(|y| (0..width - 1).map(move |x| (x, y))) {
+        let (Some(p), Some(q), Some(r)) = (point(x, y), point(x + 1, y), point(x, y + 1)) else {
+            continue;
+        };
+        let normal = (r - p).cross(q - p).normalize_or_zero();
+        if normal.y.abs() < 0.3 {
+            // Alike within a few degrees and half a meter.
+            let key = [normal.x * 8.0, normal.z * 8.0, normal.dot(p) * 2.0];
+            *walls.entry(key.map(|n| n.round() as i32)).or_default() += 1;
+        }
+    }
+    walls.into_values().max().unwrap_or(0) as f32 / pixels.len() as f32
 }
 
 /// A walk through the doorways of a world, one view per meter: points, each with the direction of walking.

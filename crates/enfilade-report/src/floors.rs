@@ -177,7 +177,7 @@ fn ask(world: &World, t: &Triangle, area: f64, is_level: bool, out: &mut Samples
 
 /// Assigns neighboring points of two lines to the cells above them, if there is headroom.
 fn ask_run(world: &World, run: &[DVec3], each: f64, is_level: bool, out: &mut Samples) {
-    // The corners of their hull: both ends of both lines.
+    // The vertices of their hull: both ends of both lines.
     let last = run.len() - 1;
     let ends = [0, last.min(1), last.saturating_sub(1), last].map(|k| run[k]);
     let hull = [JUST_ABOVE, HEADROOM].map(|up| ends.map(|p| p + DVec3::Y * up));

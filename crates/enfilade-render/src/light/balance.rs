@@ -29,7 +29,7 @@ const SUN: Vec3 = Vec3::new(3.2, 2.9, 2.4);
 /// Least light on walls: a room without daylight has its lamps on. Linear, in skies.
 const LAMP: f32 = 0.05;
 /// Color of that lamp.
-const LAMP_COLOR: Vec3 = Vec3::new(1.12, 0.99, 0.82);
+const LAMP_COLOR: Vec3 = Vec3::new(1.05, 1.0, 0.91);
 const ROUNDS: usize = 80;
 
 /// An opening of the graph for light.
