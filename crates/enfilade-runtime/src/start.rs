@@ -32,17 +32,34 @@ pub struct Start {
 
 impl Start {
     /// Finds a place near the middle of a room with many ways out, from where the way ahead is free for 3 m; if none of the
-    /// first rooms has one, that with the longest way. `None` for a world without cells.
+    /// first rooms has one, that with the longest way. Without rooms, takes the first cell; `None` for a world without cells.
     #[must_use]
     pub fn find(world: &World, sight: &Sight, state: &SightState) -> Option<Self> {
+        let mut rooms: Vec<CellId> = world.graph.rooms().map(|(id, _)| id).collect();
+        if rooms.is_empty() {
+            rooms.extend(world.graph.cell_ids().next());
+        }
+        Self::among(world, sight, state, &rooms, None)
+    }
+
+    /// Finds a place as [`Start::find`] does in one of these cells, on a floor at this height if there is one. Cells that do
+    /// not exist are ignored.
+    #[must_use]
+    pub fn among(
+        world: &World,
+        sight: &Sight,
+        state: &SightState,
+        cells: &[CellId],
+        floor: Option<f32>,
+    ) -> Option<Self> {
         let walk = Walk {
             world,
             sight,
             state,
         };
         let mut best: Option<(f32, Self)> = None;
-        for cell in walk.rooms() {
-            let eye = walk.place_in(cell);
+        for cell in walk.best_of(cells) {
+            let eye = walk.place_in(cell, floor);
             let (far, yaw) = walk.widest(eye);
             if best.is_none_or(|(most, _)| far > most) {
                 best = Some((far, Self { eye, yaw }));
@@ -62,28 +79,23 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Lists the rooms with the most ways out, the largest of equals first; the first cell if there are none.
-    fn rooms(&self) -> Vec<CellId> {
+    /// Lists the cells with the most ways out, the largest of equals first.
+    fn best_of(&self, cells: &[CellId]) -> impl Iterator<Item = CellId> {
         let graph = &self.world.graph;
         let ways = |cell: CellId| {
             let exits = graph.exits(cell).map(|exit| exit.portal);
             exits.filter(|portal| is_way(portal.kind)).count()
         };
-        let mut rooms: Vec<_> = (graph.rooms())
-            .map(|(id, cell)| (ways(id), cell.volume, id))
-            .collect();
-        rooms.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
-        let rooms = rooms.into_iter().map(|(.., id)| id).take(ROOMS);
-        let rooms: Vec<_> = rooms.collect();
-        if rooms.is_empty() {
-            return graph.cell_ids().take(1).collect();
-        }
-        rooms
+        let known = cells.iter().filter(|id| id.idx() < graph.cells.len());
+        let mut ranked: Vec<_> = known.map(|&id| (ways(id), graph[id].volume, id)).collect();
+        ranked.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
+        ranked.into_iter().map(|(.., id)| id).take(ROOMS)
     }
 
     /// Returns an eye near the middle of a cell, above its floor.
-    fn place_in(&self, cell: CellId) -> [f32; 3] {
-        let [low, high] = self.world.graph.cells[cell.idx()].aabb;
+    fn place_in(&self, cell: CellId, floor: Option<f32>) -> [f32; 3] {
+        let [low, high] = self.world.graph[cell].aabb;
+        let height = floor.unwrap_or(low[1]) + EYE;
         let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
         // A low-discrepancy sequence (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018): the same
         // places each time.
@@ -93,7 +105,7 @@ impl Walk<'_> {
         };
         let places = (0..PLACES).map(|i| {
             let (x, z) = (along(0, i, 0.754_877_666_2), along(2, i, 0.569_840_291));
-            [x, low[1] + EYE, z]
+            [x, height, z]
         });
         let away = |p: &[f32; 3]| (p[0] - middle[0]).hypot(p[2] - middle[2]);
         let mut eye = places

@@ -25,16 +25,17 @@ const U32: u32 = 5125;
 
 /// Makes a model of what may be seen from the beginning of a walk in any direction: a GLB with `KHR_mesh_quantization`, one mesh
 /// for each material, without pictures and normals. Coordinates have 16 bits, so they are rounded to 0.4 mm over 50 m. `extras` of
-/// the scene have `eye` and `yaw`. Packed with zstd.
+/// the scene have `eye` and `yaw`. Packed with zstd. `None` for a world without cells.
 ///
 /// # Errors
 ///
-/// A world without cells, or that cannot be prepared for queries.
-pub fn first_picture(world: &World) -> Result<Vec<u8>, PackError> {
+/// A world that cannot be prepared for queries.
+pub fn first_picture(world: &World) -> Result<Option<Vec<u8>>, PackError> {
     let sight = Sight::build(world)?;
     let state = SightState::as_modeled(&sight);
-    let start = Start::find(world, &sight, &state);
-    let start = start.ok_or_else(|| damaged("a world without cells has no place to begin"))?;
+    let Some(start) = Start::find(world, &sight, &state) else {
+        return Ok(None);
+    };
     let mut viewer = Viewer::new(&sight);
     let view = View::around(start.eye).map_err(|e| damaged(e.to_string()))?;
     let seen = viewer.see(&sight, &state, &view);
@@ -55,7 +56,8 @@ pub fn first_picture(world: &World) -> Result<Vec<u8>, PackError> {
         }
     }
     let glb = soup.encode(world, &start);
-    zstd::bulk::compress(&glb, 19).map_err(|e| damaged(e.to_string()))
+    let packed = zstd::bulk::compress(&glb, 19);
+    packed.map(Some).map_err(|e| damaged(e.to_string()))
 }
 
 /// Triangles by material.

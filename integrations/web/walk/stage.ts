@@ -1,0 +1,40 @@
+// The scene, its lights, the camera and the canvas.
+import { AmbientLight, Color, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+
+/** All that is drawn, and what draws it. */
+export class Stage {
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(70, 1, 0.05, 500);
+  readonly renderer = new WebGLRenderer({ antialias: true });
+
+  constructor() {
+    const { scene, camera, renderer } = this;
+    scene.background = new Color(0xcfd6dd);
+    scene.add(new HemisphereLight(0xffffff, 0x8a7f72, 1.6), new AmbientLight(0xffffff, 0.4));
+    const lamp = new DirectionalLight(0xffffff, 1.1);
+    camera.add(lamp);
+    lamp.position.set(0.3, 0.6, 1);
+    scene.add(camera);
+    document.body.prepend(renderer.domElement);
+    const resize = (): void => {
+      renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+      renderer.setSize(innerWidth, innerHeight);
+      camera.aspect = innerWidth / innerHeight;
+      camera.updateProjectionMatrix();
+    };
+    addEventListener('resize', resize);
+    resize();
+  }
+
+  /** Draws what an eye sees. */
+  draw(eye: readonly [number, number, number], yaw: number, pitch: number): void {
+    this.aim(eye, yaw, pitch);
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /** Places the camera. */
+  aim(eye: readonly [number, number, number], yaw: number, pitch: number): void {
+    this.camera.position.set(...eye);
+    this.camera.rotation.set(pitch, yaw, 0, 'YXZ');
+  }
+}
