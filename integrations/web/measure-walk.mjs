@@ -59,6 +59,7 @@ export async function opened(own, address, link) {
   await devtools.send('Network.enable');
   if (link) await devtools.send('Network.emulateNetworkConditions', { offline: false, latency: LATENCY, downloadThroughput: PACE, uploadThroughput: PACE });
   const events = [];
+  // Times of the network and of the page begin at different moments.
   let origin;
   const note = (timestamp, bytes, requests) => events.push({ at: timestamp, bytes, requests });
   // What of an answer has come so far; its end tells the exact size, with headers.
@@ -67,9 +68,9 @@ export async function opened(own, address, link) {
     note(timestamp, bytes, 0);
     soFar.set(id, (soFar.get(id) ?? 0) + bytes);
   };
-  devtools.on('Network.requestWillBeSent', ({ requestId, timestamp, request }) => {
+  devtools.on('Network.requestWillBeSent', ({ requestId, timestamp, wallTime, request }) => {
     if (!request.url.startsWith('http') || request.url.endsWith('/favicon.ico')) return;
-    origin ??= timestamp;
+    origin ??= 1000 * (wallTime - timestamp);
     soFar.set(requestId, 0);
     note(timestamp, 0, 1);
   });
@@ -80,9 +81,9 @@ export async function opened(own, address, link) {
   await tab.addInitScript(watch);
   await tab.goto(address);
   await tab.waitForFunction(() => globalThis.times.view !== undefined, undefined, { timeout: 120_000 });
-  const times = await tab.evaluate(() => globalThis.times);
+  const { times, began } = await tab.evaluate(() => ({ times: globalThis.times, began: performance.timeOrigin }));
   const until = Object.fromEntries(Object.entries(times).map(([name, ms]) => {
-    const before = events.filter(({ at }) => (at - origin) * 1000 <= ms);
+    const before = events.filter(({ at }) => 1000 * at + origin - began <= ms);
     const sum = (key) => before.reduce((total, event) => total + event[key], 0);
     return [name, { ms, bytes: sum('bytes'), requests: sum('requests') }];
   }));

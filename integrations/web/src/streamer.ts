@@ -241,10 +241,12 @@ export class Streamer {
     }
     // What has come is put to use before more is asked for.
     if (now < this.pauseUntil || this.waiting > 16 * this.options.maxRequest) return;
-    // What is on its way shares the link: the own room comes alone, then the view, then what may be seen soon.
+    // What is on its way shares the link: the own room comes alone, then the view, then what may be seen soon. Where little is
+    // on its way, the link would wait for the next request.
     let isWaiting = false;
     for (let i = 0; i < this.order.length; i++) {
-      if (isWaiting && (i === this.ownRoom || i === this.inView)) return;
+      const isNext = i === this.ownRoom || i === this.inView;
+      if (isWaiting && isNext && this.counts.inFlightBytes > this.options.maxGap) return;
       if (this.requests.size >= this.options.maxInFlight) return;
       const piece = this.order[i]!;
       if (this.state[piece] === ABSENT) this.request(piece);
