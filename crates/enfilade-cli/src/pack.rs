@@ -29,8 +29,8 @@ pub(crate) struct Pack {
     /// Write one file instead of a folder, for servers of ranges.
     #[arg(long)]
     one_file: bool,
-    /// Also write a first-person walk for the browser, which loads what comes into view: index.html in the folder, or
-    /// NAME-walk.html beside the file. Any server of files will do, such as `enfilade serve`.
+    /// Also write a first-person walk for the browser, which loads what comes into view: index.html and its parts in the folder,
+    /// or NAME-walk.html beside the file. Any server of files will do, such as `enfilade serve`.
     #[arg(long)]
     walk: bool,
     /// Print JSON for machines.

@@ -52,15 +52,15 @@ impl Start {
         cells: &[CellId],
         floor: Option<f32>,
     ) -> Option<Self> {
-        let walk = Walk {
+        let seeker = Seeker {
             world,
             sight,
             state,
         };
         let mut best: Option<(f32, Self)> = None;
-        for cell in walk.best_of(cells) {
-            let eye = walk.place_in(cell, floor);
-            let (far, yaw) = walk.widest(eye);
+        for cell in seeker.best_of(cells) {
+            let eye = seeker.place_in(cell, floor);
+            let (far, yaw) = seeker.widest(eye);
             if best.is_none_or(|(most, _)| far > most) {
                 best = Some((far, Self { eye, yaw }));
             }
@@ -72,13 +72,13 @@ impl Start {
     }
 }
 
-struct Walk<'a> {
+struct Seeker<'a> {
     world: &'a World,
     sight: &'a Sight,
     state: &'a SightState,
 }
 
-impl Walk<'_> {
+impl Seeker<'_> {
     /// Lists the cells with the most ways out, the largest of equals first.
     fn best_of(&self, cells: &[CellId]) -> impl Iterator<Item = CellId> {
         let graph = &self.world.graph;
@@ -181,7 +181,7 @@ mod tests {
             (start.eye[1] - room.aabb[0][1] - EYE).abs() < 0.1,
             "{start:?}"
         );
-        let walk = Walk {
+        let seeker = Seeker {
             world: &world,
             sight: &sight,
             state: &state,
@@ -191,9 +191,9 @@ mod tests {
             [x - far * start.yaw.sin(), y, z - far * start.yaw.cos()]
         };
         assert!(
-            (0..6_u16).all(|i| walk.passes(at(f32::from(i) * STEP), at(f32::from(i + 1) * STEP)))
+            (0..6_u16).all(|i| seeker.passes(at(f32::from(i) * STEP), at(f32::from(i + 1) * STEP)))
         );
-        assert!(walk.widest(start.eye).0 >= ENOUGH);
+        assert!(seeker.widest(start.eye).0 >= ENOUGH);
     }
 
     #[test]

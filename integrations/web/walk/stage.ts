@@ -7,6 +7,9 @@ export class Stage {
   readonly camera = new PerspectiveCamera(70, 1, 0.05, 500);
   readonly renderer = new WebGLRenderer({ antialias: true });
 
+  /** The pose that was drawn last. */
+  private drawn = '';
+
   constructor() {
     const { scene, camera, renderer } = this;
     scene.background = new Color(0xcfd6dd);
@@ -26,15 +29,17 @@ export class Stage {
     resize();
   }
 
-  /** Draws what an eye sees. */
-  draw(eye: readonly [number, number, number], yaw: number, pitch: number): void {
-    this.aim(eye, yaw, pitch);
-    this.renderer.render(this.scene, this.camera);
-  }
-
   /** Places the camera. */
   aim(eye: readonly [number, number, number], yaw: number, pitch: number): void {
     this.camera.position.set(...eye);
     this.camera.rotation.set(pitch, yaw, 0, 'YXZ');
+  }
+
+  /** Draws what does not move by itself: the same picture again would take time from what is on its way. */
+  drawIfMoved(): void {
+    const { position, rotation } = this.camera;
+    const pose = [...position, ...rotation, innerWidth, innerHeight].join();
+    if (pose !== this.drawn) this.renderer.render(this.scene, this.camera);
+    this.drawn = pose;
   }
 }

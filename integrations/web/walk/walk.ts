@@ -51,13 +51,12 @@ async function begin(stage: Stage, controls: Controls): Promise<FirstPicture | u
   if (!first) return undefined;
   controls.yaw = first.yaw;
   await new Promise<void>((shown) => {
-    let drawn = '';
+    let isDrawn = false;
     stage.renderer.setAnimationLoop(() => {
-      // The same picture again would take time from what is on its way.
-      const wanted = `${controls.yaw} ${controls.pitch} ${innerWidth} ${innerHeight}`;
-      if (drawn !== '') shown();
-      if (drawn !== wanted) stage.draw(first.eye, controls.yaw, controls.pitch);
-      drawn = wanted;
+      if (isDrawn) shown();
+      stage.aim(first.eye, controls.yaw, controls.pitch);
+      stage.drawIfMoved();
+      isDrawn = true;
     });
   });
   performance.mark('first room');
@@ -138,7 +137,8 @@ async function main(): Promise<void> {
     const counts = streamed ? streamed.update(camera, now) : undefined;
     if (!streamed) culler.update(camera);
     follow(streamed?.streamer.settled ?? true, counts ? 1 - counts.late / Math.max(1, counts.wanted) : 1);
-    renderer.render(scene, camera);
+    if (first) stage.drawIfMoved();
+    else renderer.render(scene, camera);
     sinceText += seconds;
     if (sinceText < 0.15) return;
     sinceText = 0;
