@@ -21,7 +21,7 @@ function row(name, scene, value, bar, more = {}) {
 
 const wasm = readFileSync(at('dist/enfilade.wasm'));
 row('web module, kB gzipped', 'enfilade.wasm', gzipSync(wasm, { level: 9 }).length / 1000, undefined, { kB: wasm.length / 1000 });
-row('web walk page, kB', 'walk.html', statSync(at('dist/walk.html')).size / 1000);
+for (const name of ['code', 'module']) row(`web walk, kB of its ${name}`, 'demo', statSync(at(`dist/walk/walk-${name}.bin`)).size / 1000);
 
 for (const name of names) {
   const world = await World.open(readFileSync(`${folder}/${name}.glb`));

@@ -4,13 +4,15 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
+use enfilade::cpg::wire::decode_glb;
 use enfilade::geom::shown;
-use enfilade::stream::{HEAD, PackedPlace, PackedWorld};
+use enfilade::stream::{HEAD, PackedPlace, PackedWorld, first_picture};
 use enfilade::whole;
-use enfilade_report::walk_html;
+use enfilade_report::WalkPage;
 
 use crate::formats::Format;
 use crate::output::{Outputs, Written, check_folder, write_whole};
+use crate::report::title_of;
 use crate::screen::print_json;
 use crate::walk_page;
 use enfilade_cli::input::{name_of, read};
@@ -27,8 +29,8 @@ pub(crate) struct Pack {
     /// Write one file instead of a folder, for servers of ranges.
     #[arg(long)]
     one_file: bool,
-    /// Also write a first-person walk for the browser, which loads what comes into view: index.html in the folder, or
-    /// NAME-walk.html beside the file. Any server of files will do, such as `enfilade serve`.
+    /// Also write a first-person walk for the browser, which loads what comes into view: index.html and its parts in the folder,
+    /// or NAME-walk.html beside the file. Any server of files will do, such as `enfilade serve`.
     #[arg(long)]
     walk: bool,
     /// Print JSON for machines.
@@ -74,24 +76,25 @@ pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
     }
     let glb = read(&args.input)?;
     let packed = PackedWorld::pack(&glb).with_context(|| name_of(&args.input))?;
-    // The page is in the folder of its world.
-    let index = args
-        .walk
-        .then(|| ("index.html", walk_html("./").into_bytes()));
     if args.one_file {
         write_whole(&args.output, &packed.one_file()?)?;
         if args.walk {
-            walk_page::write(&walk_page::beside(&args.output)?, &args.output)?;
+            let page = walk_page::beside(&args.output)?;
+            let walk = walk(args, walk_page::address(&page, &args.output)?, &glb)?;
+            write_whole(&page, walk.html().as_bytes())?;
         }
     } else {
-        whole::write_folder(&args.output, packed.files()?.into_iter().chain(index)).with_context(
-            || {
-                format!(
-                    "cannot write {}; choose another place, or free space there",
-                    args.output.display()
-                )
-            },
-        )?;
+        let mut files = packed.files()?.to_vec();
+        if args.walk {
+            // The page is in the folder of its world.
+            files.extend(walk(args, "./".into(), &glb)?.files());
+        }
+        whole::write_folder(&args.output, files).with_context(|| {
+            format!(
+                "cannot write {}; choose another place, or free space there",
+                args.output.display()
+            )
+        })?;
     }
     let head = packed.head.encode()?.len() as u64;
     let sizes = packed.head.catalog.pieces();
@@ -124,6 +127,14 @@ pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
     )?;
     writeln!(out, "wrote {}", shown(&report.file))?;
     Ok(())
+}
+
+/// Returns the walk through the world at an address, with its first picture.
+fn walk(args: &Pack, address: String, glb: &[u8]) -> anyhow::Result<WalkPage> {
+    let world = decode_glb(glb)?;
+    let mut walk = walk_page::of(address, title_of(&args.input), &world)?;
+    walk.first = first_picture(&world)?;
+    Ok(walk)
 }
 
 pub(crate) fn unpack_world(args: &Unpack) -> anyhow::Result<()> {

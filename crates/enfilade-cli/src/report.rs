@@ -111,7 +111,7 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     }
     let page = report_html(&world, &parts);
     if let Some(walk) = &walk {
-        walk_page::write(walk, &args.world)?;
+        walk_page::write(walk, &args.world, parts.title.clone(), &world)?;
     }
     write_whole(&args.output, page.as_bytes())?;
     let written = Written::new(&args.output, page.as_bytes());
@@ -127,7 +127,8 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
 }
 
 /// Returns the name of a file in words: `town-hall_2.glb` is `Town hall 2`.
-fn title_of(path: &Path) -> String {
+/// Returns a title for people by the name of a file.
+pub(crate) fn title_of(path: &Path) -> String {
     if is_stream(path) {
         return "World".into();
     }

@@ -4,7 +4,9 @@ use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade_report::walk_html;
+use enfilade::runtime::Start;
+use enfilade::{Sight, SightState, World};
+use enfilade_report::{WalkPage, WalkStorey, find_storeys};
 
 use crate::output::write_whole;
 use enfilade_cli::input::is_stream;
@@ -23,13 +25,36 @@ pub(crate) fn address_of_page(page: &Path) -> String {
     encoded(&page.file_name().unwrap_or_default().to_string_lossy())
 }
 
-/// Writes the page of a walk through a world.
-pub(crate) fn write(page: &Path, world: &Path) -> anyhow::Result<()> {
-    write_whole(page, walk_html(&address(page, world)?).as_bytes())
+/// Writes the page of a walk through a world file, with all parts inside.
+pub(crate) fn write(page: &Path, at: &Path, title: String, world: &World) -> anyhow::Result<()> {
+    let walk = of(address(page, at)?, title, world)?;
+    write_whole(page, walk.html().as_bytes())
+}
+
+/// Returns the walk through a world at an address, with a place on each storey to choose.
+pub(crate) fn of(address: String, title: String, world: &World) -> anyhow::Result<WalkPage> {
+    let sight = Sight::build(world)?;
+    let state = SightState::as_modeled(&sight);
+    let storeys = find_storeys(world).into_iter().filter(|s| !s.is_between);
+    let storeys = storeys.filter_map(|storey| {
+        let floor = Some(storey.floor as f32);
+        let start = Start::among(world, &sight, &state, &storey.cells, floor)?;
+        Some(WalkStorey {
+            name: storey.name,
+            eye: start.eye,
+            yaw: start.yaw,
+        })
+    });
+    Ok(WalkPage {
+        world: address,
+        title,
+        storeys: storeys.collect(),
+        first: None,
+    })
 }
 
 /// Returns the address of a world, relative to a page: of a file or a folder, or as it is if it is on a server.
-fn address(page: &Path, world: &Path) -> anyhow::Result<String> {
+pub(crate) fn address(page: &Path, world: &Path) -> anyhow::Result<String> {
     if is_stream(world) {
         bail!(
             "--walk opens the world again in the browser, so it cannot be '-'; give a file's name"

@@ -68,10 +68,11 @@ fn a_packed_world_unpacks_to_the_same_bytes() {
 #[test]
 fn a_walk_opens_the_world_beside_its_page() {
     let dir = folder("walk");
-    let world_of = |page: &str| {
+    let made = |page: &str| -> serde_json::Value {
         let page = fs::read_to_string(dir.join(page)).unwrap();
-        let start = page.find("data-world=\"").unwrap() + "data-world=\"".len();
-        page[start..].split('"').next().unwrap().to_owned()
+        let start = page.find("data-walk=\"").unwrap() + "data-walk=\"".len();
+        let text = page[start..].split('"').next().unwrap();
+        serde_json::from_str(&text.replace("&quot;", "\"")).unwrap()
     };
     for (line, page, world) in [
         ("pack w.glb -o w.enf --walk", "w.enf/index.html", "./"),
@@ -88,13 +89,22 @@ fn a_walk_opens_the_world_beside_its_page() {
     ] {
         let (is_done, _, err) = run(&dir, line);
         assert!(is_done, "{line}: {err}");
-        assert_eq!(world_of(page), world, "{line}");
+        let made = made(page);
+        assert_eq!(made["page"]["world"], world, "{line}");
+        assert_eq!(made["hasFirst"], page != "r-walk.html", "{line}");
+        let storeys = made["page"]["storeys"].as_array().unwrap();
+        assert!(!storeys.is_empty() && storeys[0]["name"] == "1", "{line}");
     }
     assert!(
         fs::read_to_string(dir.join("r.html"))
             .unwrap()
             .contains("href=\"r-walk.html\"")
     );
+    assert_eq!(made("w.enf/index.html")["page"]["title"], "W");
+    let size = |name: &str| fs::metadata(dir.join("w.enf").join(name)).unwrap().len();
+    let first = ["index.html", "walk-code.bin", "walk-first.bin"].map(size);
+    assert!(first.iter().sum::<u64>() < 300_000, "{first:?}");
+    assert!(size("walk-module.bin") > 100_000);
     // The page is not a part of the world.
     let (is_done, _, err) = run(&dir, "unpack w.enf -o back.glb");
     assert!(is_done, "{err}");

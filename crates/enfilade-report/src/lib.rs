@@ -58,4 +58,4 @@ pub use rooms::{RoomFacts, room_facts};
 pub use shapes::{PlanLabel, PlanShape};
 pub use storeys::{Storey, find_storeys};
 pub use verdict::{InputDoubt, Verdict, cells_in_words, is_empty, why_empty};
-pub use walk::walk_html;
+pub use walk::{WalkPage, WalkStorey};

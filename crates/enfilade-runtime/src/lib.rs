@@ -79,6 +79,7 @@ mod seen;
 mod sight;
 mod sight_error;
 mod sightline;
+mod start;
 mod state;
 mod view;
 
@@ -94,5 +95,6 @@ pub use seen::{ChunkId, DetailId, SeeCounts, Seen, Visit};
 pub use sight::{Sight, SightSkeleton, SkeletonError};
 pub use sight_error::SightError;
 pub use sightline::{SightHit, Sightlines};
+pub use start::Start;
 pub use state::{SavedDoors, SavedDoorsError, SightState};
 pub use view::{View, ViewError};

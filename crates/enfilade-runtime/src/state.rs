@@ -79,6 +79,18 @@ impl SightState {
         }
     }
 
+    /// Makes a state in which doors hide what is behind them if they are shut in the model.
+    #[must_use]
+    pub fn as_modeled(sight: &Sight) -> Self {
+        let mut state = Self::new(sight);
+        for portal in (0..sight.n_portals() as u32).map(PortalId) {
+            if let Some(share) = state.leaves(portal) {
+                state.set_leaves(portal, share);
+            }
+        }
+        state
+    }
+
     /// Makes a state of an empty world.
     pub(crate) fn new_empty() -> Self {
         Self {

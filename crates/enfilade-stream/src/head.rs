@@ -10,8 +10,8 @@ use crate::{Catalog, Piece, PieceId, WorldPieces, images_of};
 /// First bytes of a head.
 const MAGIC: [u8; 8] = *b"enfpack\0";
 
-/// Version of packed worlds that this program writes and reads.
-const VERSION: u32 = 1;
+/// Version of packed worlds that this program writes. It reads version 1, too, in which pieces lie in the order of their ids.
+const VERSION: u32 = 2;
 
 /// Bytes before the compressed body: magic, version, sizes and hash of the body.
 const FRONT: usize = 8 + 4 + 8 + 8 + 16;
@@ -46,7 +46,7 @@ pub enum PackError {
     NotPacked,
     /// A packed world of another version.
     #[error(
-        "this packed world has version {0}, but this program reads version {VERSION}; pack the world again"
+        "this packed world has version {0}, but this program reads versions up to {VERSION}; pack the world again"
     )]
     Version(u32),
     /// Damage.
@@ -117,11 +117,13 @@ struct Listed {
 }
 
 impl Listed {
-    /// Checks that the pieces lie one after the other, are those into which the world falls, and that each cell lists all that
+    /// Checks that the pieces lie one after the other, in any order, are those into which the world falls, and that each cell lists all that
     /// the head knows it needs: only the pictures of objects depend on triangles.
     fn check(&self, world: &World) -> Result<(), PackError> {
+        let mut places: Vec<_> = self.pieces.iter().map(|[at, n, _]| (*at, *n)).collect();
+        places.sort_unstable();
         let mut end = Some(0_u64);
-        for [offset, n_packed, _] in &self.pieces {
+        for (offset, n_packed) in &places {
             if end != Some(*offset) {
                 return Err(damaged("its pieces do not lie one after the other"));
             }
@@ -228,7 +230,7 @@ impl PackedHead {
             return Err(PackError::NotPacked);
         }
         let version = u32::from_le_bytes([front[8], front[9], front[10], front[11]]);
-        if version != VERSION {
+        if !(1..=VERSION).contains(&version) {
             return Err(PackError::Version(version));
         }
         let n = word(front, 12).saturating_add(FRONT as u64);

@@ -8,6 +8,7 @@ mod bound;
 mod catalog;
 mod deadlines;
 mod files;
+mod first_picture;
 mod head;
 #[cfg(feature = "http")]
 mod http;
@@ -22,6 +23,7 @@ mod threads;
 pub use bound::{Due, deadlines, due_times, least_bandwidth};
 pub use catalog::{Catalog, Piece, PieceId};
 pub use files::{FileFetch, HEAD, PackedFiles};
+pub use first_picture::first_picture;
 pub use head::{PackError, PackedHead, PieceAt};
 #[cfg(feature = "http")]
 pub use http::{HttpFetch, PackedHttp};

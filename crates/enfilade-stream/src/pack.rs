@@ -1,8 +1,8 @@
 //! World file → packed world, and back.
 
-use enfilade_cpg::CellId;
 use enfilade_cpg::wire::{SplitFile, join_file, split_file};
-use enfilade_runtime::{Sight, SightSkeleton};
+use enfilade_cpg::{CellId, PortalKind};
+use enfilade_runtime::{Sight, SightSkeleton, SightState, Start};
 
 use crate::head::{
     PackError, PackedHead, PieceAt, compressed_piece, damaged, expanded_piece, hash_of,
@@ -32,11 +32,11 @@ impl PackedWorld {
             rest,
         } = Divided::of(file)?;
         let mut body = Vec::new();
-        let mut sizes = Vec::new();
-        for piece in &pieces {
-            let (at, n_packed) = push(&mut body, &compressed_piece(piece)?);
-            head.places.push(at);
-            sizes.push(n_packed);
+        let mut sizes = vec![0; pieces.len()];
+        head.places = vec![NOWHERE; pieces.len()];
+        for piece in in_order_of_a_walk(&head)? {
+            let packed = compressed_piece(&pieces[piece.idx()])?;
+            (head.places[piece.idx()], sizes[piece.idx()]) = push(&mut body, &packed);
         }
         let mut sized = (rest.len() as u64).to_le_bytes().to_vec();
         sized.extend(compressed_piece(&rest)?);
@@ -150,6 +150,44 @@ impl PackedHead {
     }
 }
 
+/// Place of what is not packed yet.
+const NOWHERE: PieceAt = PieceAt {
+    offset: 0,
+    hash: [0; 16],
+};
+
+/// Lists all pieces as they lie in the body: those of the room in which a walk begins, then those of the rooms on a tour from
+/// there through open ways and doors, at last those of no room. So what is seen from a place lies in few ranges.
+fn in_order_of_a_walk(head: &PackedHead) -> Result<Vec<PieceId>, PackError> {
+    let graph = &head.world.graph;
+    let sight = head.sight()?;
+    let start = Start::find(&head.world, &sight, &SightState::as_modeled(&sight));
+    let first = start.and_then(|start| sight.locate(start.eye));
+    // The outdoors need most pieces, so they come last.
+    let mut is_passed: Vec<bool> = graph.cells.iter().map(|cell| cell.outdoor).collect();
+    let mut cells = Vec::new();
+    for root in first.into_iter().chain(graph.cell_ids()) {
+        let mut open = vec![root];
+        while let Some(cell) = open.pop() {
+            if std::mem::replace(&mut is_passed[cell.idx()], true) {
+                continue;
+            }
+            cells.push(cell);
+            let ways = graph
+                .exits(cell)
+                .filter(|exit| matches!(exit.portal.kind, PortalKind::Open | PortalKind::Door));
+            open.extend(ways.map(|exit| exit.to));
+        }
+    }
+    let all = (0..head.catalog.pieces().len() as u32).map(PieceId);
+    let of_cells = cells.iter().flat_map(|c| head.catalog.pieces_of(*c));
+    let mut is_listed = vec![false; all.len()];
+    let listed = of_cells.copied().chain(all);
+    Ok(listed
+        .filter(|piece| !std::mem::replace(&mut is_listed[piece.idx()], true))
+        .collect())
+}
+
 /// A world file in pieces, and all of its head but what depends on the compression.
 struct Divided {
     head: PackedHead,
@@ -176,16 +214,12 @@ impl Divided {
             n_packed: 0,
             n_resident: piece.len() as u64,
         });
-        let nowhere = PieceAt {
-            offset: 0,
-            hash: [0; 16],
-        };
         let head = PackedHead {
             world: SightSkeleton::hollow(&world),
             skeleton,
             catalog: Catalog::new(sizes.collect(), &rows),
             places: Vec::new(),
-            rest: nowhere,
+            rest: NOWHERE,
             rest_packed: 0,
             file: (file.len() as u64, hash_of(file)),
         };

@@ -408,6 +408,20 @@ typedef struct EnfList {
 } EnfList;
 
 /*
+ A place to begin a walk.
+ */
+typedef struct EnfStart {
+  /*
+   The eye, 1.6 m above the floor. [Units: m]
+   */
+  float eye[3];
+  /*
+   Direction in which the way is free farthest: 0 along -z, counter-clockwise seen from above. [Units: rad]
+   */
+  float yaw;
+} EnfStart;
+
+/*
  The end of a step.
  */
 typedef struct EnfStep {
@@ -707,6 +721,12 @@ int32_t enf_pvs_row(struct EnfWorld *handle,
  Returns the cell of a point (three numbers), or `ENF_NONE` in solid matter.
  */
 int32_t enf_locate(struct EnfWorld *handle, const float *point);
+
+/*
+ Finds a place to begin a walk, in a room with many ways out. Returns `ENF_NONE`, and writes nothing, in a world without cells.
+ */
+int32_t enf_start(struct EnfWorld *handle,
+                  struct EnfStart *out);
 
 /*
  Follows a step in a straight line from cell to cell.

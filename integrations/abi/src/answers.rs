@@ -256,6 +256,16 @@ pub struct EnfHit {
     pub portal: u32,
 }
 
+/// A place to begin a walk.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct EnfStart {
+    /// The eye, 1.6 m above the floor. [Units: m]
+    pub eye: [f32; 3],
+    /// Direction in which the way is free farthest: 0 along -z, counter-clockwise seen from above. [Units: rad]
+    pub yaw: f32,
+}
+
 /// The end of a step.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]

@@ -16,8 +16,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use enfilade_runtime::View;
 
 use crate::answers::{
-    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen, EnfStep,
-    EnfWhy,
+    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen, EnfStart,
+    EnfStep, EnfWhy,
 };
 use crate::handle::EnfWorld;
 use crate::last_error;
@@ -334,6 +334,13 @@ pub unsafe extern "C" fn enf_locate(handle: *mut EnfWorld, point: *const f32) ->
         let (world, point) = unsafe { (world(handle)?, numbers(point, "the point")?) };
         Ok(world.locate(point)?.map_or(ENF_NONE, |c| c as i32))
     })
+}
+
+/// Finds a place to begin a walk, in a room with many ways out. Returns `ENF_NONE`, and writes nothing, in a world without cells.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn enf_start(handle: *mut EnfWorld, out: *mut EnfStart) -> i32 {
+    // SAFETY: the pointers are those of the caller.
+    unsafe { describe_if_any(handle, out, EnfWorld::start, ENF_NONE) }
 }
 
 /// Follows a step in a straight line from cell to cell.

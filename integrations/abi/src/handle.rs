@@ -5,12 +5,13 @@ mod whys;
 use enfilade_cpg::wire::decode_glb;
 use enfilade_cpg::{CellId, MotionKind, PortalId, PortalKind, World};
 use enfilade_runtime::{
-    DetailId, Follower, Sight, SightSkeleton, SightState, Sightlines, Step, Target, View, Viewer,
+    DetailId, Follower, Sight, SightSkeleton, SightState, Sightlines, Start, Step, Target, View,
+    Viewer,
 };
 
 use crate::answers::{
     EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfFact, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen,
-    EnfStep, EnfVisit,
+    EnfStart, EnfStep, EnfVisit,
 };
 use crate::status as s;
 use crate::status::Failure;
@@ -337,6 +338,16 @@ impl EnfWorld {
     /// If it is not finite.
     pub fn locate(&self, p: [f32; 3]) -> Result<Option<u32>, Failure> {
         Ok(self.sight.locate(finite(p)?).map(|c| c.0))
+    }
+
+    /// Finds a place to begin a walk; `None` in a world without cells.
+    ///
+    /// # Errors
+    ///
+    /// Never.
+    pub fn start(&mut self) -> Result<Option<EnfStart>, Failure> {
+        let start = Start::find(&self.world, &self.sight, &self.state);
+        Ok(start.map(|Start { eye, yaw }| EnfStart { eye, yaw }))
     }
 
     /// Follows a step from cell to cell.

@@ -9,7 +9,7 @@ use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 use enfilade_abi::EnfWorld;
-use enfilade_abi::answers::EnfWhy;
+use enfilade_abi::answers::{EnfCell, EnfStart, EnfWhy};
 use enfilade_abi::ffi::*;
 use enfilade_abi::status::*;
 use enfilade_cpg::wire::encode_glb;
@@ -75,6 +75,8 @@ fn null_is_an_error_everywhere() {
             enf_pvs_row(null_mut(), 0, null_mut()),
             enf_locate(w, null()),
             enf_locate(null_mut(), p),
+            enf_start(null_mut(), null_mut()),
+            enf_start(w, null_mut()),
             enf_step(w, null(), p, null_mut()),
             enf_step(w, p, p, null_mut()),
             enf_set_openness(null_mut(), 0, 1.0),
@@ -91,7 +93,7 @@ fn null_is_an_error_everywhere() {
             enf_pick(w, null(), p, null_mut()),
         ]
     };
-    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 30]);
+    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 32]);
     assert!(last_error().contains("null"), "{}", last_error());
     // SAFETY: null is allowed.
     unsafe {
@@ -202,6 +204,21 @@ fn a_view_lists_the_eyes_own_cell_first_and_a_closed_door_hides_the_rest() {
         let after = seen.assume_init();
         assert_eq!(after.n_cells, 1);
         assert_eq!(*after.cells, cells[0]);
+    }
+}
+
+#[test]
+fn a_walk_begins_in_a_room() {
+    let Open(w) = &open();
+    let mut start = MaybeUninit::<EnfStart>::uninit();
+    // SAFETY: the pointers lead to enough values and to room for the answers, which are read after success only.
+    unsafe {
+        assert_eq!(enf_start(*w, start.as_mut_ptr()), 1);
+        let cell = enf_locate(*w, start.assume_init().eye.as_ptr());
+        assert!(cell >= 0);
+        let mut room = MaybeUninit::<EnfCell>::uninit();
+        assert_eq!(enf_cell(*w, cell as u32, room.as_mut_ptr()), 1);
+        assert_eq!(room.assume_init().kind, ENF_ROOM);
     }
 }
 

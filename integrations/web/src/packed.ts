@@ -71,7 +71,7 @@ export function headSize(bytes: Uint8Array): number {
     throw new Error('this is not a packed world: make one with `enfilade pack`');
   }
   const version = view.getUint32(8, true);
-  if (version !== 1) throw new Error(`this packed world has version ${version}, this package reads version 1`);
+  if (version !== 1 && version !== 2) throw new Error(`this packed world has version ${version}, this package reads 1 and 2`);
   return HEAD + Number(view.getBigUint64(12, true));
 }
 
@@ -128,18 +128,13 @@ export class PackedPlace {
     return place;
   }
 
-  /** Fetches pieces that lie side by side, from the first of them to the last; returns their bytes, piece by piece. */
-  async fetch(first: number, last: number, signal?: AbortSignal): Promise<Uint8Array[]> {
-    const { pieces } = this.head;
-    const from = pieces[first]![0];
-    const to = pieces[last]![0] + pieces[last]![1];
+  /** Fetches pieces in one request, with what lies between them; returns the bytes of each. */
+  async fetch(wanted: readonly number[], signal?: AbortSignal): Promise<Uint8Array[]> {
+    const places = wanted.map((piece) => this.head.pieces[piece]!);
+    const from = Math.min(...places.map(([offset]) => offset));
+    const to = Math.max(...places.map(([offset, packed]) => offset + packed));
     const bytes = await this.bytes(this.begin + from, to - from, signal);
-    const out: Uint8Array[] = [];
-    for (let i = first; i <= last; i++) {
-      const [offset, packed] = pieces[i]!;
-      out.push(bytes.subarray(offset - from, offset - from + packed));
-    }
-    return out;
+    return places.map(([offset, packed]) => bytes.subarray(offset - from, offset - from + packed));
   }
 
   private async bytes(from: number, n: number, signal?: AbortSignal): Promise<Uint8Array> {

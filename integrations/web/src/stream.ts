@@ -79,8 +79,8 @@ function geometryOf(piece: Piece, primitive: NonNullable<PieceJson['primitives']
 
 /** Options of a streamed world. */
 export interface StreamedOptions extends StreamOptions {
-  /** Where the module is, if it does not lie beside this package's code. */
-  wasm?: WasmSource;
+  /** Where the module is, if it does not lie beside this package's code; it may be on its way. */
+  wasm?: WasmSource | Promise<WasmSource>;
 }
 
 /** A packed world in a scene. Add `scene`, and call `update` every frame before rendering. */
@@ -115,7 +115,8 @@ export class StreamedWorld implements Receiver {
 
   /** Opens a packed world at an address; only its head is read. */
   static async open(address: string | URL, options: StreamedOptions = {}): Promise<StreamedWorld> {
-    const [runtime, place] = await Promise.all([Runtime.load(options.wasm), PackedPlace.open(address)]);
+    const load = async (): Promise<Runtime> => Runtime.load(await options.wasm);
+    const [runtime, place] = await Promise.all([load(), PackedPlace.open(address)]);
     const { hollow, skeleton } = place.head;
     const world = World.hollow(runtime, hollow, skeleton);
     const bytes = hollow.slice().buffer as ArrayBuffer;

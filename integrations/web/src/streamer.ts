@@ -9,11 +9,13 @@ export interface StreamOptions {
   maxResident?: number;
   /** Most requests on their way. 4. */
   maxInFlight?: number;
-  /** Most bytes of one request: pieces side by side come together. 256 kB. */
+  /** Most bytes of one request: pieces near each other come together. 256 kB. */
   maxRequest?: number;
+  /** Most bytes between two pieces of one request that are not wanted themselves. 16 kB: the time of an answer brings more. */
+  maxGap?: number;
   /** Distance on foot, in meters, within which what may be seen is fetched before it is in view; 0 for none. 12. */
   ahead?: number;
-  /** Milliseconds a frame for unpacking, the most needed first; one piece at least. 4. */
+  /** Milliseconds a frame for unpacking, the most needed first; a quarter of slow frames, and one piece at least. 4. */
   unpackTime?: number;
 }
 
@@ -71,6 +73,10 @@ export class Streamer {
   private pauseUntil = 0;
   private pause = 0;
   private readonly aheadOf = new Map<number, number[]>();
+  /** Pieces as they lie in the file, and the place of each in this list. */
+  private readonly laid: number[];
+  private readonly placeOf: Uint32Array;
+  private before = 0;
 
   constructor(
     readonly place: PackedPlace,
@@ -82,10 +88,15 @@ export class Streamer {
       maxResident: options.maxResident ?? 256e6,
       maxInFlight: options.maxInFlight ?? 4,
       maxRequest: options.maxRequest ?? 256e3,
+      maxGap: options.maxGap ?? 16e3,
       ahead: options.ahead ?? 12,
       unpackTime: options.unpackTime ?? 4,
     };
-    const n = place.head.pieces.length;
+    const { pieces } = place.head;
+    const n = pieces.length;
+    this.laid = Array.from(pieces.keys()).sort((a, b) => pieces[a]![0] - pieces[b]![0] || a - b);
+    this.placeOf = new Uint32Array(n);
+    this.laid.forEach((piece, i) => (this.placeOf[piece] = i));
     this.state = new Uint8Array(n);
     this.rank = new Uint32Array(n).fill(n);
     const none = { resident: 0, residentPieces: 0, inFlight: 0, inFlightBytes: 0, wanted: 0, late: 0 };
@@ -109,7 +120,8 @@ export class Streamer {
       this.plannedCell = seen.eyeCell;
       this.plan(seen);
     }
-    this.integrate();
+    this.integrate(Math.max(this.options.unpackTime, (now - this.before) / 4));
+    this.before = now;
     this.ask(now);
     const { counts } = this;
     counts.late = 0;
@@ -185,7 +197,7 @@ export class Streamer {
   }
 
   /** Unpacks what has arrived, and makes room for it. */
-  private integrate(): void {
+  private integrate(most: number): void {
     const begin = performance.now();
     while (this.arrived.length > 0) {
       let first = 0;
@@ -201,7 +213,7 @@ export class Streamer {
       this.state[piece] = RESIDENT;
       this.counts.resident += size;
       this.counts.residentPieces++;
-      if (performance.now() - begin > this.options.unpackTime) break;
+      if (performance.now() - begin > most) break;
     }
   }
 
@@ -229,10 +241,12 @@ export class Streamer {
     }
     // What has come is put to use before more is asked for.
     if (now < this.pauseUntil || this.waiting > 16 * this.options.maxRequest) return;
-    // What is on its way shares the link: the own room comes alone, then the view, then what may be seen soon.
+    // What is on its way shares the link: the own room comes alone, then the view, then what may be seen soon. Where little is
+    // on its way, the link would wait for the next request.
     let isWaiting = false;
     for (let i = 0; i < this.order.length; i++) {
-      if (isWaiting && (i === this.ownRoom || i === this.inView)) return;
+      const isNext = i === this.ownRoom || i === this.inView;
+      if (isWaiting && isNext && this.counts.inFlightBytes > this.options.maxGap) return;
       if (this.requests.size >= this.options.maxInFlight) return;
       const piece = this.order[i]!;
       if (this.state[piece] === ABSENT) this.request(piece);
@@ -246,19 +260,36 @@ export class Streamer {
     return rank < this.ownRoom ? 0 : rank < this.inView ? 1 : 2;
   }
 
-  /** Asks for a piece together with those beside it that are wanted too. */
-  private request(piece: number): void {
+  /** Lists a piece and those near it that are wanted as soon, with what is wanted later between them. */
+  private together(piece: number): number[] {
+    const { laid, options, rank, state } = this;
     const { pieces } = this.place.head;
-    const isWanted = (i: number): boolean => i >= 0 && i < pieces.length && this.state[i] === ABSENT && this.rank[i]! < pieces.length;
-    const isBeside = (a: number, b: number): boolean => pieces[a]![0] + pieces[a]![1] === pieces[b]![0];
-    let [first, last, bytes] = [piece, piece, pieces[piece]![1]];
     // What is needed sooner does not wait for what is needed later.
     const tier = this.tier(piece);
-    const fits = (i: number): boolean =>
-      isWanted(i) && this.tier(i) === tier && bytes + pieces[i]![1] <= this.options.maxRequest;
-    while (fits(last + 1) && isBeside(last, last + 1)) bytes += pieces[++last]![1];
-    while (fits(first - 1) && isBeside(first - 1, first)) bytes += pieces[--first]![1];
-    const own = Array.from({ length: last - first + 1 }, (_, i) => first + i);
+    const isWanted = (i: number): boolean => state[i] === ABSENT && rank[i]! < state.length;
+    let [first, last] = [this.placeOf[piece]!, this.placeOf[piece]!];
+    let [begin, end] = [pieces[piece]![0], pieces[piece]![0] + pieces[piece]![1]];
+    for (const step of [1, -1]) {
+      for (let at = this.placeOf[piece]! + step; at >= 0 && at < laid.length; at += step) {
+        const next = laid[at]!;
+        const [from, to] = [pieces[next]![0], pieces[next]![0] + pieces[next]![1]];
+        const isFar = step > 0 ? from - end > options.maxGap : begin - to > options.maxGap;
+        const [low, high] = [Math.min(begin, from), Math.max(end, to)];
+        if (isFar || high - low > options.maxRequest) break;
+        if (!isWanted(next) || this.tier(next) > tier) continue;
+        [begin, end] = [low, high];
+        if (step > 0) last = at;
+        else first = at;
+      }
+    }
+    return laid.slice(first, last + 1).filter(isWanted);
+  }
+
+  /** Asks for a piece together with those near it. */
+  private request(piece: number): void {
+    const { pieces } = this.place.head;
+    const own = this.together(piece);
+    const bytes = own.reduce((sum, i) => sum + pieces[i]![1], 0);
     const request: Request = { pieces: own, bytes, stop: new AbortController() };
     for (const i of own) this.state[i] = ASKED;
     this.requests.add(request);
@@ -267,7 +298,7 @@ export class Streamer {
       this.requests.delete(request);
       this.count();
     };
-    this.place.fetch(first, last, request.stop.signal).then(
+    this.place.fetch(own, request.stop.signal).then(
       (parts) => {
         end();
         this.pause = 0;

@@ -22,6 +22,7 @@ export interface Exports {
   enf_portals_of_detail(world: number, detail: number, out: number): number;
   enf_pvs_row(world: number, cell: number, out: number): number;
   enf_locate(world: number, point: number): number;
+  enf_start(world: number, out: number): number;
   enf_step(world: number, from: number, to: number, out: number): number;
   enf_set_openness(world: number, portal: number, share: number): number;
   enf_set_closed(world: number, portal: number, isClosed: number): number;

@@ -305,6 +305,15 @@ export class World {
     return this.cells[this.locate(point)];
   }
 
+  /** Finds a place to begin a walk, and the direction in which the way is free farthest: 0 along -z, counter-clockwise. */
+  start(): { eye: [number, number, number]; yaw: number } | undefined {
+    const { runtime, scratch } = this;
+    if (runtime.checked(runtime.exports.enf_start(this.handle, scratch + ANSWER)) !== 1) return undefined;
+    runtime.refresh();
+    const [x, y, z, yaw] = runtime.f32.subarray(this.answer, this.answer + 4) as unknown as [number, number, number, number];
+    return { eye: [x, y, z], yaw };
+  }
+
   /**
    * Lists the portals that a step in a straight line crosses, in order, at most 16; and the cell at its end, or -1.
    * `isRelocated` if the way does not lead to the end through portals, but through matter.

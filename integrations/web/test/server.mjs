@@ -14,7 +14,8 @@ export async function serve(folders, { pace = Infinity, latency = 0, ranges = tr
   const server = createServer(async (request, response) => {
     const url = new URL(request.url, 'http://x');
     const [, first, ...rest] = normalize(decodeURIComponent(url.pathname)).split('/');
-    const path = folders[first] && join(folders[first], ...rest);
+    const named = folders[first] && join(folders[first], ...rest);
+    const path = named && url.pathname.endsWith('/') ? join(named, 'index.html') : named;
     // Precise clocks, which measurements need, are given to isolated pages only.
     const headers = { 'Cross-Origin-Opener-Policy': 'same-origin', 'Cross-Origin-Embedder-Policy': 'require-corp' };
     if (!path || !existsSync(path) || !statSync(path).isFile()) return response.writeHead(404, headers).end();

@@ -1,7 +1,9 @@
 // Covers W1, W2 and W6 in the browser: a packed world over HTTP, piece by piece.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
-import { folder, worlds } from '../scripts/worlds.mjs';
+import { execFileSync } from 'node:child_process';
+import { opened, serving } from '../measure-walk.mjs';
+import { command, folder, worlds } from '../scripts/worlds.mjs';
 import { at, browser, page, visit } from './browser.mjs';
 import { serve } from './server.mjs';
 
@@ -42,7 +44,7 @@ test('the walk opens the packed world and the whole one beside it, walks, and op
     const walk = await own.newPage({ viewport: { width: 640, height: 400 } });
     const errors = [];
     walk.on('pageerror', (error) => errors.push(error.message));
-    await walk.goto(`${server.address}/web/dist/walk.html?world=/worlds/${name}`);
+    await walk.goto(`${server.address}/web/dist/walk/?world=/worlds/${name}`);
     await walk.waitForFunction(() => globalThis.walk?.culler.counts.cells > 0, undefined, { timeout: 60_000 });
     const at = () => walk.evaluate(() => [...globalThis.walk.walker.eye]);
     const begin = await at();
@@ -81,10 +83,96 @@ test('the walk opens the packed world and the whole one beside it, walks, and op
   }
 });
 
+/** Packs the demo house with its walk; returns the address of the page. */
+async function packedWalk(t, name, ...args) {
+  execFileSync(command, ['-q', 'pack', `${folder}/demo.glb`, '-o', `${folder}/${name}`, '--walk', ...args]);
+  const server = await serving(folder);
+  t.after(() => server.close());
+  return server.address;
+}
+
+test('the first picture of a packed walk comes in three requests, all that is in view in few more', async (t) => {
+  const address = await packedWalk(t, 'walk.enf');
+  const { tab, until, close } = await opened(own, `${address}/walk.enf/`, false);
+  // The page, its script, and the picture; then the module, the head, the own room, the view, and what may be seen soon.
+  assert.equal(until.room.requests, 3);
+  assert.ok(until.room.bytes < 300e3, JSON.stringify(until));
+  assert.ok(until.view.requests <= 10, JSON.stringify(until));
+  const [wanted, pieces] = await tab.evaluate(() => [globalThis.walk.streamed.streamer.counts.wanted, globalThis.walk.streamed.place.head.pieces.length]);
+  assert.ok(wanted > 10 && pieces > 20, `${wanted} pieces in view of ${pieces}`);
+  assert.equal(await tab.title(), 'Demo');
+  await close();
+});
+
+test('the first picture is that of the world without its textures, to the rounding of coordinates', async (t) => {
+  const address = await packedWalk(t, 'walk.enf');
+  const tab = await own.newPage({ viewport: { width: 320, height: 200 } });
+  // Without its head, the world does not come.
+  await tab.route('**/head.enfp', (route) => route.abort());
+  const shot = async () => {
+    await tab.addStyleTag({ content: 'body > :not(canvas:first-child) { display: none }' });
+    await tab.waitForTimeout(300);
+    return [...(await tab.screenshot())];
+  };
+  await tab.goto(`${address}/walk.enf/`);
+  await tab.waitForFunction(() => performance.getEntriesByName('first room').length > 0, undefined, { timeout: 60_000 });
+  const first = await shot();
+  await tab.unroute('**/head.enfp');
+  await tab.reload();
+  // What comes later may bring variants of materials.
+  const hasAll = () => globalThis.walk?.streamed.streamer.settled && globalThis.walk.streamed.streamer.counts.residentPieces > 0.9 * globalThis.walk.streamed.place.head.pieces.length;
+  await tab.waitForFunction(hasAll, undefined, { timeout: 60_000 });
+  await tab.evaluate(() => {
+    const { streamed, walker, world } = globalThis.walk;
+    streamed.scene.traverse(({ material }) => {
+      if (material?.map) [material.map, material.needsUpdate] = [null, true];
+    });
+    // A walker settles on the floor by a few centimeters.
+    walker.flies = true;
+    world.start().eye.forEach((v, k) => (walker.eye[k] = v));
+  });
+  const whole = await shot();
+  const shares = await tab.evaluate(async (pictures) => {
+    const pixels = await Promise.all(pictures.map(async (bytes) => {
+      const bitmap = await createImageBitmap(new Blob([new Uint8Array(bytes)], { type: 'image/png' }));
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      return context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+    }));
+    let [differing, colors] = [0, new Set()];
+    for (let i = 0; i < pixels[0].length; i += 4) {
+      colors.add(pixels[0].subarray(i, i + 3).join());
+      differing += [0, 1, 2].some((k) => Math.abs(pixels[0][i + k] - pixels[1][i + k]) > 8);
+    }
+    return { differing: (4 * differing) / pixels[0].length, colors: colors.size };
+  }, [first, whole]);
+  assert.ok(shares.differing < 0.01 && shares.colors > 20, JSON.stringify(shares));
+  await tab.close();
+});
+
+test('a walk in one page opens the packed file beside it, and its buttons lead to storeys', async (t) => {
+  const address = await packedWalk(t, 'one.enf', '--one-file');
+  const walk = await own.newPage({ viewport: { width: 640, height: 400 } });
+  await walk.goto(`${address}/one-walk.html`);
+  await walk.waitForFunction(() => globalThis.walk?.culler.counts.cells > 0, undefined, { timeout: 60_000 });
+  const buttons = await walk.locator('#storeys button').allTextContents();
+  assert.deepEqual(buttons.slice(0, 2), ['1', '2']);
+  const height = () => walk.evaluate(() => globalThis.walk.walker.eye[1]);
+  const heights = [];
+  for (const name of buttons.slice(0, 2)) {
+    await walk.getByRole('button', { name, exact: true }).click();
+    const isMarked = (name) => document.querySelector('[aria-pressed=true]')?.textContent === name;
+    await walk.waitForFunction(isMarked, name, { timeout: 30_000 });
+    heights.push(await height());
+  }
+  assert.ok(heights[1] > heights[0] + 2, heights.join());
+  await walk.close();
+});
+
 test('two thumbs walk and look, and a tap opens a door', async () => {
   const phone = await own.newContext({ viewport: { width: 400, height: 640 }, hasTouch: true, isMobile: true });
   const walk = await phone.newPage();
-  await walk.goto(`${server.address}/web/dist/walk.html?world=/worlds/demo.glb`);
+  await walk.goto(`${server.address}/web/dist/walk/?world=/worlds/demo.glb`);
   await walk.waitForFunction(() => globalThis.walk?.culler.counts.cells > 0, undefined, { timeout: 60_000 });
   const link = await phone.newCDPSession(walk);
   const touch = (type, x, y) => link.send('Input.dispatchTouchEvent', { type, touchPoints: type === 'touchEnd' ? [] : [{ x, y }] });

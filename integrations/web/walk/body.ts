@@ -1,5 +1,5 @@
 // The walker: stays out of walls by rooms and doorways, so that it needs no triangles.
-import type { Cell, World } from '../src/world.js';
+import type { World } from '../src/world.js';
 
 /** Height of the eye, in meters. */
 export const EYE = 1.6;
@@ -14,44 +14,6 @@ export class Walker {
     private readonly world: World,
     readonly eye: [number, number, number],
   ) {}
-
-  /** Places a walker in the middle of the room with the most ways out. */
-  static inMiddle(world: World): Walker {
-    const ways = (cell: Cell): number =>
-      cell.portals.filter((id) => ['door', 'open'].includes(world.portals[id]!.kind)).length;
-    const rooms = world.cells.filter((cell) => cell.kind === 'room');
-    rooms.sort((a, b) => ways(b) - ways(a) || b.volume - a.volume);
-    const cell = rooms[0] ?? world.cells[0]!;
-    const { aabb } = cell;
-    let best: [number, number, number] = [0, 1, 2].map((k) => (aabb[k]! + aabb[k + 3]!) / 2) as [number, number, number];
-    let nearest = Infinity;
-    const middle = [...best];
-    for (let i = 0; i < 4000; i++) {
-      // A low-discrepancy sequence: the same place each time.
-      const share = [0.7548776662, 0.5698402910, 0.1] as const;
-      const p = [0, 2, 1].map((axis, k) => aabb[axis]! + ((i * share[k]!) % 1) * (aabb[axis + 3]! - aabb[axis]!));
-      const eye: [number, number, number] = [p[0]!, aabb[1]! + EYE, p[1]!];
-      const away = Math.hypot(eye[0] - middle[0]!, eye[2] - middle[2]!);
-      if (away < nearest && world.locate(eye) === cell.id) [best, nearest] = [eye, away];
-    }
-    const walker = new Walker(world, best);
-    walker.fall(1);
-    return walker;
-  }
-
-  /** Returns the yaw of the direction, of 32, in which the way is free farthest at the height of the eye, up to 20 m. */
-  widestView(): number {
-    const { eye } = this;
-    let [best, farthest] = [0, 0];
-    for (let i = 0; i < 32; i++) {
-      const yaw = (i / 16) * Math.PI;
-      const at = (far: number): number[] => [eye[0] - far * Math.sin(yaw), eye[1], eye[2] - far * Math.cos(yaw)];
-      let far = 0;
-      while (far < 20 && this.passes(at(far), at(far + 0.5))) far += 0.5;
-      if (far > farthest) [best, farthest] = [yaw, far];
-    }
-    return best;
-  }
 
   /** Returns true if a body passes from one point to another. */
   private passes(from: number[], to: number[]): boolean {

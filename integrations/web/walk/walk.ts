@@ -1,21 +1,15 @@
 // A walk through a world in the browser: first person, with keyboard and mouse or by touch.
-import {
-  AmbientLight,
-  Color,
-  DirectionalLight,
-  HemisphereLight,
-  PerspectiveCamera,
-  Scene,
-  Vector3,
-  WebGLRenderer,
-} from 'three';
+import { Vector3, type Scene } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-import wasm from '../dist/enfilade.wasm';
 import { StreamedWorld } from '../src/stream.js';
 import { cullerOf, enfilade, type PortalCuller } from '../src/three.js';
 import { EYE, Walker } from './body.js';
 import { Controls } from './controls.js';
+import { removeFirst, showFirst, type FirstPicture } from './first.js';
+import { made, moduleOfWalk } from './made.js';
 import { RoomMap } from './map.js';
+import { Stage } from './stage.js';
+import { StoreyButtons } from './storeys.js';
 
 const element = (id: string): HTMLElement => document.getElementById(id)!;
 
@@ -27,18 +21,17 @@ interface Opened {
 
 /** Opens what the page was made for, what its address says, or a world beside it. */
 async function open(scene: Scene): Promise<Opened> {
-  const asked = new URLSearchParams(location.search).get('world') ?? document.documentElement.dataset['world'];
   const failures: string[] = [];
-  for (const name of asked ? [asked] : ['world.enf', 'world.glb']) {
+  const wasm = moduleOfWalk();
+  for (const name of made.world ? [made.world] : ['world.enf', 'world.glb']) {
     try {
-      const bytes = wasm as Uint8Array<ArrayBuffer>;
       if (/\.glb($|\?)/.test(name)) {
-        const gltf = await new GLTFLoader().register(enfilade({ wasm: bytes })).loadAsync(name);
+        const plugin = enfilade({ wasm: await wasm });
+        const gltf = await new GLTFLoader().register(plugin).loadAsync(name);
         scene.add(gltf.scene);
         return { culler: cullerOf(gltf), streamed: undefined, name };
       }
-      const streamed = await StreamedWorld.open(name, { wasm: bytes });
-      scene.add(streamed.scene);
+      const streamed = await StreamedWorld.open(name, { wasm });
       return { culler: streamed.culler, streamed, name };
     } catch (error) {
       failures.push(`${name}: ${(error as Error).message}`);
@@ -52,40 +45,28 @@ const megabytes = (bytes: number): string => `${(bytes / 1e6).toFixed(2)} MB`;
 /** Longest time that a frame makes up for, and the longest step of a walker, who must not jump through a wall. [s] */
 const [LONGEST, STEP] = [1, 1 / 30];
 
-async function main(): Promise<void> {
-  element('help').textContent = 'loading …';
-  const scene = new Scene();
-  scene.background = new Color(0xcfd6dd);
-  const { culler, streamed, name } = await open(scene);
-  const { world } = culler;
-  // Doors that are shut in the model hide what is behind them, until they are opened.
-  for (const portal of world.portals) {
-    if (portal.leaves.length > 0) culler.setOpenness(portal.id, world.openness(portal.id));
-  }
-  scene.add(new HemisphereLight(0xffffff, 0x8a7f72, 1.6), new AmbientLight(0xffffff, 0.4));
-  const camera = new PerspectiveCamera(70, 1, 0.05, 500);
-  const lamp = new DirectionalLight(0xffffff, 1.1);
-  camera.add(lamp);
-  lamp.position.set(0.3, 0.6, 1);
-  scene.add(camera);
-  const renderer = new WebGLRenderer({ antialias: true });
-  document.body.prepend(renderer.domElement);
-  const resize = (): void => {
-    renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-    renderer.setSize(innerWidth, innerHeight);
-    camera.aspect = innerWidth / innerHeight;
-    camera.updateProjectionMatrix();
-  };
-  addEventListener('resize', resize);
-  resize();
+/** Draws the first picture until the world has come: one may look around in it. */
+async function begin(stage: Stage, controls: Controls): Promise<FirstPicture | undefined> {
+  const first = await showFirst(stage, made.first);
+  if (!first) return undefined;
+  controls.yaw = first.yaw;
+  await new Promise<void>((shown) => {
+    let isDrawn = false;
+    stage.renderer.setAnimationLoop(() => {
+      if (isDrawn) shown();
+      stage.aim(first.eye, controls.yaw, controls.pitch);
+      stage.drawIfMoved();
+      isDrawn = true;
+    });
+  });
+  performance.mark('first room');
+  document.querySelector('h1')!.hidden = true;
+  return first;
+}
 
-  const walker = Walker.inMiddle(world);
-  const controls = new Controls(renderer.domElement);
-  controls.yaw = walker.widestView();
-  const map = new RoomMap(element('map') as HTMLCanvasElement, world);
-  element('help').textContent = controls.isTouch
-    ? 'left thumb walks · right thumb looks · tap a door'
-    : 'click to look · W A S D walk · E door · F fly · M map · I counters';
+/** Connects keys and taps. */
+function listen(stage: Stage, controls: Controls, culler: PortalCuller, walker: Walker): void {
+  const { camera } = stage;
   const direction = new Vector3();
   const openDoor = (x: number, y: number): void => {
     direction.set(x, y, 0.5).unproject(camera).sub(camera.position).normalize();
@@ -99,6 +80,44 @@ async function main(): Promise<void> {
     if (key === 'KeyC') culler.enabled = !culler.enabled;
     if (key === 'KeyI') element('panel').hidden = !element('panel').hidden;
     if (key === 'KeyM') element('map').hidden = !element('map').hidden;
+  };
+}
+
+async function main(): Promise<void> {
+  const stage = new Stage();
+  const { scene, camera, renderer } = stage;
+  const controls = new Controls(renderer.domElement);
+  let first = await begin(stage, controls);
+  const { culler, streamed, name } = await open(scene);
+  const { world } = culler;
+  // Doors that are shut in the model hide what is behind them, until they are opened.
+  for (const portal of world.portals) {
+    if (portal.leaves.length > 0) culler.setOpenness(portal.id, world.openness(portal.id));
+  }
+  const start = first ?? world.start() ?? { eye: [0, EYE, 0] as [number, number, number], yaw: 0 };
+  const walker = new Walker(world, [...start.eye]);
+  if (!first) controls.yaw = start.yaw;
+  const map = new RoomMap(element('map') as HTMLCanvasElement, world);
+  const storeys = new StoreyButtons(element('storeys'), made.storeys ?? [], (storey) => {
+    storey.eye.forEach((v, k) => (walker.eye[k] = v));
+    controls.yaw = storey.yaw;
+  });
+  for (const id of ['map', 'room']) element(id).hidden = false;
+  document.querySelector('h1')!.hidden = true;
+  element('help').textContent = controls.isTouch
+    ? 'left thumb walks · right thumb looks · tap a door'
+    : 'click to look · W A S D walk · E door · F fly · M map · I counters';
+  listen(stage, controls, culler, walker);
+  const bar = document.querySelector('progress')!;
+
+  /** Shows the world in place of the first picture once all in view is there. */
+  const follow = (isSettled: boolean, share: number): void => {
+    bar.value = Math.max(bar.value, 0.5 + 0.5 * share);
+    bar.hidden ||= isSettled;
+    if (!isSettled && first) return;
+    if (streamed && !streamed.scene.parent) scene.add(streamed.scene);
+    if (first) removeFirst(first);
+    first = undefined;
   };
 
   let before = performance.now();
@@ -114,17 +133,19 @@ async function main(): Promise<void> {
       walker.fall(seconds / steps);
     }
     culler.animate(seconds);
-    camera.position.set(...walker.eye);
-    camera.rotation.set(controls.pitch, controls.yaw, 0, 'YXZ');
+    stage.aim(walker.eye, controls.yaw, controls.pitch);
     const counts = streamed ? streamed.update(camera, now) : undefined;
     if (!streamed) culler.update(camera);
-    renderer.render(scene, camera);
+    follow(streamed?.streamer.settled ?? true, counts ? 1 - counts.late / Math.max(1, counts.wanted) : 1);
+    if (first) stage.drawIfMoved();
+    else renderer.render(scene, camera);
     sinceText += seconds;
     if (sinceText < 0.15) return;
     sinceText = 0;
     const { seen } = culler;
     const visible = new Set(seen!.cells.subarray(0, seen!.cellCount));
     map.draw(walker.eye, controls.yaw, visible, (cell) => !streamed || streamed.streamer.isComplete(cell));
+    storeys.mark(walker.eye[1]);
     const cell = world.cells[culler.counts.cell];
     element('room').textContent = cell ? cell.name : 'in a wall';
     const lines = [
@@ -143,11 +164,9 @@ async function main(): Promise<void> {
     element('panel').textContent = lines.join('\n');
   };
   renderer.setAnimationLoop(frame);
-  document.title = `A walk: ${name}`;
+  if (!document.title) document.title = `A walk: ${name}`;
   const hooks = { world, culler, walker, controls, streamed, camera, renderer, eyeHeight: EYE };
   (globalThis as Record<string, unknown>)['walk'] = hooks;
 }
 
-main().catch((error: Error) => {
-  element('help').textContent = `${error.message}. A page cannot read files beside it without a server: try python3 -m http.server.`;
-});
+main().catch(made.tell);
