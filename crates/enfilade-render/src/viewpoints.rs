@@ -73,7 +73,7 @@ pub fn good_camera(studio: &mut Studio, world: &World) -> Result<Camera, RenderE
     Ok(best.1)
 }
 
-/// Returns the details that are no door leaves.
+/// Returns the details other than door leaves.
 fn furniture<'a>(sight: &'a Sight, world: &'a World) -> impl Iterator<Item = &'a DetailObject> {
     let is_leaf = |k: u32| sight.portals_of(DetailId(k)).next().is_some();
     let numbered = (0..).zip(&world.details);
@@ -265,7 +265,7 @@ fn interest(studio: &mut Studio, world: &World, camera: &Camera) -> Result<f32, 
     let mut reached: BTreeSet<CellId> = BTreeSet::new();
     let mut openings = 0;
     for visit in seen.visits() {
-        // What lies behind a shut door is not in the picture, whatever lets see it.
+        // Rooms behind a shut door are not in the picture, though a portal leads to them.
         let is_open = visit.via.is_none_or(|via| {
             let from = world.graph[via]
                 .cells
