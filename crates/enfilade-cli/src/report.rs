@@ -127,7 +127,6 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
 }
 
 /// Returns the name of a file in words: `town-hall_2.glb` is `Town hall 2`.
-/// Returns a title for people by the name of a file.
 pub(crate) fn title_of(path: &Path) -> String {
     if is_stream(path) {
         return "World".into();

@@ -1,5 +1,8 @@
 // The scene, its lights, the camera and the canvas.
-import { AmbientLight, Color, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+import { AmbientLight, Color, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, ShaderChunk, WebGLRenderer } from 'three';
+
+// There is nothing for metals to mirror: they would be black, as would all that an exporter left at glTF's default, a metal.
+ShaderChunk.metalnessmap_fragment += '\nmetalnessFactor = 0.0;';
 
 /** All that is drawn, and what draws it. */
 export class Stage {
