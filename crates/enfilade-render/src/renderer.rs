@@ -7,7 +7,7 @@ use glam::{Mat4, Vec3};
 
 use crate::camera::Projection;
 use crate::context_targets::ContextTargets;
-use crate::formats::{COLOR, DEPTH};
+use crate::formats::DEPTH;
 use crate::frame::{Paint, Style};
 use crate::gpu::{Gpu, RenderError};
 use crate::lamps::LampMaps;
@@ -487,7 +487,7 @@ impl Renderer {
         pass.draw(on_top.clone(), 0..1);
     }
 
-    /// Draws a frame and reads it back. Panics if the renderer was made for a window's format.
+    /// Draws a frame and reads it back. Panics unless [`Renderer::can_be_read`].
     pub(crate) fn picture(
         &mut self,
         gpu: &Gpu,
@@ -501,19 +501,28 @@ impl Renderer {
         read_picture(gpu, &target, size)
     }
 
-    /// Makes a texture for a picture that is read back. Panics if the renderer was made for a window's format.
+    /// Returns `true` if pictures have four bytes a pixel, as those of nearly all windows do.
+    pub(crate) fn can_be_read(&self) -> bool {
+        use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Unorm, Rgba8UnormSrgb};
+        matches!(
+            self.format,
+            Bgra8Unorm | Bgra8UnormSrgb | Rgba8Unorm | Rgba8UnormSrgb
+        )
+    }
+
+    /// Makes a texture for a picture that is read back. Panics unless [`Renderer::can_be_read`].
     pub(crate) fn picture_target(
         &self,
         gpu: &Gpu,
         size: [u32; 2],
     ) -> Result<wgpu::Texture, RenderError> {
-        assert_eq!(self.format, COLOR, "pictures are {COLOR:?}");
+        assert!(self.can_be_read(), "pictures of {:?}", self.format);
         gpu.check_picture(size)?;
         Ok(texture(
             gpu,
             "picture",
             size,
-            COLOR,
+            self.format,
             wgpu::TextureUsages::COPY_SRC,
         ))
     }
@@ -526,7 +535,11 @@ pub(crate) fn read_picture(
     size: [u32; 2],
 ) -> Result<Picture, RenderError> {
     let [width, height] = size;
-    let rgba = read_texture(gpu, target, size, 4)?;
+    let mut rgba = read_texture(gpu, target, size, 4)?;
+    use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb};
+    if matches!(target.format(), Bgra8Unorm | Bgra8UnormSrgb) {
+        rgba.chunks_exact_mut(4).for_each(|p| p.swap(0, 2));
+    }
     Ok(Picture {
         width,
         height,

@@ -293,12 +293,16 @@ fn interest(studio: &mut Studio, world: &World, camera: &Camera) -> Result<f32, 
         - share(sky))
 }
 
-/// Returns the standard deviation of a picture's brightness: greater where the sun shines in. [0, 0.5]
+/// Returns the standard deviation of a picture's brightness: greater where the sun shines in. 0 if the studio's pictures cannot be
+/// read. [0, 0.5]
 fn contrast(studio: &mut Studio, camera: &Camera) -> Result<f32, RenderError> {
     let style = Style {
         dark_corners: false,
         ..Style::default()
     };
+    if !studio.renderer.can_be_read() {
+        return Ok(0.0);
+    }
     let picture = studio.picture(camera, Culling::Portals, style, &[], SMALL)?;
     let brightness = |p: &[u8]| {
         let [r, g, b] = [0, 1, 2].map(|k| f32::from(p[k]) / 255.0);

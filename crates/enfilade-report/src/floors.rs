@@ -157,7 +157,11 @@ fn ask(world: &World, t: &Triangle, area: f64, is_level: bool, out: &mut Samples
     let each = area / (n * n) as f64;
     // Centroids of the n² small triangles, upright and inverted alternately.
     let point = |i: usize, j: usize| {
-        let (row, column, third) = (i as f64, (j / 2) as f64, if j % 2 == 0 { 1.0 } else { 2.0 });
+        let (row, column, third) = (
+            i as f64,
+            (j / 2) as f64,
+            if j.is_multiple_of(2) { 1.0 } else { 2.0 },
+        );
         let (u, v) = (
             (row + third / 3.0) / n as f64,
             (column + third / 3.0) / n as f64,
