@@ -1,7 +1,7 @@
 //! `verify --views`: pictures with and without culling, compared pixel by pixel.
 
 use std::fmt;
-use std::path::Path;
+use std::path::PathBuf;
 
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::shown;
@@ -13,28 +13,34 @@ use enfilade_render::{
 use serde::Serialize;
 
 use crate::formats::Format;
-use crate::output::{Outputs, write_whole};
+use crate::output::{Outputs, make_folder, write_whole};
 use crate::progress::StageBar;
 use crate::render::tell_of_pictures;
 use enfilade_cli::cameras::random_camera;
 use enfilade_cli::doors::random_doors;
+use enfilade_cli::values::size;
 
 /// Most eyes drawn for one view, if they lie on surfaces.
 const MAX_DRAWS: usize = 100;
 
-/// Settings of the comparison.
-pub(crate) struct Asked<'a> {
-    pub(crate) views: u64,
-    pub(crate) seed: u64,
-    pub(crate) size: [u32; 2],
-    pub(crate) adapter: &'a AdapterChoice,
-    /// An existing folder.
-    pub(crate) pictures: Option<&'a Path>,
-    /// Files that the command reads and writes.
-    pub(crate) outputs: Outputs,
-    pub(crate) max_listed: usize,
-    /// Open and shut doors at random, again for each view.
-    pub(crate) has_doors: bool,
+/// Options of the comparison.
+#[derive(clap::Args)]
+pub(crate) struct ViewComparison {
+    /// Views to draw with and without culling by portals, and to compare pixel by pixel.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    views: u64,
+    /// Open and shut doors at random, again for each of these views.
+    #[arg(long, requires = "views")]
+    doors: bool,
+    /// Size of the compared pictures.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
+    view_size: [u32; 2],
+    /// Draw the views that differ, with and without culling, to PNG files in this folder.
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Adapter to draw the views with: `best`, `gpu`, `software`, or part of a name.
+    #[arg(long, default_value = "best", value_name = "NAME")]
+    adapter: AdapterChoice,
 }
 
 /// Results of the comparison.
@@ -43,7 +49,7 @@ pub(crate) struct Exactness {
     views: u64,
     pixels: u64,
     /// Pixels that differ.
-    pub(crate) differing: u64,
+    differing: u64,
     /// Views with such pixels.
     differing_views: u64,
     /// Pixels whose center lies on an edge, within a 64th of a pixel: both pictures are right.
@@ -79,6 +85,13 @@ struct Lost {
     found: String,
     /// Distances of the missing and of the shown surface along the view direction. [Units: wu]
     depths: [f32; 2],
+}
+
+impl Exactness {
+    /// Pixels that differ.
+    pub(crate) fn differing(&self) -> u64 {
+        self.differing
+    }
 }
 
 impl fmt::Display for Exactness {
@@ -144,90 +157,111 @@ fn named(studio: &Studio, world: &World, shown: PixelContent) -> (String, Vec<Ce
     }
 }
 
-pub(crate) fn verify_pictures(world: &World, asked: &mut Asked<'_>) -> anyhow::Result<Exactness> {
-    let mut studio = Studio::new(enfilade_cli::adapter::open(asked.adapter)?, world)?;
-    tell_of_pictures(&studio)?;
-    let bounds = studio.world.bounds();
-    let margin = 0.05;
-    let bounds = [bounds[0].map(|x| x - margin), bounds[1].map(|x| x + margin)];
-    let mut rng = Rng::new(asked.seed);
-    let mut out = Exactness {
-        views: asked.views,
-        adapter: studio.gpu.name(),
-        ..Exactness::default()
-    };
-    let mut oracle = Oracle::new(world, &studio.sight);
-    let bar = StageBar::new();
-    bar.start("comparing pictures", asked.views);
-    let aspect = asked.size[0] as f32 / asked.size[1] as f32;
-    for view in 0..asked.views {
-        // No renderer draws what the near plane cuts off, so draw another eye.
-        if asked.has_doors {
-            studio.state = random_doors(&mut rng, &studio.sight);
-            oracle.follow(&studio.sight, &studio.state);
+impl ViewComparison {
+    /// Makes the folder of pictures.
+    pub(crate) fn make_folder(&self) -> anyhow::Result<()> {
+        match &self.pictures {
+            Some(folder) if self.views > 0 => make_folder("--pictures", folder),
+            _ => Ok(()),
         }
-        let mut camera = random_camera(&mut rng, world, &studio.sight, bounds);
-        for _ in 0..MAX_DRAWS {
-            if !oracle.is_at_surface(camera.eye) {
-                break;
-            }
-            camera = random_camera(&mut rng, world, &studio.sight, bounds);
-        }
-        if oracle.is_at_surface(camera.eye) {
-            out.on_surface += 1;
-            continue;
-        }
-        let [whole, culled] = studio.ids_compared(&camera, asked.size)?;
-        out.triangles[1] += studio.world.n_triangles();
-        let seen = camera.view(aspect)?;
-        out.triangles[0] += studio
-            .list(&seen, camera.eye, Culling::Portals, asked.size)
-            .n_triangles();
-        let mut lost: Vec<LostPixel> = Vec::new();
-        for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
-            let mut difference = a.difference(b);
-            // Each pixel once, although it has two layers.
-            out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
-            // If another opaque triangle is shown, and rightly, it hides other things as well.
-            let is_hidden_by_that = |l: &LostPixel| {
-                let [before, now] = [&whole[0], &culled[0]].map(|p| p.at(l.at));
-                layer == 1
-                    && before.0 != now.0
-                    && Camera::distance_of(before.1) <= Camera::distance_of(l.found.1)
-                    && !lost.iter().any(|o| o.at == l.at)
-            };
-            difference.lost.retain(|l| {
-                if is_hidden_by_that(l) {
-                    out.edges += 1;
-                    return false;
-                }
-                let drawn = f64::from(Camera::distance_of(l.found.1));
-                let on_edge = oracle.is_right(&camera, l.at, asked.size, drawn, layer == 1);
-                let in_crack = !oracle.is_met(&camera, l.at, asked.size, l.expected.0, layer == 1);
-                out.edges += u64::from(on_edge);
-                out.cracks += u64::from(in_crack && !on_edge);
-                !on_edge && !in_crack
-            });
-            lost.extend(difference.lost);
-        }
-        if !lost.is_empty() {
-            out.differing += lost.len() as u64;
-            out.differing_views += 1;
-            if out.lost.len() < asked.max_listed {
-                out.lost
-                    .push(describe(&studio, world, &camera, view, &lost));
-                if let Some(dir) = asked.pictures {
-                    let picture = picture_of_loss(&mut studio, &camera, &lost, asked.size)?;
-                    let to = dir.join(format!("view-{view}.png"));
-                    asked.outputs.write("--pictures", Format::Picture, &to)?;
-                    write_whole(&to, &picture.to_png()?)?;
-                }
-            }
-        }
-        bar.set(view + 1);
     }
-    bar.finish();
-    Ok(out)
+
+    /// Compares views, if asked to; lists as many losses as `max_listed`.
+    pub(crate) fn compare(
+        &self,
+        world: &World,
+        seed: u64,
+        max_listed: usize,
+        outputs: &mut Outputs,
+    ) -> anyhow::Result<Option<Exactness>> {
+        if self.views == 0 {
+            return Ok(None);
+        }
+        let mut studio = Studio::new(enfilade_cli::adapter::open(&self.adapter)?, world)?;
+        tell_of_pictures(&studio)?;
+        let bounds = studio.world.bounds();
+        let margin = 0.05;
+        let bounds = [bounds[0].map(|x| x - margin), bounds[1].map(|x| x + margin)];
+        let mut rng = Rng::new(seed);
+        let mut out = Exactness {
+            views: self.views,
+            adapter: studio.gpu.name(),
+            ..Exactness::default()
+        };
+        let mut oracle = Oracle::new(world, &studio.sight);
+        let bar = StageBar::new();
+        bar.start("comparing pictures", self.views);
+        let aspect = self.view_size[0] as f32 / self.view_size[1] as f32;
+        for view in 0..self.views {
+            // No renderer draws what the near plane cuts off, so draw another eye.
+            if self.doors {
+                studio.state = random_doors(&mut rng, &studio.sight);
+                oracle.follow(&studio.sight, &studio.state);
+            }
+            let mut camera = random_camera(&mut rng, world, &studio.sight, bounds);
+            for _ in 0..MAX_DRAWS {
+                if !oracle.is_at_surface(camera.eye) {
+                    break;
+                }
+                camera = random_camera(&mut rng, world, &studio.sight, bounds);
+            }
+            if oracle.is_at_surface(camera.eye) {
+                out.on_surface += 1;
+                continue;
+            }
+            let [whole, culled] = studio.ids_compared(&camera, self.view_size)?;
+            out.triangles[1] += studio.world.n_triangles();
+            let seen = camera.view(aspect)?;
+            out.triangles[0] += studio
+                .list(&seen, camera.eye, Culling::Portals, self.view_size)
+                .n_triangles();
+            let mut lost: Vec<LostPixel> = Vec::new();
+            for (layer, (a, b)) in whole.iter().zip(&culled).enumerate() {
+                let mut difference = a.difference(b);
+                // Each pixel once, although it has two layers.
+                out.pixels += if layer == 0 { difference.n_pixels } else { 0 };
+                // If another opaque triangle is shown, and rightly, it hides other things as well.
+                let is_hidden_by_that = |l: &LostPixel| {
+                    let [before, now] = [&whole[0], &culled[0]].map(|p| p.at(l.at));
+                    layer == 1
+                        && before.0 != now.0
+                        && Camera::distance_of(before.1) <= Camera::distance_of(l.found.1)
+                        && !lost.iter().any(|o| o.at == l.at)
+                };
+                difference.lost.retain(|l| {
+                    if is_hidden_by_that(l) {
+                        out.edges += 1;
+                        return false;
+                    }
+                    let drawn = f64::from(Camera::distance_of(l.found.1));
+                    let on_edge = oracle.is_right(&camera, l.at, self.view_size, drawn, layer == 1);
+                    let in_crack =
+                        !oracle.is_met(&camera, l.at, self.view_size, l.expected.0, layer == 1);
+                    out.edges += u64::from(on_edge);
+                    out.cracks += u64::from(in_crack && !on_edge);
+                    !on_edge && !in_crack
+                });
+                lost.extend(difference.lost);
+            }
+            if !lost.is_empty() {
+                out.differing += lost.len() as u64;
+                out.differing_views += 1;
+                if out.lost.len() < max_listed {
+                    out.lost
+                        .push(describe(&studio, world, &camera, view, &lost));
+                    if let Some(dir) = &self.pictures {
+                        let picture = picture_of_loss(&mut studio, &camera, &lost, self.view_size)?;
+                        let to = dir.join(format!("view-{view}.png"));
+                        outputs.write("--pictures", Format::Picture, &to)?;
+                        write_whole(&to, &picture.to_png()?)?;
+                    }
+                }
+            }
+            bar.set(view + 1);
+        }
+        bar.finish();
+        Ok(Some(out))
+    }
 }
 
 fn describe(

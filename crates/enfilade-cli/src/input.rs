@@ -7,12 +7,20 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use enfilade::geom::shown;
 use enfilade::import::{ImportError, ImportOptions, Imported, Limits, SceneSource, import_sources};
-use enfilade::stream::{PackedFiles, PackedPlace};
+#[cfg(feature = "pack")]
+use enfilade::stream::{PackError, PackedFiles, PackedPlace};
 
 /// Returns `true` if a path stands for standard input or output. A file of that name is `./-`.
 #[must_use]
 pub fn is_stream(path: &Path) -> bool {
     path == Path::new("-")
+}
+
+/// Returns `true` if a path is the address of a world on a server.
+#[must_use]
+pub fn is_address(path: &Path) -> bool {
+    let text = path.to_string_lossy().to_ascii_lowercase();
+    text.starts_with("http://") || text.starts_with("https://")
 }
 
 /// The name of an input in messages.
@@ -111,11 +119,34 @@ const BEGINNING: u64 = 4096;
 const MAX_TEXT: u64 = 64 << 20;
 
 fn read_world_like(path: &Path, length: impl Fn(&[u8]) -> u64) -> anyhow::Result<Vec<u8>> {
-    if PackedPlace::is_url(path) || PackedFiles::is_packed(path) {
-        let unpack = || PackedPlace::read_all(path)?.unpack();
-        return unpack().with_context(|| cannot_read(path));
+    if let Some(bytes) = read_packed(path, false).with_context(|| cannot_read(path))? {
+        return Ok(bytes);
     }
     read_headed(path, length, Limits::default().max_file_bytes).with_context(|| cannot_read(path))
+}
+
+/// Puts a packed world together, from disk or from a server; `None` for other paths. Compares its head with its pieces if asked to.
+#[cfg(feature = "pack")]
+pub(crate) fn read_packed(path: &Path, is_checked: bool) -> Result<Option<Vec<u8>>, PackError> {
+    if !is_address(path) && !PackedFiles::is_packed(path) {
+        return Ok(None);
+    }
+    let packed = PackedPlace::read_all(path)?;
+    let file = packed.unpack()?;
+    if is_checked {
+        packed.check(&file)?;
+    }
+    Ok(Some(file))
+}
+
+/// Refuses folders and addresses: this build reads no packed worlds.
+#[cfg(not(feature = "pack"))]
+pub(crate) fn read_packed(path: &Path, _: bool) -> anyhow::Result<Option<Vec<u8>>> {
+    anyhow::ensure!(
+        !path.is_dir() && !is_address(path),
+        "this build reads no packed worlds: build it with the features `pack` and `http`"
+    );
+    Ok(None)
 }
 
 /// The length that a GLB states.

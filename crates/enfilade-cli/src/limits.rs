@@ -62,6 +62,7 @@ impl Limits {
     }
 
     /// The error of a loop that ended because the time was up.
+    #[cfg(feature = "sound")]
     pub(crate) fn time_is_up(&self) -> anyhow::Error {
         anyhow::Error::msg(late(self.max_time.unwrap_or_default()))
     }

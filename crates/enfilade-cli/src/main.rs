@@ -11,6 +11,10 @@ mod bake;
 mod decimate;
 mod demo;
 mod edit;
+#[cfg(feature = "render")]
+mod exact;
+#[cfg(not(feature = "render"))]
+#[path = "exact_left_out.rs"]
 mod exact;
 mod export;
 mod formats;
@@ -19,33 +23,44 @@ mod inspect;
 mod job;
 mod kit;
 mod limits;
+#[cfg_attr(
+    not(feature = "view"),
+    allow(dead_code, reason = "the window shows more of it than pictures")
+)]
 mod living;
 mod locate;
 mod manual;
 mod name;
 mod output;
+#[cfg(feature = "pack")]
 mod pack;
 mod path;
 mod pieces;
 mod plan;
+#[cfg(feature = "render")]
 mod portals;
 mod progress;
 mod progress_lines;
 mod pvs;
 mod rebake;
+#[cfg(feature = "render")]
 mod render;
+#[cfg(feature = "report")]
 mod report;
 mod reviewed;
 mod screen;
 mod see;
+#[cfg(feature = "serve")]
 mod serve;
 mod simplify;
+#[cfg(feature = "sound")]
 mod sound;
 mod specials;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
 mod walk;
+#[cfg(feature = "report")]
 mod walk_page;
 
 use std::io::Write;
@@ -85,18 +100,25 @@ enum Command {
     Locate(locate::Locate),
     Man(manual::Man),
     Name(name::Name),
+    #[cfg(feature = "pack")]
     Pack(pack::Pack),
     Path(path::WalkedPath),
     Plan(plan::Plan),
+    #[cfg(feature = "render")]
     Portals(portals::Portals),
     Pvs(pvs::Pvs),
     Rebake(rebake::Rebake),
+    #[cfg(feature = "render")]
     Render(render::Render),
+    #[cfg(feature = "report")]
     Report(report::Report),
     See(see::See),
+    #[cfg(feature = "serve")]
     Serve(serve::Serve),
     Simplify(simplify::Simplify),
+    #[cfg(feature = "sound")]
     Sound(sound::Sound),
+    #[cfg(feature = "pack")]
     Unpack(pack::Unpack),
     Verify(verify::Verify),
     #[cfg(feature = "view")]
@@ -122,18 +144,25 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Locate(args) => locate::run(&args),
         Command::Man(args) => manual::man(&args, Cli::command()),
         Command::Name(args) => name::run(&args),
+        #[cfg(feature = "pack")]
         Command::Pack(args) => pack::pack(&args),
         Command::Path(args) => path::run(&args),
         Command::Plan(args) => plan::run(&args),
+        #[cfg(feature = "render")]
         Command::Portals(args) => portals::run(&args),
         Command::Pvs(args) => pvs::run(&args),
         Command::Rebake(args) => rebake::run(&args),
+        #[cfg(feature = "render")]
         Command::Render(args) => render::run(&args),
+        #[cfg(feature = "report")]
         Command::Report(args) => report::run(&args),
         Command::See(args) => see::run(&args),
+        #[cfg(feature = "serve")]
         Command::Serve(args) => serve::run(&args),
         Command::Simplify(args) => simplify::run(&args),
+        #[cfg(feature = "sound")]
         Command::Sound(args) => sound::run(&args),
+        #[cfg(feature = "pack")]
         Command::Unpack(args) => pack::unpack_world(&args),
         Command::Verify(args) => verify::run(&args),
         #[cfg(feature = "view")]

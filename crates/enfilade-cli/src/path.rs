@@ -7,7 +7,6 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use enfilade::geom::DVec3;
-use enfilade::stream::PackedPlace;
 use enfilade::world::{Agent, PartId, Path, Space};
 
 use self::refusal::{MovedEnd, Wanted};
@@ -16,7 +15,7 @@ use crate::limits::Limits;
 use crate::output::Outputs;
 use crate::screen::{Warned, print_json, printed_at_once};
 use crate::walk::{self, Walks, WorldFile};
-use enfilade_cli::input::is_stream;
+use enfilade_cli::input::{is_address, is_stream};
 use enfilade_cli::values::point;
 use enfilade_cli::world::read_world_hashed;
 
@@ -83,7 +82,7 @@ pub(crate) fn run(args: &WalkedPath) -> anyhow::Result<()> {
         bail!("--step {}: a length of at least 0 is needed", args.step);
     }
     if args.keep {
-        if is_stream(&args.world) || PackedPlace::is_url(&args.world) {
+        if is_stream(&args.world) || is_address(&args.world) {
             bail!("--keep writes a file beside the world; give it a file, not '-' or an address");
         }
         let mut outputs = Outputs::reading([&args.world])?;

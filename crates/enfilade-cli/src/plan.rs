@@ -1,17 +1,20 @@
 //! `enfilade plan`: a floor plan per storey.
 
+#[cfg_attr(not(feature = "print"), path = "plan/svg_only.rs")]
+mod form;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use enfilade::cpg::World;
-use enfilade_report::{Drawing, PAPERS, Paper, PlanOptions, Plans, Storey, to_pdf};
+use enfilade_report::{PlanOptions, Plans, Storey};
 
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
 use crate::screen::{Warned, print_json};
-use enfilade_cli::input::{is_stream, name_of};
+use enfilade_cli::input::name_of;
 use enfilade_cli::world::read_world;
 use enfilade_report::{is_empty, why_empty};
 
@@ -41,15 +44,9 @@ pub(crate) struct Plan {
     /// are none, and openings that parted none; 40 at most.
     #[arg(long)]
     why: bool,
-    /// Width of a .png in pixels; 2400 if not given.
-    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(enfilade_report::MAX_PIXELS)))]
-    width: Option<u32>,
-    /// Paper of a .pdf: A0 to A5, Letter or Tabloid; A4 if not given.
-    #[arg(long, value_name = "PAPER", value_parser = paper)]
-    paper: Option<Paper>,
-    /// Scale of a .pdf, as in 1:100; the largest common scale that fits the paper if not given.
-    #[arg(long, value_name = "1:N", value_parser = scale)]
-    scale: Option<f64>,
+    #[cfg(feature = "print")]
+    #[command(flatten)]
+    print: form::PrintOptions,
     /// Print a report on the files as JSON for machines; nothing is printed otherwise.
     #[arg(long)]
     json: bool,
@@ -79,17 +76,9 @@ struct StoreyReport<'a> {
     cells: Vec<u32>,
 }
 
-/// The kind of the file.
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    Svg,
-    Png,
-    Pdf,
-}
-
 pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
     args.limits.begin()?;
-    let kind = kind(args)?;
+    let form = args.form()?;
     let name = args.output.file_name().unwrap_or_default();
     let is_several = name.to_string_lossy().contains(PLACE);
     let mut outputs = Outputs::reading([&args.world])?;
@@ -124,7 +113,7 @@ pub(crate) fn run(args: &Plan) -> anyhow::Result<()> {
     }
     let mut reports = Vec::new();
     for (path, which) in &jobs {
-        let bytes = drawn(args, kind, &plans, which)?;
+        let bytes = form.drawn(&plans, which)?;
         write_whole(path, &bytes)?;
         reports.push(PlanReport::One {
             written: Written::new(path, &bytes),
@@ -155,35 +144,6 @@ impl<'a> StoreyReport<'a> {
             cells: storey.cells.iter().map(|c| c.0).collect(),
         }
     }
-}
-
-/// The kind by the extension; refused if an option is for another kind of file.
-fn kind(args: &Plan) -> anyhow::Result<Kind> {
-    let extension = args.output.extension().unwrap_or_default();
-    let extension = extension.to_string_lossy().to_ascii_lowercase();
-    let kind = match extension.as_str() {
-        "png" => Kind::Png,
-        "pdf" => Kind::Pdf,
-        _ => Kind::Svg,
-    };
-    let misplaced = [
-        ("--width", args.width.is_some(), Kind::Png, ".png"),
-        ("--paper", args.paper.is_some(), Kind::Pdf, ".pdf"),
-        ("--scale", args.scale.is_some(), Kind::Pdf, ".pdf"),
-    ];
-    for (option, is_given, of, extension) in misplaced {
-        if is_given && kind != of {
-            bail!(
-                "{option} applies only to a {extension} file, not to {}; leave {option} out, or give -o a name that ends in {extension}",
-                if is_stream(&args.output) {
-                    "standard output".into()
-                } else {
-                    args.output.display().to_string()
-                }
-            );
-        }
-    }
-    Ok(kind)
 }
 
 fn read(args: &Plan) -> anyhow::Result<World> {
@@ -225,27 +185,6 @@ fn chosen(args: &Plan, plans: &Plans) -> anyhow::Result<Vec<usize>> {
     Ok(out)
 }
 
-/// The bytes of one file.
-fn drawn(args: &Plan, kind: Kind, plans: &Plans, which: &[usize]) -> anyhow::Result<Vec<u8>> {
-    Ok(match kind {
-        Kind::Svg => plans.sheet(which).to_svg().into_bytes(),
-        Kind::Png => {
-            let width = args.width.unwrap_or(2400);
-            let picture = plans.sheet(which).to_png(width);
-            picture.context("no picture was drawn; change --width")?
-        }
-        Kind::Pdf => {
-            let pages: Vec<Drawing> = if which.is_empty() {
-                vec![plans.sheet(&[])]
-            } else {
-                which.iter().map(|&k| plans.sheet(&[k])).collect()
-            };
-            let paper = args.paper.unwrap_or(PAPERS[1]);
-            to_pdf(&pages, paper, args.scale).context("change --scale or --paper")?
-        }
-    })
-}
-
 /// The output's name for one storey.
 fn named(path: &Path, storey: &str) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -256,21 +195,5 @@ fn height(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x < 100.0 => Ok(x),
         _ => Err("a height in meters between 0 and 100 is needed, e.g. 1.2".into()),
-    }
-}
-
-fn paper(text: &str) -> Result<Paper, String> {
-    let found = PAPERS
-        .into_iter()
-        .find(|p| p.name.eq_ignore_ascii_case(text));
-    let names = PAPERS.map(|p| p.name).join(", ");
-    found.ok_or_else(|| format!("a size of paper is needed: {names}"))
-}
-
-fn scale(text: &str) -> Result<f64, String> {
-    let number = text.strip_prefix("1:").unwrap_or(text);
-    match number.parse::<f64>() {
-        Ok(x) if (1.0..=1e6).contains(&x) => Ok(x),
-        _ => Err("a scale from 1:1 to 1:1000000 is needed, e.g. 1:100".into()),
     }
 }

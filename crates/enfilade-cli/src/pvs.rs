@@ -10,7 +10,6 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{self, CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
-use enfilade::stream::PackedPlace;
 use enfilade::vis::{
     VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, WorldVis, see_all, see_parts_through,
     see_world,
@@ -25,7 +24,7 @@ use crate::output::{Outputs, is_same_file, write_whole};
 use crate::pieces::PieceFolder;
 use crate::progress::StageBar;
 use crate::screen::{json_text, print_json};
-use enfilade_cli::input::{is_stream, name_of, read};
+use enfilade_cli::input::{is_address, is_stream, name_of, read};
 use enfilade_cli::values::{bytes, seconds};
 
 mod statistics;
@@ -312,7 +311,7 @@ fn outputs_of(args: &Pvs) -> anyhow::Result<(Outputs, PathBuf)> {
     let path = match &args.output {
         Some(path) => path.clone(),
         None if is_stream(&args.input) => args.input.clone(),
-        None if PackedPlace::is_url(&args.input) => {
+        None if is_address(&args.input) => {
             bail!("an address has no folder for the answer; name a file with -o")
         }
         None => args.input.with_extension("pvs"),

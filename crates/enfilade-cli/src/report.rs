@@ -1,25 +1,24 @@
 //! `enfilade report`: writes a page about a world.
 
+#[cfg(feature = "render")]
+mod pictures;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use enfilade::cpg::{CellId, Pvs, World};
 use enfilade::geom::Triangle;
-use enfilade::runtime::{Sight, SightState, Viewer};
+use enfilade::runtime::Sight;
 use enfilade::vis::{VisConfig, VisContext, see_world};
-use enfilade_render::{
-    AdapterChoice, Culling, FOV, Gpu, RenderError, Studio, Style, good_camera, walk_cameras,
-};
-use enfilade_report::{Figure, ReportParts, Table, report_html};
+use enfilade_report::{ReportParts, Table, report_html};
 use enfilade_verify::structural_triangles;
 
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, Written, write_whole};
-use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
-use crate::screen::{Warned, print_json};
+use crate::screen::print_json;
 use crate::walk_page;
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
@@ -33,18 +32,12 @@ pub(crate) struct Report {
     /// File for the page; `-` for standard output.
     #[arg(short, long, value_name = "HTML")]
     output: PathBuf,
-    /// Number of views on the measured walk, 100,000 at most.
-    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    views: u32,
-    /// Adapter to draw pictures with: `best`, `gpu`, `software`, or part of a name.
-    #[arg(long, default_value = "best", value_name = "NAME")]
-    adapter: AdapterChoice,
+    #[cfg(feature = "render")]
+    #[command(flatten)]
+    pictures: pictures::PictureOptions,
     /// Title of the page; by default the file's name in words, `World` for standard input.
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
-    /// Leave out pictures: no adapter is needed.
-    #[arg(long)]
-    no_pictures: bool,
     /// Also write a first-person walk for the browser beside the page, NAME-walk.html, and link it. It opens the world
     /// where it is now, from any server of files, such as `enfilade serve`.
     #[arg(long)]
@@ -65,7 +58,6 @@ struct PageReport<'a> {
     notes: &'a [String],
 }
 
-const SIZE: [u32; 2] = [960, 540];
 /// Limit of the visibility search, in openings tested from openings; pairs that are undecided then count as visible.
 /// Twice what a clinic of 660 rooms needs. A count instead of a time, so that the page of a world is always the same.
 const BUDGET: u64 = 2_000_000;
@@ -92,23 +84,11 @@ pub(crate) fn run(args: &Report) -> anyhow::Result<()> {
     parts.verdict = Some(Verdict::of(&world, &[]).untried());
     parts.visible = visible(&world, &mut parts.notes)?;
     let sight = Sight::build(&world).with_context(|| name_of(&args.world))?;
-    let steps = measured(&world, &sight, args.views as usize);
     parts
         .tables
         .push(in_numbers(&world, &sight, &parts.visible));
-    if !steps.is_empty() {
-        parts.tables.push(on_a_walk(&sight, &steps));
-    }
-    if !args.no_pictures {
-        match enfilade_cli::adapter::open(&args.adapter) {
-            Ok(gpu) => parts.figures = pictures(gpu, &world)?,
-            Err(why @ RenderError::NoAdapter) => {
-                let _ = writeln!(Warned, "enfilade: the report has no pictures: {why}");
-                parts.notes.push(format!("No pictures: {why}."));
-            }
-            Err(why) => bail!(why),
-        }
-    }
+    #[cfg(feature = "render")]
+    pictures::add(&mut parts, &args.pictures, &world, &sight)?;
     let page = report_html(&world, &parts);
     if let Some(walk) = &walk {
         walk_page::write(walk, &args.world, parts.title.clone(), &world)?;
@@ -157,34 +137,6 @@ fn visible(world: &World, notes: &mut Vec<String>) -> anyhow::Result<Pvs> {
         );
     }
     Ok(out.cells)
-}
-
-/// One view of the walk.
-struct Step {
-    frustum: u64,
-    portals: u64,
-    cells: usize,
-    clips: u64,
-}
-
-fn measured(world: &World, sight: &Sight, views: usize) -> Vec<Step> {
-    let state = SightState::new(sight);
-    let mut viewer = Viewer::new(sight);
-    let mut steps = Vec::new();
-    for camera in walk_cameras(world, sight, views, FOV) {
-        let Ok(view) = camera.view(16.0 / 9.0) else {
-            continue;
-        };
-        let frustum = viewer.see_through_walls(sight, &view).n_triangles();
-        let seen = viewer.see(sight, &state, &view);
-        steps.push(Step {
-            frustum,
-            portals: seen.n_triangles(),
-            cells: seen.cells().len(),
-            clips: u64::from(seen.counts().clips),
-        });
-    }
-    steps
 }
 
 fn row(cells: &[&str]) -> Vec<String> {
@@ -242,65 +194,4 @@ fn in_numbers(world: &World, sight: &Sight, visible: &Pvs) -> Table {
             row(&["rooms seen", "", &mean(seen), &most_seen.to_string()]),
         ],
     }
-}
-
-fn on_a_walk(sight: &Sight, steps: &[Step]) -> Table {
-    let all = sight.n_triangles().max(1) as f64;
-    let line = |name: &str, digits: usize, value: &dyn Fn(&Step) -> f64| {
-        let values = || steps.iter().map(value);
-        let mean = values().sum::<f64>() / steps.len() as f64;
-        let low = values().fold(f64::INFINITY, f64::min);
-        let high = values().fold(0.0, f64::max);
-        let mut cells = vec![name.to_owned()];
-        cells.extend([low, mean, high].map(|x| format!("{x:.digits$}")));
-        cells
-    };
-    Table {
-        title: "On a walk".into(),
-        note: format!(
-            "{} views at eye height, a meter apart, through the doorways.",
-            steps.len()
-        ),
-        rows: vec![
-            row(&["", "least", "mean", "most"]),
-            line("triangles in the view frustum, %", 2, &|s| {
-                s.frustum as f64 / all * 100.0
-            }),
-            line("triangles seen through doorways, %", 2, &|s| {
-                s.portals as f64 / all * 100.0
-            }),
-            line("rooms seen", 1, &|s| s.cells as f64),
-            line("doorways clipped to find out", 1, &|s| s.clips as f64),
-        ],
-    }
-}
-
-fn pictures(gpu: Gpu, world: &World) -> anyhow::Result<Vec<Figure>> {
-    let mut studio = Studio::new(gpu, world)?;
-    tell_of_pictures(&studio)?;
-    light(&mut studio, world)?;
-    let mut out = Vec::new();
-    let style = Style::default();
-    let camera = good_camera(&mut studio, world)?;
-    let picture = smooth(SIZE, |size| {
-        Ok(studio.picture(&camera, Culling::Portals, style, &[], size)?)
-    })?;
-    out.push(Figure {
-        caption: "A view inside.".into(),
-        png: picture.to_png()?,
-    });
-    let picture = smooth(SIZE, |size| {
-        let marks = portal_marks(&mut studio, world, &camera, size)?;
-        Ok(studio.picture(&camera, Culling::Portals, style, &marks, size)?)
-    })?;
-    out.push(Figure {
-        caption: "The same view: doorways in orange, the narrowed views in blue.".into(),
-        png: picture.to_png()?,
-    });
-    let picture = smooth(SIZE, |size| above(&mut studio, world, &camera, None, size))?;
-    out.push(Figure {
-        caption: "The same view from above: what is visible keeps its color; behind walls reddish, out of view gray, the portals looked through orange.".into(),
-        png: picture.to_png()?,
-    });
-    Ok(out)
 }

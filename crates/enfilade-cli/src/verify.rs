@@ -8,22 +8,20 @@ use enfilade::cpg::World;
 use enfilade::geom::Triangle;
 use enfilade::geom::scene::{Role, Scene, TriangleSource};
 use enfilade::runtime::{SeeOptions, Sight};
-use enfilade_render::AdapterChoice;
 use enfilade_verify::{
     SourceDetail, VerifyOptions, ViewOptions, ViewReport, check_drawn, compare_details,
     compare_scene, other_scene, verify_evidence, verify_views, verify_world_with_progress,
 };
 
 use crate::bake::settings::{SceneOptions, bound};
-use crate::exact::{Asked, verify_pictures};
+use crate::exact::ViewComparison;
 use crate::limits::Limits;
-use crate::output::{Outputs, make_folder};
+use crate::output::Outputs;
 use crate::progress::StageBar;
 use crate::pvs::read_graph;
 use crate::screen::{print_json, printed, printed_at_once, write_lines};
 use enfilade_cli::answers::Answers;
 use enfilade_cli::input::{import_scene, name_of, read};
-use enfilade_cli::values::size;
 use enfilade_cli::world::read_world_checked;
 
 /// Tests the promises of a world with random sight lines; exits with 1 if one is broken.
@@ -50,21 +48,8 @@ pub(crate) struct Verify {
     /// hit. 0: none.
     #[arg(long, default_value_t = 10_000, value_name = "N")]
     sight: u64,
-    /// Views to draw with and without culling by portals, and to compare pixel by pixel.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    views: u64,
-    /// Open and shut doors at random, again for each of these views.
-    #[arg(long, requires = "views")]
-    doors: bool,
-    /// Size of the compared pictures.
-    #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
-    view_size: [u32; 2],
-    /// Draw the views that differ, with and without culling, to PNG files in this folder.
-    #[arg(long, value_name = "DIR")]
-    pictures: Option<PathBuf>,
-    /// Adapter to draw the views with: `best`, `gpu`, `software`, or part of a name.
-    #[arg(long, default_value = "best", value_name = "NAME")]
-    adapter: AdapterChoice,
+    #[command(flatten)]
+    drawn: ViewComparison,
     /// Start of the random sequences; equal seeds give equal reports.
     #[arg(long, default_value_t = 1, value_name = "S")]
     seed: u64,
@@ -90,10 +75,7 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     if let Some(evidence) = &args.evidence {
         return verify_visibility(args, evidence);
     }
-    let pictures = args.pictures.as_deref().filter(|_| args.views > 0);
-    if let Some(folder) = pictures {
-        make_folder("--pictures", folder)?;
-    }
+    args.drawn.make_folder()?;
     let (world, file) = read_world_checked(&args.world)?;
     let source = (!args.source.is_empty())
         .then(|| read_source(args, &mut outputs))
@@ -119,21 +101,10 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
     let sight = (args.sight > 0)
         .then(|| verify_sight(args, &world))
         .transpose()?;
-    let exact = (args.views > 0)
-        .then(|| {
-            let mut asked = Asked {
-                views: args.views,
-                seed: args.seed,
-                size: args.view_size,
-                adapter: &args.adapter,
-                pictures,
-                outputs,
-                max_listed: args.list,
-                has_doors: args.doors,
-            };
-            verify_pictures(&world, &mut asked).with_context(|| name_of(&args.world))
-        })
-        .transpose()?;
+    let exact = args
+        .drawn
+        .compare(&world, args.seed, args.list, &mut outputs)
+        .with_context(|| name_of(&args.world))?;
     let mut out = printed_at_once();
     if args.json {
         let mut value = serde_json::to_value(&report)?;
@@ -172,11 +143,11 @@ pub(crate) fn run(args: &Verify) -> anyhow::Result<()> {
             sight.hits
         );
     }
-    if let Some(exact) = exact.filter(|e| e.differing > 0) {
+    if let Some(exact) = exact.filter(|e| e.differing() > 0) {
         bail!(
             "{} is not drawn whole: {} pixels differ from pictures without culling",
             name_of(&args.world),
-            exact.differing
+            exact.differing()
         );
     }
     Ok(())

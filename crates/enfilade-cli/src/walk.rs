@@ -12,7 +12,7 @@ use enfilade::world::{Agent, PartId, Space, WalkMap, WalkMapKey};
 
 use crate::output::write_whole;
 use crate::screen::Told;
-use enfilade_cli::input::{is_stream, read_glb};
+use enfilade_cli::input::is_stream;
 
 /// Largest map read: of more floors than a map has. [Units: bytes]
 const MOST: u64 = 2 << 30;
@@ -24,11 +24,12 @@ pub(crate) struct WorldFile<'a> {
     pub(crate) hash: u64,
 }
 
+#[cfg(feature = "render")]
 impl<'a> WorldFile<'a> {
     /// Reads the file of a world for its hash; `None` if that is not possible, or useless without a map beside it.
     pub(crate) fn of(path: &'a Path) -> Option<Self> {
         let is_of_use = !is_stream(path) && beside(path).is_file();
-        let bytes = is_of_use.then(|| read_glb(path).ok())?;
+        let bytes = is_of_use.then(|| enfilade_cli::input::read_glb(path).ok())?;
         let hash = WalkMapKey::hash(&bytes?);
         Some(Self { path, hash })
     }

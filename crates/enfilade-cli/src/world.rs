@@ -5,10 +5,9 @@ use std::path::Path;
 use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade::cpg::wire::decode_glb;
-use enfilade::stream::{PackError, PackedFiles, PackedPlace};
 use enfilade::world::WalkMapKey;
 
-use crate::input::{name_of, read_glb};
+use crate::input::{name_of, read_glb, read_packed};
 
 /// Reads a world written by `bake` from `path`, or from standard input if that is `-`.
 ///
@@ -25,16 +24,9 @@ pub fn read_world(path: &Path) -> anyhow::Result<World> {
 ///
 /// As [`read_world`]; a head that was forged, or written wrongly.
 pub fn read_world_checked(path: &Path) -> anyhow::Result<(World, Vec<u8>)> {
-    let read = || {
-        let packed = PackedPlace::read_all(path)?;
-        let file = packed.unpack()?;
-        packed.check(&file)?;
-        Ok::<_, PackError>(file)
-    };
-    let file = if PackedPlace::is_url(path) || PackedFiles::is_packed(path) {
-        read().with_context(|| name_of(path))?
-    } else {
-        read_glb(path)?
+    let file = match read_packed(path, true).with_context(|| name_of(path))? {
+        Some(file) => file,
+        None => read_glb(path)?,
     };
     Ok((decode_glb(&file).with_context(|| name_of(path))?, file))
 }

@@ -290,6 +290,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the memory left before [`ImportError::Bomb`]. [Units: bytes]
+    #[cfg(feature = "draco")]
     pub(crate) fn memory_left(&self) -> u64 {
         self.max_held_bytes().saturating_sub(self.n_held_bytes)
     }

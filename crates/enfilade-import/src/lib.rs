@@ -30,7 +30,6 @@ mod foreign;
 mod gltf;
 mod groups;
 mod ifc;
-mod las_head;
 mod left_out;
 mod map;
 mod marks;
@@ -176,6 +175,12 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Heights => sources::read_heights(bytes, builder),
         Format::Vox => vox::read(bytes, builder),
     }
+}
+
+/// The problem of a file whose reader was left out of the build.
+#[cfg(not(all(feature = "draco", feature = "scans")))]
+fn not_built(format: &str, feature: &str) -> String {
+    format!("is {format}, which this build cannot read: build it with the feature `{feature}`")
 }
 
 /// The supported formats.

@@ -1,4 +1,5 @@
-//! Reports on enfilade worlds for people: floor plans as SVG, with the feature `print` also as PNG and PDF, an HTML page about a world, and a verdict on it.
+//! Reports on enfilade worlds for people: floor plans as SVG, with the feature `print` also as PNG and PDF, with `page` an HTML page
+//! about a world, and a verdict on it.
 //!
 //! ```
 //! use enfilade_cpg::World;
@@ -18,10 +19,13 @@ mod drawing;
 mod floors;
 #[cfg(feature = "print")]
 mod font;
+#[cfg(feature = "page")]
 mod graph;
+#[cfg(feature = "page")]
 mod html;
 mod label;
 mod marks;
+#[cfg(feature = "page")]
 mod matrix;
 mod palette_page;
 #[cfg(feature = "print")]
@@ -30,6 +34,7 @@ mod plain;
 mod plan;
 #[cfg(feature = "print")]
 mod raster;
+#[cfg(feature = "page")]
 mod reasons;
 mod relief;
 mod rooms;
@@ -40,9 +45,11 @@ mod sheet;
 mod storeys;
 mod svg;
 mod verdict;
+#[cfg(feature = "page")]
 mod walk;
 
 pub use drawing::Drawing;
+#[cfg(feature = "page")]
 pub use html::{Figure, ReportParts, Table, report_html};
 pub use palette_page::{PaletteEntry, palette_html, palette_plan};
 #[cfg(feature = "print")]
@@ -58,4 +65,5 @@ pub use rooms::{RoomFacts, room_facts};
 pub use shapes::{PlanLabel, PlanShape};
 pub use storeys::{Storey, find_storeys};
 pub use verdict::{InputDoubt, Verdict, cells_in_words, is_empty, why_empty};
+#[cfg(feature = "page")]
 pub use walk::{WalkPage, WalkStorey};

@@ -14,6 +14,7 @@ use enfilade_cpg::{Cell, CellId, CellPortalGraph, PortalKind};
 pub use files::{SceneFile, SceneFiles};
 pub use json::graph_json;
 pub use obj::surfaces_obj;
+#[cfg(feature = "page")]
 pub(crate) use tables::cells_table;
 pub use tables::{cells_csv, portals_csv};
 pub use text_graphs::{graph_dot, graph_graphml};

@@ -14,7 +14,7 @@ use crate::relief::Relief;
 use crate::rooms::{RoomFacts, facts_of_rooms};
 use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
-use crate::sheet::{COLUMN, MARGIN, Sheet};
+use crate::sheet::{MARGIN, Sheet};
 use crate::storeys::{Page, Storey, find_pages};
 
 /// Largest height of the letters of names, in a small house. [Units: wu]
@@ -247,6 +247,7 @@ impl<'a> Plans<'a> {
     }
 
     /// Draws the legend of all plans.
+    #[cfg(feature = "page")]
     pub(crate) fn legend(&self) -> Drawing {
         let zoom = lettering(self.max - self.min, 1);
         let items = self.pages.iter().flat_map(|p| p.marks.iter().cloned());
@@ -263,7 +264,7 @@ impl<'a> Plans<'a> {
         };
         let n = sheet.items.len();
         let margin = DVec2::splat(MARGIN * zoom);
-        let room = 3.0 * COLUMN * sheet.legend();
+        let room = 3.0 * crate::sheet::COLUMN * sheet.legend();
         let end = sheet.foot(self.world, margin, room, false);
         Drawing {
             title: "Legend".into(),

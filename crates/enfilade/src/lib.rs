@@ -109,6 +109,7 @@
 //! | always | [`whole`] | atomic writing of files |
 //! | always | [`geom`] | boxes, planes, windings, the scene, the bounding volume hierarchy |
 //! | `import` | `import` | reads glTF, OBJ, PLY and STL into one [`Scene`](geom::scene::Scene) |
+//! | `draco`, `scans`, `tiff` | | … glTF compressed with Draco; scans in E57, LAS and LAZ; height maps in TIFF |
 //! | `bake` | `bake` | scene → [`World`]: finds cells and portals |
 //! | `vis` | `vis` | visibility from each cell, precomputed |
 //! | `render` | `render` | pictures of a world with wgpu |

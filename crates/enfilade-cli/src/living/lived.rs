@@ -14,10 +14,11 @@ use enfilade_render::{
 };
 
 use super::doors::AutoDoors;
-use super::file::{LivingFile, SoundEntry, read_living};
+use super::file::{LivingFile, SoundEntry};
 use super::lift::{Lift, LiftPlace};
 use super::people::People;
 use super::radar::{Blip, Radar};
+use super::read::read_living;
 use crate::walk::WorldFile;
 
 /// Time that a cell stays awake after it was seen last. [Units: s]

@@ -202,6 +202,10 @@ pub(super) struct PrimitiveExtensions {
 
 #[derive(serde::Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[cfg_attr(
+    not(feature = "draco"),
+    expect(dead_code, reason = "no decoder reads it")
+)]
 pub(super) struct DracoDef {
     pub(super) buffer_view: u32,
     /// Unique ids in the bitstream, by attribute name.
