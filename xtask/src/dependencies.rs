@@ -13,6 +13,9 @@ use crate::{cargo, output_of, root, run_to_end};
 /// The only allowed source of other people's packages.
 const REGISTRY: &str = "registry+https://github.com/rust-lang/crates.io-index";
 
+/// Most packages of the command without features, our own included.
+const MOST_OF_SMALLEST: usize = 110;
+
 /// Fails with a line for each problem.
 pub(crate) fn run() -> anyhow::Result<()> {
     let text = std::fs::read_to_string(root().join("deny.toml")).context("deny.toml")?;
@@ -34,6 +37,28 @@ pub(crate) fn run() -> anyhow::Result<()> {
         bail!("{}", problems.join("\n"));
     }
     println!("{} packages keep to deny.toml", ours.len());
+    smallest_build()
+}
+
+/// Fails if the command without features has come to need many packages.
+fn smallest_build() -> anyhow::Result<()> {
+    let tree = output_of(&mut cargo(&[
+        "tree",
+        "--locked",
+        "--package=enfilade-cli",
+        "--no-default-features",
+        "--edges=normal,build",
+        "--prefix=none",
+        "--format={p}",
+        "--no-dedupe",
+    ]))?;
+    let needed: BTreeSet<&str> = tree.lines().filter(|line| !line.is_empty()).collect();
+    let n = needed.len();
+    anyhow::ensure!(
+        n <= MOST_OF_SMALLEST,
+        "the command without features needs {n} packages, {MOST_OF_SMALLEST} at most: put the new ones behind a feature"
+    );
+    println!("the command without features needs {n} packages, all ours included");
     Ok(())
 }
 

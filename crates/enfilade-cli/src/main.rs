@@ -197,9 +197,37 @@ fn main() -> ExitCode {
     }
 }
 
+/// Commands that this build leaves out, and the features that have them.
+const LEFT_OUT: &[[&str; 2]] = &[
+    #[cfg(not(feature = "pack"))]
+    ["pack", "pack"],
+    #[cfg(not(feature = "render"))]
+    ["portals", "render"],
+    #[cfg(not(feature = "render"))]
+    ["render", "render"],
+    #[cfg(not(feature = "report"))]
+    ["report", "report"],
+    #[cfg(not(feature = "serve"))]
+    ["serve", "serve"],
+    #[cfg(not(feature = "sound"))]
+    ["sound", "sound"],
+    #[cfg(not(feature = "pack"))]
+    ["unpack", "pack"],
+    #[cfg(not(feature = "view"))]
+    ["view", "view"],
+];
+
 /// Ends with a usage error, or with the requested help. The message repeats arguments, which a shell may make from
 /// file names: arguments with hidden characters are shown escaped.
 fn wrong_usage(error: &clap::Error) -> ! {
+    let asked = std::env::args().nth(1).unwrap_or_default();
+    if let Some([_, feature]) = LEFT_OUT.iter().find(|[command, _]| *command == asked) {
+        let _ = writeln!(
+            Warned,
+            "enfilade: this build leaves out `{asked}`; build it with the feature `{feature}`, or take the released binary"
+        );
+        std::process::exit(error.exit_code());
+    }
     let args = || std::env::args_os().map(|a| a.to_string_lossy().into_owned());
     if args().any(|a| a.contains(is_hidden)) {
         let args = args().map(|a| shown(a).to_string());
