@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
             .collect();
         outputs.write_all("-o", Format::Picture, &pictures)?;
     }
-    prepare(args, (&world, &mut studio), ahead.as_deref())?;
+    prepare(args, &world, &mut studio, ahead.as_deref())?;
     let mut lived = match &args.living {
         Some(path) => {
             let lived = Lived::read(path, &world, WorldFile::of(&args.world))?;
@@ -108,7 +108,7 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
             let live = (lived.as_mut(), mirrored.as_mut());
-            let (picture, own) = draw(args, (&world, &mut studio), live, camera, size)?;
+            let (picture, own) = draw(args, &world, &mut studio, live.0, live.1, camera, size)?;
             counts = own;
             Ok(picture)
         })?;
@@ -150,7 +150,8 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
 /// Adds what the pictures need: levels of detail, light, lamps, and textures of far portals.
 fn prepare(
     args: &Render,
-    (world, studio): (&World, &mut Studio),
+    world: &World,
+    studio: &mut Studio,
     ahead: Option<&[u8]>,
 ) -> anyhow::Result<()> {
     if args.lod > 0.0 {
@@ -169,8 +170,10 @@ fn prepare(
 /// Draws a picture of a size, which may be a multiple of the requested one. Counts the textures in it.
 fn draw(
     args: &Render,
-    (world, studio): (&World, &mut Studio),
-    (lived, mirrored): (Option<&mut Lived>, Option<&mut Mirrored>),
+    world: &World,
+    studio: &mut Studio,
+    lived: Option<&mut Lived>,
+    mirrored: Option<&mut Mirrored>,
     camera: &Camera,
     size: [u32; 2],
 ) -> anyhow::Result<(Picture, PortalTextureCounts)> {
@@ -329,14 +332,15 @@ pub(crate) fn portal_marks(
     let view = camera.view(size[0] as f32 / size[1] as f32)?;
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let mut marks = Vec::new();
-    add_portal_marks(&mut marks, (world, &Pose::IDENTITY), &seen, camera, size);
+    add_portal_marks(&mut marks, world, &Pose::IDENTITY, &seen, camera, size);
     Ok(marks)
 }
 
 /// Adds the marks of a world that stands at a pose in the frame of the camera.
 pub(crate) fn add_portal_marks(
     marks: &mut Vec<Mark>,
-    (world, pose): (&World, &Pose),
+    world: &World,
+    pose: &Pose,
     seen: &Seen<'_>,
     camera: &Camera,
     size: [u32; 2],

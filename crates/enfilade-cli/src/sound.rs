@@ -108,7 +108,7 @@ pub(crate) fn run(args: &Sound) -> anyhow::Result<()> {
     let opened = opened(&args.open, n)?;
     let (mut points, mut warnings) = (given, Vec::new());
     if args.walk {
-        points = walked::along_paths(args, (&world, hash), &points, &mut warnings)?;
+        points = walked::along_paths(args, &world, hash, &points, &mut warnings)?;
         seconds = duration(&points)?;
     } else {
         walked::check(&world, &points, &mut warnings)?;

@@ -127,7 +127,8 @@ impl Streamed {
     pub fn for_views(
         packed: Packed,
         gpu: Gpu,
-        (sight, state): (Sight, SightState),
+        sight: Sight,
+        state: SightState,
         views: &[Vec<InView>],
     ) -> anyhow::Result<(Studio, Self)> {
         let largest = views.iter().map(|v| packed.size_of(v)).max().unwrap_or(0);
@@ -142,7 +143,7 @@ impl Streamed {
             ..StreamOptions::default()
         };
         let catalog = packed.head.catalog.clone();
-        let streamed = Self::new(packed, catalog, &studio, (options, u64::MAX))?;
+        let streamed = Self::new(packed, catalog, &studio, options, u64::MAX)?;
         Ok((studio, streamed))
     }
 
@@ -167,7 +168,7 @@ impl Streamed {
             ..StreamOptions::default()
         };
         let catalog = packed.on_adapter();
-        let streamed = Self::new(packed, catalog, &studio, (options, transit))?;
+        let streamed = Self::new(packed, catalog, &studio, options, transit)?;
         Ok((studio, streamed))
     }
 
@@ -175,7 +176,8 @@ impl Streamed {
         packed: Packed,
         catalog: Catalog,
         studio: &Studio,
-        (options, max_backlog): (StreamOptions, u64),
+        options: StreamOptions,
+        max_backlog: u64,
     ) -> anyhow::Result<Self> {
         let maker = studio.world.piece_maker();
         let maker = maker.context("a packed world is streamed into a hollow one")?;

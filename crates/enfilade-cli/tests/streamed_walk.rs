@@ -182,7 +182,7 @@ fn a_view_is_settled_for_a_picture_alone() {
     cells_in_view(&seen, sight.n_cells(), &mut cells);
     let views = [view_of(&cells)];
     let state = SightState::new(&sight);
-    let opened = Streamed::for_views(packed, gpu(), (sight, state), &views).unwrap();
+    let opened = Streamed::for_views(packed, gpu(), sight, state, &views).unwrap();
     let (mut studio, mut streamed) = opened;
     let [view] = views;
     streamed.look(view);

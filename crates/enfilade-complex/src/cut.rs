@@ -66,7 +66,9 @@ pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: 
                 let votes = |leaf| labels.map(|label| votes.weight(leaf, label));
                 let leaves = &cells.cell_of_leaf;
                 let border = (pair, &leaks[&pair].1[..]);
-                cut(graph, leaves, &adjacency, &node_of, border, &votes)
+                cut(
+                    graph, leaves, &adjacency, &node_of, border.0, border.1, &votes,
+                )
             })
             .collect();
         for (leaf, to) in moves {
@@ -325,7 +327,8 @@ fn cut(
     cell_of_leaf: &[u32],
     adjacency: &Adjacency,
     node_of: &[AtomicU32],
-    (pair, border): ([u32; 2], &[u32]),
+    pair: [u32; 2],
+    border: &[u32],
     votes: &impl Fn(u32) -> [f64; 2],
 ) -> Vec<(u32, u32)> {
     let node = |leaf: u32| node_of[leaf as usize].load(Relaxed);

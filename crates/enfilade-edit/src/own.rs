@@ -88,7 +88,8 @@ impl OwnWorlds {
     pub(crate) fn make(
         &mut self,
         host: Option<InstanceId>,
-        (base, before): (&OwnBase, Vec<HandEditKind>),
+        base: &OwnBase,
+        before: Vec<HandEditKind>,
         kind: &HandEditKind,
     ) -> Result<(), HandEditError> {
         let mut own = self.made(host, base, &before);

@@ -68,7 +68,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 fn opened(path: &Path) -> Result<(EditSession, Resumed), EditError> {
-    EditSession::open(path, kit(), (EditGround::Open, "-"), DEFAULT_TOLERANCE)
+    EditSession::open(path, kit(), EditGround::Open, "-", DEFAULT_TOLERANCE)
 }
 
 #[test]

@@ -190,7 +190,9 @@ impl Light {
     fn new(
         gpu: &Gpu,
         field: Field,
-        (texels, first_cell, n_cells): (&[[u32; 4]], usize, usize),
+        texels: &[[u32; 4]],
+        first_cell: usize,
+        n_cells: usize,
         probes: Probes,
         has_field: bool,
     ) -> Result<Self, RenderError> {
@@ -242,7 +244,7 @@ impl Light {
             texels: vec![0],
             brightness: Vec::new(),
         };
-        Self::new(gpu, field, (&[], 0, 0), probes, false)
+        Self::new(gpu, field, &[], 0, 0, probes, false)
     }
 
     /// Computes the light of a world under a sun in direction `sun`.
@@ -279,7 +281,7 @@ impl Light {
             texels.extend(entry);
         }
         let n_cells = world.graph.cells.len();
-        Self::new(gpu, field, (&texels, first, n_cells), probes, true)
+        Self::new(gpu, field, &texels, first, n_cells, probes, true)
     }
 
     /// Returns the exposure for an eye at a place, relative to the outdoors: longer in dim rooms, from which the

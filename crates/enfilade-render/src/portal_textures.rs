@@ -63,7 +63,8 @@ impl PortalTextures {
         gpu: &Gpu,
         layouts: &Layouts,
         list: &RenderList,
-        (projection, exposure): (&Projection, f32),
+        projection: &Projection,
+        exposure: f32,
         marks: bool,
     ) -> DoorwayDraw<'_> {
         let variant = DoorwayVariant {

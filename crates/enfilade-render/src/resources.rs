@@ -102,13 +102,14 @@ pub(crate) fn read_texture(
     size: [u32; 2],
     bytes_per_pixel: u32,
 ) -> Result<Vec<u8>, RenderError> {
-    read_layer(gpu, (texture, 0), size, bytes_per_pixel)
+    read_layer(gpu, texture, 0, size, bytes_per_pixel)
 }
 
 /// As [`read_texture`], of one layer of an array.
 pub(crate) fn read_layer(
     gpu: &Gpu,
-    (texture, layer): (&wgpu::Texture, u32),
+    texture: &wgpu::Texture,
+    layer: u32,
     [width, height]: [u32; 2],
     bytes_per_pixel: u32,
 ) -> Result<Vec<u8>, RenderError> {

@@ -156,7 +156,7 @@ impl Studio {
         let mut lists = self.space_lists(shot, size)?;
         let lamps = self.space_lamps(shot, shot.seen);
         let props = self.prop_copies(shot);
-        let mut shown = self.space_shown(shot, (&lamps, &props), size)?;
+        let mut shown = self.space_shown(shot, &lamps, &props, size)?;
         let mut textures = self.portal_textures.take();
         if let (Some(own), Some((PartId::ROOT, list))) = (&mut textures, lists.first_mut())
             && std::mem::take(&mut own.is_planned)
@@ -209,7 +209,7 @@ impl Studio {
             Some(tree) => {
                 let lamps = self.space_lamps(shot, Some(answer));
                 let props = self.prop_copies(shot);
-                let shown = self.space_shown(shot, (&lamps, &props), size)?;
+                let shown = self.space_shown(shot, &lamps, &props, size)?;
                 let mut worlds = staged_worlds(&self.world, &mut self.stage, &mut self.parts);
                 (self.renderer).draw_tree(&self.gpu, &mut worlds, &tree, &shown, output)?;
                 Some(tree.counts())
@@ -350,7 +350,8 @@ impl Studio {
     fn space_shown<'s>(
         &self,
         shot: &SpaceShot<'s>,
-        (lamps, props): (&'s [ActiveLamp], &'s [PropCopy]),
+        lamps: &'s [ActiveLamp],
+        props: &'s [PropCopy],
         size: [u32; 2],
     ) -> Result<Shown<'s>, RenderError> {
         let projection = shot.camera.projection(size[0] as f32 / size[1] as f32)?;

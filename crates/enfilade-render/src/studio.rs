@@ -289,7 +289,7 @@ impl Studio {
         let seen_by = (&shown.projection_in(&self.stage), shown.exposure);
         let (layouts, marks) = (&self.renderer.layouts, shown.style.dark_corners);
         Shown {
-            textures: Some(own.write(&self.gpu, layouts, list, seen_by, marks)),
+            textures: Some(own.write(&self.gpu, layouts, list, seen_by.0, seen_by.1, marks)),
             ..shown
         }
     }

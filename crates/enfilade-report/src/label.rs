@@ -58,7 +58,8 @@ pub(crate) struct Fitted {
 /// alone.
 pub(crate) fn fit(
     section: &Section,
-    (label, region): (Label, &Region),
+    label: Label,
+    region: &Region,
     [name, area, number]: [&str; 3],
     sizes: Sizes,
 ) -> Fitted {

@@ -371,7 +371,7 @@ impl<'a> Plans<'a> {
             };
             let number = cell.0.to_string();
             let words = [&*name, area.as_str(), number.as_str()];
-            let fitted = fit(&drawn.section, (*label, region), words, sheet.sizes);
+            let fitted = fit(&drawn.section, *label, region, words, sheet.sizes);
             if fitted.is_number {
                 sheet.numbered.insert(cell);
             }

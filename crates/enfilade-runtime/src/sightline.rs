@@ -166,7 +166,7 @@ impl Sightlines {
     #[must_use]
     pub fn first_hit(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
         self.hit_of_whole(point(a), point(b))
-            .map(|hit| self.named(hit, None))
+            .map(|hit| self.named(hit.0, hit.1, hit.2, None))
     }
 
     /// As [`Sightlines::first_hit`], by following the segment from cell to cell; also reports the cell where it ends.
@@ -174,12 +174,16 @@ impl Sightlines {
     pub fn first_hit_by_cells(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
         let (a, b) = (point(a), point(b));
         match self.walk(a, b) {
-            Walk::Sure(hit, cell) => hit.map(|hit| self.named(hit, Some(CellId(cell)))),
-            Walk::Doubtful => self.hit_of_whole(a, b).map(|hit| self.named(hit, None)),
+            Walk::Sure(hit, cell) => {
+                hit.map(|hit| self.named(hit.0, hit.1, hit.2, Some(CellId(cell))))
+            }
+            Walk::Doubtful => self
+                .hit_of_whole(a, b)
+                .map(|hit| self.named(hit.0, hit.1, hit.2, None)),
         }
     }
 
-    fn named(&self, (t, triangle, front): (f64, u32, bool), cell: Option<CellId>) -> SightHit {
+    fn named(&self, t: f64, triangle: u32, front: bool, cell: Option<CellId>) -> SightHit {
         let (batch, triangle) = self.source[triangle as usize];
         SightHit {
             t,

@@ -184,12 +184,12 @@ impl VisPlan<'_> {
             .for_each(|&d| bits::set(&mut is_here, d as usize));
         let most = MOST_FOR_EXIT * sources.len().max(LEAST_EXITS);
         let most = self.most_directions.min(most);
-        let mut rows = self.rows(&sources, &mut is_here, (true, most))?;
+        let mut rows = self.rows(&sources, &mut is_here, true, most)?;
         let others: Vec<u32> = bits::ones(&is_here)
             .map(|d| d as u32)
             .filter(|d| sources.binary_search(d).is_err())
             .collect();
-        let others_rows = self.rows(&others, &mut is_here, (false, most))?;
+        let others_rows = self.rows(&others, &mut is_here, false, most)?;
         let mut all: Vec<(u32, Vec<u32>)> = sources.iter().copied().zip(rows.drain(..)).collect();
         all.extend(others.into_iter().zip(others_rows));
         all.sort_unstable_by_key(|row| row.0);
@@ -207,7 +207,8 @@ impl VisPlan<'_> {
         &self,
         sources: &[u32],
         is_here: &mut [u64],
-        (grows, most): (bool, usize),
+        grows: bool,
+        most: usize,
     ) -> Option<Vec<Vec<u32>>> {
         let dirs = &self.dirs;
         let ground = self.ground();
@@ -275,7 +276,7 @@ impl VisPlan<'_> {
         let blocker = is_blocked.as_ref().map(|f| f as Blocker<'_>);
         let clearance = self.ground().tolerance.clearance;
         let table = (might, Some(scope));
-        let search = Search::within(&dirs, table, clearance, config.far, blocker);
+        let search = Search::within(&dirs, table.0, table.1, clearance, config.far, blocker);
         out.n_base += search.n_pairs();
         self.finish_search(search, walls, on_round, out)
     }

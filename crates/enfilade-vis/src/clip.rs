@@ -130,7 +130,8 @@ impl Arena {
     pub(crate) fn clip_all(
         &mut self,
         mut poly: Poly,
-        (planes, side): (&[Four], Side),
+        planes: &[Four],
+        side: Side,
         ball: [f64; 4],
         turn: DVec3,
         tolerance: &Tolerance,

@@ -447,7 +447,8 @@ impl Next {
     #[inline]
     pub(crate) fn window(
         &self,
-        (might, d): (&BitTable, usize),
+        might: &BitTable,
+        d: usize,
         exits: &Range<usize>,
         start: usize,
     ) -> u64 {

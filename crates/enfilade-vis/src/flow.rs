@@ -145,7 +145,7 @@ impl Flow {
             let at = at as usize;
             let exits = dirs.after(at);
             for start in exits.clone().step_by(64) {
-                let window = shared.next.window((shared.might, at), &exits, start)
+                let window = shared.next.window(shared.might, at, &exits, start)
                     & bits::window(&self.unreached, start);
                 bits::clear_window(&mut self.unreached, start, window);
                 self.stack
@@ -376,7 +376,7 @@ impl Flow {
         let clip = |arena: &mut Arena, poly: Poly, planes: &[Four], side: Side| {
             let dir = poly.dir as usize;
             let turn = dirs.all[dir].turn;
-            arena.clip_all(poly, (planes, side), dirs.balls[dir], turn, tolerance)
+            arena.clip_all(poly, planes, side, dirs.balls[dir], turn, tolerance)
         };
         // Clip the last opening by each set of planes at once: that closes most chains.
         for k in 1..last {
@@ -479,7 +479,7 @@ impl Flow {
         let planes = (&self.planes[first_plane..], Side::After);
         target = self
             .arena
-            .clip_all(target, planes, ball, next.turn, tolerance)?;
+            .clip_all(target, planes.0, planes.1, ball, next.turn, tolerance)?;
         if pass.dir != source.dir {
             let end = self.planes.len();
             separators(
@@ -490,9 +490,9 @@ impl Flow {
             );
             let ball = dirs.balls[source.dir as usize];
             let planes = (&self.planes[end..], Side::Before);
-            source = self
-                .arena
-                .clip_all(source, planes, ball, source_turn, tolerance)?;
+            source =
+                self.arena
+                    .clip_all(source, planes.0, planes.1, ball, source_turn, tolerance)?;
             self.planes.truncate(end);
         }
         Some((source, target))

@@ -140,14 +140,15 @@ impl Search<'_> {
             let Some(first) = line.chain.iter().position(is_wanted) else {
                 continue;
             };
-            self.turn(line, (first, exit as u32), walked, out);
+            self.turn(line, first, exit as u32, walked, out);
         }
     }
 
     fn turn(
         &self,
         line: &Line,
-        (first, exit): (usize, u32),
+        first: usize,
+        exit: u32,
         [ahead, behind]: &mut [Vec<u32>; 2],
         out: &mut Vec<Line>,
     ) {

@@ -38,7 +38,7 @@ pub(crate) fn narrow_might(
             .par_iter()
             .with_max_len(4)
             .map_init(Work::default, |work, &(_, source)| {
-                work.narrow(dirs, (might, &next), tolerance, source)
+                work.narrow(dirs, might, &next, tolerance, source)
             })
             .collect();
         for (&(_, source), row) in round.iter().zip(rows) {
@@ -75,7 +75,8 @@ impl Work {
     fn narrow(
         &mut self,
         dirs: &Dirs,
-        (might, ahead): (&BitTable, &Next),
+        might: &BitTable,
+        ahead: &Next,
         tolerance: &Tolerance,
         source: usize,
     ) -> Vec<u64> {
@@ -105,7 +106,7 @@ impl Work {
                 &mut self.planes,
             );
             pack(&mut self.planes, tolerance);
-            self.flood(dirs, (might, ahead), tolerance, (source, pass));
+            self.flood(dirs, might, ahead, tolerance, (source, pass));
             bits::unite(&mut row, &self.reached);
         }
         row
@@ -115,11 +116,12 @@ impl Work {
     fn flood(
         &mut self,
         dirs: &Dirs,
-        (might, ahead): (&BitTable, &Next),
+        might: &BitTable,
+        ahead: &Next,
         tolerance: &Tolerance,
         ends: (usize, usize),
     ) {
-        dispatch!(Level::new(), simd => self.flood_by(simd, dirs, (might, ahead), tolerance, ends));
+        dispatch!(Level::new(), simd => self.flood_by(simd, dirs,might, ahead, tolerance, ends));
     }
 
     #[inline(always)]
@@ -127,7 +129,8 @@ impl Work {
         &mut self,
         simd: S,
         dirs: &Dirs,
-        (might, ahead): (&BitTable, &Next),
+        might: &BitTable,
+        ahead: &Next,
         tolerance: &Tolerance,
         (source, pass): (usize, usize),
     ) {
@@ -143,7 +146,7 @@ impl Work {
             let exits = dirs.after(at);
             for start in exits.clone().step_by(64) {
                 let window =
-                    ahead.window((might, at), &exits, start) & bits::window(&self.allowed, start);
+                    ahead.window(might, at, &exits, start) & bits::window(&self.allowed, start);
                 bits::clear_window(&mut self.allowed, start, window);
                 // A loop, as a closure would not be compiled for the processor that `simd` stands for.
                 let mut rest = window;

@@ -64,7 +64,7 @@ pub fn see_parts_through(
     let glasses = Hourglasses::new(&SightGraph::of_graph(&world.graph))?;
     let (volumes, ends) = volumes_of(world, (pvs, through), &glasses);
     let (all, by_cell) = (all_parts(world), by_cell(world));
-    let candidates = candidates(pvs, &volumes, &ends, (&all, &by_cell));
+    let candidates = candidates(pvs, &volumes, &ends, &all, &by_cell);
     let both = |&(ends, part): &([u32; 2], u32)| ends.map(|portal| (portal, part));
     let mut asked: Vec<(u32, u32)> = candidates.iter().flatten().flat_map(both).collect();
     asked.par_sort_unstable();
@@ -116,7 +116,8 @@ fn candidates(
     pvs: &Pvs,
     volumes: &VisibleVolumes,
     ends: &[[u32; 2]],
-    (all, by_cell): (&[Shape], &[Vec<u32>]),
+    all: &[Shape],
+    by_cell: &[Vec<u32>],
 ) -> Vec<Vec<([u32; 2], u32)>> {
     let mut first_piece = 0;
     let pairs: Vec<(usize, u32)> = (pvs.pairs().enumerate())

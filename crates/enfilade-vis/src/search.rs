@@ -87,13 +87,14 @@ impl<'a> Search<'a> {
         blocker: Option<Blocker<'a>>,
     ) -> Self {
         let might = dirs.might_see(clearance, far);
-        Self::within(dirs, (might, None), clearance, far, blocker)
+        Self::within(dirs, might, None, clearance, far, blocker)
     }
 
     /// Starts from openings that each opening might see, for the part of the answer that is asked for.
     pub(crate) fn within(
         dirs: &'a Dirs,
-        (might, scope): (BitTable, Option<Scope>),
+        might: BitTable,
+        scope: Option<Scope>,
         clearance: f64,
         far: Option<f64>,
         blocker: Option<Blocker<'a>>,

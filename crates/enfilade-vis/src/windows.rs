@@ -135,7 +135,7 @@ impl Windows {
                 continue;
             }
             let mark = self.arena.mark();
-            if let Some(part) = self.narrow(ground, (source, from), pass, next) {
+            if let Some(part) = self.narrow(ground, source, from, pass, next) {
                 self.reach(dirs, source, part);
             }
             self.arena.release(mark);
@@ -173,7 +173,8 @@ impl Windows {
     fn narrow(
         &mut self,
         ground: &Ground<'_>,
-        (source, from): (usize, Poly),
+        source: usize,
+        from: Poly,
         pass: usize,
         next: usize,
     ) -> Option<Poly> {
@@ -208,7 +209,8 @@ impl Windows {
             target = self.arena.clip(target, front, turn, tolerance)?;
         }
         let planes = (&self.planes[..], Side::After);
-        self.arena.clip_all(target, planes, ball, turn, tolerance)
+        self.arena
+            .clip_all(target, planes.0, planes.1, ball, turn, tolerance)
     }
 
     /// Adds a part of an opening to what is reached; queues the opening if that is new.

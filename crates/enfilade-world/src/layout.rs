@@ -161,7 +161,8 @@ impl Layout {
                 PortalKind::Open,
                 normal,
                 area,
-                (first_piece, first),
+                first_piece,
+                first,
             ),
             portal: side.portal(),
             maps: (0..side.passes.len())
@@ -183,13 +184,7 @@ impl Layout {
         if area == 0.0 {
             area = add(&portal.outline);
         }
-        self.shape_of(
-            portal.cells,
-            portal.kind,
-            normal,
-            area,
-            (first_piece, first),
-        )
+        self.shape_of(portal.cells, portal.kind, normal, area, first_piece, first)
     }
 
     /// Returns the shape of an opening whose pieces and vertices are the last ones.
@@ -199,7 +194,8 @@ impl Layout {
         kind: PortalKind,
         normal: DVec3,
         area: f64,
-        (first_piece, first): (u32, usize),
+        first_piece: u32,
+        first: usize,
     ) -> OpeningShape {
         let own = &self.corners[first..];
         let bounds = Aabb::of_points(own);

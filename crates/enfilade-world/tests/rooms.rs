@@ -73,7 +73,8 @@ fn check_view(
     space: &Space,
     model: &Model,
     viewer: &mut SpaceViewer,
-    (frame, eye): (PartId, DVec3),
+    frame: PartId,
+    eye: DVec3,
     rng: &mut Rng,
     n_rays: usize,
 ) -> usize {
@@ -180,7 +181,7 @@ fn ray_hits_are_seen_through_sixteen_nested_rooms() {
         for _ in 0..6 {
             let frame = PartId(rng.below(worlds.len()) as u32);
             let eye = (frame, random_in(&space, frame, &mut rng));
-            n_hits += check_view(&space, &model, &mut viewer, eye, &mut rng, 100);
+            n_hits += check_view(&space, &model, &mut viewer, eye.0, eye.1, &mut rng, 100);
         }
         let eye = random_in(&space, PartId(16), &mut rng).as_vec3().to_array();
         let view = View::around(eye).unwrap();
@@ -233,7 +234,7 @@ fn ray_hits_are_seen_between_adjacent_rooms() {
         for _ in 0..12 {
             let frame = PartId(rng.below(worlds.len()) as u32);
             let eye = (frame, random_in(&space, frame, &mut rng));
-            n_hits += check_view(&space, &model, &mut viewer, eye, &mut rng, 100);
+            n_hits += check_view(&space, &model, &mut viewer, eye.0, eye.1, &mut rng, 100);
         }
     }
     assert!(n_hits > 5000, "{n_hits}");

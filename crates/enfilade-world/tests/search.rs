@@ -27,7 +27,8 @@ fn point_in(layout: &Layout, rng: &mut Rng) -> (CellId, DVec3) {
 fn lengths_by_sweeps(
     layout: &Layout,
     ways: &Ways,
-    (cell, from): (CellId, DVec3),
+    cell: CellId,
+    from: DVec3,
     pass: impl Fn(Exit) -> Option<f64>,
 ) -> Vec<[Vec<f64>; 2]> {
     let all = || (0..layout.n_portals() as u32).map(PortalId);
@@ -87,7 +88,9 @@ fn lengths_are_those_of_sweeps_over_all_pairs() {
             costs[2 * e.portal.idx() + side]
         };
         search.run(&ways, start.0, start.1, f64::INFINITY, cost);
-        let expected = lengths_by_sweeps(&layout, &ways, start, |e| cost(e).map(|c| c.max(0.0)));
+        let expected = lengths_by_sweeps(&layout, &ways, start.0, start.1, |e| {
+            cost(e).map(|c| c.max(0.0))
+        });
         let mut n_reached = 0;
         for p in (0..layout.n_portals() as u32).map(PortalId) {
             for (side, to) in layout.opening(p).cells().into_iter().enumerate() {

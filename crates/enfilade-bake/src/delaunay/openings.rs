@@ -24,7 +24,8 @@ impl Knife<'_> {
     /// Returns the open pieces of facet `i` of tetrahedron `t` towards its neighbor. `pair` holds the cuts of the two.
     pub(super) fn openings(
         &self,
-        (t, i): (u32, usize),
+        t: u32,
+        i: usize,
         pair: [&TetrahedraCut; 2],
     ) -> SmallVec<[OpenPiece; 2]> {
         let other_facet = (self.delaunay.tetrahedra[t as usize].neighbors[i] & 3) as usize;

@@ -154,12 +154,12 @@ impl Session {
         let mut begun = self.begun.lock().ok();
         let earlier = begun.as_mut().and_then(|begun| begun.take());
         let to_cells = (&self.cells, rules_of(config));
-        let merging = begun_before(earlier, to_cells, &self.resolved, n_steps);
+        let merging = begun_before(earlier, to_cells.0, to_cells.1, &self.resolved, n_steps);
         if let Some(begun) = &mut begun {
             **begun = Some(merging.clone());
         }
         let record = (&self.decimation, &self.resolved[..]);
-        remaining(&self.cells, merging, record, n_steps)
+        remaining(&self.cells, merging, record.0, record.1, n_steps)
     }
 
     /// Returns the openings of a portal as convex polygons, without cracks, in which no portal is placed. [Units: wu]

@@ -383,7 +383,7 @@ impl Air<'_> {
         let pair = [&cuts[t], &cuts[other]];
         let is_cut = pair.iter().any(|c| c.parts.is_some());
         let facet = (t as u32, i);
-        for piece in self.knife.openings(facet, pair) {
+        for piece in self.knife.openings(facet.0, facet.1, pair) {
             let ids = [parts.id(t, piece.parts[0]), parts.id(other, piece.parts[1])];
             let [a, b] = ids.map(|p| parts.at(p));
             let whole = passing_radius(f, a, b);

@@ -51,7 +51,7 @@ impl Standing {
             })
             .collect();
         let pairs = patches.iter().map(|(pair, _)| *pair);
-        let hollow = hollow_rooms(air, (&room_of_cell, pairs), min_radius, None, allowance);
+        let hollow = hollow_rooms(air, &room_of_cell, pairs, min_radius, None, allowance);
         Self {
             room_of_cell,
             patches,
@@ -141,7 +141,7 @@ pub(super) fn count_rooms(
     });
     let pairs: BTreeSet<(u32, u32)> = pairs.collect();
     let rooms = (&room_of_cell[..], pairs.into_iter());
-    let hollow = hollow_rooms(air, rooms, min_radius, Some(known), &unlimited);
+    let hollow = hollow_rooms(air, rooms.0, rooms.1, min_radius, Some(known), &unlimited);
     let mut all: BTreeSet<u32> = room_of_cell.into_iter().collect();
     all.remove(&OUTDOOR_CELL);
     let n_hollow = all.intersection(&hollow).count();
@@ -178,7 +178,8 @@ fn void_joined(
 /// opening joins.
 fn hollow_rooms(
     air: &CellSpace<'_>,
-    (room_of_cell, pairs): (&[u32], impl Iterator<Item = (u32, u32)>),
+    room_of_cell: &[u32],
+    pairs: impl Iterator<Item = (u32, u32)>,
     min_radius: f64,
     known: Option<&KnownBacks>,
     allowance: &Allowance,

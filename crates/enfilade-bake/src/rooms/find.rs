@@ -94,7 +94,9 @@ pub(crate) fn propose(
     drop((closures, lids, shut));
     let stairs = inside_of(&structure.stairs, &grid, &structure.bvh, allowance);
     let not_air = (&matter.regions[..], &stairs);
-    let ballots = Ballots::cast(&grid, &labels, &regions, not_air, share, allowance);
+    let ballots = Ballots::cast(
+        &grid, &labels, &regions, not_air.0, not_air.1, share, allowance,
+    );
     drop(stairs);
     let region_at = |p| region_at(&grid, &labels, &regions, p);
     let voids = voids_of(structure, &matter, &region_at, allowance);

@@ -54,7 +54,7 @@ pub(super) fn split_forks(
     (walls, least): (&Walls<'_>, f64),
     allowance: &Allowance,
 ) -> [f64; 2] {
-    let places = find_places(grid, labels, regions, field, (walls, least), allowance);
+    let places = find_places(grid, labels, regions, field, walls, least, allowance);
     let mut by_region: BTreeMap<u32, Vec<ForkPlace>> = BTreeMap::new();
     for place in places {
         let at = grid.voxel_at(place.center);
@@ -103,7 +103,8 @@ fn find_places(
     labels: &Labels,
     regions: &Regions,
     field: DistanceField,
-    (walls, least): (&Walls<'_>, f64),
+    walls: &Walls<'_>,
+    least: f64,
     allowance: &Allowance,
 ) -> Vec<ForkPlace> {
     let mut found: Vec<ForkPlace> = Vec::new();
@@ -117,7 +118,15 @@ fn find_places(
     while widest.dims.iter().any(|&n| n > 1) {
         let most = BLOCKS * edge as f64;
         let rooms = (labels, regions);
-        let balls = BlockBalls::of(grid, &widest, edge, [least, most], rooms, allowance);
+        let balls = BlockBalls::of(
+            grid,
+            &widest,
+            edge,
+            [least, most],
+            rooms.0,
+            rooms.1,
+            allowance,
+        );
         let middles = balls.middles([least, most].map(|r| r * grid.voxel));
         for fork in find_forks(&balls, middles.into_iter(), walls) {
             let place = place_of(&balls, &fork);

@@ -106,13 +106,7 @@ pub(crate) fn split_limbs(
         allowance,
     };
     let first = n as u32;
-    join_limbs(
-        flooded,
-        regions,
-        &thickness,
-        (first, rule.thicker),
-        settings,
-    );
+    join_limbs(flooded, regions, &thickness, first, rule.thicker, settings);
 }
 
 pub(super) type Contacts = BTreeMap<(u32, u32), Vec<u64>>;
@@ -138,7 +132,8 @@ fn join_limbs(
     flooded: Flooded<'_>,
     regions: &mut Regions,
     thickness: &BTreeMap<u32, f64>,
-    (first, thicker): (u32, f64),
+    first: u32,
+    thicker: f64,
     settings: &MergeSettings,
 ) {
     let region_of = |basin: u32| regions.region_of_basin[basin as usize];

@@ -47,7 +47,8 @@ impl Ballots {
         grid: &Grid,
         labels: &Labels,
         regions: &Regions,
-        (hollow, solid): (&[u32], &SparseVolume),
+        hollow: &[u32],
+        solid: &SparseVolume,
         share: f64,
         allowance: &Allowance,
     ) -> Self {

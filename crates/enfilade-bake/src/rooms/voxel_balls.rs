@@ -33,7 +33,8 @@ impl<'a> BlockBalls<'a> {
         widest: &WidestOfBlocks,
         edge: usize,
         [least, most]: [f64; 2],
-        (labels, regions): (&Labels, &Regions),
+        labels: &Labels,
+        regions: &Regions,
         allowance: &'a Allowance,
     ) -> Self {
         let dims = widest.dims;

@@ -146,11 +146,11 @@ fn lost_in(scene: &str, folder: &Path) -> anyhow::Result<Figure> {
 
 fn opened(path: &Path) -> anyhow::Result<(EditSession, Resumed)> {
     let scene = path.file_name().unwrap_or_default().to_string_lossy();
-    let ground = (EditGround::Open, "-");
     Ok(EditSession::open(
         path,
         kit(&scene)?,
-        ground,
+        EditGround::Open,
+        "-",
         DEFAULT_TOLERANCE,
     )?)
 }

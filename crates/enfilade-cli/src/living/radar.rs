@@ -70,7 +70,8 @@ impl Radar {
     fn add(
         &mut self,
         space: &Space,
-        (kind, number): (BlipKind, u32),
+        kind: BlipKind,
+        number: u32,
         part: PartId,
         at: DVec3,
     ) -> Option<ThingId> {
@@ -104,7 +105,7 @@ impl Radar {
                 }
                 None => {
                     let person = (BlipKind::Person, number);
-                    self.people[i] = self.add(space, person, PartId::ROOT, at);
+                    self.people[i] = self.add(space, person.0, person.1, PartId::ROOT, at);
                 }
             }
         }
@@ -121,12 +122,13 @@ impl Radar {
             return;
         }
         for (i, (part, at)) in (0..).zip(lamps) {
-            self.add(space, (BlipKind::Lamp, i), part, DVec3::from_array(at));
+            self.add(space, BlipKind::Lamp, i, part, DVec3::from_array(at));
         }
         for (i, sound) in (0..).zip(sounds) {
             self.add(
                 space,
-                (BlipKind::Sound, i),
+                BlipKind::Sound,
+                i,
                 PartId::ROOT,
                 DVec3::from_array(sound.at),
             );

@@ -89,7 +89,7 @@ impl Setting {
             views.push(view_of(&cells));
         }
         let gpu = adapter::open(&args.adapter)?;
-        let (studio, streamed) = Streamed::for_views(packed, gpu, (sight, state), &views)?;
+        let (studio, streamed) = Streamed::for_views(packed, gpu, sight, state, &views)?;
         Ok(Self {
             world,
             studio,

@@ -19,7 +19,8 @@ const FAR: f64 = 1e4;
 /// Returns the positions of the ears on the walking path from point to point; ends elsewhere than asked are added to `warnings`.
 pub(super) fn along_paths(
     args: &Sound,
-    (world, hash): (&World, u64),
+    world: &World,
+    hash: u64,
     points: &[DVec3],
     warnings: &mut Vec<String>,
 ) -> anyhow::Result<Vec<DVec3>> {

@@ -55,7 +55,7 @@ fn pieces_in_view_take_the_room_of_others_that_come_back_when_they_are_in_view()
         ..StreamOptions::default()
     };
     let catalog = packed.head.catalog.clone();
-    let mut streamed = Streamed::new(packed, catalog, &studio, (options, u64::MAX)).unwrap();
+    let mut streamed = Streamed::new(packed, catalog, &studio, options, u64::MAX).unwrap();
     let cameras = walk_cameras(&world, &whole.sight, 400, FOV);
     let style = Style {
         shadows: false,

@@ -390,7 +390,7 @@ impl App<'_> {
         let asked = (self.args.screenshot.as_path(), &self.args.adapter);
         let review = self.reviewer.as_mut();
         let marks = review.map_or_else(Vec::new, Reviewer::lend_marks);
-        let made = open.shot(asked, (&self.world, &marks), &mut self.outputs);
+        let made = open.shot(asked.0, asked.1, &self.world, &marks, &mut self.outputs);
         if let Some(reviewer) = &mut self.reviewer {
             reviewer.take_marks(marks);
         }
@@ -455,7 +455,7 @@ impl App<'_> {
         let opening = || portal_looked_at(space, &pointed.ray).map(|found| (found.0, found.1));
         let portal = leaf_of.or_else(opening);
         match portal {
-            Some(portal) => open.toggle(portal),
+            Some(portal) => open.toggle(portal.0, portal.1),
             None => open.say("no portal there".into()),
         }
     }

@@ -8,7 +8,7 @@ use super::open::Open;
 impl Open {
     /// Opens or closes a portal: its leaves begin to move; one without leaves changes at once, and with it those that it meets. It no
     /// longer opens by itself.
-    pub(super) fn toggle(&mut self, (part, portal): (PartId, PortalId)) {
+    pub(super) fn toggle(&mut self, part: PartId, portal: PortalId) {
         if part == PartId::ROOT {
             self.lived.leave_alone(portal);
         }
@@ -20,7 +20,7 @@ impl Open {
             let is_open = state.is_open(portal);
             let met = self.lived.space.meets(part, portal).to_vec();
             for (part, portal) in met.into_iter().chain([(part, portal)]) {
-                self.set_open((part, portal), !is_open);
+                self.set_open(part, portal, !is_open);
             }
             let now = if is_open { "closed" } else { "open" };
             self.say(format!("{portal} is {now}"));
@@ -35,7 +35,7 @@ impl Open {
         ));
     }
 
-    fn set_open(&mut self, (part, portal): (PartId, PortalId), is_open: bool) {
+    fn set_open(&mut self, part: PartId, portal: PortalId, is_open: bool) {
         let is_root = part == PartId::ROOT;
         match (is_open, is_root) {
             (true, true) => self.studio.state.open(portal),

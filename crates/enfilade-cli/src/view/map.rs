@@ -92,7 +92,13 @@ impl Map {
                 return;
             }
             self.is_stale = false;
-            self.begun = Some(Sheet::begin(space, titles, self.has_parts, eye[1]));
+            self.begun = Some(Sheet::begin(
+                space,
+                titles.0,
+                titles.1,
+                self.has_parts,
+                eye[1],
+            ));
         }
         if let Some(mut sheet) = self.begun.take_if(|sheet| sheet.advance(space)) {
             sheet.label();

@@ -293,7 +293,7 @@ impl Open {
         self.begin_textures();
         self.scan(world);
         if self.is_living {
-            return self.draw_living((camera, &view), target, (seconds, marks));
+            return self.draw_living(camera, &view, target, seconds, marks);
         }
         let list = if self.mode == Mode::Queries {
             let (list, counts) = self.studio.list_by_queries(world, camera, size)?;
@@ -352,9 +352,11 @@ impl Open {
     /// Draws a world that is lived in: all of its parts, people, lamps.
     fn draw_living(
         &mut self,
-        (camera, view): (&Camera, &View),
+        camera: &Camera,
+        view: &View,
         target: wgpu::SurfaceTexture,
-        (seconds, marks): (f64, &[Mark]),
+        seconds: f64,
+        marks: &[Mark],
     ) -> anyhow::Result<()> {
         let size = [self.config.width, self.config.height];
         let output = target
@@ -392,7 +394,7 @@ impl Open {
             self.shown.closed.extend(shut.map(|portal| (part, portal)));
             if self.shown.portals {
                 let of = (&**space.world(part), &space.between(part, player.frame));
-                add_portal_marks(&mut marks, of, &seen, camera, size);
+                add_portal_marks(&mut marks, of.0, of.1, &seen, camera, size);
             }
         }
         self.shown.cells.sort_unstable();
@@ -444,8 +446,10 @@ impl Open {
     /// Writes a picture of the world as shown now, without the panel; `marks` are drawn into a world in one piece.
     pub(super) fn shot(
         &mut self,
-        (screenshot, adapter): (&Path, &AdapterChoice),
-        (world, marks): (&World, &[Mark]),
+        screenshot: &Path,
+        adapter: &AdapterChoice,
+        world: &World,
+        marks: &[Mark],
         outputs: &mut Outputs,
     ) -> anyhow::Result<()> {
         self.n_shots += 1;
@@ -458,7 +462,13 @@ impl Open {
             Some(streamed) => {
                 let state = (self.studio.sight.clone(), self.studio.state.clone());
                 let (packed, view) = (streamed.packed().clone(), streamed.in_view().to_vec());
-                let opened = Streamed::for_views(packed, gpu, state, std::slice::from_ref(&view))?;
+                let opened = Streamed::for_views(
+                    packed,
+                    gpu,
+                    state.0,
+                    state.1,
+                    std::slice::from_ref(&view),
+                )?;
                 let (mut studio, mut streamed) = opened;
                 streamed.look(view);
                 streamed.settle(&mut studio, Eye::default())?;

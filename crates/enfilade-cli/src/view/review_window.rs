@@ -63,7 +63,8 @@ impl ReviewOptions {
     /// If a file cannot be written, or the system opens no windows.
     pub(crate) fn begin(
         &self,
-        (input, output): (&Path, Option<&Path>),
+        input: &Path,
+        output: Option<&Path>,
         known: Option<&Path>,
         choices: &mut Outputs,
     ) -> anyhow::Result<Option<ReviewWindow>> {

@@ -143,7 +143,7 @@ impl Check<'_> {
                 Way::Lead { to, map, back } => {
                     self.lead(pass, *to, map)?;
                     if let Some(back) = back {
-                        self.way_back(id, pass, (*to, map), *back)?;
+                        self.way_back(id, pass, *to, map, *back)?;
                     }
                 }
                 Way::Monitor(camera) => {
@@ -176,7 +176,8 @@ impl Check<'_> {
         &self,
         id: SpecialId,
         pass: usize,
-        (to, map): (CellId, &Similarity),
+        to: CellId,
+        map: &Similarity,
         back: SpecialId,
     ) -> Result<(), SpecialProblem> {
         let cell = self.graph.specials[id.idx()].cell;

@@ -84,7 +84,7 @@ impl LayerViews {
     /// Returns the texels of a layer, 4 bytes each.
     fn read(&self, gpu: &Gpu, layer: usize) -> Result<Vec<u8>, RenderError> {
         let size = [self.texture.width(), self.texture.height()];
-        read_layer(gpu, (&self.texture, layer as u32), size, 4)
+        read_layer(gpu, &self.texture, layer as u32, size, 4)
     }
 }
 

@@ -264,7 +264,7 @@ impl Studio {
             let new: Vec<DoorwayId> = seen.stopped().to_vec();
             let mut is_passed = false;
             for id in new {
-                if judged.insert(id) && self.is_looked_through(own, place, (id, lines), wanted) {
+                if judged.insert(id) && self.is_looked_through(own, place, id, lines, wanted) {
                     own.stops.pass(id.0, id.1);
                     is_passed = true;
                 }
@@ -280,7 +280,8 @@ impl Studio {
         &self,
         own: &mut PortalTextures,
         place: &StandingPlace,
-        (id, lines): (DoorwayId, u32),
+        id: DoorwayId,
+        lines: u32,
         wanted: &mut WantedTextures,
     ) -> bool {
         let far = f64::from(own.options.transition_distance);
@@ -295,7 +296,7 @@ impl Studio {
         for eye in &place.around {
             let at = doorway.place(Vec3::from(*eye).as_dvec3());
             let distance = doorway.distance(at);
-            let is_coarse = pixels_across(&doorway, at, (FOV, lines)) > COARSEST * side;
+            let is_coarse = pixels_across(&doorway, at, FOV, lines) > COARSEST * side;
             let is_near_plane = at.height < GRAZING * distance;
             is_geometry |= distance < far || is_coarse || is_near_plane;
             if distance < far * NEAREST || is_coarse || is_near_plane || is_level {
@@ -357,7 +358,7 @@ impl Studio {
         // Each frame may replace the textures of the last.
         own.frame += 1;
         let mut counts = PortalTextureCounts::default();
-        if !self.draw_texture(own, &shot, key, (&doorway, one.from), &mut counts)? {
+        if !self.draw_texture(own, &shot, key, &doorway, one.from, &mut counts)? {
             return Ok(None);
         }
         let Some(held) = own.held.get(&key) else {

@@ -27,14 +27,15 @@ pub(super) fn standing_places(world: &World, sight: &Sight) -> Vec<StandingPlace
     let lines = Sightlines::build(world);
     let mut out = Vec::new();
     for (id, cell) in (0..).map(CellId).zip(&world.graph.cells) {
-        places_in(&mut out, (sight, &lines), id, cell);
+        places_in(&mut out, sight, &lines, id, cell);
     }
     out
 }
 
 fn places_in(
     out: &mut Vec<StandingPlace>,
-    (sight, lines): (&Sight, &Sightlines),
+    sight: &Sight,
+    lines: &Sightlines,
     id: CellId,
     cell: &Cell,
 ) {

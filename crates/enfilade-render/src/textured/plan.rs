@@ -78,7 +78,7 @@ impl Studio {
             let mut is_passed = false;
             for id in new {
                 judged.push(id);
-                if !self.judge(own, shot, id, (&mut lacking, &mut counts))? {
+                if !self.judge(own, shot, id, &mut lacking, &mut counts)? {
                     own.stops.pass(id.0, id.1);
                     is_passed = true;
                 }
@@ -107,7 +107,8 @@ impl Studio {
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
         id: DoorwayId,
-        (lacking, counts): (&mut Vec<Lacking>, &mut PortalTextureCounts),
+        lacking: &mut Vec<Lacking>,
+        counts: &mut PortalTextureCounts,
     ) -> Result<bool, RenderError> {
         let (frame, last) = (own.frame, own.options.transition_frames);
         let far = f64::from(own.options.transition_distance);
@@ -125,7 +126,7 @@ impl Studio {
         }
         let distance = doorway.distance(eye);
         let is_near = distance < far * if turn == 0 { HYSTERESIS } else { 1.0 };
-        let is_coarse = pixels_across(&doorway, eye, (shot.fov_y, shot.size[1])) > COARSEST * side;
+        let is_coarse = pixels_across(&doorway, eye, shot.fov_y, shot.size[1]) > COARSEST * side;
         let is_geometry = is_near || is_coarse || eye.height < GRAZING * distance;
         let to = if is_geometry { last } else { 0 };
         let turn = if was_shown && own.may_turn(id) {
@@ -152,7 +153,7 @@ impl Studio {
             return Ok(false);
         }
         if is_made && turn > 0 {
-            self.turn(own, shot, (id, &doorway, eye), counts)?;
+            self.turn(own, shot, id, &doorway, eye, counts)?;
         }
         Ok(is_made)
     }
@@ -195,7 +196,7 @@ impl Studio {
         };
         while !is_enough(&components) {
             let Some(first) = missing.next() else { break };
-            if !self.make(own, shot, first.key, (doorway, first.from), counts)? {
+            if !self.make(own, shot, first.key, doorway, first.from, counts)? {
                 return Ok(false);
             }
             if let Some(held) = own.want(first.key) {
@@ -212,7 +213,9 @@ impl Studio {
         &mut self,
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
-        (id, doorway, eye): (DoorwayId, &Doorway, DoorwayPlace),
+        id: DoorwayId,
+        doorway: &Doorway,
+        eye: DoorwayPlace,
         counts: &mut PortalTextureCounts,
     ) -> Result<(), RenderError> {
         let turn = own.doorway(&self.world, id).turn;
@@ -229,7 +232,7 @@ impl Studio {
         } else {
             first.from.lerp(eye, share)
         };
-        if !self.draw_texture(own, shot, (id, None), (doorway, from), counts)? {
+        if !self.draw_texture(own, shot, (id, None), doorway, from, counts)? {
             return Ok(());
         }
         counts.n_turning += 1;
@@ -268,7 +271,7 @@ impl Studio {
             if !own.shown.contains_key(&one.id) {
                 continue;
             }
-            if !self.make(own, shot, one.key, (&doorway, one.from), counts)? {
+            if !self.make(own, shot, one.key, &doorway, one.from, counts)? {
                 return Ok(());
             }
             // A texture enters with the weight that it has, which is least for the last.
@@ -321,7 +324,7 @@ impl Studio {
                         continue;
                     }
                     let from = viewpoints.place(&doorway, index);
-                    if !self.make(own, shot, key, (&doorway, from), counts)? {
+                    if !self.make(own, shot, key, &doorway, from, counts)? {
                         return Ok(());
                     }
                 }
@@ -401,7 +404,8 @@ impl Studio {
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
         key: TextureKey,
-        (doorway, from): (&Doorway, DoorwayPlace),
+        doorway: &Doorway,
+        from: DoorwayPlace,
         counts: &mut PortalTextureCounts,
     ) -> Result<bool, RenderError> {
         // A texture that was made ahead counts half.
@@ -414,7 +418,7 @@ impl Studio {
         if rest < 2 {
             return Ok(false);
         }
-        let is_made = self.draw_texture(own, shot, key, (doorway, from), counts)?;
+        let is_made = self.draw_texture(own, shot, key, doorway, from, counts)?;
         counts.n_made += usize::from(is_made);
         Ok(is_made)
     }
@@ -426,7 +430,8 @@ impl Studio {
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
         key: TextureKey,
-        (doorway, from): (&Doorway, DoorwayPlace),
+        doorway: &Doorway,
+        from: DoorwayPlace,
         counts: &mut PortalTextureCounts,
     ) -> Result<bool, RenderError> {
         let side = [own.options.side; 2];
@@ -525,11 +530,7 @@ pub(crate) fn state_of<'a>(space: Option<&'a Space>, own: &'a SightState) -> &'a
 }
 
 /// Returns the extent of a doorway on a screen of an angle and a number of lines, along its longer side. [Units: px]
-pub(super) fn pixels_across(
-    doorway: &Doorway,
-    eye: DoorwayPlace,
-    (fov_y, lines): (f32, u32),
-) -> f64 {
+pub(super) fn pixels_across(doorway: &Doorway, eye: DoorwayPlace, fov_y: f32, lines: u32) -> f64 {
     let size = doorway.high - doorway.low;
     let per_meter = f64::from(lines) / (2.0 * (f64::from(fov_y) * 0.5).tan());
     // Seen from the side, it is narrower.

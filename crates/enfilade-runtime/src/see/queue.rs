@@ -53,7 +53,7 @@ impl Traversal<'_, '_> {
             let other = &self.viewer.pending[at as usize];
             let next = other.next;
             if other.state != Stage::Gone {
-                if self.covers((&other.region, other.entry), (&region, entry)) {
+                if self.covers(&other.region, other.entry, &region, entry) {
                     // The waiting visit covers it. If the new one is nearer, only the order of drawing may
                     // differ a little.
                     self.viewer.out.counts.spared += 1;
@@ -62,7 +62,7 @@ impl Traversal<'_, '_> {
                 }
                 if other.state == Stage::Waiting {
                     let waste = other.region.waste_of_joining(&region);
-                    if self.covers((&region, entry), (&other.region, other.entry)) {
+                    if self.covers(&region, entry, &other.region, other.entry) {
                         near = near.min(other.near);
                         self.viewer.pending[at as usize].state = Stage::Gone;
                         self.viewer.out.counts.spared += 1;
@@ -133,8 +133,10 @@ impl Traversal<'_, '_> {
     /// Returns `true` if one visit of a cell contains everything that another sees.
     fn covers(
         &self,
-        (region, entry): (&Region, Option<(DVec3, f64)>),
-        (other, other_entry): (&Region, Option<(DVec3, f64)>),
+        region: &Region,
+        entry: Option<(DVec3, f64)>,
+        other: &Region,
+        other_entry: Option<(DVec3, f64)>,
     ) -> bool {
         if !other.is_within(region) {
             return false;

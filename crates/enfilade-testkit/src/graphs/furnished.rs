@@ -153,7 +153,7 @@ pub(super) fn furnish(
     for (kind, set, cell, at, yaw) in placings {
         let (mesh, n) = meshes[&(kind, set)];
         let (sin, cos) = yaw.to_radians().sin_cos();
-        place(world, (kind.name(), mesh, n), cell, at, [cos, sin]);
+        place(world, kind.name(), mesh, n, cell, at, [cos, sin]);
     }
     for (cell, [low, high]) in floors {
         let mesh = world.detail_meshes.len() as u32;
@@ -169,13 +169,15 @@ pub(super) fn furnish(
                 ..Primitive::default()
             }],
         });
-        place(world, ("floor", mesh, 12), *cell, *low, [1.0, 0.0]);
+        place(world, "floor", mesh, 12, *cell, *low, [1.0, 0.0]);
     }
 }
 
 fn place(
     world: &mut World,
-    (name, mesh, n_triangles): (&str, u32, u32),
+    name: &str,
+    mesh: u32,
+    n_triangles: u32,
     cell: u32,
     at: DVec3,
     [cos, sin]: [f64; 2],

@@ -87,7 +87,7 @@ fn exits_at_hand_are_those_of_the_table() {
             let exits = dirs.after(d);
             let windows = exits.clone().step_by(64);
             let at_hand = windows
-                .flat_map(|start| bits::ones_from(start, next.window((&might, d), &exits, start)));
+                .flat_map(|start| bits::ones_from(start, next.window(&might, d, &exits, start)));
             let of_table = exits.clone().filter(|&q| might.get(d, q));
             assert!(at_hand.eq(of_table), "{seed} {d}");
         }

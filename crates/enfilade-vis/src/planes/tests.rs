@@ -107,7 +107,7 @@ fn clips_by_four_planes_are_those_by_one_after_the_other() {
         for side in [Side::Before, Side::After] {
             let mut arena = Arena::default();
             let whole = arena.push(&points, 0);
-            let all = arena.clip_all(whole, (&planes, side), ball, turn, &tolerance());
+            let all = arena.clip_all(whole, &planes, side, ball, turn, &tolerance());
             let all = all.map(|poly| arena.get(poly).to_vec());
             let one = lanes(&planes).try_fold(whole, |poly, (four, lane)| {
                 arena.clip(poly, four.half_space(side, lane), turn, &tolerance())

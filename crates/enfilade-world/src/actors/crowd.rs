@@ -400,7 +400,7 @@ impl Actors {
         }
         let part = part_at(&member.knots, member.part as usize, self.now);
         let plan = (&member.knots[..], &self.points[actor.0 as usize][..]);
-        let (at, velocity) = place_at(plan, part, self.now);
+        let (at, velocity) = place_at(plan.0, plan.1, part, self.now);
         Some(ActorPlace {
             at,
             velocity,
@@ -455,7 +455,7 @@ impl Actors {
         let member = &mut self.members[id as usize];
         let (knots, points) = (&mut member.knots, &mut self.points[id as usize]);
         let part = part_at(knots, member.part as usize, time);
-        let (at, _) = place_at((knots, points), part, time);
+        let (at, _) = place_at(knots, points, part, time);
         let cell = knots[part].cell;
         let event = ActorEvent {
             actor: ActorId(id),

@@ -106,11 +106,7 @@ pub(super) fn part_at(knots: &[Knot], from: usize, time: f64) -> usize {
 }
 
 /// Returns the position and velocity of a plan at a time in one of its parts. [Units: wu, wu/s]
-pub(super) fn place_at(
-    (knots, points): (&[Knot], &[DVec3]),
-    part: usize,
-    time: f64,
-) -> (DVec3, DVec3) {
+pub(super) fn place_at(knots: &[Knot], points: &[DVec3], part: usize, time: f64) -> (DVec3, DVec3) {
     let (from, at) = (&knots[part], points[part]);
     let Some(to) = knots.get(part + 1) else {
         return (at, DVec3::ZERO);

@@ -280,7 +280,7 @@ impl BodyFlood {
                 self.reach(space, ImagePlace { image, place }, since);
             }
             for &(other, portal) in &door.meets {
-                self.dock(motion, image, (other, portal), since);
+                self.dock(motion, image, other, portal, since);
             }
         }
         self.left_by = left_by;
@@ -291,7 +291,8 @@ impl BodyFlood {
         &mut self,
         motion: &Motion<'_>,
         image: usize,
-        (other, portal): (PartId, PortalId),
+        other: PartId,
+        portal: PortalId,
         since: f64,
     ) {
         let space = motion.space;

@@ -75,7 +75,7 @@ impl PathSearch {
         ends: [(PartId, DVec3); 2],
         mut may_pass: impl FnMut(PartId, PortalId) -> bool,
     ) -> Option<Blocked> {
-        let [start, goal] = ends.map(|end| map.stand(space, end));
+        let [start, goal] = ends.map(|end| map.stand(space, end.0, end.1));
         let (start, goal) = (start?, goal?);
         if [start, goal].iter().any(|s| s.part != PartId::ROOT) {
             return None;

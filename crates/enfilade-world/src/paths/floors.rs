@@ -129,7 +129,7 @@ impl Floors {
             walker,
         };
         let room = WalkerRoom::new(&solid, &walker);
-        floors.keep((layout, border), &grounds, &is_clear, &room);
+        floors.keep(layout, border, &grounds, &is_clear, &room);
         for (portal, leaf) in &leaves {
             floors.swing(*portal, leaf, &room);
         }
@@ -143,7 +143,8 @@ impl Floors {
     /// portals.
     fn keep(
         &mut self,
-        (layout, border): (&Layout, Option<CellId>),
+        layout: &Layout,
+        border: Option<CellId>,
         grounds: &[Ground],
         is_clear: &[bool],
         room: &WalkerRoom,

@@ -202,7 +202,7 @@ impl Joints {
             for k in 0..2 {
                 let (own, layout) = (&map.parts[parts[k].idx()], space.layout(parts[k]));
                 let from = (middle[k].1, &self.edges[parts[k].idx()][..]);
-                own.measure(strides, layout, from, &mut joint.lengths[k]);
+                own.measure(strides, layout, from.0, from.1, &mut joint.lengths[k]);
             }
         }
     }

@@ -69,7 +69,8 @@ impl PartLeg {
     pub(super) fn with_end(
         &self,
         map: &WalkMap,
-        (step, is_last): (Bend, bool),
+        step: Bend,
+        is_last: bool,
         may_pass: &mut impl FnMut(PartId, PortalId) -> bool,
         bends: &mut Vec<Bend>,
     ) -> f64 {
@@ -125,13 +126,15 @@ impl Tools {
         map: &WalkMap,
         space: &Space,
         entry: &PartEntry,
-        (goal, edges): (Stand, &[u32]),
+        goal: Stand,
+        edges: &[u32],
     ) -> f64 {
         let (own, layout) = (&map.parts[goal.part.idx()], space.layout(goal.part));
         own.measure(
             &mut self.strides,
             layout,
-            (goal.floor, edges),
+            goal.floor,
+            edges,
             &mut self.lengths,
         );
         // For the start, if it is in the same cell.
@@ -161,12 +164,12 @@ impl Tools {
     ) -> bool {
         let (own, layout) = (&map.parts[goal.part.idx()], space.layout(goal.part));
         let start = entry.start;
-        self.arrive(map, space, entry, (goal, &leg.edges));
+        self.arrive(map, space, entry, goal, &leg.edges);
         leg.part = goal.part;
         let mut least = f64::INFINITY;
         for i in 0..self.arrivals.len() {
             let arrival = self.arrivals[i];
-            if !self.lay_out(own, layout, entry, (goal.floor, &leg.edges), &arrival) {
+            if !self.lay_out(own, layout, entry, goal.floor, &leg.edges, &arrival) {
                 continue;
             }
             self.set_bends(own, [(start.at, start.floor), (goal.at, goal.floor)]);
@@ -192,7 +195,8 @@ impl Tools {
         own: &PartMap,
         layout: &Layout,
         entry: &PartEntry,
-        (goal, edges): (u32, &[u32]),
+        goal: u32,
+        edges: &[u32],
         arrival: &Arrival,
     ) -> bool {
         self.crossings.clear();

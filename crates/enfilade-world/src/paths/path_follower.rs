@@ -136,7 +136,7 @@ impl PathFollower {
         };
         let mut from = 0.0;
         for PathPortal { part, exit, at } in path.portals {
-            from = follower.nearest(space, (part, at), [from, f64::INFINITY]);
+            from = follower.nearest(space, part, at, [from, f64::INFINITY]);
             follower.doors.push(DoorAhead {
                 part,
                 portal: exit.portal,
@@ -160,7 +160,7 @@ impl PathFollower {
         let agent = *walker.agent();
         let frame = walker.frame;
         let joined = self.joined_up_to(space, self.passed + 2.0 * AHEAD, &agent);
-        self.passed = self.nearest(space, (frame, feet), [self.passed, joined]);
+        self.passed = self.nearest(space, frame, feet, [self.passed, joined]);
         let end = self.points.len().checked_sub(1);
         let left = end.map_or(DVec3::ZERO, |i| self.point(space, frame, i) - feet);
         if left.with_y(0.0).length() <= agent.radius && left.y.abs() <= agent.step {
@@ -184,7 +184,7 @@ impl PathFollower {
         if let Some((part, Target::Detail { detail, .. })) = walker.obstacle()
             && self.idle > SHUT
         {
-            self.shut_leaf((part, detail), walker, space);
+            self.shut_leaf(part, detail, walker, space);
         }
         if self.idle > PATIENCE {
             Progress::Stuck
@@ -203,7 +203,7 @@ impl PathFollower {
             let begins = door.opening == DoorTurn::Ahead
                 && (0.0..DOOR).contains(&(door.at - self.passed))
                 // One that does not get out of its way is pushed.
-                && (self.idle > SHUT || self.is_clear(walker, space, (&door, 1.0)));
+                && (self.idle > SHUT || self.is_clear(walker, space,&door, 1.0));
             if begins || door.opening == DoorTurn::Moves {
                 let share = share + (seconds / SWING) as f32;
                 space.set_leaves(door.part, door.portal, share);
@@ -217,12 +217,7 @@ impl PathFollower {
     }
 
     /// Shuts a leaf unless the path needs it open, or the walker is in its doorway.
-    fn shut_leaf(
-        &self,
-        (part, detail): (PartId, DetailId),
-        walker: &mut Walker,
-        space: &mut Space,
-    ) {
+    fn shut_leaf(&self, part: PartId, detail: DetailId, walker: &mut Walker, space: &mut Space) {
         let mut ahead = self.doors.iter().filter(|d| d.at > self.passed);
         let known = self.leaves.iter().find(|l| (l.0, l.1) == (part, detail));
         let Some(&(_, _, portal)) = known else { return };
@@ -232,8 +227,7 @@ impl PathFollower {
             at: 0.0,
             opening: DoorTurn::Done,
         };
-        if ahead.all(|d| !self.is_leaf(part, detail, d))
-            && self.is_clear(walker, space, (&door, 0.0))
+        if ahead.all(|d| !self.is_leaf(part, detail, d)) && self.is_clear(walker, space, &door, 0.0)
         {
             space.set_leaves(part, portal, 0.0);
         }
@@ -244,7 +238,8 @@ impl PathFollower {
         &self,
         walker: &mut Walker,
         space: &mut Space,
-        (door, share): (&DoorAhead, f32),
+        door: &DoorAhead,
+        share: f32,
     ) -> bool {
         space.with_leaves(door.part, door.portal, share, |space| {
             !walker.touches(space, |part, detail| self.is_leaf(part, detail, door))
@@ -256,7 +251,7 @@ impl PathFollower {
     }
 
     /// Returns the length of the path, within a range, after which it is nearest to a point in the frame of a part.
-    fn nearest(&self, space: &Space, (frame, p): (PartId, DVec3), [from, until]: [f64; 2]) -> f64 {
+    fn nearest(&self, space: &Space, frame: PartId, p: DVec3, [from, until]: [f64; 2]) -> f64 {
         let (mut least, mut nearest) = (f64::INFINITY, from);
         let first = self.lengths.partition_point(|&l| l < from).max(1) - 1;
         for i in first..self.points.len().saturating_sub(1) {

@@ -63,8 +63,10 @@ impl PathSearch {
         path: &mut Path,
     ) -> Result<(), NoPath> {
         path.clear();
-        let start = map.stand(space, from).ok_or(NoPath::NoFloorAtStart)?;
-        let goal = map.stand(space, to).ok_or(NoPath::NoFloorAtEnd)?;
+        let start = map
+            .stand(space, from.0, from.1)
+            .ok_or(NoPath::NoFloorAtStart)?;
+        let goal = map.stand(space, to.0, to.1).ok_or(NoPath::NoFloorAtEnd)?;
         let crawls = crawls(map, space, [start, goal]);
         let mut may_pass = |part, portal| {
             let cells = space.layout(part).opening(portal).cells();
@@ -72,7 +74,7 @@ impl PathSearch {
                 && (crawls || !cells.into_iter().any(|c| is_void(space, part, c)))
         };
         let infinite = f64::INFINITY;
-        let last = self.spread(map, space, start, (Some(goal), infinite), &mut may_pass);
+        let last = self.spread(map, space, start, Some(goal), infinite, &mut may_pass);
         self.lay_legs(map, space, last.ok_or(NoPath::NoWay)?, goal, &mut may_pass)?;
         self.tighten(map, space, &mut may_pass);
         self.write(map, space, path);
@@ -94,8 +96,10 @@ impl PathSearch {
         radius: f64,
         mut may_pass: impl FnMut(PartId, PortalId) -> bool,
     ) -> Result<&[(Place, f64)], NoPath> {
-        let start = map.stand(space, from).ok_or(NoPath::NoFloorAtStart)?;
-        self.spread(map, space, start, (None, radius), &mut may_pass);
+        let start = map
+            .stand(space, from.0, from.1)
+            .ok_or(NoPath::NoFloorAtStart)?;
+        self.spread(map, space, start, None, radius, &mut may_pass);
         self.near.clear();
         for entry in &self.entries[..self.n_entries] {
             let part = entry.start.part;
@@ -115,12 +119,12 @@ impl PathSearch {
     /// walker cannot stand there or did not reach it. Square by square, so up to 2.8 % too long within a cell, and more through
     /// portals, which it passes at fixed points: 7.8 % is the most measured. [Units: wu]
     pub fn distance(&mut self, map: &WalkMap, space: &Space, to: (PartId, DVec3)) -> Option<f64> {
-        let goal = map.stand(space, to)?;
+        let goal = map.stand(space, to.0, to.1)?;
         let mut least = f64::INFINITY;
         let own = self.entries[..self.n_entries].iter();
         for entry in own.filter(|e| e.start.part == goal.part) {
             let edges = self.joints.edges(goal.part);
-            let length = self.tools.arrive(map, space, entry, (goal, edges));
+            let length = self.tools.arrive(map, space, entry, goal, edges);
             least = least.min(entry.offset + length);
         }
         (least < f64::INFINITY).then_some(least)
@@ -133,7 +137,8 @@ impl PathSearch {
         map: &WalkMap,
         space: &Space,
         start: Stand,
-        (goal, radius): (Option<Stand>, f64),
+        goal: Option<Stand>,
+        radius: f64,
         may_pass: &mut impl FnMut(PartId, PortalId) -> bool,
     ) -> Option<usize> {
         self.joints.update(map, space, &mut self.tools.strides);
@@ -153,7 +158,7 @@ impl PathSearch {
             if let Some(goal) = goal.filter(|goal| goal.part == start.part) {
                 let entry = &self.entries[at];
                 let edges = self.joints.edges(goal.part);
-                let arrived = self.tools.arrive(map, space, entry, (goal, edges));
+                let arrived = self.tools.arrive(map, space, entry, goal, edges);
                 let length = offset + arrived;
                 if length < least {
                     (least, best) = (length, Some(at));
@@ -190,7 +195,7 @@ impl PathSearch {
             strides, lengths, ..
         } = &mut self.tools;
         let edges = self.joints.edges(start.part);
-        own.measure(strides, layout, (start.floor, edges), lengths);
+        own.measure(strides, layout, start.floor, edges, lengths);
         let at = self.n_entries;
         self.n_entries += 1;
         if self.entries.len() == at {
@@ -346,9 +351,9 @@ impl PathSearch {
                         }
                         let [near, far] = &mut self.tools.tried;
                         let step = joint.steps[a][1 - side];
-                        let first = before.with_end(map, (step, true), may_pass, near);
+                        let first = before.with_end(map, step, true, may_pass, near);
                         let step = joint.steps[b][side];
-                        let second = behind.with_end(map, (step, false), may_pass, far);
+                        let second = behind.with_end(map, step, false, may_pass, far);
                         let length = first + across(a, b) + second;
                         if length < least - 1e-6 {
                             (least, from, to, is_shorter) = (length, a, b, true);

@@ -59,7 +59,7 @@ impl Sequences {
         if start.cell == end.cell {
             self.complete(NONE, direct, end.at);
         }
-        self.extend(search, ways, (end.cell, end), NONE, most);
+        self.extend(search, ways, end.cell, end, NONE, most);
         for _ in 0..limit.steps {
             let Some(Reverse((bits, at))) = self.heap.pop() else {
                 break;
@@ -89,7 +89,7 @@ impl Sequences {
                 let point = self.partials[at as usize].point;
                 self.complete(at, least, point);
             }
-            self.extend(search, ways, (into, end), at, most);
+            self.extend(search, ways, into, end, at, most);
         }
         self.found.len()
     }
@@ -134,7 +134,8 @@ impl Sequences {
         &mut self,
         search: &LengthSearch,
         ways: &Ways,
-        (cell, end): (CellId, End<'_>),
+        cell: CellId,
+        end: End<'_>,
         before: u32,
         most: f64,
     ) {

@@ -67,7 +67,7 @@ impl Strides {
                 continue;
             }
             let from = floors.point(at);
-            each_move(floors, at, (opened, edges), |to| {
+            each_move(floors, at, opened, edges, |to| {
                 let through = length + floors.point(to).distance(from) as f32;
                 let label = &mut self.labels[to as usize];
                 if label.stamp != self.stamp || through < label.length {
@@ -106,7 +106,8 @@ impl Strides {
 fn each_move(
     floors: &Floors,
     at: u32,
-    (opened, edges): (&[PortalId], &[u32]),
+    opened: &[PortalId],
+    edges: &[u32],
     mut visit: impl FnMut(u32),
 ) {
     let mut may = |hindrance| match hindrance {

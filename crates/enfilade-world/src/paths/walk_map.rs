@@ -117,7 +117,7 @@ impl WalkMap {
     }
 
     /// Returns where a walker with any part, from the feet to the head, at a point of a frame stands.
-    pub(super) fn stand(&self, space: &Space, (frame, p): (PartId, DVec3)) -> Option<Stand> {
+    pub(super) fn stand(&self, space: &Space, frame: PartId, p: DVec3) -> Option<Stand> {
         let half = DVec3::Y * 0.5 * self.floors(PartId::ROOT).walker().height;
         let located = [p + half, p].map(|p| space.locate(frame, p).map(|place| place.part));
         let parts = located.into_iter().chain([Some(frame), Some(PartId::ROOT)]);
@@ -214,7 +214,8 @@ impl PartMap {
         &self,
         strides: &mut Strides,
         layout: &Layout,
-        (from, edges): (u32, &[u32]),
+        from: u32,
+        edges: &[u32],
         lengths: &mut Vec<f64>,
     ) {
         let half = 0.5 * self.floors.squares().side;

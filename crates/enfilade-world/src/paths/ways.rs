@@ -122,12 +122,7 @@ impl Ways {
 
     /// Sets the lengths within a cell to those of another world's, which has the first of its points; `added` has a row for each
     /// of the others, with a length to each of all. Copies nothing.
-    pub(crate) fn share_lengths(
-        &mut self,
-        cell: CellId,
-        (of, own): (&Self, CellId),
-        added: Vec<f64>,
-    ) {
+    pub(crate) fn share_lengths(&mut self, cell: CellId, of: &Self, own: CellId, added: Vec<f64>) {
         self.bent[cell.idx()] = Bent {
             n: of.n_points[own.idx()] as usize,
             shared: of.bent[own.idx()].shared.clone(),

@@ -59,7 +59,7 @@ impl SoundGraph {
             if let Some(place) = joined.place(cell) {
                 let own = &parts[place.part.idx()];
                 // Before lengths are known, those of what stands in the cell.
-                ways.share_lengths(cell, (&own.ways, place.cell), Vec::new());
+                ways.share_lengths(cell, &own.ways, place.cell, Vec::new());
             }
         }
         let mut graph = Self {
@@ -98,7 +98,7 @@ impl SoundGraph {
                 self.lengths_from(parts, cell, q, &mut lengths);
                 rows.extend_from_slice(&lengths);
             }
-            self.ways.share_lengths(cell, (&own.ways, place.cell), rows);
+            self.ways.share_lengths(cell, &own.ways, place.cell, rows);
         }
     }
 

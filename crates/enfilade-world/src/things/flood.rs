@@ -158,7 +158,7 @@ impl Flood {
             // As if they touched: through the prism between the two.
             let radius = space.parts[other.idx()].layout.opening(portal).radius();
             let depth = space.docking.depth(radius);
-            if self.is_within(space, posted, (other, portal), depth) && passes(other, portal) {
+            if self.is_within(space, posted, other, portal, depth) && passes(other, portal) {
                 let cell = beyond.inner;
                 self.add(space, Place { part: other, cell });
             }
@@ -183,7 +183,7 @@ impl Flood {
 
     /// Returns `true` if the shape meets a portal's opening.
     fn meets(&mut self, space: &Space, posted: &Posted, id: PartId, portal: PortalId) -> bool {
-        self.is_within(space, posted, (id, portal), 0.0)
+        self.is_within(space, posted, id, portal, 0.0)
     }
 
     /// Returns `true` if the shape is within a distance of a portal's opening.
@@ -191,7 +191,8 @@ impl Flood {
         &mut self,
         space: &Space,
         posted: &Posted,
-        (id, portal): (PartId, PortalId),
+        id: PartId,
+        portal: PortalId,
         distance: f64,
     ) -> bool {
         let layout = &space.parts[id.idx()].layout;

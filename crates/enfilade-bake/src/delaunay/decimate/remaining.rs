@@ -48,7 +48,8 @@ const LAG: usize = 100;
 /// from it. `resolved` are the choices.
 pub(in crate::delaunay) fn begun_before(
     begun: Option<Merging>,
-    (cells, rules): (&Cells, Rules),
+    cells: &Cells,
+    rules: Rules,
     resolved: &[Resolved],
     n_steps: usize,
 ) -> Merging {
@@ -80,7 +81,8 @@ impl Merging {
 pub(in crate::delaunay) fn remaining(
     cells: &Cells,
     mut merging: Merging,
-    (record, resolved): (&Decimation, &[Resolved]),
+    record: &Decimation,
+    resolved: &[Resolved],
     n_steps: usize,
 ) -> Vec<RemainingPortal> {
     let next = merging.advance(n_steps);
