@@ -87,7 +87,7 @@ fn max_lines(file: &str) -> usize {
     }
 }
 
-fn is_test(file: &str) -> bool {
+pub(crate) fn is_test(file: &str) -> bool {
     file.contains("/tests/") || file.ends_with("tests.rs")
 }
 
@@ -136,7 +136,7 @@ fn body_end(code: &str) -> Option<usize> {
 }
 
 /// Returns the text with comments, strings and characters blanked, byte for byte; line breaks stay.
-fn without_literals(text: &str) -> String {
+pub(crate) fn without_literals(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(c) = rest.chars().next() {

@@ -12,6 +12,7 @@ mod installed;
 mod lengths;
 mod mutual;
 mod names;
+mod parameters;
 mod python;
 mod steps;
 mod suites;

@@ -10,7 +10,8 @@ pub(crate) fn problems(sources: &BTreeMap<String, String>) -> Vec<String> {
         let Some((krate, path)) = file.split_once("/src/") else {
             continue;
         };
-        if path.ends_with("tests.rs") {
+        // Builds that leave something out have stand-ins of the same name.
+        if path.ends_with("tests.rs") || path.ends_with("_left_out.rs") {
             continue;
         }
         let end = text.find("\n#[cfg(test)]\nmod tests {");

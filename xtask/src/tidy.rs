@@ -1,5 +1,5 @@
 //! Checks beyond lints: dependencies between crates, circles of imports, lengths of files and functions,
-//! names of types, wording of comments, forbidden strings, links.
+//! names of types, packed parameters, wording of comments, forbidden strings, links.
 //!
 //! The table here is the "may not" column of ARCHITECTURE.md; change both together.
 
@@ -10,7 +10,7 @@ use std::process::Command;
 use anyhow::bail;
 use serde_json::Value;
 
-use crate::{cargo, lengths, mutual, names, output_of, root, words};
+use crate::{cargo, lengths, mutual, names, output_of, parameters, root, words};
 
 /// Permitted dependencies of one crate. Dependencies of its tests are exempt.
 struct Fence {
@@ -266,6 +266,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     problems.extend(mutual::problems(&sources));
     problems.extend(lengths::problems(&sources));
     problems.extend(names::problems(&sources));
+    problems.extend(parameters::problems(&sources));
     problems.extend(words::problems(&sources));
     if !problems.is_empty() {
         bail!("{}", problems.join("\n"));

@@ -82,9 +82,9 @@ pub(crate) fn run(args: &Decimate) -> anyhow::Result<()> {
     }
     #[cfg(feature = "view")]
     let window = {
-        let files = (args.inputs[0].as_path(), args.output.as_deref());
+        let (input, output) = (args.inputs[0].as_path(), args.output.as_deref());
         let known = args.options.delaunay.choices.as_deref();
-        args.window.begin(files.0, files.1, known, &mut choices)?
+        args.window.begin(input, output, known, &mut choices)?
     };
     let mut settings = settings::resolve(&args.options)?;
     settings.bake.config.method = Some(Method::Delaunay);

@@ -1,6 +1,6 @@
 //! `enfilade plan`: a floor plan per storey.
 
-#[cfg_attr(not(feature = "print"), path = "plan/svg_only.rs")]
+#[cfg_attr(not(feature = "print"), path = "plan/form_left_out.rs")]
 mod form;
 
 use std::io::Write;

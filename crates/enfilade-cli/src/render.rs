@@ -107,8 +107,8 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         let mut counts = PortalTextureCounts::default();
         let mut picture = smooth(args.size, |size| {
             drawn_size = size;
-            let live = (lived.as_mut(), mirrored.as_mut());
-            let (picture, own) = draw(args, &world, &mut studio, live.0, live.1, camera, size)?;
+            let (lived, mirrored) = (lived.as_mut(), mirrored.as_mut());
+            let (picture, own) = draw(args, &world, &mut studio, lived, mirrored, camera, size)?;
             counts = own;
             Ok(picture)
         })?;
@@ -122,13 +122,10 @@ pub(crate) fn run(args: &Render) -> anyhow::Result<()> {
         }
         write_whole(&to, &picture.to_png()?)?;
         let textures = (args.mode == RenderMode::PortalTextures).then_some(counts);
-        let culling = match textures {
-            // A mirror in view leaves no portal as a texture.
-            Some(none) if mirrored.is_some() && none.n_textured == 0 => Culling::Portals,
-            _ => args.mode.culling(),
-        };
-        let shot = (camera, drawn_size, culling);
-        let mut drawn = Drawn::new(&to, &mut studio, &world, shot, textures)?;
+        let culling = culled(args.mode, textures, mirrored.is_some());
+        let file = to.display().to_string();
+        let mut drawn = Drawn::new(file, &mut studio, &world, drawn_size, camera, culling)?;
+        drawn.record(textures);
         drawn.loaded_bytes = pieces.as_ref().map(|p| p.counts().loaded);
         if args.json {
             all.push(drawn);
@@ -203,7 +200,7 @@ fn draw(
     };
     let culling = args.mode.culling();
     if let Some(mirrored) = mirrored {
-        return mirrored.picture(studio, (camera, culling), style, &marks, size);
+        return mirrored.picture(studio, camera, culling, style, &marks, size);
     }
     let counts = if culling == Culling::PortalTextures {
         settle(studio, |s| Ok(s.plan_portal_textures(camera, style, size)?))?
@@ -264,21 +261,30 @@ struct Drawn {
     loaded_bytes: Option<[u64; 2]>,
 }
 
+/// Returns how a picture was culled: a mirror in view leaves no portal as a texture.
+fn culled(mode: RenderMode, textures: Option<PortalTextureCounts>, is_mirrored: bool) -> Culling {
+    match textures {
+        Some(none) if is_mirrored && none.n_textured == 0 => Culling::Portals,
+        _ => mode.culling(),
+    }
+}
+
 impl Drawn {
     fn new(
-        file: &Path,
+        file: String,
         studio: &mut Studio,
         world: &World,
         // The size before halving: sparing depends on its pixels.
-        (camera, size, culling): (&Camera, [u32; 2], Culling),
-        textures: Option<PortalTextureCounts>,
+        size: [u32; 2],
+        camera: &Camera,
+        culling: Culling,
     ) -> anyhow::Result<Self> {
         let view = camera.view(size[0] as f32 / size[1] as f32)?;
         let list = studio.list(&view, camera.eye, culling, size);
         let (triangles, draws) = (list.n_triangles(), list.n_draws());
         let cell = studio.sight.locate(camera.eye);
         Ok(Self {
-            file: file.display().to_string(),
+            file,
             eye: camera.eye,
             look: [0, 1, 2].map(|k| camera.eye[k] + camera.toward[k]),
             cell: cell.map(|c| c.0),
@@ -287,12 +293,19 @@ impl Drawn {
             of_triangles: studio.world.n_triangles(),
             draws,
             adapter: studio.gpu.name(),
-            textured_portals: textures.map(|t| t.n_textured),
-            plain_portals: textures.map(|t| t.n_plain),
-            textures_made: textures.map(|t| t.n_made),
-            textures_loaded: textures.map(|t| t.n_loaded),
+            textured_portals: None,
+            plain_portals: None,
+            textures_made: None,
+            textures_loaded: None,
             loaded_bytes: None,
         })
+    }
+
+    fn record(&mut self, textures: Option<PortalTextureCounts>) {
+        self.textured_portals = textures.map(|t| t.n_textured);
+        self.plain_portals = textures.map(|t| t.n_plain);
+        self.textures_made = textures.map(|t| t.n_made);
+        self.textures_loaded = textures.map(|t| t.n_loaded);
     }
 }
 

@@ -89,10 +89,10 @@ impl OwnWorlds {
         &mut self,
         host: Option<InstanceId>,
         base: &OwnBase,
-        before: Vec<HandEditKind>,
+        before: &[HandEditKind],
         kind: &HandEditKind,
     ) -> Result<(), HandEditError> {
-        let mut own = self.made(host, base, &before);
+        let mut own = self.made(host, base, before);
         base.add(&mut own, kind)?;
         self.by_host.insert(host, own);
         Ok(())

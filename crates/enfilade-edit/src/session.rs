@@ -232,7 +232,7 @@ impl EditSession {
             let before = kinds_of(&self.edits, host);
             let base = own_base(&self.around, &self.level, host);
             let base = base.ok_or(HandEditError::HostGone)?;
-            self.own.make(host, &base, before, &edit.kind)?;
+            self.own.make(host, &base, &before, &edit.kind)?;
         }
         self.replayed(&operation)?;
         let written = self.write(&Entry::Operation(operation));

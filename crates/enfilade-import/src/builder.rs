@@ -8,7 +8,6 @@ use crate::groups::name_groups;
 use crate::left_out::leave_out;
 use crate::order::sort;
 use crate::origins::Origins;
-
 use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
 use enfilade_geom::scene::{
     Entity, Filling, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
@@ -289,8 +288,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Returns the memory left before [`ImportError::Bomb`]. [Units: bytes]
     #[cfg(feature = "draco")]
+    /// Returns the memory left before [`ImportError::Bomb`]. [Units: bytes]
     pub(crate) fn memory_left(&self) -> u64 {
         self.max_held_bytes().saturating_sub(self.n_held_bytes)
     }

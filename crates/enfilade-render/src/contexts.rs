@@ -334,9 +334,18 @@ impl Studio {
                 is_everywhere || seen.cells().contains(&cell)
             };
             for special in graph.special_ids().filter(is_seen) {
-                let key = (index, id, special);
                 if !context.never_meets(space, id, special) {
-                    self.add_face(tree, space, context, (node, part), key, children, answer);
+                    self.add_face(
+                        tree,
+                        space,
+                        context,
+                        (node, part),
+                        index,
+                        id,
+                        special,
+                        children,
+                        answer,
+                    );
                 }
             }
         }
@@ -353,7 +362,9 @@ impl Studio {
         space: &Space,
         context: &SeenContext<'_>,
         (node, part): (usize, usize),
-        (index, id, special): (usize, PartId, SpecialId),
+        index: usize,
+        id: PartId,
+        special: SpecialId,
         children: &HashMap<ViaKey, usize>,
         answer: SpaceSeen<'_>,
     ) {

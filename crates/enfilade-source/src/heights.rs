@@ -6,6 +6,7 @@
 
 #[cfg(feature = "tiff")]
 mod geotiff;
+mod raster;
 mod terrain;
 
 use std::io::Cursor;
@@ -15,6 +16,8 @@ use enfilade_geom::DVec3;
 use crate::{SourceError, SourceLimits, Surface};
 #[cfg(feature = "tiff")]
 use geotiff::of_tiff;
+pub use raster::HeightMap;
+use raster::{checked, error};
 use terrain::triangulate;
 
 /// Refuses a TIFF: this build has no reader.
@@ -30,21 +33,6 @@ const OFF: f64 = 0.1;
 /// Most samples of a map: those of a square of 8,192.
 const MAX_SAMPLES: u64 = 1 << 26;
 
-/// A raster of heights.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeightMap {
-    /// Samples from west to east, and from north to south.
-    pub dims: [usize; 2],
-    /// The samples, `[south][east]`; NaN where there is none.
-    pub samples: Vec<f32>,
-    /// Greatest gray, where samples are grays; `None` for heights.
-    pub white: Option<f64>,
-    /// Distance between samples to the east and to the south, if the file tells it. [Units: wu]
-    pub cell: Option<[f64; 2]>,
-    /// East and north of the first sample, if the file tells them. [Units: wu]
-    pub place: Option<[f64; 2]>,
-}
-
 /// Settings of height maps that files may not tell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HeightOptions {
@@ -52,10 +40,6 @@ pub struct HeightOptions {
     pub cell: Option<f64>,
     /// Heights of black and of white. [Units: wu]
     pub heights: Option<[f64; 2]>,
-}
-
-fn error(place: &str, problem: impl Into<String>) -> SourceError {
-    SourceError::new(place, problem)
 }
 
 impl HeightMap {
@@ -169,24 +153,6 @@ impl HeightMap {
     }
 }
 
-/// Checks the numbers of samples to the east and to the south.
-fn checked([nx, nz]: [u32; 2], most: u64) -> Result<[usize; 2], SourceError> {
-    let n = u64::from(nx) * u64::from(nz);
-    if n > most {
-        let problem = format!(
-            "{nx} × {nz} samples, more than the {most} allowed; cut the map or make it coarser"
-        );
-        return Err(error("size", problem));
-    }
-    if nx < 2 || nz < 2 {
-        return Err(error(
-            "size",
-            format!("{nx} × {nz} samples; land needs two by two"),
-        ));
-    }
-    Ok([nx as usize, nz as usize])
-}
-
 fn of_png(bytes: &[u8], most: u64) -> Result<HeightMap, SourceError> {
     let damaged = |e: png::DecodingError| error("PNG", format!("{e}; is the file cut off?"));
     let limits = png::Limits {
@@ -230,6 +196,7 @@ fn of_png(bytes: &[u8], most: u64) -> Result<HeightMap, SourceError> {
 #[cfg(test)]
 mod tests {
     use tiff::encoder::{TiffEncoder, colortype};
+    use tiff::tags::Tag;
 
     use super::geotiff::{GEOGRAPHIC, MODEL_TYPE};
     use super::*;

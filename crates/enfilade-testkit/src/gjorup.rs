@@ -100,7 +100,8 @@ pub fn gjorup_rooms(variant: Variant, degrees: [f64; 3]) -> Generated {
         Variant::Distorted => "gjorup-distorted",
     };
     let mut rooms = FourRooms::new(variant);
-    let corridors = CORRIDORS.map(|c| rooms.add_ends(c));
+    let corridors = CORRIDORS
+        .map(|(a, wall_a, b, wall_b, extent)| rooms.add_ends(a, wall_a, b, wall_b, extent));
     let volumes = [0, 1, 2, 3].map(|r| rooms.add_room(r));
     let mut mesh = rooms.mesh;
     for Corridor { p, q, .. } in &corridors {
@@ -159,8 +160,14 @@ impl FourRooms {
     }
 
     /// Adds the two ends of a corridor.
-    fn add_ends(&mut self, corridor: (usize, usize, usize, usize, [f64; 2])) -> Corridor {
-        let (a, wall_a, b, wall_b, extent) = corridor;
+    fn add_ends(
+        &mut self,
+        a: usize,
+        wall_a: usize,
+        b: usize,
+        wall_b: usize,
+        extent: [f64; 2],
+    ) -> Corridor {
         let p = self.add_end(a, wall_a, extent);
         let q = self.add_end(b, wall_b, extent);
         Corridor {

@@ -36,6 +36,14 @@ pub(crate) struct Visible<'a> {
     slack: f64,
 }
 
+/// A line from a point of a cell to a point of air, or of a part.
+struct AimedLine {
+    from: CellId,
+    a: DVec3,
+    b: DVec3,
+    part: Option<u32>,
+}
+
 impl<'a> Visible<'a> {
     /// Returns `None` if the world stores only whole cells.
     pub(crate) fn new(world: &'a World, eps: f64) -> Option<Self> {
@@ -296,7 +304,8 @@ impl<'a> Visible<'a> {
             }
             None => return,
         };
-        self.try_aimed(subject, rng, (from, a), (b, part), i, tally);
+        let line = AimedLine { from, a, b, part };
+        self.try_aimed(subject, rng, line, i, tally);
     }
 
     /// Follows a line from a point of a cell to a point of air, or to a part.
@@ -304,8 +313,7 @@ impl<'a> Visible<'a> {
         &self,
         subject: &Subject,
         rng: &mut Rng,
-        (from, a): (CellId, DVec3),
-        (b, part): (DVec3, Option<u32>),
+        AimedLine { from, a, b, part }: AimedLine,
         i: u64,
         tally: &mut Tally,
     ) {

@@ -23,7 +23,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::bits::{self, BitTable};
 use crate::clip::{Arena, Poly};
 use crate::dirs::{Dirs, Next};
-use crate::planes::{Facing, Four, Side, admits, hide, separators};
+use crate::planes::{FacedOutline, Facing, Four, Side, admits, hide, separators};
 use crate::rays::{Blocker, Line};
 use crate::tolerance::{HalfSpace, Tolerance};
 
@@ -434,8 +434,8 @@ impl Flow {
 
     pub(crate) fn add_planes(&mut self, shared: &Shared<'_>, source: Poly, pass: Poly) {
         separators(
-            (self.arena.get(source), facing(shared.dirs, source.dir)),
-            (self.arena.get(pass), facing(shared.dirs, pass.dir)),
+            FacedOutline::new(self.arena.get(source), facing(shared.dirs, source.dir)),
+            FacedOutline::new(self.arena.get(pass), facing(shared.dirs, pass.dir)),
             &shared.tolerance,
             &mut self.planes,
         );
@@ -483,8 +483,8 @@ impl Flow {
         if pass.dir != source.dir {
             let end = self.planes.len();
             separators(
-                (self.arena.get(pass), facing(dirs, pass.dir)),
-                (self.arena.get(target), facing(dirs, target.dir)),
+                FacedOutline::new(self.arena.get(pass), facing(dirs, pass.dir)),
+                FacedOutline::new(self.arena.get(target), facing(dirs, target.dir)),
                 tolerance,
                 &mut self.planes,
             );

@@ -15,7 +15,7 @@ use crate::clip::{Arena, Poly};
 use crate::config::KEPT;
 use crate::dirs::Dirs;
 use crate::flow::{back_of, facing, front_of};
-use crate::planes::{Four, LANES, Side, pack, separators};
+use crate::planes::{FacedOutline, Four, LANES, Side, pack, separators};
 use crate::tolerance::{HalfSpace, Tolerance};
 
 /// Builds the hourglasses of one graph.
@@ -198,8 +198,8 @@ impl Hourglasses {
 
     fn separate(&self, arena: &Arena, a: Poly, b: Poly, out: &mut Vec<Four>) {
         separators(
-            (arena.get(a), facing(&self.dirs, a.dir)),
-            (arena.get(b), facing(&self.dirs, b.dir)),
+            FacedOutline::new(arena.get(a), facing(&self.dirs, a.dir)),
+            FacedOutline::new(arena.get(b), facing(&self.dirs, b.dir)),
             &self.tolerance,
             out,
         );

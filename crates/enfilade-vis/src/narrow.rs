@@ -11,7 +11,7 @@ use crate::bits::{self, BitTable};
 use crate::clip::Arena;
 use crate::dirs::{Dirs, Next};
 use crate::flow::{back_of, facing, front_of};
-use crate::planes::{Four, admits, pack, separators};
+use crate::planes::{FacedOutline, Four, admits, pack, separators};
 use crate::search::Search;
 use crate::tolerance::Tolerance;
 
@@ -100,8 +100,8 @@ impl Work {
             };
             self.planes.clear();
             separators(
-                (self.arena.get(first), facing(dirs, source as u32)),
-                (self.arena.get(second), facing(dirs, pass as u32)),
+                FacedOutline::new(self.arena.get(first), facing(dirs, source as u32)),
+                FacedOutline::new(self.arena.get(second), facing(dirs, pass as u32)),
                 tolerance,
                 &mut self.planes,
             );

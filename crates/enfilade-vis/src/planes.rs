@@ -103,6 +103,19 @@ pub(crate) struct Facing {
     pub(crate) normal: DVec3,
 }
 
+/// The vertices of an opening, and how it faces.
+#[derive(Clone, Copy)]
+pub(crate) struct FacedOutline<'p> {
+    pub(crate) points: &'p [DVec3],
+    pub(crate) facing: Facing,
+}
+
+impl<'p> FacedOutline<'p> {
+    pub(crate) fn new(points: &'p [DVec3], facing: Facing) -> Self {
+        Self { points, facing }
+    }
+}
+
 /// Appends the planes through an edge of one polygon and a vertex of the other that have `a` behind and `b` in front.
 ///
 /// In the cross-section perpendicular to an edge, its polygon is a half-line, and the first vertex of the other
@@ -112,8 +125,8 @@ pub(crate) struct Facing {
 /// A plane through an edge of each comes twice. Dropping one would save a little, but then a checker that cuts by
 /// both would keep polygons that differ by rounding, and find planes that differ by more.
 pub(crate) fn separators(
-    a: (&[DVec3], Facing),
-    b: (&[DVec3], Facing),
+    a: FacedOutline<'_>,
+    b: FacedOutline<'_>,
     tolerance: &Tolerance,
     out: &mut Vec<Four>,
 ) {
@@ -123,35 +136,40 @@ pub(crate) fn separators(
 #[inline(always)]
 fn separators_by<S: Simd>(
     simd: S,
-    a: (&[DVec3], Facing),
-    b: (&[DVec3], Facing),
+    a: FacedOutline<'_>,
+    b: FacedOutline<'_>,
     tolerance: &Tolerance,
     out: &mut Vec<Four>,
 ) {
-    let heights = Heights::new(b.0, a.1.normal);
-    for i in (0..a.0.len()).step_by(LANES) {
-        through_edges::<S, true>(simd, (a.0, i), (b.0, &heights), a.1, tolerance, out);
+    let other = Heights::new(b.points, a.facing.normal);
+    for first in (0..a.points.len()).step_by(LANES) {
+        through_edges::<S, true>(simd, a, first, &other, tolerance, out);
     }
-    let heights = Heights::new(a.0, -b.1.normal);
-    for i in (0..b.0.len()).step_by(LANES) {
-        through_edges::<S, false>(simd, (b.0, i), (a.0, &heights), b.1, tolerance, out);
+    let other = Heights::new(a.points, -b.facing.normal);
+    for first in (0..b.points.len()).step_by(LANES) {
+        through_edges::<S, false>(simd, b, first, &other, tolerance, out);
     }
 }
 
 /// Heights of vertices along a direction, precomputed for the first few.
-struct Heights {
+struct Heights<'p> {
+    points: &'p [DVec3],
     ahead: DVec3,
     first: [f64; 12],
 }
 
-impl Heights {
+impl<'p> Heights<'p> {
     #[inline]
-    fn new(points: &[DVec3], ahead: DVec3) -> Self {
+    fn new(points: &'p [DVec3], ahead: DVec3) -> Self {
         let mut first = [0.0; 12];
         for (height, &p) in first.iter_mut().zip(points) {
             *height = ahead.dot(p);
         }
-        Self { ahead, first }
+        Self {
+            points,
+            ahead,
+            first,
+        }
     }
 
     #[inline]
@@ -234,17 +252,21 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Appends the planes through edges `first..first + LANES` of `own` and a vertex of `other`. `heights` are those of
-/// `other` ahead of `own`; `FIRST` if `own` belongs behind the plane.
+/// Appends the planes through edges `first..first + LANES` of `own` and a vertex of the polygon whose
+/// heights ahead of `own` are given; `FIRST` if `own` belongs behind the plane.
 #[inline(always)]
 fn through_edges<S: Simd, const FIRST: bool>(
     simd: S,
-    (own, first): (&[DVec3], usize),
-    (other, heights): (&[DVec3], &Heights),
-    facing: Facing,
+    FacedOutline {
+        points: own,
+        facing,
+    }: FacedOutline<'_>,
+    first: usize,
+    heights: &Heights<'_>,
     tolerance: &Tolerance,
     out: &mut Vec<Four>,
 ) {
+    let other = heights.points;
     let n = own.len();
     // Lanes past the last edge repeat it.
     let at = |l: usize| own[(first + l).min(n - 1)];

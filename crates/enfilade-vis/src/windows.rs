@@ -17,7 +17,7 @@ use enfilade_geom::{Aabb, DVec3};
 use crate::clip::{Arena, Poly};
 use crate::dirs::Dirs;
 use crate::flow::{back_of, facing, front_of};
-use crate::planes::{Four, Side, hide, separators};
+use crate::planes::{FacedOutline, Four, Side, hide, separators};
 use crate::tolerance::{HalfSpace, Tolerance};
 
 /// Times that the box around an opening's part grows before all of the opening counts.
@@ -118,8 +118,8 @@ impl Windows {
                 from = clipped;
             }
             separators(
-                (self.arena.get(from), facing(dirs, source as u32)),
-                (self.arena.get(part), facing(dirs, pass as u32)),
+                FacedOutline::new(self.arena.get(from), facing(dirs, source as u32)),
+                FacedOutline::new(self.arena.get(part), facing(dirs, pass as u32)),
                 tolerance,
                 &mut self.planes,
             );

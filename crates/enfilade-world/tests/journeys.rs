@@ -153,10 +153,10 @@ fn a_path_through_docked_doors_is_that_of_one_world() {
                 assert!(off < 0.05, "{off}");
             }
             let within = search
-                .cells_within(&map, &space, ends[0], 50.0, |_, _| true)
+                .cells_within(&map, &space, ends[0].0, ends[0].1, 50.0, |_, _| true)
                 .unwrap();
             assert_eq!(within.len(), 2);
-            let far = search.distance(&map, &space, ends[1]).unwrap();
+            let far = search.distance(&map, &space, ends[1].0, ends[1].1).unwrap();
             assert!(
                 far > path.length - side && far < 1.08 * path.length + side,
                 "{far}"
@@ -298,8 +298,8 @@ fn a_second_path_from_part_to_part_allocates_nothing() {
     ];
     let mut ask = || {
         let _ = search.find(&map, &space, ends, |_, _| true, &mut path);
-        let _ = search.cells_within(&map, &space, ends[0], 20.0, |_, _| true);
-        let _ = search.distance(&map, &space, ends[1]);
+        let _ = search.cells_within(&map, &space, ends[0].0, ends[0].1, 20.0, |_, _| true);
+        let _ = search.distance(&map, &space, ends[1].0, ends[1].1);
     };
     (0..4).for_each(|_| ask());
     assert_eq!(allocation_counter::measure(ask).count_total, 0);

@@ -101,7 +101,7 @@ fn bodies_meet_in_and_beyond_a_special_portal_what_they_meet_in_a_doorway() {
             let mut deepest = [0.0_f64; 2];
             let mut is_in_two = false;
             for (i, space) in [&plain, &linked].into_iter().enumerate() {
-                casters[i].for_each_contact(space, &body, (ROOT, from), place, |contact| {
+                casters[i].for_each_contact(space, &body, ROOT, from, place, |contact| {
                     deepest[i] = deepest[i].max(contact.depth);
                     is_in_two |= contact.map != Similarity::IDENTITY;
                 });

@@ -231,14 +231,14 @@ fn what_is_near_is_as_far_as_one_walks() {
         let mut rng = Rng::new(seed);
         let from = point_on_floor(layout, &mut rng);
         let cells = search
-            .cells_within(&map, &space, (PartId::ROOT, from), 8.0, |_, _| true)
+            .cells_within(&map, &space, PartId::ROOT, from, 8.0, |_, _| true)
             .unwrap();
         n_far += layout.n_cells() - cells.len();
         assert!(cells.is_sorted_by(|a, b| a.1 <= b.1) && cells.iter().all(|c| c.1 <= 8.0));
         for _ in 0..80 {
             let to = point_on_floor(layout, &mut rng);
             let found = paths.find(&map, &space, at_root([from, to]), |_, _| true, &mut path);
-            if let Some(far) = search.distance(&map, &space, (PartId::ROOT, to)) {
+            if let Some(far) = search.distance(&map, &space, PartId::ROOT, to) {
                 n_near += 1;
                 assert!(
                     found.is_ok() && far > 0.97 * path.length - 0.2,
@@ -332,8 +332,8 @@ fn a_second_path_allocates_nothing() {
     let ends = [(); 2].map(|()| point_on_floor(layout, &mut rng));
     let mut ask = || {
         let _ = search.find(&map, &space, at_root(ends), |_, _| true, &mut path);
-        let _ = search.cells_within(&map, &space, (PartId::ROOT, ends[0]), 20.0, |_, _| true);
-        let _ = search.distance(&map, &space, (PartId::ROOT, ends[1]));
+        let _ = search.cells_within(&map, &space, PartId::ROOT, ends[0], 20.0, |_, _| true);
+        let _ = search.distance(&map, &space, PartId::ROOT, ends[1]);
     };
     // Buffers change places, so several queries are needed to grow all.
     (0..4).for_each(|_| ask());
@@ -475,7 +475,7 @@ fn points_from_nowhere_have_no_floor() {
     let map = WalkMap::new(&space, Agent::default());
     let found = search.find(&map, &space, at_root([inside; 2]), |_, _| true, &mut path);
     assert_eq!(found, Err(NoPath::NoFloorAtStart));
-    assert_eq!(search.distance(&map, &space, (PartId::ROOT, inside)), None);
+    assert_eq!(search.distance(&map, &space, PartId::ROOT, inside), None);
 }
 
 /// W10: a path from a point to itself has no length.

@@ -126,7 +126,8 @@ impl WorldView {
         world: &PortalWorld,
         state: &PortalState,
         into: &Affine3A,
-        (eye, clip_from_world): (Vec3, Mat4),
+        eye: Vec3,
+        clip_from_world: Mat4,
         movers: &Query<(Entity, &Reach), With<Mover>>,
     ) {
         self.eye = into.transform_point3(eye).to_array();
@@ -220,7 +221,7 @@ pub(crate) fn cull(
                 continue;
             };
             let own = view.world_of(root, state.revision, world);
-            own.look_at_all(world, state, &into, (eye, clip_from_world), &movers);
+            own.look_at_all(world, state, &into, eye, clip_from_world, &movers);
         }
         view.worlds.retain(|w| w.is_current);
         view.retain(&mut visible, culling.is_enabled, &known, &mut dropped.0);

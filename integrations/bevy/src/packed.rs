@@ -136,7 +136,7 @@ impl AssetLoader for PackedLoader {
         heads().remove(&path);
         let loaded = loaded?;
         let place = PiecePlace::beside(&self.server, &path, size);
-        let packed = self.packed(load_context, settings, (head, &hollow), place)?;
+        let packed = self.packed(load_context, settings, head, &hollow, place)?;
         load_context.add_labeled_asset(PACKED_LABEL, packed);
         Ok(loaded)
     }
@@ -152,7 +152,8 @@ impl PackedLoader {
         &self,
         load_context: &mut LoadContext<'_>,
         settings: &GltfLoaderSettings,
-        (head, hollow): (Arc<PackedHead>, &[u8]),
+        head: Arc<PackedHead>,
+        hollow: &[u8],
         place: PiecePlace,
     ) -> Result<PackedWorld, BevyError> {
         let file = gltf::Gltf::from_slice_without_validation(hollow)?;

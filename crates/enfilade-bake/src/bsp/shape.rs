@@ -18,7 +18,8 @@ pub(super) fn shapes(
         tree,
         tree.root,
         whole(&tree.bounds, tolerance.cut),
-        (tolerance.cut, purse),
+        tolerance.cut,
+        purse,
         &mut |leaf, region| {
             out[leaf as usize] = shape_of(&region);
         },
@@ -30,7 +31,8 @@ fn visit(
     tree: &Tree,
     child: i32,
     region: Region,
-    (eps, purse): (f64, Purse<'_>),
+    eps: f64,
+    purse: Purse<'_>,
     take: &mut dyn FnMut(u32, Region),
 ) {
     // A region is cut face by face.
@@ -46,6 +48,6 @@ fn visit(
         .into_iter()
         .zip(node.children)
     {
-        visit(tree, child, region, (eps, purse), take);
+        visit(tree, child, region, eps, purse, take);
     }
 }

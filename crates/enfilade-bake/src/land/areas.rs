@@ -15,7 +15,7 @@ use enfilade_geom::{Allowance, DVec3};
 
 use super::relief::{NOTHING, Relief};
 use crate::MergeSettings;
-use crate::rooms::{Flooded, LimbRule, merge_basins, split_limbs};
+use crate::rooms::{Flooded, LimbRule, LimbSettings, merge_basins, split_limbs};
 use crate::structure::OUTDOORS;
 use crate::voxel::{BitVolume, Grid, SparseVolume, WatershedOptions, distance_squared, watershed};
 
@@ -153,7 +153,10 @@ impl LandPlan {
             &mut regions,
             &mut peaks,
             &shut,
-            (settings, STREETS),
+            LimbSettings {
+                merge: settings,
+                rule: STREETS,
+            },
             allowance,
         );
         let room = |i: usize| {

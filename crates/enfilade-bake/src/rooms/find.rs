@@ -12,7 +12,7 @@ use super::basins::Basins;
 use super::candidates::Openings;
 use super::forks::{is_curved, split_forks};
 use super::hollow::{Matter, find_matter};
-use super::limb_rule::LimbRule;
+use super::limb_rule::{LimbRule, LimbSettings};
 use super::limbs::split_limbs;
 use super::low::join_low;
 use super::regions::Regions;
@@ -47,8 +47,7 @@ pub(crate) fn propose(
     } = air;
     let field = is_curved(&framed(structure)).then(|| solid.field(allowance));
     basins.refill(&solid.occupied);
-    let n_occupied = solid.occupied.count();
-    let mut notes = solid.lids.notes(&grid);
+    let (n_occupied, mut notes) = (solid.occupied.count(), solid.lids.notes(&grid));
     let Solid {
         shut,
         closures,
@@ -62,7 +61,7 @@ pub(crate) fn propose(
         structure,
         &grid,
         &mut basins,
-        (&shut, &slabs, field),
+        FloodedAir::of(&shut, &slabs, field),
         config,
         context,
     )?;
@@ -155,6 +154,22 @@ fn framed<'a>(structure: &'a Structure<'_>) -> Cow<'a, [Triangle]> {
     structure.frame.triangles_to_grid(&structure.triangles)
 }
 
+/// The flooded air, besides its basins.
+struct FloodedAir<'a> {
+    /// Voxels that door leaves and panes fill.
+    shut: &'a SparseVolume,
+    /// Heights at which slabs end storeys.
+    slabs: &'a [f64],
+    /// Distances to look for forks in.
+    field: Option<DistanceField>,
+}
+
+impl<'a> FloodedAir<'a> {
+    fn of(shut: &'a SparseVolume, slabs: &'a [f64], field: Option<DistanceField>) -> Self {
+        Self { shut, slabs, field }
+    }
+}
+
 /// Makes rooms of basins; returns them with the volumes of tubes and of all rooms, see [`split_forks`]. Forks are looked for
 /// where a `field` is given.
 ///
@@ -164,10 +179,11 @@ fn rooms_of(
     structure: &Structure<'_>,
     grid: &Grid,
     basins: &mut Basins,
-    (shut, slabs, field): (&SparseVolume, &[f64], Option<DistanceField>),
+    air: FloodedAir<'_>,
     config: &BakeConfig,
     context: &BakeContext<'_>,
 ) -> Result<(Regions, [f64; 2]), BakeError> {
+    let FloodedAir { shut, slabs, field } = air;
     let allowance = context.allowance();
     let mut regions = basins.merge(grid, shut, slabs, config, allowance);
     context.check()?;
@@ -177,7 +193,10 @@ fn rooms_of(
         &mut regions,
         &mut basins.peaks,
         shut,
-        (&config.merge, LimbRule::ROOMS),
+        LimbSettings {
+            merge: &config.merge,
+            rule: LimbRule::ROOMS,
+        },
         allowance,
     );
     join_low(grid, &basins.labels, &mut regions, allowance);
@@ -188,11 +207,11 @@ fn rooms_of(
         };
         split_forks(
             grid,
-            &mut basins.labels,
+            basins,
             &mut regions,
-            &mut basins.peaks,
             field,
-            (&walls, config.merge.min_radius),
+            &walls,
+            config.merge.min_radius,
             allowance,
         )
     });

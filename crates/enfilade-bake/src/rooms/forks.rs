@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 
 use enfilade_geom::{Allowance, Triangle, triangle_area_normal};
 
+use super::basins::Basins;
 use super::flooded::contact_faces;
 use super::fork_pieces::ForkPieces;
 use super::fork_place::{ForkArm, ForkPlace};
@@ -47,11 +48,11 @@ pub(super) fn is_curved(triangles: &[Triangle]) -> bool {
 /// rooms, zero if none had. Radii count from `least` on. [Units: wu]
 pub(super) fn split_forks(
     grid: &Grid,
-    labels: &mut Labels,
+    Basins { labels, peaks, .. }: &mut Basins,
     regions: &mut Regions,
-    peaks: &mut Vec<f32>,
     field: DistanceField,
-    (walls, least): (&Walls<'_>, f64),
+    walls: &Walls<'_>,
+    least: f64,
     allowance: &Allowance,
 ) -> [f64; 2] {
     let places = find_places(grid, labels, regions, field, walls, least, allowance);
@@ -117,14 +118,13 @@ fn find_places(
     let mut least = least / grid.voxel;
     while widest.dims.iter().any(|&n| n > 1) {
         let most = BLOCKS * edge as f64;
-        let rooms = (labels, regions);
         let balls = BlockBalls::of(
             grid,
             &widest,
             edge,
             [least, most],
-            rooms.0,
-            rooms.1,
+            labels,
+            regions,
             allowance,
         );
         let middles = balls.middles([least, most].map(|r| r * grid.voxel));

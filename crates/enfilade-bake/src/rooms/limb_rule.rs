@@ -1,7 +1,16 @@
 //! The rule for limbs: corridors of buildings, and streets of land.
 
+use crate::MergeSettings;
+
 /// A limb opens to areas at least this many times as thick: its section is at most half of theirs.
 pub(crate) const THICKER: f64 = 2.0;
+
+/// Rule for limbs, and the settings of merging.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LimbSettings<'a> {
+    pub(crate) merge: &'a MergeSettings,
+    pub(crate) rule: LimbRule,
+}
 
 /// Rule for limbs.
 #[derive(Clone, Copy, Debug)]

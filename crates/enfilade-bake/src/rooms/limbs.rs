@@ -26,7 +26,7 @@ use crate::voxel::{BitVolume, Grid, Labels, SparseVolume, distance};
 
 use super::flooded::{Flooded, contact_faces};
 use super::fronts::group_faces;
-use super::limb_rule::{LimbRule, THICKER, sagitta};
+use super::limb_rule::{LimbRule, LimbSettings, THICKER, sagitta};
 use super::regions::Regions;
 use super::sections::section_of;
 use super::slabs::LAYERS;
@@ -41,14 +41,17 @@ const ON_AXIS: f64 = 0.9;
 const STEP: f64 = 1.15;
 
 /// Splits limbs off their rooms, in the labels of a flooded volume. Half-widths count from
-/// `settings.min_radius` on; `shut` are the voxels that door leaves and panes fill.
+/// `min_radius` of the settings on; `shut` are the voxels that door leaves and panes fill.
 pub(crate) fn split_limbs(
     grid: &Grid,
     labels: &mut Labels,
     regions: &mut Regions,
     peaks: &mut Vec<f32>,
     shut: &SparseVolume,
-    (settings, rule): (&MergeSettings, LimbRule),
+    LimbSettings {
+        merge: settings,
+        rule,
+    }: LimbSettings<'_>,
     allowance: &Allowance,
 ) {
     let least = settings.min_radius / grid.voxel;

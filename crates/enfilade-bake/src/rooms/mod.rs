@@ -36,7 +36,7 @@ pub(crate) use air::{FLOODED, Plot, measure, plots, prepare};
 pub(crate) use basins::{Basins, Division, DivisionNode, ROOT};
 pub(crate) use find::{COUNTS, propose};
 pub(crate) use flooded::Flooded;
-pub(crate) use limb_rule::{LimbRule, THICKER};
+pub(crate) use limb_rule::{LimbRule, LimbSettings, THICKER};
 pub(crate) use limbs::{Limb, Plan, split_limbs};
 pub(crate) use part::{VoxelRange, WholeAir};
 pub(crate) use regions::merge_basins;

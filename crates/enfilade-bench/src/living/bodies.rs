@@ -83,7 +83,7 @@ impl Site {
             let mut is_free = true;
             let grown = grown(&body, FREE);
             let (at, place) = ((ROOT, from), Place { part: ROOT, cell });
-            caster.for_each_contact(&self.space, &grown, at, place, |_| is_free = false);
+            caster.for_each_contact(&self.space, &grown, at.0, at.1, place, |_| is_free = false);
             if !is_free {
                 continue;
             }

@@ -138,7 +138,7 @@ impl Places {
         let mut names = Vec::new();
         if let Some(place) = space.locate(ROOT, middle) {
             self.caster
-                .for_each_contact(space, &body, (ROOT, middle), place, |contact| {
+                .for_each_contact(space, &body, ROOT, middle, place, |contact| {
                     let [x, _, z] = contact.normal.to_array();
                     names.push(match contact.target {
                         Target::Detail { detail, .. } => {
@@ -191,7 +191,7 @@ impl Places {
             };
             let mut is_free = true;
             self.caster
-                .for_each_contact(space, &body, (ROOT, middle), place, |_| {
+                .for_each_contact(space, &body, ROOT, middle, place, |_| {
                     is_free = false;
                 });
             if is_free {

@@ -140,7 +140,7 @@ impl Linked {
             let body = random_body(rng);
             let mut deepest = [0.0_f64; 2];
             for (i, space) in [&self.plain, &self.linked].into_iter().enumerate() {
-                casters[i].for_each_contact(space, &body, (ROOT, from), place, |contact| {
+                casters[i].for_each_contact(space, &body, ROOT, from, place, |contact| {
                     deepest[i] = deepest[i].max(contact.depth);
                     beyond += usize::from(i == 1 && contact.map != Similarity::IDENTITY);
                 });

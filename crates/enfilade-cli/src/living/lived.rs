@@ -279,7 +279,7 @@ impl Lived {
         radar.follow(&self.space, people);
         let lamps = self.lamps.iter().map(|l| (l.part, l.at.map(f64::from)));
         radar.place_fixed(&self.space, lamps, &self.file.sounds);
-        radar.look(&self.space, (player.frame, player.eye), &self.awake)
+        radar.look(&self.space, player.frame, player.eye, &self.awake)
     }
 
     /// Plays some seconds: lifts, people, and the doors that they and the player open.

@@ -139,7 +139,8 @@ impl Radar {
     pub(super) fn look(
         &mut self,
         space: &Space,
-        (frame, eye): (PartId, DVec3),
+        frame: PartId,
+        eye: DVec3,
         awake: &AwakeCells,
     ) -> &[Blip] {
         self.blips.clear();
@@ -269,7 +270,7 @@ mod tests {
         let mut awake = AwakeCells::new(layout.n_cells(), 1.0);
         awake.update(0.0, [CellId(0)]);
         let player = (PartId::ROOT, middle(0));
-        let blips = radar.look(&space, player, &awake).to_vec();
+        let blips = radar.look(&space, player.0, player.1, &awake).to_vec();
         let told: Vec<_> = blips
             .iter()
             .map(|b| (b.number, b.n_portals, b.is_awake))
@@ -282,7 +283,7 @@ mod tests {
         // A person in a doorway is in both rooms, and listed once.
         let door = layout.opening(enfilade::PortalId(0));
         radar.follow(&space, [(1, door.center().with_y(0.0))].into_iter());
-        let blips = radar.look(&space, player, &awake).to_vec();
+        let blips = radar.look(&space, player.0, player.1, &awake).to_vec();
         let one: Vec<&Blip> = blips.iter().filter(|b| b.number == 1).collect();
         assert!(one.len() == 1 && one[0].cells.len() == 2 && one[0].is_awake);
         let words = radar_words(&blips, |c| c.to_string());

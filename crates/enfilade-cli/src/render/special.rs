@@ -59,7 +59,8 @@ impl Mirrored {
     pub(crate) fn picture(
         &mut self,
         studio: &mut Studio,
-        (camera, culling): (&Camera, Culling),
+        camera: &Camera,
+        culling: Culling,
         style: Style,
         marks: &[Mark],
         size: [u32; 2],

@@ -14,7 +14,7 @@ use super::row;
 use crate::render::{above, light, portal_marks, smooth, tell_of_pictures};
 use crate::screen::Warned;
 
-/// What of a report needs a camera.
+/// Options of all that needs a camera.
 #[derive(clap::Args)]
 pub(super) struct PictureOptions {
     /// Number of views on the measured walk, 100,000 at most.

@@ -92,13 +92,7 @@ impl Map {
                 return;
             }
             self.is_stale = false;
-            self.begun = Some(Sheet::begin(
-                space,
-                titles.0,
-                titles.1,
-                self.has_parts,
-                eye[1],
-            ));
+            self.begun = Some(Sheet::begin(space, titles, self.has_parts, eye[1]));
         }
         if let Some(mut sheet) = self.begun.take_if(|sheet| sheet.advance(space)) {
             sheet.label();
@@ -251,7 +245,7 @@ impl Sheet {
             portals.extend(ways.map(|portal| {
                 let outline = graph[portal].outline.iter();
                 let outline = outline.map(|p| pose.point(DVec3::from(p.map(f64::from))));
-                Line::of((part, portal), &outline.collect::<Vec<_>>())
+                Line::of(part, portal, &outline.collect::<Vec<_>>())
             }));
         }
         let size = [high[0] - low[0], high[1] - low[1]];
@@ -336,7 +330,7 @@ impl Sheet {
 }
 
 impl Line {
-    fn of(of: (PartId, PortalId), outline: &[DVec3]) -> Self {
+    fn of(part: PartId, portal: PortalId, outline: &[DVec3]) -> Self {
         let flat = |p: &DVec3| [p.x as f32, p.z as f32];
         // The two vertices farthest apart, seen from above.
         let mut ends = [[0.0; 2]; 2];
@@ -352,7 +346,7 @@ impl Line {
             }
         }
         Self {
-            of,
+            of: (part, portal),
             ends,
             heights: [bottom as f32, top as f32],
         }

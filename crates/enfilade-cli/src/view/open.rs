@@ -21,7 +21,7 @@ use winit::window::{CursorGrabMode, Window};
 
 use super::editing::Editor;
 use super::mode::Mode;
-use super::panel::{Panel, Shown};
+use super::panel::{MapSource, Panel, Shown};
 use super::titles::Titles;
 use super::walker::{RUN, Walker};
 use crate::formats::Format;
@@ -341,7 +341,10 @@ impl Open {
             &self.window,
             &output,
             size,
-            (&self.lived.space, &self.titles),
+            &MapSource {
+                space: &self.lived.space,
+                titles: &self.titles,
+            },
             &self.shown,
         );
         self.window.pre_present_notify();
@@ -435,7 +438,10 @@ impl Open {
             window,
             &output,
             size,
-            (&self.lived.space, &self.titles),
+            &MapSource {
+                space: &self.lived.space,
+                titles: &self.titles,
+            },
             &self.shown,
         );
         self.window.pre_present_notify();

@@ -102,6 +102,12 @@ F12            picture to a file
 F1             this help
 Esc            close";
 
+/// Rooms and their names, for the map.
+pub(super) struct MapSource<'a> {
+    pub(super) space: &'a Space,
+    pub(super) titles: &'a Titles,
+}
+
 impl Panel {
     pub(super) fn new(
         gpu: &Gpu,
@@ -139,12 +145,12 @@ impl Panel {
         window: &Window,
         output: &wgpu::TextureView,
         size: [u32; 2],
-        (space, titles): (&Space, &Titles),
+        map: &MapSource<'_>,
         shown: &Shown,
     ) {
         let input = self.state.take_egui_input(window);
         if let Some(camera) = shown.camera {
-            self.map.follow(space, titles, camera.eye);
+            self.map.follow(map.space, map.titles, camera.eye);
         }
         let (map, strip) = (&mut self.map, &mut self.strip);
         let mut full = self

@@ -133,7 +133,7 @@ pub(crate) fn open_review(
     let world = Arc::new(scene_world(reviewed.scene()));
     let space = Space::new(Arc::clone(&world))?;
     let outputs = reviewed.outputs.clone();
-    let files = (window.save, window.output);
+    let (save, output) = (window.save, window.output);
     let app = App {
         args: &args,
         world: Arc::clone(&world),
@@ -147,7 +147,7 @@ pub(crate) fn open_review(
         )?),
         outputs,
         editor: None,
-        reviewer: Some(Reviewer::new(reviewed, files, world)),
+        reviewer: Some(Reviewer::new(reviewed, save, output, world)),
         baking: None,
         open: None,
         failed: None,

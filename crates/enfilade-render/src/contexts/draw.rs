@@ -32,6 +32,16 @@ struct Drawing<'a> {
     size: [u32; 2],
 }
 
+/// The pictures of a frame that depend on each other, ready to be drawn.
+struct DrawnTree<'a> {
+    tree: &'a Tree,
+    /// Format of the last picture.
+    format: wgpu::TextureFormat,
+    props: &'a [(PartId, Vec<PropDraw>)],
+    /// Index of the texture of each picture but the last.
+    pictures: &'a [usize],
+}
+
 impl Renderer {
     /// Draws a tree to `output`, a texture of the renderer's format and of the size of its first picture. `worlds` by part.
     pub(crate) fn draw_tree(
@@ -63,16 +73,15 @@ impl Renderer {
         }
         let sizes = tree.pictures[1..].iter().map(TreePicture::room);
         let pictures = (self.contexts).place(gpu, &self.layouts, format, sizes);
+        let drawn = DrawnTree {
+            tree,
+            format,
+            props: &props,
+            pictures: &pictures,
+        };
         for picture in (0..tree.pictures.len()).rev() {
             gpu.check_picture(tree.pictures[picture].size)?;
-            self.draw_tree_picture(
-                gpu,
-                worlds,
-                (tree, picture, format),
-                shown,
-                (&props, &pictures),
-                output,
-            );
+            self.draw_tree_picture(gpu, worlds, &drawn, picture, shown, output);
         }
         Ok(())
     }
@@ -81,9 +90,14 @@ impl Renderer {
         &mut self,
         gpu: &Gpu,
         worlds: &mut [StagedWorld<'_>],
-        (tree, picture, format): (&Tree, usize, wgpu::TextureFormat),
+        &DrawnTree {
+            tree,
+            format,
+            props,
+            pictures,
+        }: &DrawnTree<'_>,
+        picture: usize,
         shown: &Shown<'_>,
-        (props, pictures): (&[(PartId, Vec<PropDraw>)], &[usize]),
         output: &wgpu::TextureView,
     ) {
         let own = &tree.pictures[picture];

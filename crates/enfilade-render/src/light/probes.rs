@@ -108,6 +108,13 @@ struct Room<'a> {
     balance: &'a Balance,
 }
 
+/// View of a point through portals: the part left of the last one, and the share of the light that passes all.
+#[derive(Clone, Copy)]
+struct Through<'a> {
+    seen: &'a [Vec3],
+    passes: f32,
+}
+
 /// Light on six surfaces, and the share of each hemisphere that it came from.
 #[derive(Clone, Copy, Default)]
 struct Falling {
@@ -122,7 +129,7 @@ impl Room<'_> {
         out: &mut Falling,
         p: Vec3,
         cell: CellId,
-        through: Option<(&[Vec3], f32)>,
+        through: Option<Through<'_>>,
         path: &mut Vec<u32>,
     ) {
         for portal in &self.world.graph[cell].portals {
@@ -139,13 +146,17 @@ impl Room<'_> {
             for piece in &hole.pieces {
                 let mut seen: Polygon = piece.iter().map(|&q| q - p).collect();
                 let mut passes = hole.passes;
-                if let Some((window, before)) = through {
-                    seen = clip_through(&seen, window);
-                    passes *= before;
+                if let Some(before) = through {
+                    seen = clip_through(&seen, before.seen);
+                    passes *= before.passes;
                 }
                 if seen.len() >= 3 {
                     let clear = self.clear_share(p, &seen, path.is_empty());
-                    self.add_seen(out, p, (cell, portal.0), &seen, passes * clear, path);
+                    let through = Through {
+                        seen: &seen,
+                        passes: passes * clear,
+                    };
+                    self.add_seen(out, p, cell, portal.0, through, path);
                 }
             }
         }
@@ -169,11 +180,12 @@ impl Room<'_> {
         &self,
         out: &mut Falling,
         p: Vec3,
-        (cell, portal): (CellId, u32),
-        seen: &[Vec3],
-        passes: f32,
+        cell: CellId,
+        portal: u32,
+        through: Through<'_>,
         path: &mut Vec<u32>,
     ) {
+        let Through { seen, passes } = through;
         let behind = self.holes[portal as usize].other(cell);
         let (mut scratch, mut part) = (Vec::new(), Vec::new());
         if self.world.graph[behind].outdoor {
@@ -192,7 +204,7 @@ impl Room<'_> {
         let shares = WAYS.map(|way| form_factor(seen, way, &mut scratch) * passes);
         if path.len() < 2 && shares.iter().any(|&s| s > WORTH) {
             path.push(portal);
-            self.add(&mut beyond, p, behind, Some((seen, passes)), path);
+            self.add(&mut beyond, p, behind, Some(through), path);
             path.pop();
         }
         for (k, share) in shares.into_iter().enumerate() {

@@ -138,7 +138,7 @@ impl Studio {
         if is_geometry && turn >= last {
             return Ok(false);
         }
-        let is_made = self.compose(own, shot, (id, &doorway, eye), (lacking, counts))?;
+        let is_made = self.compose(own, shot, id, &doorway, lacking, counts)?;
         // Parts behind it may move, and its own view would stop here.
         let has_guest = |space: &Space, cell| {
             let part = PartId::ROOT;
@@ -164,9 +164,12 @@ impl Studio {
         &mut self,
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
-        (id, doorway, eye): (DoorwayId, &Doorway, DoorwayPlace),
-        (lacking, counts): (&mut Vec<Lacking>, &mut PortalTextureCounts),
+        id: DoorwayId,
+        doorway: &Doorway,
+        lacking: &mut Vec<Lacking>,
+        counts: &mut PortalTextureCounts,
     ) -> Result<bool, RenderError> {
+        let eye = doorway.place(shot.eye);
         let viewpoints = own.options.viewpoints.clone();
         let state = own.doorway(&self.world, id);
         let Some(composed) = viewpoints.of(doorway, state.lattice_place(eye), state.anchor) else {
@@ -383,11 +386,10 @@ impl Studio {
                 let Some(doorway) = own.doorway(&self.world, id).doorway.clone() else {
                     continue;
                 };
-                let eye = doorway.place(shot.eye);
                 let is_special = own.doorway(&self.world, id).is_special;
                 let mut none = Vec::new();
-                let is_made = !is_special
-                    && self.compose(own, shot, (id, &doorway, eye), (&mut none, counts))?;
+                let is_made =
+                    !is_special && self.compose(own, shot, id, &doorway, &mut none, counts)?;
                 if !is_made {
                     own.shown.remove(&id);
                     counts.n_plain += 1;

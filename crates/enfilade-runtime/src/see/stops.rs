@@ -45,14 +45,14 @@ impl Clone for Stops {
     }
 }
 
-fn put(list: &mut Vec<(PortalId, CellId)>, stop: (PortalId, CellId)) {
-    if let Err(at) = list.binary_search(&stop) {
-        list.insert(at, stop);
+fn put(list: &mut Vec<(PortalId, CellId)>, portal: PortalId, into: CellId) {
+    if let Err(at) = list.binary_search(&(portal, into)) {
+        list.insert(at, (portal, into));
     }
 }
 
-fn take(list: &mut Vec<(PortalId, CellId)>, stop: (PortalId, CellId)) {
-    if let Ok(at) = list.binary_search(&stop) {
+fn take(list: &mut Vec<(PortalId, CellId)>, portal: PortalId, into: CellId) {
+    if let Ok(at) = list.binary_search(&(portal, into)) {
         list.remove(at);
     }
 }
@@ -67,14 +67,14 @@ impl Stops {
 
     /// Passes a portal into a cell, however far it is.
     pub fn pass(&mut self, portal: PortalId, into: CellId) {
-        take(&mut self.chosen, (portal, into));
-        put(&mut self.passed, (portal, into));
+        take(&mut self.chosen, portal, into);
+        put(&mut self.passed, portal, into);
     }
 
     /// Stops at a portal into a cell, however near it is.
     pub fn stop(&mut self, portal: PortalId, into: CellId) {
-        take(&mut self.passed, (portal, into));
-        put(&mut self.chosen, (portal, into));
+        take(&mut self.passed, portal, into);
+        put(&mut self.chosen, portal, into);
     }
 
     /// Returns `true` if there are none.

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-use super::{HeightMap, checked, error};
+use super::raster::{HeightMap, checked, error};
 use crate::SourceError;
 
 /// Key of a GeoTIFF's directory that tells the kind of its coordinates, and the kinds in meters and in degrees.

@@ -42,7 +42,10 @@ fn pair(seed: u64) -> [(Vec<DVec3>, DVec3); 2] {
 fn between(seed: u64) -> Vec<Four> {
     let [(a, a_turn), (b, b_turn)] = pair(seed);
     let mut planes = Vec::new();
-    let (a, b) = ((&a[..], facing(a_turn)), (&b[..], facing(b_turn)));
+    let (a, b) = (
+        FacedOutline::new(&a, facing(a_turn)),
+        FacedOutline::new(&b, facing(b_turn)),
+    );
     separators(a, b, &tolerance(), &mut planes);
     planes
 }
@@ -82,7 +85,10 @@ fn planes_have_the_first_polygon_behind_and_the_second_in_front() {
 fn all_processors_round_alike() {
     for seed in 0..200 {
         let [(a, a_turn), (b, b_turn)] = pair(seed);
-        let (a, b) = ((&a[..], facing(a_turn)), (&b[..], facing(b_turn)));
+        let (a, b) = (
+            FacedOutline::new(&a, facing(a_turn)),
+            FacedOutline::new(&b, facing(b_turn)),
+        );
         let mut plain = Vec::new();
         dispatch!(Level::baseline(), simd => separators_by(simd, a, b, &tolerance(), &mut plain));
         let bits = |planes: &[Four]| -> Vec<u64> {

@@ -468,7 +468,7 @@ impl Actors {
         member.n_events += 1;
         member.part = 0;
         let mut chance = Chance::new(self.seed, id, event.number);
-        let mut draft = PlanDraft::new((knots, points), Knot { time, cell }, at);
+        let mut draft = PlanDraft::new(knots, points, Knot { time, cell }, at);
         plan(&event, &mut chance, &mut draft);
         draft.take_at_least(time, LEAST_PLAN);
         let is_any = knots.len() > 1;

@@ -33,7 +33,8 @@ pub struct PlanDraft<'a> {
 impl<'a> PlanDraft<'a> {
     /// Starts at a place, replacing the old plan.
     pub(super) fn new(
-        (knots, points): (&'a mut Vec<Knot>, &'a mut Vec<DVec3>),
+        knots: &'a mut Vec<Knot>,
+        points: &'a mut Vec<DVec3>,
         start: Knot,
         at: DVec3,
     ) -> Self {

@@ -193,11 +193,12 @@ impl Caster {
         &mut self,
         space: &Space,
         body: &Body,
-        (frame, at): (PartId, DVec3),
+        frame: PartId,
+        at: DVec3,
         place: Place,
         mut visit: impl FnMut(&Contact),
     ) {
-        let motion = Motion::rest(space, body, (frame, at), place);
+        let motion = Motion::rest(space, body, frame, at, place);
         let all = |_: PartId, _: DetailId| true;
         self.flood.run(&motion, all, |it, _| {
             let core = &it.moving.core;
@@ -226,11 +227,12 @@ impl Caster {
         &mut self,
         space: &Space,
         body: &Body,
-        (frame, at): (PartId, DVec3),
+        frame: PartId,
+        at: DVec3,
         place: Place,
         mut visit: impl FnMut(PartId, Target, &Triangle),
     ) {
-        let motion = Motion::rest(space, body, (frame, at), place);
+        let motion = Motion::rest(space, body, frame, at, place);
         let all = |_: PartId, _: DetailId| true;
         self.flood.run(&motion, all, |it, _| {
             let back = it.moving.map.inverse();

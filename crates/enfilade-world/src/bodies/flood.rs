@@ -71,6 +71,17 @@ struct Reached {
     since: f64,
 }
 
+/// A triangle that a body may meet, in the frame of the part.
+#[derive(Clone, Copy)]
+struct Found<'t> {
+    /// The portal that it is an opening of, and the cell behind.
+    opens_to: Option<(PortalId, CellId)>,
+    target: Option<Target>,
+    corners: &'t Triangle,
+    /// Half extents of the body's box, for this triangle.
+    reach: DVec3,
+}
+
 /// A triangle on the way: the time at which the boxes meet, and its vertices relative to the body's position on entering the
 /// cell.
 #[derive(Clone, Copy, Debug)]
@@ -375,8 +386,13 @@ impl BodyFlood {
                 };
                 let is_way = |(_, to)| !self.is_behind_done(space, stay, to);
                 if target.is_some() || opens_to.is_some_and(is_way) {
-                    let what = (opens_to, target);
-                    self.gather(space, what, (t, reach), moving, stay, visit);
+                    let found = Found {
+                        opens_to,
+                        target,
+                        corners: t,
+                        reach,
+                    };
+                    self.gather(space, found, moving, stay, visit);
                     *t_max = t_max.min(stay.left);
                 }
             });
@@ -428,8 +444,13 @@ impl BodyFlood {
                     primitive,
                     triangle,
                 };
-                let what = (None, Some(target));
-                self.gather(space, what, (&corners, moving.reach), moving, stay, visit);
+                let found = Found {
+                    opens_to: None,
+                    target: Some(target),
+                    corners: &corners,
+                    reach: moving.reach,
+                };
+                self.gather(space, found, moving, stay, visit);
                 *t_max = t_max.min(stay.left);
             });
         });
@@ -440,22 +461,23 @@ impl BodyFlood {
     fn gather(
         &mut self,
         space: &Space,
-        what: (Option<(PortalId, CellId)>, Option<Target>),
-        (corners, reach): (&Triangle, DVec3),
+        found: Found<'_>,
         moving: &Moving,
         stay: &mut Stay,
         visit: &mut impl FnMut(&Candidate<'_>, &mut f64),
     ) {
         if self.images.carver.is_empty() {
-            let corners = corners.map(|p| p - stay.start);
-            return self.gather_whole(space, what, (&corners, reach), moving, stay, visit);
+            let corners = &found.corners.map(|p| p - stay.start);
+            let found = Found { corners, ..found };
+            return self.gather_whole(space, found, moving, stay, visit);
         }
         let mut carved = std::mem::take(&mut self.carved);
         carved.clear();
-        self.images.carver.carve(corners, |t| carved.push(t));
+        self.images.carver.carve(found.corners, |t| carved.push(t));
         for t in &carved {
-            let corners = t.map(|p| p - stay.start);
-            self.gather_whole(space, what, (&corners, reach), moving, stay, visit);
+            let corners = &t.map(|p| p - stay.start);
+            let found = Found { corners, ..found };
+            self.gather_whole(space, found, moving, stay, visit);
         }
         self.carved = carved;
     }
@@ -465,8 +487,12 @@ impl BodyFlood {
     fn gather_whole(
         &mut self,
         space: &Space,
-        (opens_to, target): (Option<(PortalId, CellId)>, Option<Target>),
-        (corners, reach): (&Triangle, DVec3),
+        Found {
+            opens_to,
+            target,
+            corners,
+            reach,
+        }: Found<'_>,
         moving: &Moving,
         stay: &mut Stay,
         visit: &mut impl FnMut(&Candidate<'_>, &mut f64),

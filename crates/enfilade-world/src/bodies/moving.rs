@@ -35,7 +35,8 @@ impl<'a> Motion<'a> {
     pub(super) fn rest(
         space: &'a Space,
         body: &'a Body,
-        (frame, at): (PartId, DVec3),
+        frame: PartId,
+        at: DVec3,
         place: Place,
     ) -> Self {
         Self {

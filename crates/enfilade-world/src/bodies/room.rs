@@ -85,7 +85,8 @@ pub(crate) fn is_free_between(
     caster: &mut Caster,
     space: &Space,
     agent: &Agent,
-    (frame, [from, to]): (PartId, [DVec3; 2]),
+    frame: PartId,
+    [from, to]: [DVec3; 2],
     stops: impl Fn(PartId, DetailId) -> bool,
 ) -> bool {
     let (body, up) = agent.body();
@@ -99,7 +100,7 @@ pub(crate) fn is_free_between(
         let mut is_free = true;
         // In the seam of two parts, it is in neither.
         if let Some(place) = space.locate(frame, middle) {
-            caster.for_each_contact(space, &body, (frame, middle), place, |contact| {
+            caster.for_each_contact(space, &body, frame, middle, place, |contact| {
                 is_free &= match contact.target {
                     Target::Wall { .. } => false,
                     Target::Detail { detail, .. } => !stops(contact.place.part, detail),

@@ -61,7 +61,7 @@ impl Site {
     fn touched(&self, body: &Body, at: DVec3) -> Vec<Contact> {
         let mut all = Vec::new();
         let mut caster = self.caster.borrow_mut();
-        caster.for_each_contact(&self.space, body, (ROOT, at), self.place(at), |c| {
+        caster.for_each_contact(&self.space, body, ROOT, at, self.place(at), |c| {
             all.push(*c);
         });
         all
@@ -523,7 +523,7 @@ fn contacts_are_those_of_every_reachable_triangle() {
         }
         let mut candidates = 0;
         let mut caster = site.caster.borrow_mut();
-        caster.for_each_candidate(&site.space, &body, (ROOT, at), site.place(at), |_, _, t| {
+        caster.for_each_candidate(&site.space, &body, ROOT, at, site.place(at), |_, _, t| {
             assert!(body.bounds(at).expanded(1e-9).overlaps(&Aabb::of_points(t)));
             candidates += 1;
         });
@@ -548,7 +548,7 @@ fn queries_allocate_nothing_once_warm() {
             let _ = site.cast(&body, at, DVec3::new(rng.range(-3.0, 3.0), -0.5, 2.0));
             let mut caster = site.caster.borrow_mut();
             let mut deepest = 0.0_f64;
-            caster.for_each_contact(&site.space, &body, (ROOT, at), site.place(at), |c| {
+            caster.for_each_contact(&site.space, &body, ROOT, at, site.place(at), |c| {
                 deepest = deepest.max(c.depth);
             });
         }

@@ -140,7 +140,7 @@ impl Walker {
         };
         let mut is_touched = false;
         self.caster
-            .for_each_contact(space, &body, (self.frame, at), place, |contact| {
+            .for_each_contact(space, &body, self.frame, at, place, |contact| {
                 if let Target::Detail { detail, .. } = contact.target {
                     is_touched |= counts(contact.place.part, detail);
                 }
@@ -223,7 +223,7 @@ impl Walker {
             };
             let mut deepest = (0.0, DVec3::ZERO);
             self.caster
-                .for_each_contact(space, &body, (self.frame, at), place, |contact| {
+                .for_each_contact(space, &body,self.frame, at, place, |contact| {
                     let level = DVec3::new(contact.normal.x, 0.0, contact.normal.z);
                     let is_ignored =
                         matches!(contact.target, Target::Detail { detail, .. } if !counts(contact.place.part, detail));
@@ -513,7 +513,8 @@ mod tests {
         caster.for_each_contact(
             &site.space,
             &body,
-            (PartId::ROOT, after + below),
+            PartId::ROOT,
+            after + below,
             Place {
                 part: PartId::ROOT,
                 cell: CellId(1),

@@ -97,7 +97,8 @@ impl Floors {
     /// one with a radius of 0.2 m.
     #[must_use]
     pub(crate) fn new(
-        (layout, border): (&Layout, Option<CellId>),
+        layout: &Layout,
+        border: Option<CellId>,
         world: &World,
         walker: Agent,
         counts: impl FnMut(DetailId) -> bool,

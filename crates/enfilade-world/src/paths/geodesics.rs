@@ -55,6 +55,13 @@ struct View {
     lengths: Vec<f64>,
 }
 
+/// The first and the last `Corner` of the shortest path found, by index.
+struct BestBends {
+    length: f64,
+    first: usize,
+    last: usize,
+}
+
 impl View {
     fn begin(&mut self, cell: CellId, at: DVec3, n: usize) {
         if self.from != Some((cell, at)) || self.lengths.len() != n {
@@ -312,7 +319,11 @@ impl Concave {
     /// Finds the `Corner`s of the shortest path through any.
     fn bend(&self, from: DVec3, to: DVec3, seen: &mut Seen, bends: &mut Vec<Corner>) -> Option<()> {
         let n = self.corners.len();
-        let mut best = (f64::INFINITY, 0, 0);
+        let mut best = BestBends {
+            length: f64::INFINITY,
+            first: 0,
+            last: 0,
+        };
         let Seen { order, ends } = seen;
         let [first, last] = ends;
         // In ellipses about both ends, from narrow to wide: what is outside makes the path longer than what is found.
@@ -321,14 +332,18 @@ impl Concave {
             order.clear();
             let corners = self.corners.iter().enumerate();
             let least = corners.map(|(i, c)| (from.distance(c.at) + c.at.distance(to), i as u32));
-            order.extend(least.filter(|l| l.0 < widest.min(best.0)));
+            order.extend(least.filter(|l| l.0 < widest.min(best.length)));
             order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
             self.bend_within(from, to, order, [first, last], &mut best);
-            if best.0 <= widest {
+            if best.length <= widest {
                 break;
             }
         }
-        let (length, mut at, end) = best;
+        let BestBends {
+            length,
+            first: mut at,
+            last: end,
+        } = best;
         if length == f64::INFINITY {
             return None;
         }
@@ -348,11 +363,11 @@ impl Concave {
         to: DVec3,
         corners: &[(f64, u32)],
         [first, last]: [&mut View; 2],
-        best: &mut (f64, usize, usize),
+        best: &mut BestBends,
     ) {
         let n = self.corners.len();
         for &(least, i) in corners {
-            if least >= best.0 {
+            if least >= best.length {
                 break;
             }
             let i = i as usize;
@@ -365,12 +380,16 @@ impl Concave {
                 let j = j as usize;
                 // Most are too long without what is left.
                 let most = start + f64::from(row[j]);
-                if most >= best.0 || most + self.corners[j].at.distance(to) >= best.0 {
+                if most >= best.length || most + self.corners[j].at.distance(to) >= best.length {
                     continue;
                 }
                 let whole = most + last.length(self, to, j);
-                if whole < best.0 {
-                    *best = (whole, i, j);
+                if whole < best.length {
+                    *best = BestBends {
+                        length: whole,
+                        first: i,
+                        last: j,
+                    };
                 }
             }
         }

@@ -301,7 +301,7 @@ impl Joints {
             stops.is_none_or(|stops| stops[detail.0 as usize])
         };
         let is_free =
-            is_way && is_free_between(&mut self.caster, space, agent, (parts[0], line), stops);
+            is_way && is_free_between(&mut self.caster, space, agent, parts[0], line, stops);
         is_free.then_some(ends)
     }
 }

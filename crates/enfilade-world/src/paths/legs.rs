@@ -17,14 +17,20 @@ const N_SEQUENCES: usize = 4;
 /// Greatest length of these, found square by square, relative to the best.
 const MOST: f64 = 1.06;
 
-/// A part entered by a search.
-#[derive(Clone, Debug)]
-pub(super) struct PartEntry {
+/// The place where a search enters a part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entrance {
     pub(super) start: Stand,
     /// Length up to its start. [Units: wu]
     pub(super) offset: f64,
     /// The joint that leads in, the side to which it leads, and the entry before; `None` at the start of the search.
     pub(super) via: Option<(usize, usize, usize)>,
+}
+
+/// A part entered by a search.
+#[derive(Clone, Debug)]
+pub(super) struct PartEntry {
+    pub(super) at: Entrance,
     pub(super) search: LengthSearch,
 }
 
@@ -138,7 +144,7 @@ impl Tools {
             &mut self.lengths,
         );
         // For the start, if it is in the same cell.
-        self.lengths.push(self.strides.length(entry.start.floor));
+        self.lengths.push(self.strides.length(entry.at.start.floor));
         let lengths = &self.lengths;
         entry.search.arrivals_by(
             &own.ways,
@@ -163,7 +169,7 @@ impl Tools {
         leg: &mut PartLeg,
     ) -> bool {
         let (own, layout) = (&map.parts[goal.part.idx()], space.layout(goal.part));
-        let start = entry.start;
+        let start = entry.at.start;
         self.arrive(map, space, entry, goal, &leg.edges);
         leg.part = goal.part;
         let mut least = f64::INFINITY;
@@ -214,8 +220,8 @@ impl Tools {
         }
         self.crossings.reverse();
         self.floors.clear();
-        self.floors.push(entry.start.floor);
-        let mut at = entry.start.floor;
+        self.floors.push(entry.at.start.floor);
+        let mut at = entry.at.start.floor;
         for i in 0..=self.crossings.len() {
             let (end, next) = self.crossings.get(i).copied().unwrap_or((goal, goal));
             let opened = &self.opened;
@@ -267,17 +273,24 @@ impl Tools {
             let along = (b - a).with_y(0.0);
             self.profile.clear();
             self.profile.push(a);
-            let end = walk_straight(floors, start, b, &mut |_| true, |from, direction, to| {
-                let middle = (floors.point(from) + floors.point(to)) * 0.5 - a;
-                let t = middle.with_y(0.0).dot(along) / along.length_squared();
-                let at = up(a + along * t.clamp(0.0, 1.0), to);
-                self.profile.push(at);
-                if let Some(portal) = floors.portal_of(from, direction) {
-                    let to = floors.floor(to).cell;
-                    let exit = Exit { portal, to };
-                    path.portals.push(PathPortal { part, exit, at });
-                }
-            });
+            let end = walk_straight(
+                floors,
+                start.0,
+                start.1,
+                b,
+                &mut |_| true,
+                |from, direction, to| {
+                    let middle = (floors.point(from) + floors.point(to)) * 0.5 - a;
+                    let t = middle.with_y(0.0).dot(along) / along.length_squared();
+                    let at = up(a + along * t.clamp(0.0, 1.0), to);
+                    self.profile.push(at);
+                    if let Some(portal) = floors.portal_of(from, direction) {
+                        let to = floors.floor(to).cell;
+                        let exit = Exit { portal, to };
+                        path.portals.push(PathPortal { part, exit, at });
+                    }
+                },
+            );
             debug_assert!(end.is_some(), "{a} {b}");
             self.profile.push(b);
             self.keep_profile(0.5 * floors.walker().step, part, &mut path.points);

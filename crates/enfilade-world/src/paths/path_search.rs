@@ -3,7 +3,7 @@
 use enfilade_geom::DVec3;
 
 use super::joints::{Joint, Joints};
-use super::legs::{PartEntry, PartLeg, Tools, length_of};
+use super::legs::{Entrance, PartEntry, PartLeg, Tools, length_of};
 use super::search::LengthSearch;
 use super::walk_map::{Stand, WalkMap};
 use super::{NoPath, Path, PathPortal};
@@ -92,20 +92,19 @@ impl PathSearch {
         &mut self,
         map: &WalkMap,
         space: &Space,
-        from: (PartId, DVec3),
+        part: PartId,
+        from: DVec3,
         radius: f64,
         mut may_pass: impl FnMut(PartId, PortalId) -> bool,
     ) -> Result<&[(Place, f64)], NoPath> {
-        let start = map
-            .stand(space, from.0, from.1)
-            .ok_or(NoPath::NoFloorAtStart)?;
+        let start = map.stand(space, part, from).ok_or(NoPath::NoFloorAtStart)?;
         self.spread(map, space, start, None, radius, &mut may_pass);
         self.near.clear();
         for entry in &self.entries[..self.n_entries] {
-            let part = entry.start.part;
+            let part = entry.at.start.part;
             let cells = entry.search.cells().iter();
             (self.near)
-                .extend(cells.map(|&(cell, far)| (Place { part, cell }, entry.offset + far)));
+                .extend(cells.map(|&(cell, far)| (Place { part, cell }, entry.at.offset + far)));
         }
         self.near
             .sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -118,14 +117,20 @@ impl PathSearch {
     /// Returns the walking distance of a point in the frame of a part from the start of [`PathSearch::cells_within`]; `None` if the
     /// walker cannot stand there or did not reach it. Square by square, so up to 2.8 % too long within a cell, and more through
     /// portals, which it passes at fixed points: 7.8 % is the most measured. [Units: wu]
-    pub fn distance(&mut self, map: &WalkMap, space: &Space, to: (PartId, DVec3)) -> Option<f64> {
-        let goal = map.stand(space, to.0, to.1)?;
+    pub fn distance(
+        &mut self,
+        map: &WalkMap,
+        space: &Space,
+        part: PartId,
+        to: DVec3,
+    ) -> Option<f64> {
+        let goal = map.stand(space, part, to)?;
         let mut least = f64::INFINITY;
         let own = self.entries[..self.n_entries].iter();
-        for entry in own.filter(|e| e.start.part == goal.part) {
+        for entry in own.filter(|e| e.at.start.part == goal.part) {
             let edges = self.joints.edges(goal.part);
             let length = self.tools.arrive(map, space, entry, goal, edges);
-            least = least.min(entry.offset + length);
+            least = least.min(entry.at.offset + length);
         }
         (least < f64::INFINITY).then_some(least)
     }
@@ -151,9 +156,14 @@ impl PathSearch {
         self.gates.resize(2 * self.joints.all.len(), far);
         self.n_entries = 0;
         let (mut least, mut best) = (f64::INFINITY, None);
-        let mut next = Some((start, 0.0, None));
-        while let Some((start, offset, via)) = next {
-            let at = self.enter(map, space, (start, offset, via), radius, may_pass);
+        let mut next = Some(Entrance {
+            start,
+            offset: 0.0,
+            via: None,
+        });
+        while let Some(entrance) = next {
+            let Entrance { start, offset, .. } = entrance;
+            let at = self.enter(map, space, entrance, radius, may_pass);
             self.reach_joints(map, at, goal, may_pass);
             if let Some(goal) = goal.filter(|goal| goal.part == start.part) {
                 let entry = &self.entries[at];
@@ -175,7 +185,11 @@ impl PathSearch {
                 let part = self.joints.all[joint].parts[side];
                 let start = Stand { part, at, floor };
                 let is_near = length < least && length <= radius;
-                is_near.then_some((start, length, Some((joint, side, before))))
+                is_near.then_some(Entrance {
+                    start,
+                    offset: length,
+                    via: Some((joint, side, before)),
+                })
             });
         }
         best
@@ -186,10 +200,11 @@ impl PathSearch {
         &mut self,
         map: &WalkMap,
         space: &Space,
-        (start, offset, via): (Stand, f64, Option<(usize, usize, usize)>),
+        entrance: Entrance,
         radius: f64,
         may_pass: &mut impl FnMut(PartId, PortalId) -> bool,
     ) -> usize {
+        let Entrance { start, offset, .. } = entrance;
         let (own, layout) = (&map.parts[start.part.idx()], space.layout(start.part));
         let Tools {
             strides, lengths, ..
@@ -200,14 +215,12 @@ impl PathSearch {
         self.n_entries += 1;
         if self.entries.len() == at {
             self.entries.push(PartEntry {
-                start,
-                offset,
-                via,
+                at: entrance,
                 search: LengthSearch::new(),
             });
         }
         let entry = &mut self.entries[at];
-        (entry.start, entry.offset, entry.via) = (start, offset, via);
+        entry.at = entrance;
         entry.search.run_from(
             &own.ways,
             own.floors.floor(start.floor).cell,
@@ -228,7 +241,7 @@ impl PathSearch {
         may_pass: &mut impl FnMut(PartId, PortalId) -> bool,
     ) {
         let entry = &self.entries[at];
-        let part = entry.start.part;
+        let part = entry.at.start.part;
         let own = &map.parts[part.idx()];
         let all = &self.joints.all;
         for (i, joint) in all.iter().enumerate() {
@@ -249,11 +262,11 @@ impl PathSearch {
             let floor = joint.middle()[side].1;
             let cell = own.floors.floor(floor).cell;
             let mut length = entry.search.least(&own.ways, cell, &joint.lengths[side]);
-            if cell == own.floors.floor(entry.start.floor).cell {
+            if cell == own.floors.floor(entry.at.start.floor).cell {
                 // The search from the start of this entry.
                 length = length.min(self.tools.strides.length(floor));
             }
-            let length = entry.offset + length + joint.length;
+            let length = entry.at.offset + length + joint.length;
             if length < gate.length && joint.passed.iter().all(|p| may_pass(p.part, p.portal)) {
                 (gate.length, gate.before) = (length, at);
             }
@@ -275,7 +288,7 @@ impl PathSearch {
             let entry = &self.entries[at];
             if self.legs.len() == self.n_legs {
                 self.legs.push(PartLeg {
-                    part: entry.start.part,
+                    part: entry.at.start.part,
                     bends: Vec::new(),
                     sequence: Vec::new(),
                     opened: Vec::new(),
@@ -287,18 +300,18 @@ impl PathSearch {
             }
             let leg = &mut self.legs[self.n_legs];
             self.n_legs += 1;
-            leg.via = entry.via.map(|(joint, side, _)| (joint, side));
+            leg.via = entry.at.via.map(|(joint, side, _)| (joint, side));
             let middle = |joint: usize| self.joints.all[joint].steps.len() / 2;
             leg.first_step = leg.via.map_or(0, |(joint, _)| middle(joint));
             leg.step = out;
             out = leg.first_step;
             leg.edges.clear();
             leg.edges
-                .extend_from_slice(self.joints.edges(entry.start.part));
+                .extend_from_slice(self.joints.edges(entry.at.start.part));
             if !self.tools.lay_leg(map, space, entry, goal, may_pass, leg) {
                 return Err(NoPath::NoWay);
             }
-            let Some((joint, side, before)) = entry.via else {
+            let Some((joint, side, before)) = entry.at.via else {
                 break;
             };
             let joint = &self.joints.all[joint];

@@ -63,7 +63,7 @@ fn catch(
     // From either neighbor: the last floor before the obstacle, and the line that passes it.
     for (from, leg, at) in [(c, [b, c], i + 1), (a, [a, b], i)] {
         let mut last = from.1;
-        let end = walk_straight(floors, from, p, may, |_, _, to| last = to);
+        let end = walk_straight(floors, from.0, from.1, p, may, |_, _, to| last = to);
         if end.is_some() {
             continue;
         }
@@ -102,7 +102,7 @@ pub(crate) fn straight(
     to: DVec3,
     may: &mut impl FnMut(Hindrance) -> bool,
 ) -> Option<u32> {
-    walk_straight(floors, from, to, may, |_, _, _| {})
+    walk_straight(floors, from.0, from.1, to, may, |_, _, _| {})
 }
 
 /// Removes all bends that a straight line can skip, from the start on.
@@ -188,12 +188,9 @@ mod tests {
             },
             ..CellPortalGraph::default()
         };
-        let floors = Floors::new(
-            (&Layout::new(&world), None),
-            &world,
-            Agent::default(),
-            |_| true,
-        );
+        let floors = Floors::new(&Layout::new(&world), None, &world, Agent::default(), |_| {
+            true
+        });
         let on = |x: f64, z: f64| {
             let p = DVec3::new(x, 0.0, z);
             (p, floors.below(p).unwrap())

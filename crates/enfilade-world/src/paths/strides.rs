@@ -140,7 +140,8 @@ fn each_move(
 /// it is in another cell. Returns the floor at the end; `None` if blocked, or by something for which `may` returns `false`.
 pub(crate) fn walk_straight(
     floors: &Floors,
-    (from, start): (DVec3, u32),
+    from: DVec3,
+    start: u32,
     to: DVec3,
     may: &mut impl FnMut(Hindrance) -> bool,
     mut visit: impl FnMut(u32, usize, u32),

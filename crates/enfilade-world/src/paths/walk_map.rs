@@ -153,7 +153,7 @@ impl PartMap {
         let counted: Vec<bool> = (0..n).map(|i| counts(DetailId(i))).collect();
         let stops = stops_of(world, |d| counted[d.0 as usize]);
         let border = space.parts[part.idx()].border;
-        let floors = Floors::new((layout, border), world, walker, |d| counted[d.0 as usize]);
+        let floors = Floors::new(layout, border, world, walker, |d| counted[d.0 as usize]);
         let mut chosen: Vec<(PortalId, [u32; 2])> = Vec::new();
         let mut by_portal: Vec<(PortalId, u32, u32)> = Vec::new();
         for c in floors.crossings().iter().filter(|c| c.direction < 2) {

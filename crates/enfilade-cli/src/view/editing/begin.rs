@@ -70,7 +70,7 @@ pub(crate) fn begin(
         }
     };
     before_journal()?;
-    let opened = EditSession::open(&journal, Arc::new(kit), (ground, &mark), tolerance);
+    let opened = EditSession::open(&journal, Arc::new(kit), ground, &mark, tolerance);
     let (session, resumed) = opened.with_context(|| journal.display().to_string())?;
     let mut editor = Editor::new(session, save.to_owned(), journal);
     editor.resumed(&resumed);

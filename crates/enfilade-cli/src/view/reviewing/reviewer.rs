@@ -78,7 +78,8 @@ pub(crate) struct Reviewer<'a> {
 impl<'a> Reviewer<'a> {
     pub(crate) fn new(
         reviewed: Reviewed<'a>,
-        (save, output): (PathBuf, Option<PathBuf>),
+        save: PathBuf,
+        output: Option<PathBuf>,
         scene: Arc<World>,
     ) -> Self {
         let scale = WeightScale::of(reviewed.review.config());
