@@ -259,6 +259,11 @@ pub(crate) fn run() -> anyhow::Result<()> {
             problems.extend(link_problems(file, &text, &|path| {
                 root().join(path).exists()
             }));
+            if file.starts_with("docs/benchmarks/") && !text.contains("Figures as of commit `") {
+                problems.push(format!(
+                    "{file}: does not say of which build its figures are: \"Figures as of commit `…`\", and why not of this one"
+                ));
+            }
         } else if file.ends_with(".rs") {
             sources.insert(file.to_owned(), text);
         }
