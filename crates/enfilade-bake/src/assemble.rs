@@ -65,7 +65,7 @@ impl Cut<'_> {
 }
 
 /// A portal and its classification.
-struct Judged {
+struct KnownPortal {
     portal: PartitionPortal,
     kind: PortalKind,
     /// Its lower edge is at a floor, with no sill below it.
@@ -126,22 +126,22 @@ pub(crate) fn portals_of(cut: &Cut<'_>, is_void: &dyn Fn(u32) -> bool) -> Vec<Po
     let plates = plates(cut.structure.scene);
     let in_turn = cut.partition.portals.par_iter();
     let in_turn = in_turn.filter(cut.allowance.each(WORK_A_LOOK));
-    let judge = kinds::Judge::new(cut);
-    let judge = &judge;
-    let judged = in_turn.filter_map(storable).flat_map_iter(|p| {
-        let is_whole_filled = judge.is_filled(&p);
-        let parts = fillers::divided(&p, judge.is_on_floor(&p), &plates, cut.allowance);
+    let kinds = kinds::PortalKinds::new(cut);
+    let kinds = &kinds;
+    let known = in_turn.filter_map(storable).flat_map_iter(|p| {
+        let is_whole_filled = kinds.is_filled(&p);
+        let parts = fillers::divided(&p, kinds.is_on_floor(&p), &plates, cut.allowance);
         let is_filled = is_whole_filled || parts.len() > 1;
-        parts.into_iter().map(move |portal| Judged {
-            kind: judge.kind(&portal, is_filled),
-            is_on_floor: judge.is_on_floor(&portal),
+        parts.into_iter().map(move |portal| KnownPortal {
+            kind: kinds.kind(&portal, is_filled),
+            is_on_floor: kinds.is_on_floor(&portal),
             is_filled,
-            is_pane: judge.is_pane(&portal),
+            is_pane: kinds.is_pane(&portal),
             portal,
         })
     });
-    let bays = bays::join_bays(judged.collect());
-    let mut portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| judge.kind(p, false))
+    let bays = bays::join_bays(known.collect());
+    let mut portals: Vec<Portal> = bays::join_slits(bays, is_void, |p| kinds.kind(p, false))
         .iter()
         .filter_map(|j| portal(cut, j))
         .collect();
@@ -227,11 +227,11 @@ fn storable(portal: &PartitionPortal) -> Option<PartitionPortal> {
 }
 
 /// Returns the portal in its final form; `None` if no piece is wider than the rounding.
-fn portal(cut: &Cut<'_>, judged: &Judged) -> Option<Portal> {
-    let p = &judged.portal;
+fn portal(cut: &Cut<'_>, known: &KnownPortal) -> Option<Portal> {
+    let p = &known.portal;
     Some(Portal {
         cells: p.cells.map(CellId),
-        kind: judged.kind,
+        kind: known.kind,
         why: vec![cut.why(p)],
         ..rounded_portal(&p.plane, &p.outline, &p.pieces, cut.outward)?
     })

@@ -79,7 +79,7 @@ impl FillerFacts {
 
     /// Returns what it is.
     #[must_use]
-    pub fn judge(&self) -> Filler {
+    pub fn kind(&self) -> Filler {
         let [width, height, depth] = self.size.to_array();
         let is_high = self.is_upright && height >= LOWEST_DOOR;
         let deepest = if is_high {
@@ -150,7 +150,7 @@ impl HoleFacts {
 
     /// Returns why it fills a hole; `None` if it does not.
     #[must_use]
-    pub fn judge(&self) -> Option<FillsHole> {
+    pub fn kind(&self) -> Option<FillsHole> {
         let [left, right, _, above] = self.sides;
         let is_leaf = self.leaf <= LEAF;
         // A leaf where two walls meet: a lintel and one jamb hold it, and another wall replaces the other jamb.
@@ -204,7 +204,7 @@ mod tests {
             (covered(0.59), Filler::Ring),
         ];
         for (facts, verdict) in cases {
-            assert_eq!(facts.judge(), verdict, "{facts:?}");
+            assert_eq!(facts.kind(), verdict, "{facts:?}");
         }
     }
 
@@ -321,7 +321,7 @@ mod tests {
             ),
         ];
         for (facts, verdict) in cases {
-            assert_eq!(facts.judge(), verdict, "{facts:?}");
+            assert_eq!(facts.kind(), verdict, "{facts:?}");
         }
     }
 }

@@ -447,7 +447,7 @@ impl<'a> Builder<'a> {
             return self.place_room(&room, placement, &source);
         }
         let mesh = &self.scene.meshes[placement.mesh as usize];
-        let (verdict, filling, is_mixed) = self.judge(placement, mesh);
+        let (verdict, filling, is_mixed) = self.decide(placement, mesh);
         let is_mark = matches!(verdict, RoleVerdict::Mark(_));
         let (role, reason) = match verdict {
             RoleVerdict::Ignore(reason) | RoleVerdict::Mark(reason) => {
@@ -520,7 +520,7 @@ impl<'a> Builder<'a> {
 
     /// Returns the verdict on a placed mesh, the opening that it says it fills, and `true` if it has both opaque and
     /// see-through parts.
-    fn judge(
+    fn decide(
         &self,
         placement: &Placement<'_>,
         mesh: &Mesh,
@@ -543,7 +543,7 @@ impl<'a> Builder<'a> {
                 <= BOX_TRIANGLES)
                 .then(|| openings::thickness(mesh, placement.transforms)),
         };
-        let verdict = self.options.roles.judge(&facts);
+        let verdict = self.options.roles.decide(&facts);
         (verdict, facts.filling(), is_mixed)
     }
 

@@ -2,7 +2,7 @@
 
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, DVec3, MOST_FLIGHT_PLAN, Triangle, is_flight, triangle_area_normal};
-use enfilade_prepare::{Upward, judge_up};
+use enfilade_prepare::{Upward, find_up};
 
 use crate::map::MAPS;
 use crate::report::UpDoubt;
@@ -319,7 +319,7 @@ pub(crate) fn up_doubt(
     if options.up.is_some() {
         return None;
     }
-    let (axis, is_clear) = match judge_up(scene) {
+    let (axis, is_clear) = match find_up(scene) {
         Upward::Clear(axis) => (axis, true),
         Upward::Likely(axis) => (axis, false),
         Upward::Unknown => return None,

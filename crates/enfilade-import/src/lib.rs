@@ -432,7 +432,7 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     report.feet_hint = extent::feet_hint(&scene, &report, options);
     extent::check(&scene, &report, options)?;
     if options.roles.is_automatic && !options.roles.is_manual {
-        enfilade_prepare::judge_undecided(&mut scene);
+        enfilade_prepare::decide_undecided(&mut scene);
     }
     if !options.leaves_missing {
         report.put_back = enfilade_prepare::put_back(&mut scene);

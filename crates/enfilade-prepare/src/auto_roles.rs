@@ -98,7 +98,7 @@ impl Shape {
 }
 
 /// Shapes that are detail, each with the reason.
-type Judged = Vec<(Shape, String)>;
+type Decided = Vec<(Shape, String)>;
 
 /// The structure of a scene.
 struct Structure {
@@ -113,7 +113,7 @@ struct Structure {
 ///
 /// Leaves scenes of fewer than three structural things unchanged: there is nothing to compare with. O(t log t)
 /// for t structural triangles, and O(log t) per small object.
-pub fn judge(scene: &mut Scene) {
+pub fn decide(scene: &mut Scene) {
     merged::forget_misleading_names(scene);
     let Structure {
         shapes,
@@ -172,7 +172,7 @@ fn furniture_of(
     triangles: &[Triangle],
     bvh: Option<&Bvh>,
     n_structural: usize,
-) -> Result<Judged, Judged> {
+) -> Result<Decided, Decided> {
     let bounds = shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.bounds));
     let mut owners = vec![FILLER; triangles.len()];
     for (i, shape) in (0..).zip(&shapes) {
@@ -180,7 +180,7 @@ fn furniture_of(
             owners[range.clone()].fill(i);
         }
     }
-    let mut judge = Judge {
+    let mut rules = ShapeRules {
         triangles,
         owners: &owners,
         bvh,
@@ -193,17 +193,17 @@ fn furniture_of(
     for _ in 0..ROUNDS {
         let before = found.len();
         for (i, shape) in shapes.iter().enumerate() {
-            if !shape.is_open || judge.is_gone[i] {
+            if !shape.is_open || rules.is_gone[i] {
                 continue;
             }
-            if let Some(reason) = judge.reason(i, shape) {
+            if let Some(reason) = rules.reason(i, shape) {
                 // The leaves of a plant have more area than they hide.
                 detail_area += shape.area.min(shape.bounds.surface_area());
                 found.push((i, reason));
             }
         }
         for (i, _) in &found[before..] {
-            judge.is_gone[*i] = true;
+            rules.is_gone[*i] = true;
         }
         if found.len() == before {
             break;
@@ -222,7 +222,7 @@ fn furniture_of(
 const FILLER: u32 = u32::MAX;
 
 /// Tests of each object that is not a filler.
-struct Judge<'a> {
+struct ShapeRules<'a> {
     triangles: &'a [Triangle],
     /// The shape of each triangle.
     owners: &'a [u32],
@@ -233,7 +233,7 @@ struct Judge<'a> {
     is_gone: Vec<bool>,
 }
 
-impl Judge<'_> {
+impl ShapeRules<'_> {
     /// Returns the reason why a shape is detail; `None` if it is structural.
     fn reason(&self, index: usize, shape: &Shape) -> Option<String> {
         let own = &*shape.of(self.triangles);
@@ -266,7 +266,7 @@ impl Judge<'_> {
     }
 }
 
-impl Judge<'_> {
+impl ShapeRules<'_> {
     /// Returns `true` for triangles of fillers and furniture.
     fn is_gone(&self, triangle: u32) -> bool {
         let owner = self.owners[triangle as usize];

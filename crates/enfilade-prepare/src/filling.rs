@@ -4,7 +4,7 @@
 
 use enfilade_geom::scene::Filling;
 
-use crate::roles::{RoleFacts, ends_in_opening_word, has_word, ifc_class, judge_words};
+use crate::roles::{RoleFacts, decide_words, ends_in_opening_word, has_word, ifc_class};
 use crate::words::words;
 
 /// Words for doors and for windows.
@@ -23,7 +23,7 @@ impl RoleFacts<'_> {
             return by_class(class);
         }
         // A window's curtain is a curtain, and a door's wall is a wall.
-        let is_other = |n: &str| judge_words(n).is_some() && !ends_in_opening_word(n);
+        let is_other = |n: &str| decide_words(n).is_some() && !ends_in_opening_word(n);
         if names().any(is_other) {
             return None;
         }

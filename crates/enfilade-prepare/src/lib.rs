@@ -19,7 +19,7 @@ mod tools;
 mod upward;
 mod words;
 
-pub use auto_roles::judge as judge_undecided;
+pub use auto_roles::decide as decide_undecided;
 pub use clean::{CleaningOptions, CleaningReport, ShellCounts, cleaning_report};
 pub use copies::{collision_copies, lower_levels};
 pub use error::BadOption;
@@ -30,5 +30,5 @@ pub use repair::{GridSteps, RepairOptions, RepairReport, put_back, repair, weld_
 pub use roles::{RoleFacts, RoleRules, RoleVerdict, drops_subtree, ifc_classes, marked_portal};
 pub use sky::{is_sky_around, skies};
 pub use tools::{TextureMatter, texture_matter};
-pub use upward::{Upward, judge_up};
+pub use upward::{Upward, find_up};
 pub use words::words;

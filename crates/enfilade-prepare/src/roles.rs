@@ -193,7 +193,7 @@ impl RoleRules {
     }
 
     /// Returns the object's role; the first rule that matches decides.
-    pub fn judge(&self, facts: &RoleFacts<'_>) -> RoleVerdict {
+    pub fn decide(&self, facts: &RoleFacts<'_>) -> RoleVerdict {
         let structural = |reason: String| RoleVerdict::Keep(Role::Structural, reason);
         let detail = |reason: String| RoleVerdict::Keep(Role::Detail, reason);
         if let Some(glob) = matching(&self.structural, facts) {
@@ -211,10 +211,10 @@ impl RoleRules {
         if self.is_manual {
             return structural("default".into());
         }
-        if let Some(verdict) = facts.names.iter().find_map(|name| judge_ifc(name)) {
+        if let Some(verdict) = facts.names.iter().find_map(|name| decide_ifc(name)) {
             return verdict;
         }
-        if let Some(verdict) = facts.names.iter().find_map(|name| judge_suffix(name)) {
+        if let Some(verdict) = facts.names.iter().find_map(|name| decide_suffix(name)) {
             return verdict;
         }
         let is_nothing = |m: &&str| {
@@ -246,7 +246,7 @@ impl RoleRules {
             return detail(format!("name: '{name}'"));
         }
         for name in facts.names {
-            match judge_words(name) {
+            match decide_words(name) {
                 Some((Role::Structural, word)) => return structural(format!("name: '{word}'")),
                 Some((Role::Detail, word)) => return detail(format!("name: '{word}'")),
                 None => {}
@@ -270,7 +270,7 @@ pub fn marked_portal(name: &str) -> Option<&str> {
         .then_some(name.trim())
 }
 
-fn judge_ifc(name: &str) -> Option<RoleVerdict> {
+fn decide_ifc(name: &str) -> Option<RoleVerdict> {
     let class = ifc_class(name)?;
     let starts = |list: &[&str]| list.iter().any(|c| class.starts_with(c));
     Some(if starts(&IFC_VOID) {
@@ -291,7 +291,7 @@ pub(crate) fn ifc_class(name: &str) -> Option<&str> {
         .then_some(class)
 }
 
-fn judge_suffix(name: &str) -> Option<RoleVerdict> {
+fn decide_suffix(name: &str) -> Option<RoleVerdict> {
     if let Some(prefix) = HULL_PREFIXES.iter().find(|p| name.starts_with(**p)) {
         return Some(RoleVerdict::Ignore(format!(
             "name starts with {prefix}: a collision hull"
@@ -336,7 +336,7 @@ pub(crate) fn ends_in_opening_word(name: &str) -> bool {
 
 /// Decides between furniture and structure: the last word of either kind names the thing (a floor lamp is a lamp, the
 /// plant room's wall a wall).
-pub(crate) fn judge_words(name: &str) -> Option<(Role, String)> {
+pub(crate) fn decide_words(name: &str) -> Option<(Role, String)> {
     let words = words(name);
     let mut opening = None;
     let mut found = None;
@@ -392,11 +392,11 @@ fn matching<'g>(globs: &'g [String], facts: &RoleFacts<'_>) -> Option<&'g str> {
 mod tests {
     use super::*;
 
-    fn judge(name: &str) -> RoleVerdict {
-        judge_with(&RoleRules::default(), name, |_| {})
+    fn decide(name: &str) -> RoleVerdict {
+        decide_with(&RoleRules::default(), name, |_| {})
     }
 
-    fn judge_with(
+    fn decide_with(
         rules: &RoleRules,
         name: &str,
         change: impl Fn(&mut RoleFacts<'_>),
@@ -411,7 +411,7 @@ mod tests {
             thickness_if_plain: None,
         };
         change(&mut facts);
-        rules.judge(&facts)
+        rules.decide(&facts)
     }
 
     #[test]
@@ -425,7 +425,7 @@ mod tests {
     }
 
     fn role(name: &str) -> Option<Role> {
-        match judge(name) {
+        match decide(name) {
             RoleVerdict::Keep(role, _) => Some(role),
             _ => None,
         }
@@ -503,17 +503,17 @@ mod tests {
     #[test]
     fn helper_volumes_and_tool_textures_are_left_out_unless_a_rule_keeps_them() {
         let portal = |thickness: Option<f64>| {
-            judge_with(&RoleRules::default(), "Portal", |f| {
+            decide_with(&RoleRules::default(), "Portal", |f| {
                 f.thickness_if_plain = thickness;
             })
         };
         assert!(matches!(portal(Some(0.1)), RoleVerdict::Mark(_)));
         assert!(matches!(portal(None), RoleVerdict::Keep(..)));
-        let skip = judge_with(&RoleRules::default(), "x", |f| {
+        let skip = decide_with(&RoleRules::default(), "x", |f| {
             f.materials = &["skip", "clip"];
         });
         assert!(matches!(skip, RoleVerdict::Ignore(_)));
-        let wall = judge_with(&RoleRules::default(), "x", |f| {
+        let wall = decide_with(&RoleRules::default(), "x", |f| {
             f.materials = &["skip", "a"];
         });
         assert!(matches!(wall, RoleVerdict::Keep(Role::Structural, _)));
@@ -522,9 +522,9 @@ mod tests {
             textures: BTreeMap::from([("skip".to_owned(), TextureMatter::Wall)]),
             ..RoleRules::default()
         };
-        let kept = judge_with(&rules, "TriggerVolume", |_| {});
+        let kept = decide_with(&rules, "TriggerVolume", |_| {});
         assert!(matches!(kept, RoleVerdict::Keep(Role::Structural, _)));
-        let skip = judge_with(&rules, "x", |f| {
+        let skip = decide_with(&rules, "x", |f| {
             f.materials = &["skip"];
         });
         assert!(matches!(skip, RoleVerdict::Keep(..)));
@@ -542,26 +542,26 @@ mod tests {
             RoleVerdict::Keep(role, reason) => (role, reason),
             other => panic!("{other:?}"),
         };
-        let of = |name: &str| reason(judge_with(&rules, name, |_| {})).0;
+        let of = |name: &str| reason(decide_with(&rules, name, |_| {})).0;
         assert_eq!(of("wall KEEP"), Role::Structural);
         assert_eq!(of("wall 1"), Role::Detail);
         assert_eq!(of("by its material"), Role::Detail);
-        let file = judge_with(&RoleRules::default(), "Wall", |f| f.is_detail_file = true);
+        let file = decide_with(&RoleRules::default(), "Wall", |f| f.is_detail_file = true);
         assert_eq!(reason(file), (Role::Detail, "from a detail file".into()));
-        let glass = judge_with(&RoleRules::default(), "Wall", |f| f.is_see_through = true);
+        let glass = decide_with(&RoleRules::default(), "Wall", |f| f.is_see_through = true);
         assert_eq!(
             reason(glass),
             (Role::Detail, "material: see-through".into())
         );
-        let moves = judge_with(&RoleRules::default(), "Wall", |f| {
+        let moves = decide_with(&RoleRules::default(), "Wall", |f| {
             f.moves = Some("animated");
         });
         assert_eq!(reason(moves), (Role::Detail, "moves: animated".into()));
-        let group = judge_with(&RoleRules::default(), "x", |f| {
+        let group = decide_with(&RoleRules::default(), "x", |f| {
             f.ancestors = &["a", "Chairs"];
         });
         assert_eq!(reason(group).0, Role::Detail);
-        let house = judge_with(&RoleRules::default(), "x", |f| {
+        let house = decide_with(&RoleRules::default(), "x", |f| {
             f.ancestors = &["House with chairs"];
         });
         assert_eq!(reason(house).0, Role::Structural);
@@ -570,7 +570,7 @@ mod tests {
             ..RoleRules::default()
         };
         assert_eq!(
-            reason(judge_with(&manual, "Table", |_| {})).0,
+            reason(decide_with(&manual, "Table", |_| {})).0,
             Role::Structural
         );
     }

@@ -1,4 +1,4 @@
-//! The axis that points up, judged by where the surface is level.
+//! The axis that points up, upward by where the surface is level.
 //!
 //! Floors and ceilings lie in few planes, and each reaches through a storey; walls lie in many, and each ends at a room
 //! or at a front. So an axis is measured by the planes across it: each plane counts as the square of its share of the
@@ -24,7 +24,7 @@ const LEAST_OPEN: f64 = 0.3;
 /// Slices of the scene's diagonal; surface in one slice, or two neighbors, is one plane.
 const SLICES: usize = 1000;
 
-/// Result of [`judge_up`]. Axes are numbered from 0, as coordinates are.
+/// Result of [`find_up`]. Axes are numbered from 0, as coordinates are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Upward {
     /// Floors lie across this axis.
@@ -39,7 +39,7 @@ pub enum Upward {
 ///
 /// Neither the unit nor the place of the scene matters, nor the order of its objects. Linear time, constant memory.
 #[must_use]
-pub fn judge_up(scene: &Scene) -> Upward {
+pub fn find_up(scene: &Scene) -> Upward {
     let has_structure = scene.objects.iter().any(|o| o.role == Role::Structural);
     let role = if has_structure {
         Role::Structural
@@ -60,7 +60,7 @@ pub fn judge_up(scene: &Scene) -> Upward {
     for t in triangles() {
         surface.add(&t);
     }
-    surface.judged()
+    surface.upward()
 }
 
 /// Areas of the surface by direction and place.
@@ -107,7 +107,7 @@ impl LevelSurface {
         }
     }
 
-    fn judged(&self) -> Upward {
+    fn upward(&self) -> Upward {
         if self.area <= 0.0 {
             return Upward::Unknown;
         }
@@ -168,8 +168,8 @@ mod tests {
         transformed(generated, &turn)
     }
 
-    fn judged(generated: &Generated) -> Upward {
-        judge_up(&generated.scene)
+    fn upward(generated: &Generated) -> Upward {
+        find_up(&generated.scene)
     }
 
     #[test]
@@ -180,26 +180,26 @@ mod tests {
             mixed::all().into_iter().chain(towers).chain(others)
         };
         for (i, building) in buildings().enumerate() {
-            assert_eq!(judged(&building), Upward::Clear(1), "{i}");
+            assert_eq!(upward(&building), Upward::Clear(1), "{i}");
             // Walls along no axis.
             let turned = rotated(building, 20.0);
-            assert_eq!(judged(&turned), Upward::Clear(1), "{i}");
+            assert_eq!(upward(&turned), Upward::Clear(1), "{i}");
         }
         for (i, building) in buildings().enumerate() {
             // Millimeters, ten kilometers away.
             let far = DMat4::from_translation(DVec3::splat(1e7))
                 * DMat4::from_scale(DVec3::splat(1000.0));
             let standing = transformed(z_up(building), &far);
-            assert_eq!(judged(&standing), Upward::Clear(2), "{i}");
+            assert_eq!(upward(&standing), Upward::Clear(2), "{i}");
         }
     }
 
     #[test]
     fn a_cave_or_a_plate_does_not_show_which_axis_points_up() {
-        assert_eq!(judged(&cave(1)), Upward::Unknown);
+        assert_eq!(upward(&cave(1)), Upward::Unknown);
         let mut surface = LevelSurface::new(DVec3::ZERO, 0.01);
         surface.add(&[DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Z]);
-        assert_eq!(surface.judged(), Upward::Unknown);
+        assert_eq!(surface.upward(), Upward::Unknown);
     }
 
     #[test]
@@ -213,7 +213,7 @@ mod tests {
             surface.add(&[at(x, y), at(x + 1, y), at(x + 1, y + 1)]);
             surface.add(&[at(x, y), at(x + 1, y + 1), at(x, y + 1)]);
         }
-        assert_eq!(surface.judged(), Upward::Clear(2));
+        assert_eq!(surface.upward(), Upward::Clear(2));
     }
 
     #[test]
@@ -234,6 +234,6 @@ mod tests {
             quad(&mut surface, DVec3::ZERO, u, v);
             quad(&mut surface, w, u, v);
         }
-        assert_eq!(surface.judged(), Upward::Likely(1));
+        assert_eq!(surface.upward(), Upward::Likely(1));
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::locator_cells::for_each_leaf;
 use crate::report::Tally;
 use crate::rng::Rng;
-use crate::sealed::judge_segment;
+use crate::sealed::check_segment;
 use crate::subject::Subject;
 
 /// Half the length of a segment across a face or portal, in tolerances. Hairs between surfaces closer than that may
@@ -68,7 +68,7 @@ fn try_some(subject: &Subject, seed: u64, n: u64, segments: &[[DVec3; 2]]) -> Ta
                 .iter()
                 .all(|&p| subject.is_clear(p, 0.9 * ASIDE * subject.eps))
             {
-                judge_segment(subject, &mut rng, 0, [a, b], &mut tally);
+                check_segment(subject, &mut rng, 0, [a, b], &mut tally);
             }
         }
         tally.across = std::mem::take(&mut tally.sealed);

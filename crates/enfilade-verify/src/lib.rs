@@ -187,8 +187,8 @@ fn try_one(
         visible.try_line(subject, rng, i, tally);
     }
     if let Some((path, met)) = seen {
-        visible.judge(subject, &path, i, tally);
-        visible.judge_parts(subject, &path, &met, i, tally);
+        visible.check_cells(subject, &path, i, tally);
+        visible.check_parts(subject, &path, &met, i, tally);
     }
 }
 

@@ -28,11 +28,11 @@ pub(crate) fn try_segment(
         tally.sealed.drawn += 1;
         tally.sealed.on_surface += 1;
     }
-    judge_segment(subject, rng, i, drawn?, tally)
+    check_segment(subject, rng, i, drawn?, tally)
 }
 
 /// Judges a segment whose ends are clear of all surfaces.
-pub(crate) fn judge_segment(
+pub(crate) fn check_segment(
     subject: &Subject,
     rng: &mut Rng,
     i: u64,

@@ -228,7 +228,7 @@ impl<'a> Visible<'a> {
     }
 
     /// Judges an unblocked path.
-    pub(crate) fn judge(&self, subject: &Subject, path: &Path, i: u64, tally: &mut Tally) {
+    pub(crate) fn check_cells(&self, subject: &Subject, path: &Path, i: u64, tally: &mut Tally) {
         tally.visible.lines += 1;
         if let Some(wrong) = self.break_on(path) {
             let failure = Failure::of_break(&wrong, i, path.ends, &[]);
@@ -237,7 +237,7 @@ impl<'a> Visible<'a> {
     }
 
     /// Judges the end of a path: one of these parts, or several in one place, of which one suffices.
-    pub(crate) fn judge_parts(
+    pub(crate) fn check_parts(
         &self,
         subject: &Subject,
         path: &Path,
@@ -339,17 +339,17 @@ impl<'a> Visible<'a> {
         let Ok(path) = follow(subject, rng, [a, end], from, &mut crossings) else {
             return;
         };
-        self.judge(subject, &path, i, tally);
+        self.check_cells(subject, &path, i, tally);
         match part {
             // Something else may lie on the wall, or just before it.
             Some(part) if is_wall && !is_first(subject, part, [a, b]) => {}
-            Some(part) => self.judge_parts(subject, &path, &[part], i, tally),
-            None => self.judge_details(subject, &path, i, tally),
+            Some(part) => self.check_parts(subject, &path, &[part], i, tally),
+            None => self.check_details(subject, &path, i, tally),
         }
     }
 
     /// Judges the objects that a path passes: they do not hide, since they may move.
-    fn judge_details(&self, subject: &Subject, path: &Path, i: u64, tally: &mut Tally) {
+    fn check_details(&self, subject: &Subject, path: &Path, i: u64, tally: &mut Tally) {
         let [a, b] = path.ends;
         let mut met: Vec<u32> = Vec::new();
         let ray = Ray::segment(a, b);
@@ -362,7 +362,7 @@ impl<'a> Visible<'a> {
         met.sort_unstable();
         met.dedup();
         for part in met {
-            self.judge_parts(subject, path, &[part], i, tally);
+            self.check_parts(subject, path, &[part], i, tally);
         }
     }
 

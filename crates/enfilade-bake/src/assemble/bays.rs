@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use enfilade_cpg::PortalKind;
 use enfilade_geom::{DVec3, Sets, Winding, is_rather_level};
 
-use super::Judged;
+use super::KnownPortal;
 use super::kinds::SLIT;
 use crate::complex::PartitionPortal;
 
@@ -57,12 +57,12 @@ fn along(p: &PartitionPortal) -> DVec3 {
 
 /// Joins windows between the same two cells that stand above each other in one upright plane, the lowest on a floor.
 /// Each bay becomes one portal with all its pieces, in place of its first window; the order is kept.
-pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
+pub(super) fn join_bays(portals: Vec<KnownPortal>) -> Vec<KnownPortal> {
     let mut sets = Sets::new(portals.len());
     let mut facades: BTreeMap<[u32; 2], Vec<(usize, Extent)>> = BTreeMap::new();
-    for (i, judged) in portals.iter().enumerate() {
-        let p = &judged.portal;
-        if judged.kind == PortalKind::Window && judged.is_pane && !is_rather_level(p.plane.normal) {
+    for (i, known) in portals.iter().enumerate() {
+        let p = &known.portal;
+        if known.kind == PortalKind::Window && known.is_pane && !is_rather_level(p.plane.normal) {
             facades.entry(p.cells).or_default().push((i, Extent::of(p)));
         }
     }
@@ -80,17 +80,17 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
     }
     let roots: Vec<u32> = (0..portals.len() as u32).map(|i| sets.find(i)).collect();
     let mut on_floor: Vec<bool> = vec![false; portals.len()];
-    for (judged, &root) in portals.iter().zip(&roots) {
-        on_floor[root as usize] |= judged.is_on_floor;
+    for (known, &root) in portals.iter().zip(&roots) {
+        on_floor[root as usize] |= known.is_on_floor;
     }
-    let mut out: Vec<Judged> = Vec::with_capacity(portals.len());
+    let mut out: Vec<KnownPortal> = Vec::with_capacity(portals.len());
     let mut place: BTreeMap<u32, usize> = BTreeMap::new();
-    for (judged, root) in portals.into_iter().zip(roots) {
+    for (known, root) in portals.into_iter().zip(roots) {
         match place.get(&root) {
-            Some(&at) if on_floor[root as usize] => out[at].take_in(judged.portal),
+            Some(&at) if on_floor[root as usize] => out[at].take_in(known.portal),
             _ => {
                 place.insert(root, out.len());
-                out.push(judged);
+                out.push(known);
             }
         }
     }
@@ -103,34 +103,34 @@ pub(super) fn join_bays(portals: Vec<Judged>) -> Vec<Judged> {
 ///
 /// Time: quadratic in the planes between two cells.
 pub(super) fn join_slits(
-    portals: Vec<Judged>,
+    portals: Vec<KnownPortal>,
     is_void: impl Fn(u32) -> bool,
     kind_of: impl Fn(&PartitionPortal) -> PortalKind,
-) -> Vec<Judged> {
-    let mut out: Vec<Judged> = Vec::with_capacity(portals.len());
+) -> Vec<KnownPortal> {
+    let mut out: Vec<KnownPortal> = Vec::with_capacity(portals.len());
     let mut slits: BTreeMap<([u32; 2], Option<PortalKind>), Vec<usize>> = BTreeMap::new();
-    for judged in portals {
-        let cells = judged.portal.cells;
+    for known in portals {
+        let cells = known.portal.cells;
         let leads_to_void = cells.into_iter().any(&is_void);
-        if (judged.portal.width < SLIT || leads_to_void) && !judged.is_filled {
+        if (known.portal.width < SLIT || leads_to_void) && !known.is_filled {
             // Kinds tell who passes, and nobody passes into a void.
-            let kind = (!leads_to_void).then_some(judged.kind);
+            let kind = (!leads_to_void).then_some(known.kind);
             let planes = slits.entry((cells, kind)).or_default();
             let home = planes
                 .iter()
-                .find(|&&at| is_coplanar(&out[at].portal, &judged.portal));
+                .find(|&&at| is_coplanar(&out[at].portal, &known.portal));
             if let Some(&at) = home {
                 let whole = &mut out[at];
-                if judged.portal.width > whole.portal.width {
-                    whole.portal.kind = judged.portal.kind;
+                if known.portal.width > whole.portal.width {
+                    whole.portal.kind = known.portal.kind;
                 }
-                whole.take_in(judged.portal);
+                whole.take_in(known.portal);
                 whole.kind = kind_of(&whole.portal);
                 continue;
             }
             planes.push(out.len());
         }
-        out.push(judged);
+        out.push(known);
     }
     out
 }
@@ -141,7 +141,7 @@ fn is_coplanar(p: &PartitionPortal, q: &PartitionPortal) -> bool {
     p.plane.normal.dot(q.plane.normal) > 0.0 && q.outline.points.iter().all(is_near)
 }
 
-impl Judged {
+impl KnownPortal {
     /// Adds the pieces of a coplanar portal.
     fn take_in(&mut self, other: PartitionPortal) {
         let whole = &mut self.portal;
@@ -162,12 +162,12 @@ mod tests {
     use enfilade_geom::Plane;
 
     /// A slit 1 m long across `x`, at the heights given, between cells 1 and 2.
-    fn slit(x: f64, up: [f64; 2]) -> Judged {
+    fn slit(x: f64, up: [f64; 2]) -> KnownPortal {
         let plane = Plane::through(DVec3::X * x, DVec3::X);
         let corners = [(up[0], 0.0), (up[1], 0.0), (up[1], 1.0), (up[0], 1.0)];
         let corners = corners.map(|(y, z)| DVec3::new(x, y, z));
         let outline = Winding::hull_in_plane(&plane, &corners);
-        Judged {
+        KnownPortal {
             portal: PartitionPortal {
                 cells: [1, 2],
                 plane,
@@ -187,7 +187,7 @@ mod tests {
     }
 
     /// Returns the number of pieces of each portal once slits are joined.
-    fn n_pieces(portals: Vec<Judged>) -> Vec<usize> {
+    fn n_pieces(portals: Vec<KnownPortal>) -> Vec<usize> {
         let joined = join_slits(portals, |cell| cell == 3, |p| p.kind);
         joined.iter().map(|j| j.portal.pieces.len()).collect()
     }
@@ -203,7 +203,7 @@ mod tests {
             |_| false,
             |p| p.kind,
         );
-        let [Judged { portal, .. }] = &joined[..] else {
+        let [KnownPortal { portal, .. }] = &joined[..] else {
             panic!("{} portals", joined.len());
         };
         let areas: Vec<f64> = portal.pieces.iter().map(Winding::area).collect();
@@ -218,12 +218,12 @@ mod tests {
         let first = || slit(0.0, [2.0, 2.1]);
         let second = || slit(0.0, [2.5, 2.7]);
         assert_eq!(n_pieces(vec![first(), slit(0.2, [2.5, 2.7])]), [1, 1]);
-        let filled = Judged {
+        let filled = KnownPortal {
             is_filled: true,
             ..second()
         };
         assert_eq!(n_pieces(vec![first(), filled]), [1, 1]);
-        let window = Judged {
+        let window = KnownPortal {
             kind: PortalKind::Window,
             ..second()
         };
@@ -246,12 +246,12 @@ mod tests {
         for j in [&mut crack, &mut lamp] {
             j.portal.cells = [1, 3];
         }
-        // A judge of the whole may find a sill that its pieces do not have.
-        let judge = |p: &PartitionPortal| match p.kind {
+        // A kinds of the whole may find a sill that its pieces do not have.
+        let kinds = |p: &PartitionPortal| match p.kind {
             PortalKind::Open if p.pieces.len() == 2 => PortalKind::Window,
             kind => kind,
         };
-        let joined = join_slits(vec![crack, lamp], |cell| cell == 3, judge);
+        let joined = join_slits(vec![crack, lamp], |cell| cell == 3, kinds);
         assert_eq!((joined.len(), joined[0].kind), (1, PortalKind::Window));
         // One between two others in another plane does not keep them apart.
         let between = slit(0.2, [2.5, 2.7]);

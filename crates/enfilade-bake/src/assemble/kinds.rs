@@ -27,7 +27,7 @@ const FILLS: f64 = 0.5;
 const REBATE: f64 = 0.15;
 
 /// Decides on kinds.
-pub(super) struct Judge<'a> {
+pub(super) struct PortalKinds<'a> {
     cut: &'a Cut<'a>,
     named: Vec<NamedShell>,
 }
@@ -39,7 +39,7 @@ struct NamedShell {
     aabb: Aabb,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> PortalKinds<'a> {
     pub(super) fn new(cut: &'a Cut<'a>) -> Self {
         let scene = cut.structure.scene;
         let named = scene.objects.par_iter().filter(|o| o.role == Role::Detail);

@@ -71,7 +71,7 @@ impl<'a> Plate<'a> {
         // The bars of a railing face along it, so it is deep, and shuts nothing.
         let around = Rectangle::around(facing(&triangles), triangles.as_flattened());
         let facts = FillerFacts::of(&around, &around.mask(triangles.iter().copied()));
-        let shape = facts.judge();
+        let shape = facts.kind();
         let is_stout = around.size().z > DEEPEST;
         (!matches!(shape, Filler::Deep | Filler::Narrow)).then(|| Self {
             aabb: Aabb::of_points(triangles.as_flattened()),

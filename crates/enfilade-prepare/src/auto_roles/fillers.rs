@@ -95,7 +95,7 @@ pub(super) fn fillers(
         let held = held(&members, &is_candidate);
         for c in members {
             let facts = c.own.held_as(&held);
-            let why = match facts.judge() {
+            let why = match facts.kind() {
                 Some(FillsHole::Thin) => format!(
                     "the wall around it {:.2} m on {} sides",
                     facts.wall,
@@ -187,7 +187,7 @@ fn candidate(units: &[Unit], index: u32, around: &Surroundings<'_>) -> Option<Ca
     // then hold one side more.
     let mut facts = own.held_as(&held(&[&candidate], &|_| false));
     facts.n_by_one += 1;
-    facts.judge().map(|_| candidate)
+    facts.kind().map(|_| candidate)
 }
 
 /// Returns the matter that holds a side, at each of its samples.

@@ -1,6 +1,6 @@
 //! Merged objects: one mesh of many things, as optimizers and formats without objects (STL, PLY) write them.
 //!
-//! The shells of such an object are judged one by one, as if each were an object. Those found to be detail become
+//! The shells of such an object are decided one by one, as if each were an object. Those found to be detail become
 //! objects of their own; the rest stays together.
 
 use enfilade_geom::filler::LEAF;

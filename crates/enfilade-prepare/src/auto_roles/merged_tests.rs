@@ -28,7 +28,7 @@ fn n_triangles(scene: &Scene, role: Role) -> usize {
 // Covers S4.
 #[test]
 fn leaves_panes_and_furniture_are_found_in_one_mesh() {
-    let scene = house().merged("").judged();
+    let scene = house().merged("").decided();
     let details: Vec<&Object> = scene
         .objects
         .iter()
@@ -53,11 +53,11 @@ fn leaves_panes_and_furniture_are_found_in_one_mesh() {
 
 #[test]
 fn the_name_of_the_first_part_does_not_hide_the_others_but_a_rule_does() {
-    let by_name = house().merged("name: 'wall'").judged();
+    let by_name = house().merged("name: 'wall'").decided();
     assert_eq!(n_triangles(&by_name, Role::Detail), 12 * 9);
-    let by_class = house().merged("IFC class IfcWall").judged();
+    let by_class = house().merged("IFC class IfcWall").decided();
     assert_eq!(n_triangles(&by_class, Role::Detail), 12 * 9);
-    let by_rule = house().merged("rule: structural 'House'").judged();
+    let by_rule = house().merged("rule: structural 'House'").decided();
     assert_eq!(n_triangles(&by_rule, Role::Detail), 0);
     assert_eq!(by_rule.objects.len(), 1);
 }
@@ -65,10 +65,10 @@ fn the_name_of_the_first_part_does_not_hide_the_others_but_a_rule_does() {
 #[test]
 fn the_name_of_a_door_makes_no_detail_of_a_whole_house() {
     let named = |reason: &str| {
-        let mut scene = house().merged(reason).judged();
+        let mut scene = house().merged(reason).decided();
         scene.objects.truncate(1);
         scene.objects[0].role = Role::Detail;
-        super::judge(&mut scene);
+        super::decide(&mut scene);
         scene
     };
     let by_class = named("IFC class IfcDoor");
@@ -79,17 +79,17 @@ fn the_name_of_a_door_makes_no_detail_of_a_whole_house() {
     // A room of 4 × 3 × 5 m under a name of cartons.
     let mut room = Build::default();
     room.block("box", [0.0; 3], [4.0, 3.0, 5.0]);
-    let mut room = room.judged();
+    let mut room = room.decided();
     room.objects[0].reason = "name: 'box'".to_owned();
     room.objects[0].role = Role::Detail;
-    super::judge(&mut room);
+    super::decide(&mut room);
     assert_eq!(room.objects[0].role, Role::Structural);
     // Beside structure, it is what it says.
-    let mut scene = house().merged("IFC class IfcDoor").judged();
+    let mut scene = house().merged("IFC class IfcDoor").decided();
     scene.objects.truncate(1);
     let walls = scene.objects[0].clone();
     scene.objects[0].role = Role::Detail;
     scene.objects.push(walls);
-    super::judge(&mut scene);
+    super::decide(&mut scene);
     assert_eq!(scene.objects[0].role, Role::Detail);
 }

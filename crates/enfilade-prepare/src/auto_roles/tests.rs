@@ -100,13 +100,13 @@ impl Build {
         out
     }
 
-    pub(super) fn judged(mut self) -> Scene {
-        judge(&mut self.0);
+    pub(super) fn decided(mut self) -> Scene {
+        decide(&mut self.0);
         self.0
     }
 
     pub(super) fn details(mut self) -> Vec<String> {
-        judge(&mut self.0);
+        decide(&mut self.0);
         let is_detail = |o: &&Object| o.role == Role::Detail;
         self.0
             .objects
@@ -118,7 +118,7 @@ impl Build {
 
     /// Returns name and reason of each detail object.
     pub(super) fn reasons(mut self) -> Vec<String> {
-        judge(&mut self.0);
+        decide(&mut self.0);
         let details = self.0.objects.iter().filter(|o| o.role == Role::Detail);
         details
             .map(|o| format!("{}: {}", o.name, o.reason))
@@ -157,7 +157,7 @@ fn what_stands_in_a_room_is_detail() {
 fn the_reason_is_told() {
     let mut b = Build::room();
     b.block("stool", [3.0, 0.0, 3.0], [3.4, 0.5, 3.4]);
-    judge(&mut b.0);
+    decide(&mut b.0);
     let stool = b.0.objects.last().unwrap();
     assert_eq!(
         stool.reason,
@@ -245,7 +245,7 @@ fn a_heap_of_loose_blocks_is_no_furniture() {
         let x = 2.0 * f64::from(i);
         b.block("block", [x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]);
     }
-    judge(&mut b.0);
+    decide(&mut b.0);
     assert!(b.0.objects.iter().all(|o| o.role == Role::Structural));
     assert!(b.0.objects[0].reason.contains("too much of the scene"));
 }
@@ -337,8 +337,8 @@ proptest! {
         there.objects.iter_mut().for_each(|o| o.transform = place);
         let n = first.index(there.objects.len());
         there.objects.rotate_left(n);
-        judge(&mut here);
-        judge(&mut there);
+        decide(&mut here);
+        decide(&mut there);
         there.objects.rotate_right(n);
         let roles = |s: &Scene| s.objects.iter().map(|o| o.role).collect::<Vec<_>>();
         prop_assert_eq!(roles(&here), roles(&there));
@@ -357,7 +357,7 @@ proptest! {
             }
         }
         let before = scene.clone();
-        judge(&mut scene);
+        decide(&mut scene);
         prop_assert_eq!(format!("{:?}", scene.meshes), format!("{:?}", before.meshes));
         for (o, was) in scene.objects.iter().zip(&before.objects) {
             if was.reason == "said" {

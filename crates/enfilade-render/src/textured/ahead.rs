@@ -256,7 +256,7 @@ impl Studio {
         let view = View::around(place.eye)?;
         own.stops.clear();
         own.stops.beyond = own.options.transition_distance * WATCHED;
-        let mut judged = BTreeSet::new();
+        let mut tried = BTreeSet::new();
         // As frames do: each round looks on through the doorways that are geometry.
         loop {
             self.viewer.stops_mut().clone_from(&own.stops);
@@ -264,7 +264,7 @@ impl Studio {
             let new: Vec<DoorwayId> = seen.stopped().to_vec();
             let mut is_passed = false;
             for id in new {
-                if judged.insert(id) && self.is_looked_through(own, place, id, lines, wanted) {
+                if tried.insert(id) && self.is_looked_through(own, place, id, lines, wanted) {
                     own.stops.pass(id.0, id.1);
                     is_passed = true;
                 }

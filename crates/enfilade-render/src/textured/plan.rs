@@ -66,19 +66,19 @@ impl Studio {
         own.begin(&self.world, state, &shot.style, self.day);
         own.stops.clear();
         own.stops.beyond = own.options.transition_distance * WATCHED;
-        let mut judged: Vec<DoorwayId> = Vec::new();
+        let mut asked: Vec<DoorwayId> = Vec::new();
         let mut lacking = Vec::new();
         // Each round looks on through the doorways that the last one left as geometry.
         loop {
             self.viewer.stops_mut().clone_from(&own.stops);
             let state = state_of(shot.space, &self.state);
             let seen = self.viewer.see(&self.sight, state, shot.view);
-            let new = seen.stopped().iter().filter(|id| !judged.contains(id));
+            let new = seen.stopped().iter().filter(|id| !asked.contains(id));
             let new: Vec<DoorwayId> = new.copied().collect();
             let mut is_passed = false;
             for id in new {
-                judged.push(id);
-                if !self.judge(own, shot, id, &mut lacking, &mut counts)? {
+                asked.push(id);
+                if !self.fills(own, shot, id, &mut lacking, &mut counts)? {
                     own.stops.pass(id.0, id.1);
                     is_passed = true;
                 }
@@ -88,7 +88,7 @@ impl Studio {
             }
         }
         self.make_lacking(own, shot, lacking, &mut counts)?;
-        self.make_ahead(own, shot, &judged, &mut counts)?;
+        self.make_ahead(own, shot, &asked, &mut counts)?;
         if own.options.max_triangles < u64::MAX {
             self.bind_triangles(own, shot, &mut counts)?;
         }
@@ -102,7 +102,7 @@ impl Studio {
     }
 
     /// Returns `true` if a doorway is filled by textures in this frame, and composes them.
-    fn judge(
+    fn fills(
         &mut self,
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
@@ -293,7 +293,7 @@ impl Studio {
         &mut self,
         own: &mut PortalTextures,
         shot: &PlanShot<'_>,
-        judged: &[DoorwayId],
+        asked: &[DoorwayId],
         counts: &mut PortalTextureCounts,
     ) -> Result<(), RenderError> {
         let Some(last) = own.last_eye else {
@@ -307,7 +307,7 @@ impl Studio {
         let viewpoints = own.options.viewpoints.clone();
         for share in [0.5, 1.0] {
             let soon = shot.eye + step * (AHEAD * share);
-            for id in judged
+            for id in asked
                 .iter()
                 .filter(|id| own.shown.contains_key(id))
                 .copied()

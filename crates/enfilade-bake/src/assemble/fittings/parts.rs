@@ -155,7 +155,7 @@ impl<'t> Shell<'t> {
     fn is_body(&self, opening: &Rectangle) -> bool {
         let share = self.facts.size / opening.size();
         let fits = |x: f64, [least, most]: [f64; 2]| x >= least && x <= most;
-        matches!(self.facts.judge(), Filler::Leaf | Filler::Pane)
+        matches!(self.facts.kind(), Filler::Leaf | Filler::Pane)
             && fits(share.y, HEIGHT)
             && fits(share.x, WIDTH)
     }
