@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use enfilade::geom::DVec3;
+
 /// Returns the processor seconds that this process has used so far, all threads together; 0 if the system does not
 /// provide them.
 pub(crate) fn cpu_seconds() -> f64 {
@@ -26,6 +28,17 @@ pub(crate) fn name(path: &Path) -> String {
     path.file_stem()
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default()
+}
+
+/// Returns a file's or folder's name with its extension.
+pub(crate) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Returns a stored point.
+pub(crate) fn point(p: [f32; 3]) -> DVec3 {
+    DVec3::from(p.map(f64::from))
 }
 
 /// Returns the structure and detail files of a scene: a file, or a folder with `scene.glb` and optionally `detail.glb`.

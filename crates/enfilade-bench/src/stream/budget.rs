@@ -158,12 +158,9 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
         n_open += source.open.len() + source.n_twice + usize::from(!streamer.view_settled());
         n_requests += streamer.counts().n_requests;
     }
-    Ok(Figure {
-        value: (n_above + n_open) as f64,
-        most: 0.0,
-        note: format!(
-            "{n_above} frames above a limit, {n_open} requests without end, of {n_frames} frames and {n_requests} requests in \
+    let note = format!(
+        "{n_above} frames above a limit, {n_open} requests without end, of {n_frames} frames and {n_requests} requests in \
              {WORLDS} worlds; at most {most:.4} of a budget"
-        ),
-    })
+    );
+    Ok(Figure::new((n_above + n_open) as f64, 0.0, note))
 }

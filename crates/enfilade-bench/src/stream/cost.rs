@@ -58,18 +58,15 @@ fn walk(scene: &str) -> anyhow::Result<Timed> {
 
 fn figure(times: &mut [f64], site: &Streamed) -> Figure {
     let at = [0.5, 0.99, 1.0].map(|share| quantile(times, share));
-    Figure {
-        value: at[1],
-        most: 20.0,
-        note: format!(
-            "µs, 99 of 100 frames; half {:.2}, longest {:.1}; {} frames, {} cells, {} pieces",
-            at[0],
-            at[2],
-            times.len(),
-            site.world.graph.cells.len(),
-            site.catalog().pieces().len(),
-        ),
-    }
+    let note = format!(
+        "µs, 99 of 100 frames; half {:.2}, longest {:.1}; {} frames, {} cells, {} pieces",
+        at[0],
+        at[2],
+        times.len(),
+        site.world.graph.cells.len(),
+        site.catalog().pieces().len(),
+    );
+    Figure::new(at[1], 20.0, note)
 }
 
 pub(super) fn moving(scene: &str) -> anyhow::Result<Figure> {

@@ -184,11 +184,7 @@ fn note(m: &Misses) -> String {
 /// Misses divided by Belady's.
 pub(super) fn belady(world: &World) -> anyhow::Result<Figure> {
     let m = misses(&Streamed::of(world)?)?;
-    Ok(Figure {
-        value: m.ours as f64 / m.belady as f64,
-        most: 1.15,
-        note: note(&m),
-    })
+    Ok(Figure::new(m.ours as f64 / m.belady as f64, 1.15, note(&m)))
 }
 
 pub(super) fn belady_in(scene: &str) -> anyhow::Result<Figure> {
@@ -198,11 +194,11 @@ pub(super) fn belady_in(scene: &str) -> anyhow::Result<Figure> {
 /// Misses less the fewer of those of LRU and `quick_cache`: fewer than both.
 pub(super) fn peers(world: &World) -> anyhow::Result<Figure> {
     let m = misses(&Streamed::of(world)?)?;
-    Ok(Figure {
-        value: m.ours as f64 - m.lru.min(m.quick) as f64,
-        most: -1.0,
-        note: note(&m),
-    })
+    Ok(Figure::new(
+        m.ours as f64 - m.lru.min(m.quick) as f64,
+        -1.0,
+        note(&m),
+    ))
 }
 
 pub(super) fn peers_in(scene: &str) -> anyhow::Result<Figure> {

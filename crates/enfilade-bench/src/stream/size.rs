@@ -275,34 +275,29 @@ fn megabytes(found: &Value, name: &str) -> String {
 /// Returns the most memory of pieces on the walk.
 pub(super) fn memory_of(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
-    Ok(Figure {
-        value: number(found, "kept") / f64::from(1 << 20),
-        most: 256.0,
-        note: format!(
-            "MiB of pieces; {} cells, {} pieces, {} unpacked, {} packed; the process {} at most, {} after opening",
-            found["cells"],
-            found["pieces"],
-            megabytes(found, "unpacked"),
-            megabytes(found, "packed"),
-            megabytes(found, "peak"),
-            megabytes(found, "peakOfHead"),
-        ),
-    })
+    let value = number(found, "kept") / f64::from(1 << 20);
+    let note = format!(
+        "MiB of pieces; {} cells, {} pieces, {} unpacked, {} packed; the process {} at most, {} after opening",
+        found["cells"],
+        found["pieces"],
+        megabytes(found, "unpacked"),
+        megabytes(found, "packed"),
+        megabytes(found, "peak"),
+        megabytes(found, "peakOfHead"),
+    );
+    Ok(Figure::new(value, 256.0, note))
 }
 
 /// Returns the number of frame × piece in view and absent on the walk.
 pub(super) fn absent(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
-    Ok(Figure {
-        value: number(found, "absent"),
-        most: 0.0,
-        note: format!(
-            "frame × piece; {} of {} frames, 10 MB/s, 50 ms, 1.4 m/s; {} asked for",
-            found["late"],
-            found["frames"],
-            megabytes(found, "requested"),
-        ),
-    })
+    let note = format!(
+        "frame × piece; {} of {} frames, 10 MB/s, 50 ms, 1.4 m/s; {} asked for",
+        found["late"],
+        found["frames"],
+        megabytes(found, "requested"),
+    );
+    Ok(Figure::new(number(found, "absent"), 0.0, note))
 }
 
 /// Returns the share of bytes after which all that is in view is complete: the worst of several places.
@@ -312,15 +307,12 @@ pub(super) fn first_picture(scene: &str) -> anyhow::Result<Figure> {
     let bytes: Vec<f64> = first.iter().filter_map(Value::as_f64).collect();
     let packed = number(found, "packed");
     let last = bytes.last().context("no first pictures")?;
-    Ok(Figure {
-        value: last / packed,
-        most: 0.01,
-        note: format!(
-            "all in view from the worst of {VIEWS} places after {:.1} MB of {}, the median after {:.1} MB; head {}",
-            last / 1e6,
-            megabytes(found, "packed"),
-            bytes[bytes.len() / 2] / 1e6,
-            megabytes(found, "head"),
-        ),
-    })
+    let note = format!(
+        "all in view from the worst of {VIEWS} places after {:.1} MB of {}, the median after {:.1} MB; head {}",
+        last / 1e6,
+        megabytes(found, "packed"),
+        bytes[bytes.len() / 2] / 1e6,
+        megabytes(found, "head"),
+    );
+    Ok(Figure::new(last / packed, 0.01, note))
 }
