@@ -118,10 +118,13 @@ pub(crate) fn write_between_marks(page: &str, text: &str) -> anyhow::Result<()> 
     std::fs::write(&path, new).with_context(|| path.display().to_string())
 }
 
-/// Runs a hidden command of this program in a process of its own, as its memory counts; returns what it prints.
+/// Runs a hidden command of this program in a process of its own, as its memory counts; returns the JSON that it prints, if any.
 pub(crate) fn step(args: &[&str]) -> anyhow::Result<Value> {
     let program = std::env::current_exe().context("this program has no path")?;
     let said = output_of(Command::new(program).args(args), None)?;
+    if said.is_empty() {
+        return Ok(Value::Null);
+    }
     serde_json::from_str(&said).context("a step that prints JSON")
 }
 

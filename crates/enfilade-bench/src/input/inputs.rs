@@ -15,6 +15,16 @@ pub(super) struct Input {
     pub(super) weight: usize,
 }
 
+impl Input {
+    const fn new(file: &'static str, weight: usize, commands: &'static [&'static str]) -> Self {
+        Self {
+            file,
+            commands,
+            weight,
+        }
+    }
+}
+
 const SCENE: &[&str] = &[
     "bake @ -o out.glb",
     "bake @ -o out.glb --method watershed",
@@ -53,100 +63,43 @@ const SURFACE: &[&str] = &[
 /// The same, for points without the place of their scanner.
 const STATION: &[&str] = &["bake @ -o out.glb --allow-empty --station 2,1.5,2"];
 
+macro_rules! seed {
+    ($folder:literal, $file:literal) => {
+        (
+            $file,
+            include_bytes!(concat!("../../../../fuzz/seeds/", $folder, "/", $file)),
+        )
+    };
+}
+
 /// The seeds of fuzzing for these.
 const SEEDS: [(&str, &[u8]); 9] = [
-    (
-        "room.e57",
-        include_bytes!("../../../../fuzz/seeds/e57/room.e57"),
-    ),
-    (
-        "room.las",
-        include_bytes!("../../../../fuzz/seeds/las/room.las"),
-    ),
-    (
-        "room.laz",
-        include_bytes!("../../../../fuzz/seeds/las/room.laz"),
-    ),
-    (
-        "ball.nii",
-        include_bytes!("../../../../fuzz/seeds/volume/ball.nii"),
-    ),
-    (
-        "ball.nii.gz",
-        include_bytes!("../../../../fuzz/seeds/volume/ball.nii.gz"),
-    ),
-    (
-        "ball.nrrd",
-        include_bytes!("../../../../fuzz/seeds/volume/ball.nrrd"),
-    ),
-    (
-        "house.json",
-        include_bytes!("../../../../fuzz/seeds/implicit/house.json"),
-    ),
-    (
-        "geotiff.tif",
-        include_bytes!("../../../../fuzz/seeds/heights/geotiff.tif"),
-    ),
-    (
-        "vault.json",
-        include_bytes!("../../../../fuzz/seeds/patches/vault.json"),
-    ),
+    seed!("e57", "room.e57"),
+    seed!("las", "room.las"),
+    seed!("las", "room.laz"),
+    seed!("volume", "ball.nii"),
+    seed!("volume", "ball.nii.gz"),
+    seed!("volume", "ball.nrrd"),
+    seed!("implicit", "house.json"),
+    seed!("heights", "geotiff.tif"),
+    seed!("patches", "vault.json"),
 ];
 
 pub(super) const INPUTS: [Input; 32] = [
-    Input {
-        file: "two.obj",
-        commands: SCENE,
-        weight: 8,
-    },
-    Input {
-        file: "two.glb",
-        commands: GLTF,
-        weight: 10,
-    },
-    Input {
-        file: "two.gltf",
-        commands: GLTF,
-        weight: 8,
-    },
-    Input {
-        file: "two.ply",
-        commands: BARE,
-        weight: 5,
-    },
-    Input {
-        file: "binary.ply",
-        commands: BARE,
-        weight: 5,
-    },
-    Input {
-        file: "two.stl",
-        commands: BARE,
-        weight: 5,
-    },
-    Input {
-        file: "two.map",
-        commands: BARE,
-        weight: 8,
-    },
-    Input {
-        file: "two.bin",
-        commands: BAKE,
-        weight: 3,
-    },
-    Input {
-        file: "picture.png",
-        commands: BAKE,
-        weight: 1,
-    },
-    Input {
-        file: "two.mtl",
-        commands: &["bake two.obj -o out.glb"],
-        weight: 1,
-    },
-    Input {
-        file: "world.glb",
-        commands: &[
+    Input::new("two.obj", 8, SCENE),
+    Input::new("two.glb", 10, GLTF),
+    Input::new("two.gltf", 8, GLTF),
+    Input::new("two.ply", 5, BARE),
+    Input::new("binary.ply", 5, BARE),
+    Input::new("two.stl", 5, BARE),
+    Input::new("two.map", 8, BARE),
+    Input::new("two.bin", 3, BAKE),
+    Input::new("picture.png", 1, BAKE),
+    Input::new("two.mtl", 1, &["bake two.obj -o out.glb"]),
+    Input::new(
+        "world.glb",
+        32,
+        &[
             "inspect @",
             "inspect @ --json",
             "inspect @ --objects 0",
@@ -172,130 +125,77 @@ pub(super) const INPUTS: [Input; 32] = [
             "bake @ -o out.glb",
             "decimate @",
         ],
-        weight: 32,
-    },
-    Input {
-        file: "world.glb",
-        commands: &[
+    ),
+    Input::new(
+        "world.glb",
+        1,
+        &[
             "render @ -o out.png --size 32x32 --eye 1,1.5,2 --look 7,1.5,2 --lod 1 --adapter software",
         ],
-        weight: 1,
-    },
-    Input {
-        file: "grid.prt",
-        commands: &[
+    ),
+    Input::new(
+        "grid.prt",
+        6,
+        &[
             "pvs @ -o out.pvs",
             "pvs @ -o out.pvs --mode fast --evidence out.ev",
             "simplify @ -o out.prt --max-cells 3",
             "verify @ --evidence grid.ev",
         ],
-        weight: 6,
-    },
-    Input {
-        file: "grid.ev",
-        commands: &["verify grid.prt --evidence @"],
-        weight: 4,
-    },
-    Input {
-        file: "world.ev",
-        commands: &["verify world.glb --evidence @"],
-        weight: 3,
-    },
-    Input {
-        file: "grid.search",
-        commands: &["pvs grid.prt -o out.pvs --checkpoint @"],
-        weight: 5,
-    },
-    Input {
-        file: "settings.toml",
-        commands: &[
+    ),
+    Input::new("grid.ev", 4, &["verify grid.prt --evidence @"]),
+    Input::new("world.ev", 3, &["verify world.glb --evidence @"]),
+    Input::new(
+        "grid.search",
+        5,
+        &["pvs grid.prt -o out.pvs --checkpoint @"],
+    ),
+    Input::new(
+        "settings.toml",
+        6,
+        &[
             "bake two.obj -o out.glb --config @ --method watershed",
             "bake two.obj -o out.glb --config @ --method bsp",
             "decimate two.obj --config @",
             "verify world.glb --source two.obj --config @ --rays 200 --sight 0",
         ],
-        weight: 6,
-    },
-    Input {
-        file: "choices.toml",
-        commands: &[
+    ),
+    Input::new(
+        "choices.toml",
+        2,
+        &[
             "bake two.obj -o out.glb --method delaunay --choices @",
             "decimate two.obj --choices @",
         ],
-        weight: 2,
-    },
-    Input {
-        file: "tone.wav",
-        commands: &["sound world.glb --listener 1,1.5,2 --source 6,1.5,3 -o out.wav --wav @"],
-        weight: 1,
-    },
-    Input {
-        file: "points.txt",
-        commands: &["locate world.glb < @"],
-        weight: 1,
-    },
-    Input {
-        file: "walk.txt",
-        commands: &["render world.glb -o out.png --size 8x8 --adapter software --path @"],
-        weight: 1,
-    },
-    Input {
-        file: "steps.txt",
-        commands: &["decimate two.obj --steps < @"],
-        weight: 1,
-    },
-    Input {
-        file: "room.e57",
-        commands: SURFACE,
-        weight: 3,
-    },
-    Input {
-        file: "room.las",
-        commands: STATION,
-        weight: 4,
-    },
-    Input {
-        file: "room.laz",
-        commands: STATION,
-        weight: 4,
-    },
-    Input {
-        file: "ball.nii",
-        commands: SURFACE,
-        weight: 4,
-    },
-    Input {
-        file: "ball.nii.gz",
-        commands: SURFACE,
-        weight: 2,
-    },
-    Input {
-        file: "ball.nrrd",
-        commands: SURFACE,
-        weight: 4,
-    },
-    Input {
-        file: "house.json",
-        commands: SURFACE,
-        weight: 4,
-    },
-    Input {
-        file: "geotiff.tif",
-        commands: SURFACE,
-        weight: 4,
-    },
-    Input {
-        file: "vault.json",
-        commands: SURFACE,
-        weight: 4,
-    },
-    Input {
-        file: "living.json",
-        commands: &[
+    ),
+    Input::new(
+        "tone.wav",
+        1,
+        &["sound world.glb --listener 1,1.5,2 --source 6,1.5,3 -o out.wav --wav @"],
+    ),
+    Input::new("points.txt", 1, &["locate world.glb < @"]),
+    Input::new(
+        "walk.txt",
+        1,
+        &["render world.glb -o out.png --size 8x8 --adapter software --path @"],
+    ),
+    Input::new("steps.txt", 1, &["decimate two.obj --steps < @"]),
+    Input::new("room.e57", 3, SURFACE),
+    Input::new("room.las", 4, STATION),
+    Input::new("room.laz", 4, STATION),
+    Input::new("ball.nii", 4, SURFACE),
+    Input::new("ball.nii.gz", 2, SURFACE),
+    Input::new("ball.nrrd", 4, SURFACE),
+    Input::new("house.json", 4, SURFACE),
+    Input::new("geotiff.tif", 4, SURFACE),
+    Input::new("vault.json", 4, SURFACE),
+    Input::new(
+        "living.json",
+        1,
+        &[
             "render world.glb -o out.png --size 8x8 --eye 1,1.5,2 --look 7,1.5,2 --adapter software --living @ --time 2",
         ],
-        weight: 1,
-    },
+    ),
 ];
 
 /// Commands that make further inputs from these, in order.

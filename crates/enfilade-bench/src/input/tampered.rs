@@ -8,7 +8,6 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::Context;
-use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{SightGraph, World};
 use enfilade::geom::Triangle;
@@ -25,6 +24,7 @@ use serde_json::{Value, json};
 use super::figures::Figures;
 use crate::measure::files_of;
 use crate::process::{binary, output_of, scenes};
+use crate::rows::baked;
 
 /// Numbers of rays tried one after the other until a problem is found; the last is the default of `verify`.
 const RAYS: [u64; 4] = [0, 20_000, 200_000, 1_000_000];
@@ -93,9 +93,7 @@ pub(crate) fn bench_tampered(scenes: &[PathBuf], kinds: &[String]) -> anyhow::Re
 }
 
 fn bench_scene(name: &str, scene: &Scene, kinds: &[String]) -> anyhow::Result<()> {
-    let context = BakeContext::new(&Silent, None);
-    let world = bake(scene, &BakeConfig::default(), &context)?.world;
-    let world = seen(world).with_context(|| name.to_owned())?;
+    let world = seen(baked(scene)?).with_context(|| name.to_owned())?;
     let is_asked =
         |kind: &str| kinds.is_empty() || kinds.iter().any(|k| kind.starts_with(k.as_str()));
     anyhow::ensure!(

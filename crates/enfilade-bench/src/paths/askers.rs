@@ -4,7 +4,6 @@
 use std::f64::consts::PI;
 
 use anyhow::{Context, ensure};
-use enfilade::bake::{BakeConfig, BakeContext, bake};
 use enfilade::geom::{Bvh, DQuat, DVec3, Ray, Triangle};
 use enfilade::world::{
     Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Place, Pose,
@@ -13,7 +12,7 @@ use enfilade::world::{
 use enfilade::{CellId, PortalId, PortalKind, World};
 use enfilade_testkit::{Beyond, Rng, Standing, assembled, chamber, lift_tower};
 
-use crate::rows::Figure;
+use crate::rows::{Figure, baked};
 
 /// Number of poses, and of those at which walks and paths are compared: each makes a map of the whole building.
 const POSES: usize = 1000;
@@ -139,9 +138,6 @@ fn at_entrance(world: &World) -> anyhow::Result<DockSite> {
 /// Returns the tower of the demo with its lift.
 fn in_tower() -> anyhow::Result<DockSite> {
     let models = lift_tower();
-    let baked = |scene| -> anyhow::Result<World> {
-        Ok(bake(scene, &BakeConfig::default(), &BakeContext::default())?.world)
-    };
     let mut space = Space::new(baked(&models.tower.scene)?)?;
     let cabin = baked(&models.cabin.scene)?;
     let cabin = space.add_part(cabin, PartId::ROOT, Pose::IDENTITY)?;

@@ -22,6 +22,7 @@ use parry3d::math::{Pose, Vector};
 use parry3d::query::{Ray, RayCast, ShapeCastHit, ShapeCastOptions, cast_shapes};
 use parry3d::shape::{Ball, Capsule, Cuboid, Shape, TriMesh};
 
+use crate::measure::point;
 use crate::rows::Figure;
 
 const CASTS: usize = 1_000_000;
@@ -29,7 +30,7 @@ const CASTS: usize = 1_000_000;
 const FREE: f64 = 1e-3;
 
 /// Generates a world by the name of its scene.
-fn made(scene: &str) -> anyhow::Result<World> {
+pub(super) fn made(scene: &str) -> anyhow::Result<World> {
     let n = scene.strip_prefix("offices-").context("offices-N")?;
     let world = room_grid(&GridParams::offices(n.parse()?, 1));
     Ok(with_doors(world, |_| false))
@@ -157,10 +158,6 @@ struct Way {
     from: DVec3,
     by: DVec3,
     cell: CellId,
-}
-
-fn point(p: [f32; 3]) -> DVec3 {
-    DVec3::from(p.map(f64::from))
 }
 
 fn vector(p: DVec3) -> Vector {
@@ -475,16 +472,4 @@ pub(super) fn time(world: &World) -> anyhow::Result<Figure> {
         each[0], each[1]
     );
     Ok(Figure::new(each[0] / each[1], 1.0, note))
-}
-
-pub(super) fn missed_in(scene: &str) -> anyhow::Result<Figure> {
-    missed(&made(scene)?)
-}
-
-pub(super) fn candidates_in(scene: &str) -> anyhow::Result<Figure> {
-    candidates(&made(scene)?)
-}
-
-pub(super) fn time_in(scene: &str) -> anyhow::Result<Figure> {
-    time(&made(scene)?)
 }

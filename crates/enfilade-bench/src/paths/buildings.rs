@@ -1,23 +1,20 @@
 //! Things, lamps and moving rooms in real buildings. The judges are trees of triangles and the polygons of portals as they are
 //! stored, read from the world alone: they share the locator with what they judge, and nothing else.
 
-use std::collections::HashSet;
 use std::sync::Arc;
 
 use anyhow::{Context, ensure};
-use enfilade::cpg::Portal;
-use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Ray, Sets, Triangle};
+use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Sets, Triangle};
 use enfilade::runtime::View;
-use enfilade::world::{
-    Lamp, LampId, Lights, PartId, Place, Pose, Shape, Space, SpaceViewer, ThingId, Things, Tie,
-};
+use enfilade::world::{PartId, Place, Pose, Shape, Space, SpaceViewer, ThingId, Things, Tie};
 use enfilade::{CellId, PortalId, World};
-use enfilade_testkit::oracle::{ball_meets, box_meets, first_hit};
+use enfilade_testkit::oracle::first_hit;
 use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
+use super::gaps::{Gap, gaps_of, joined};
+use super::lit::Lit;
 use super::parts::{Docked, Pair};
-use super::solids::{PartItem, Solid, hull};
-use crate::measure::point;
+use super::solids::{Solid, first_item, hull, items_of};
 use crate::rows::Figure;
 
 const ROOT: PartId = PartId::ROOT;
@@ -26,43 +23,11 @@ const SHAPES: usize = 1_000_000;
 /// Points of a shape that must be in the cells that it reaches.
 const POINTS: usize = 4;
 
-const LAMPS: usize = 200;
 const SAMPLES: usize = 4_000_000;
 
 const POSES: usize = 300;
 /// Rays of a view.
 const RAYS: usize = 4000;
-
-/// A portal as stored.
-struct Gap {
-    cells: [u32; 2],
-    pieces: Vec<Vec<DVec3>>,
-    bounds: Aabb,
-}
-
-impl Gap {
-    fn of(portal: &Portal) -> Self {
-        let polygon = |p: &Vec<[f32; 3]>| p.iter().map(|c| point(*c)).collect();
-        let pieces: Vec<Vec<DVec3>> = portal.pieces.iter().map(polygon).collect();
-        Self {
-            cells: portal.cells.map(|c| c.0),
-            bounds: Aabb::of_points(pieces.iter().flatten()),
-            pieces,
-        }
-    }
-
-    fn triangles(&self) -> impl Iterator<Item = Triangle> {
-        let fan = |p: &Vec<DVec3>| {
-            let p = p.clone();
-            (2..p.len()).map(move |i| [p[0], p[i - 1], p[i]])
-        };
-        self.pieces.iter().flat_map(fan)
-    }
-}
-
-fn gaps_of(world: &World) -> Vec<Gap> {
-    world.graph.portals.iter().map(Gap::of).collect()
-}
 
 /// Returns a random point in the air: of a random cell, outdoors too.
 fn point_in_air(space: &Space, rng: &mut Rng) -> (CellId, DVec3) {
@@ -171,28 +136,6 @@ fn thing(
     Ok(things.add(space, shape, ROOT, Pose::IDENTITY, Tie::Carried)?)
 }
 
-/// Returns the sets of cells joined by the openings that a ball or box meets.
-fn joined(gaps: &[Gap], n_cells: usize, (half, is_ball): (DVec3, bool), pose: &Pose) -> Sets {
-    let mut sets = Sets::new(n_cells);
-    let reach = half.length();
-    for gap in gaps {
-        if gap.bounds.distance_squared(pose.at) > reach * reach {
-            continue;
-        }
-        let is_met = gap.pieces.iter().any(|piece| {
-            if is_ball {
-                ball_meets(half.x, pose.at, piece)
-            } else {
-                box_meets(half, pose.turn, pose.at, piece)
-            }
-        });
-        if is_met {
-            sets.join(gap.cells[0], gap.cells[1]);
-        }
-    }
-    sets
-}
-
 /// Returns the structural triangles of a world, seals included.
 fn structure(world: &World) -> Vec<Triangle> {
     let batches = world.batches.iter();
@@ -222,38 +165,20 @@ pub(super) fn lights(world: &World) -> anyhow::Result<Figure> {
     let leaves: Vec<Triangle> = leaves
         .flat_map(|g| g.triangles().collect::<Vec<_>>())
         .collect();
-    let mut rng = Rng::new(2);
-    let mut lights = Lights::new(&space);
-    let mut lamps = Vec::new();
-    for _ in 0..LAMPS {
-        let lamp = Lamp {
-            frame: ROOT,
-            at: point_in_air(&space, &mut rng).1.as_vec3().to_array(),
-            range: rng.range(2.0, 12.0) as f32,
-        };
-        lights.add(&space, lamp)?;
-        lamps.push(lamp);
-    }
-    let (mut n_lit, mut n_lost, mut n_known, mut n_beyond) = (0_usize, 0_usize, 0_usize, 0_usize);
-    for _ in 0..SAMPLES {
-        let k = rng.below(LAMPS);
-        let at = point(lamps[k].at);
-        // Within its range, so that most samples matter.
-        let p = at + rng.turn() * DVec3::X * f64::from(lamps[k].range) * rng.unit();
-        let Some(place) = space.locate(ROOT, p) else {
-            continue;
-        };
-        let may = lights.may_light(&space, LampId(k as u32), place, p);
-        n_known += usize::from(may);
-        // A point on a wall may be on either side, after rounding.
-        let beyond = p + (p - at).normalize_or_zero() * 8.0 * space.layout(ROOT).tolerance();
-        let is_clear = !walls.any_hit(at, beyond, |_| false);
-        if is_clear && first_hit(&leaves, at, beyond).is_none() {
-            n_lit += 1;
-            n_lost += usize::from(!may);
-            n_beyond += usize::from(space.locate(ROOT, at) != Some(place));
-        }
-    }
+    let lit = Lit::sampled(
+        &space,
+        SAMPLES,
+        |rng| point_in_air(&space, rng).1,
+        |at, beyond| {
+            !walls.any_hit(at, beyond, |_| false) && first_hit(&leaves, at, beyond).is_none()
+        },
+    )?;
+    let Lit {
+        n_lit,
+        n_lost,
+        n_known,
+        n_beyond,
+    } = lit;
     ensure!(n_beyond > 0, "no sample was lit in another cell");
     let note = format!(
         "of {n_lit} lit samples of {SAMPLES}, {n_beyond} of them in other cells than the lamp; {n_known} are reported as \
@@ -308,7 +233,7 @@ pub(super) fn poses(world: &World) -> anyhow::Result<Figure> {
     let room = space.add_part(large, building, Pose::IDENTITY)?;
     let inner = space.add_part(small, room, Pose::IDENTITY)?;
     let parts = [ROOT, building, room, inner];
-    let solids = parts.map(|p| Solid::of(&space, p));
+    let solids = parts.map(|p| (p, Solid::of(&space, p)));
     let mut viewer = SpaceViewer::new(&space);
     let mut rng = Rng::new(1);
     let (mut n_lost, mut n_hits, mut n_across, mut n_parts) = (0_usize, 0_usize, 0_usize, 0_usize);
@@ -320,9 +245,9 @@ pub(super) fn poses(world: &World) -> anyhow::Result<Figure> {
             at: DVec3::X * 300.0 + rng.turn() * DVec3::X * 100.0,
         };
         space.set_pose(building, sail)?;
-        let there = free_pose((&space, &solids[1]), building, &boxes[0], 3.0, &mut rng);
+        let there = free_pose((&space, &solids[1].1), building, &boxes[0], 3.0, &mut rng);
         space.set_pose(room, there.context("no room for a cabin")?)?;
-        let there = free_pose((&space, &solids[2]), room, &boxes[1], 3.0, &mut rng);
+        let there = free_pose((&space, &solids[2].1), room, &boxes[1], 3.0, &mut rng);
         space.set_pose(inner, there.context("no room for a box")?)?;
         // In each of the three, or beside the cabin.
         let frame = [building, building, room, inner][n_poses % 4];
@@ -344,29 +269,11 @@ pub(super) fn poses(world: &World) -> anyhow::Result<Figure> {
         n_poses += 1;
         let view = View::around(eye.to_array())?;
         let seen = viewer.see(&space, frame, &view);
-        let mut known = HashSet::new();
-        for (part, seen) in seen.parts() {
-            n_parts += 1;
-            known.extend(seen.chunks().iter().map(|c| (part, PartItem::Chunk(*c))));
-            known.extend(seen.details().iter().map(|d| (part, PartItem::Detail(*d))));
-        }
+        let known = items_of(&seen);
+        n_parts += seen.parts().count();
         for _ in 0..RAYS {
             let direction = rng.turn() * DVec3::X;
-            let mut best = (f64::INFINITY, None);
-            for (part, solid) in parts.into_iter().zip(&solids) {
-                let to = space.between(frame, part);
-                let ray = Ray {
-                    origin: to.point(eye.as_dvec3()),
-                    direction: to.direction(direction),
-                    t_max: best.0,
-                };
-                if let Some(hit) = solid.tree.closest_hit(&ray, |_| false)
-                    && hit.t < best.0
-                {
-                    best = (hit.t, Some((part, solid.items[hit.triangle as usize])));
-                }
-            }
-            if let Some(item) = best.1 {
+            if let Some(item) = first_item(&space, &solids, frame, [eye.as_dvec3(), direction]) {
                 n_hits += 1;
                 n_across += usize::from(item.0 != frame);
                 if !known.contains(&item) {

@@ -4,7 +4,9 @@ mod actors;
 mod askers;
 mod bodies;
 mod buildings;
+mod gaps;
 mod graphs;
+mod lit;
 mod moving;
 mod parts;
 mod search;
@@ -71,15 +73,26 @@ pub(crate) const MOVING: &[Row] = &[
 /// Bodies, actors, paths and walks.
 pub(crate) const WALKING: &[Row] = &[
     Row::made("cost", &["offices-10000"], moving::cost),
-    Row::made("bodies: missed", &["offices-1000"], bodies::missed_in),
+    Row::built(
+        "bodies: missed",
+        &["offices-1000"],
+        bodies::made,
+        bodies::missed,
+    ),
     Row::baked("bodies: missed", &["institute"], bodies::missed),
-    Row::made(
+    Row::built(
         "bodies: candidates",
         &["offices-1000"],
-        bodies::candidates_in,
+        bodies::made,
+        bodies::candidates,
     ),
     Row::baked("bodies: candidates", &["institute"], bodies::candidates),
-    Row::made("bodies: time", &["offices-1000"], bodies::time_in),
+    Row::built(
+        "bodies: time",
+        &["offices-1000"],
+        bodies::made,
+        bodies::time,
+    ),
     Row::baked("bodies: time", &["institute"], bodies::time),
     Row::made("actors: state", &["offices-10000"], actors::state),
     Row::baked("actors: state", LIVED_IN, actors::state_in),

@@ -3,14 +3,14 @@
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::{Bvh, DQuat, DVec3, Ray, Triangle};
-use enfilade::runtime::{ChunkId, DetailId, Sightlines, View};
-use enfilade::world::{
-    Lamp, LampId, Lights, PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie,
-};
+use enfilade::geom::{DQuat, DVec3};
+use enfilade::runtime::{Sightlines, View};
+use enfilade::world::{PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie};
 use enfilade::{PortalId, World};
 use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
+use super::lit::Lit;
+use super::solids::{Solid, first_item, items_of};
 use super::things::{offices, random_indoors};
 use crate::measure::point;
 use crate::rows::Figure;
@@ -26,7 +26,6 @@ const DEEP: usize = 16;
 /// Size of a picture whose pixels are rays.
 const PICTURE: [usize; 2] = [96, 72];
 
-const LAMPS: usize = 200;
 const SAMPLES: usize = 10_000_000;
 
 fn vector(rng: &mut Rng, reach: f64) -> DVec3 {
@@ -93,42 +92,6 @@ fn is_inside(opening: &enfilade::world::Opening, q: DVec3) -> bool {
     })
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Item {
-    Chunk(PartId, ChunkId),
-    Detail(PartId, DetailId),
-}
-
-/// Returns all triangles of all parts in their positions, as one model without cells.
-fn model(space: &Space, worlds: &[World]) -> (Bvh, Vec<Item>) {
-    let mut triangles: Vec<Triangle> = Vec::new();
-    let mut items = Vec::new();
-    for (part, world) in (0..).map(PartId).zip(worlds) {
-        let (sight, pose) = (space.sight(part), space.pose(part));
-        for (id, chunk) in (0..).map(ChunkId).zip(sight.chunks()) {
-            let positions = &world.batches[chunk.batch as usize].primitive.positions;
-            let first = chunk.first_index as usize;
-            let indices = &sight.indices(chunk.batch)[first..first + chunk.n_indices as usize];
-            for t in indices.chunks_exact(3) {
-                triangles.push([0, 1, 2].map(|k| pose.point(point(positions[t[k] as usize]))));
-                items.push(Item::Chunk(part, id));
-            }
-        }
-        for (id, object) in (0..).map(DetailId).zip(&world.details) {
-            let placement = pose.matrix() * object.placement();
-            for p in &world.detail_meshes[object.mesh as usize].primitives {
-                for t in p.indices.chunks_exact(3) {
-                    let corner =
-                        |k: usize| placement.transform_point3(point(p.positions[t[k] as usize]));
-                    triangles.push([0, 1, 2].map(corner));
-                    items.push(Item::Detail(part, id));
-                }
-            }
-        }
-    }
-    (Bvh::build(&triangles), items)
-}
-
 /// Counts pixels of views from rooms nested 16 deep whose first hit, in the whole model at that time, is not in the
 /// answer.
 pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
@@ -141,6 +104,8 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
     for world in &worlds[1..] {
         host = space.add_part(world.clone(), host, Pose::IDENTITY)?;
     }
+    let parts = (0..worlds.len() as u32).map(PartId);
+    let solids: Vec<(PartId, Solid)> = parts.map(|p| (p, Solid::of(&space, p))).collect();
     let mut viewer = SpaceViewer::new(&space);
     let mut rng = Rng::new(1);
     let (mut n_lost, mut n_hits, mut n_parts) = (0_usize, 0_usize, 0_usize);
@@ -149,7 +114,6 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
             let pose = pose_within(&mut rng, &worlds[k], &worlds[k - 1]);
             space.set_pose(PartId(k as u32), pose)?;
         }
-        let (bvh, items) = model(&space, &worlds);
         let frame = PartId(rng.below(worlds.len()) as u32);
         let [low, high] = worlds[frame.0 as usize].graph.cells[0].aabb.map(point);
         let eye = DVec3::from_array([0, 1, 2].map(|k| rng.range(low[k], high[k]))).as_vec3();
@@ -158,28 +122,19 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
         let aspect = PICTURE[0] as f32 / PICTURE[1] as f32;
         let view = View::perspective(eye.to_array(), toward.to_array(), up, 1.1, aspect)?;
         let seen = viewer.see(&space, frame, &view);
-        let mut known = std::collections::HashSet::new();
-        for (part, seen) in seen.parts() {
-            n_parts += 1;
-            known.extend(seen.chunks().iter().map(|c| Item::Chunk(part, *c)));
-            known.extend(seen.details().iter().map(|d| Item::Detail(part, *d)));
-        }
+        let known = items_of(&seen);
+        n_parts += seen.parts().count();
         let forward = toward.as_dvec3().normalize();
         let right = forward.cross(DVec3::Y).normalize();
         let (up, tan) = (right.cross(forward), 0.55_f64.tan());
-        let pose = space.pose(frame);
         for i in 0..PICTURE[0] * PICTURE[1] {
             let [x, y] = [(i % PICTURE[0], 0), (i / PICTURE[0], 1)]
                 .map(|(i, k)| (i as f64 + 0.5) / PICTURE[k] as f64 * 2.0 - 1.0);
             let direction = forward + right * (x * tan * f64::from(aspect)) + up * (y * tan);
-            let ray = Ray {
-                origin: pose.point(eye.as_dvec3()),
-                direction: pose.direction(direction),
-                t_max: f64::INFINITY,
-            };
-            if let Some(hit) = bvh.closest_hit(&ray, |_| false) {
+            let line = [eye.as_dvec3(), direction];
+            if let Some(item) = first_item(&space, &solids, frame, line) {
                 n_hits += 1;
-                n_lost += usize::from(!known.contains(&items[hit.triangle as usize]));
+                n_lost += usize::from(!known.contains(&item));
             }
         }
     }
@@ -246,38 +201,22 @@ pub(super) fn lamps(scene: &str) -> anyhow::Result<Figure> {
         space.close(PartId::ROOT, portal);
     }
     let lines = Sightlines::build(&world);
-    let mut rng = Rng::new(2);
-    let mut lights = Lights::new(&space);
-    let mut lamps = Vec::new();
-    for _ in 0..LAMPS {
-        let lamp = Lamp {
-            frame: PartId::ROOT,
-            at: random_indoors(&space, &mut rng).as_vec3().to_array(),
-            range: rng.range(2.0, 12.0) as f32,
-        };
-        lights.add(&space, lamp)?;
-        lamps.push(lamp);
-    }
     let state = space.state(PartId::ROOT);
-    let (mut n_lit, mut n_lost, mut n_known) = (0_usize, 0_usize, 0_usize);
-    for _ in 0..SAMPLES {
-        let k = rng.below(LAMPS);
-        let at = point(lamps[k].at);
-        // Within its range, so that most samples matter.
-        let p = at + rng.turn() * DVec3::X * f64::from(lamps[k].range) * rng.unit();
-        let Some(place) = space.locate(PartId::ROOT, p) else {
-            continue;
-        };
-        let may = lights.may_light(&space, LampId(k as u32), place, p);
-        n_known += usize::from(may);
-        // And slightly beyond: by rounding, a point on a wall may be on either side.
-        let beyond =
-            p + (p - at).normalize_or_zero() * 8.0 * space.layout(PartId::ROOT).tolerance();
-        if lines.is_clear(state, lamps[k].at, beyond.as_vec3().to_array()) {
-            n_lit += 1;
-            n_lost += usize::from(!may);
-        }
-    }
+    let lit = Lit::sampled(
+        &space,
+        SAMPLES,
+        |rng| random_indoors(&space, rng),
+        |at, beyond| {
+            let [at, beyond] = [at, beyond].map(|p| p.as_vec3().to_array());
+            lines.is_clear(state, at, beyond)
+        },
+    )?;
+    let Lit {
+        n_lit,
+        n_lost,
+        n_known,
+        ..
+    } = lit;
     ensure!(n_lit > 0, "no sample was lit");
     let note = format!(
         "of {n_lit} lit samples of {SAMPLES}; {n_known} are reported as lit, {:.2} × as many",

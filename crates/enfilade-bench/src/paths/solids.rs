@@ -1,10 +1,13 @@
 //! All triangles of parts, without cells, each with what it belongs to.
 
-use crate::measure::point;
+use std::collections::HashSet;
+
 use enfilade::World;
-use enfilade::geom::{Aabb, Bvh, DVec3, Triangle};
+use enfilade::geom::{Aabb, Bvh, DVec3, Ray, Triangle};
 use enfilade::runtime::{ChunkId, DetailId};
-use enfilade::world::{PartId, Space};
+use enfilade::world::{PartId, Space, SpaceSeen};
+
+use crate::measure::point;
 
 /// A chunk or an object of a part.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
@@ -47,6 +50,40 @@ impl Solid {
     pub(super) fn is_free(&self, bounds: &Aabb) -> bool {
         !self.tree.any_in_box(bounds, |_| true)
     }
+}
+
+/// Returns the item that a ray, given by origin and direction in the frame of a part, meets first among all parts.
+pub(super) fn first_item(
+    space: &Space,
+    solids: &[(PartId, Solid)],
+    frame: PartId,
+    [origin, direction]: [DVec3; 2],
+) -> Option<(PartId, PartItem)> {
+    let mut best = (f64::INFINITY, None);
+    for (part, solid) in solids {
+        let to = space.between(frame, *part);
+        let ray = Ray {
+            origin: to.point(origin),
+            direction: to.direction(direction),
+            t_max: best.0,
+        };
+        if let Some(hit) = solid.tree.closest_hit(&ray, |_| false)
+            && hit.t < best.0
+        {
+            best = (hit.t, Some((*part, solid.items[hit.triangle as usize])));
+        }
+    }
+    best.1
+}
+
+/// Returns all that a view answers.
+pub(super) fn items_of(seen: &SpaceSeen<'_>) -> HashSet<(PartId, PartItem)> {
+    let mut known = HashSet::new();
+    for (part, seen) in seen.parts() {
+        known.extend(seen.chunks().iter().map(|c| (part, PartItem::Chunk(*c))));
+        known.extend(seen.details().iter().map(|d| (part, PartItem::Detail(*d))));
+    }
+    known
 }
 
 /// Returns the box of a cabin's room and of its walls.

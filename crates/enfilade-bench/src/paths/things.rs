@@ -4,18 +4,15 @@
 use std::time::Instant;
 
 use anyhow::Context;
-use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::geom::{Aabb, DVec3, Sets};
 use enfilade::runtime::{Sight, SightOptions, SightState, View, Viewer};
-use enfilade::world::{
-    Flood, Layout, PartId, Place, Pose, Posted, Shape, Space, SpaceViewer, Things, Tie,
-};
-use enfilade::{CellId, PortalId, World};
+use enfilade::world::{Flood, PartId, Place, Pose, Posted, Shape, Space, SpaceViewer, Things, Tie};
+use enfilade::{CellId, World};
 use enfilade_render::walk;
-use enfilade_testkit::oracle::{ball_meets, box_meets};
 use enfilade_testkit::{GridParams, Rng, dirkse_maze, room_grid};
 
-use crate::rows::Figure;
+use super::gaps::{gaps_of, joined};
+use crate::rows::{Figure, baked};
 
 /// Number of random shapes, and of steps of a thing.
 const SHAPES: usize = 1_000_000;
@@ -52,8 +49,11 @@ pub(super) fn random_indoors(space: &Space, rng: &mut Rng) -> DVec3 {
 /// Counts shapes whose flood differs from the cells that the openings they meet join to their own, computed by other
 /// code.
 pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
-    let space = Space::new(offices(scene)?)?;
+    let world = offices(scene)?;
+    let gaps = gaps_of(&world);
+    let space = Space::new(world)?;
     let layout = space.layout(PartId::ROOT);
+    let n_cells = layout.n_cells();
     let mut flood = Flood::default();
     let mut rng = Rng::new(1);
     let (mut n_wrong, mut n_several) = (0, 0);
@@ -72,8 +72,8 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
         let start = layout.locate(pose.at).context("an air point")?;
         // An opening within rounding may count as met or not.
         let margin = 4.0 * layout.tolerance();
-        let mut least = joined(layout, half, is_ball, &pose);
-        let mut most = joined(layout, half + margin, is_ball, &pose);
+        let mut least = joined(&gaps, n_cells, (half, is_ball), &pose);
+        let mut most = joined(&gaps, n_cells, (half + margin, is_ball), &pose);
         let place = Place {
             part: PartId::ROOT,
             cell: start,
@@ -81,7 +81,7 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
         let posted = Posted::new(&shape, PartId::ROOT, &pose);
         let reached = flood.reach(&space, place, &posted, |_, _| true);
         let is_in = |sets: &mut Sets, cell: u32| sets.find(cell) == sets.find(start.0);
-        let n_least = (0..layout.n_cells() as u32)
+        let n_least = (0..n_cells as u32)
             .filter(|c| is_in(&mut least, *c))
             .count();
         let known = reached.iter().filter(|p| is_in(&mut least, p.cell.0));
@@ -92,29 +92,6 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
     }
     let note = format!("of {SHAPES} balls and boxes, {n_several} in several cells");
     Ok(Figure::new(n_wrong as f64, 0.0, note))
-}
-
-/// Returns the sets of cells joined by openings that a ball or box meets.
-fn joined(layout: &Layout, half: DVec3, is_ball: bool, pose: &Pose) -> Sets {
-    let mut sets = Sets::new(layout.n_cells());
-    for portal in (0..layout.n_portals() as u32).map(PortalId) {
-        let opening = layout.opening(portal);
-        if opening.center().distance(pose.at) > opening.radius() + half.length() {
-            continue;
-        }
-        let is_met = opening.pieces().any(|piece| {
-            if is_ball {
-                ball_meets(half.x, pose.at, piece)
-            } else {
-                box_meets(half, pose.turn, pose.at, piece)
-            }
-        });
-        if is_met {
-            let [a, b] = opening.cells();
-            sets.join(a.0, b.0);
-        }
-    }
-    sets
 }
 
 /// Walks a thing of 0.3 m and counts steps after which its cell differs from the locator's.
@@ -242,9 +219,7 @@ impl Steps {
 
 /// Measures the largest share of all triangles that a view of the maze with four ghosts processes, in percent.
 pub(super) fn maze(_: &str) -> anyhow::Result<Figure> {
-    let scene = dirkse_maze(1).scene;
-    let context = BakeContext::new(&Silent, None);
-    let world = bake(&scene, &BakeConfig::default(), &context)?.world;
+    let world = baked(&dirkse_maze(1).scene)?;
     let space = Space::new(world.clone())?;
     let root = PartId::ROOT;
     // One triangle per chunk, as Dirkse counts.

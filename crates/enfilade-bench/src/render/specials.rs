@@ -18,6 +18,7 @@ use enfilade_testkit::{
     Chain, GridParams, Rng, Traced, TracedCamera, painted, room_grid, with_specials,
 };
 
+use crate::measure::point;
 use crate::rows::Figure;
 
 /// Views of a generated world.
@@ -138,10 +139,6 @@ fn add(world: &mut World, portal: PortalId, cell: CellId, passes: Vec<Pass>) {
         shape: SpecialShape::Portal(portal),
         passes,
     });
-}
-
-fn point(p: [f32; 3]) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
 }
 
 /// Returns upright, rectangular openings between rooms, evenly from all without leaves, or, if these are few, from all.

@@ -13,6 +13,7 @@ use enfilade_testkit::{
     GridParams, Rng, endless_room, linked_copies, room_grid, traced_step, with_specials,
 };
 
+use crate::measure::point;
 use crate::rows::Figure;
 
 const ROOT: PartId = PartId::ROOT;
@@ -21,10 +22,6 @@ const N_STEPS: usize = 1_000_000;
 /// Doorways of a building, and bodies at each.
 const N_DOORWAYS: usize = 8;
 const N_BODIES: usize = 4_000;
-
-fn point(p: [f32; 3]) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
-}
 
 fn random_axis(rng: &mut Rng) -> DVec3 {
     let v = DVec3::from_array([0, 1, 2].map(|_| rng.range(-1.0, 1.0)));

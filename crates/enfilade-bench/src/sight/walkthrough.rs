@@ -18,6 +18,7 @@ use enfilade_render::{
 };
 use enfilade_testkit::{TowerParams, clinic, office_tower};
 
+use crate::rows::baked;
 use crate::table::Table;
 
 /// Scenes and modes of the walk.
@@ -76,9 +77,7 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
     }
     if let Some(rooms) = args.tower {
         let scene = office_tower(&TowerParams::with_rooms(rooms, 1)).scene;
-        let context = BakeContext::new(&Silent, None);
-        let baked = bake(&scene, &BakeConfig::default(), &context)?;
-        worlds.push((format!("office tower of {rooms} rooms"), baked.world));
+        worlds.push((format!("office tower of {rooms} rooms"), baked(&scene)?));
     }
     if let Some(polygons) = args.clinic {
         let scene = clinic(polygons, 1);

@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::{Cell, World};
 use enfilade::geom::scene::{Object, Role, Scene};
 use enfilade::geom::{Aabb, DMat4, DVec3};
@@ -13,7 +12,7 @@ use enfilade_testkit::hills;
 use super::growth::{Used, bake_tower, used_by};
 use crate::measure::files_of;
 use crate::process::{bake_command, target_dir};
-use crate::rows::{Figure, folder_of};
+use crate::rows::{Figure, baked, folder_of};
 
 /// Bars of the issue for wall time and memory. [Units: s, bytes]
 const SECONDS: [(&str, f64); 3] = [("tower-1024", 6.0), ("tower-10240", 75.0), ("clinic", 10.0)];
@@ -123,11 +122,6 @@ pub(super) fn seconds_on_land(alone: &World, scene: &str) -> anyhow::Result<Figu
         SECONDS_ON_LAND,
         "a square kilometer of land",
     ))
-}
-
-fn baked(scene: &Scene) -> anyhow::Result<World> {
-    let context = BakeContext::new(&Silent, None);
-    Ok(bake(scene, &BakeConfig::default(), &context)?.world)
 }
 
 fn lost(alone: &World, scene: &str, places: &[DVec3]) -> anyhow::Result<Figure> {

@@ -31,20 +31,20 @@ const TOWNS: &[&str] = &["offices-1000"];
 const LARGE: &[&str] = &["offices-10000"];
 
 pub(crate) const ROWS: &[Row] = &[
-    Row::made("settled", TOWNS, settled::settled_in),
+    Row::built("settled", TOWNS, site::offices, settled::settled),
     Row::baked("settled", BUILDINGS, settled::settled),
-    Row::made("no pops", TOWNS, pops::pops_in),
+    Row::built("no pops", TOWNS, site::offices, pops::pops),
     Row::baked("no pops", BUILDINGS, pops::pops),
-    Row::made("bytes: radius", TOWNS, pops::radius_in),
+    Row::built("bytes: radius", TOWNS, site::offices, pops::radius),
     Row::baked("bytes: radius", BUILDINGS, pops::radius),
-    Row::made("bytes: reached", TOWNS, pops::reached_in),
+    Row::built("bytes: reached", TOWNS, site::offices, pops::reached),
     Row::baked("bytes: reached", BUILDINGS, pops::reached),
-    Row::made("eviction: Belady", TOWNS, eviction::belady_in),
+    Row::built("eviction: Belady", TOWNS, site::offices, eviction::belady),
     Row::baked("eviction: Belady", BUILDINGS, eviction::belady),
-    Row::made("eviction: peers", TOWNS, eviction::peers_in),
+    Row::built("eviction: peers", TOWNS, site::offices, eviction::peers),
     Row::baked("eviction: peers", BUILDINGS, eviction::peers),
     Row::made("budget", &["random"], budget::budget),
-    Row::made("faults", TOWNS, settled::faults_in),
+    Row::built("faults", TOWNS, site::offices, settled::faults),
     Row::baked("faults", BUILDINGS, settled::faults),
     Row::baked(
         "first picture",

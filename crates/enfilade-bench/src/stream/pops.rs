@@ -12,7 +12,7 @@ use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 
 use super::replay::{Outcome, frame_of, replay};
-use super::site::{Recorder, Recording, Streamed, offices, route};
+use super::site::{Recorder, Recording, Streamed, route};
 use crate::rows::Figure;
 
 const LATENCY: Duration = Duration::from_millis(50);
@@ -186,22 +186,10 @@ pub(super) fn pops(world: &World) -> anyhow::Result<Figure> {
     pops_of(&Streamed::of(world)?)
 }
 
-pub(super) fn pops_in(scene: &str) -> anyhow::Result<Figure> {
-    pops(&offices(scene)?)
-}
-
 pub(super) fn radius(world: &World) -> anyhow::Result<Figure> {
     radius_of(&Streamed::of(world)?)
 }
 
-pub(super) fn radius_in(scene: &str) -> anyhow::Result<Figure> {
-    radius(&offices(scene)?)
-}
-
 pub(super) fn reached(world: &World) -> anyhow::Result<Figure> {
     reached_of(&Streamed::of(world)?)
-}
-
-pub(super) fn reached_in(scene: &str) -> anyhow::Result<Figure> {
-    reached(&offices(scene)?)
 }

@@ -12,7 +12,7 @@ use enfilade::stream::{
 };
 use enfilade_testkit::Rng;
 
-use super::site::{FRAME, Recorder, Streamed, offices};
+use super::site::{FRAME, Recorder, Streamed};
 use crate::rows::Figure;
 
 const VIEWS: usize = 1000;
@@ -197,12 +197,4 @@ pub(super) fn faults(world: &World) -> anyhow::Result<Figure> {
              {n_told} failures told"
     );
     Ok(Figure::new(value, 0.0, note))
-}
-
-pub(super) fn settled_in(scene: &str) -> anyhow::Result<Figure> {
-    settled(&offices(scene)?)
-}
-
-pub(super) fn faults_in(scene: &str) -> anyhow::Result<Figure> {
-    faults(&offices(scene)?)
 }

@@ -11,6 +11,8 @@ use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
+use crate::measure::point;
+
 /// Length of a frame.
 pub(super) const FRAME: Duration = Duration::from_micros(16_667);
 
@@ -222,7 +224,6 @@ pub(super) fn route(site: &Streamed, seed: u64, n_stretches: usize) -> anyhow::R
     let graph = &site.world.graph;
     let mut been = vec![0_u32; graph.cells.len()];
     let indoors: Vec<CellId> = graph.indoor_cells().map(|c| c.0).collect();
-    let point = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
     let is_free = |a: DVec3, b: DVec3| {
         let n = (a.distance(b) / 0.05).ceil().max(1.0) as u32;
         let at = |k| a.lerp(b, f64::from(k) / f64::from(n));

@@ -6,7 +6,6 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -23,7 +22,7 @@ use super::replay::frame_of;
 use super::settled::draw_stands;
 use super::site::{FRAME, Recorder, Streamed, offices, route, visible_sets};
 use crate::measure::memory;
-use crate::process::target_dir;
+use crate::process::{step, target_dir};
 use crate::rows::Figure;
 
 /// Triangles of the furnished town: 2 GB.
@@ -250,16 +249,11 @@ fn measured(scene: &str) -> anyhow::Result<&'static Value> {
     if FOUND.get().is_none() {
         let dir: PathBuf = target_dir().join("town");
         std::fs::create_dir_all(&dir)?;
-        let step = |name: &str| {
-            let mut command = Command::new(std::env::current_exe()?);
-            let out = command.args(["town", name, scene]).arg(&dir).output()?;
-            let said = String::from_utf8_lossy(&out.stderr);
-            ensure!(out.status.success(), "{name} {scene}: {said}");
-            Ok(out.stdout)
-        };
-        let found = step("make").and_then(|_| step("walk"));
+        let place = dir.display().to_string();
+        let run = |name: &str| step(&["town", name, scene, &place]);
+        let found = run("make").and_then(|_| run("walk"));
         std::fs::remove_dir_all(&dir)?;
-        let _ = FOUND.set(serde_json::from_slice(&found?)?);
+        let _ = FOUND.set(found?);
     }
     FOUND.get().context("no figures")
 }

@@ -3,8 +3,7 @@
 use anyhow::{Context, bail};
 use enfilade::import::{ImportOptions, Imported, decode_implicit};
 
-use super::baked;
-use crate::rows::Figure;
+use crate::rows::{Figure, baked};
 
 /// Share by which the evaluated points may grow when the volume around a surface grows 64 times.
 const MOST_GROWTH: f64 = 1.05;

@@ -10,8 +10,8 @@ use enfilade::geom::{Aabb, DVec3};
 use enfilade_testkit::surface_of;
 
 use super::implicit::{GYROID, HOUSE, read};
-use super::{baked, twins};
-use crate::rows::Figure;
+use super::twins;
+use crate::rows::{Figure, baked};
 
 /// Largest exponent of the time in the surface.
 const MOST_EXPONENT: f64 = 1.15;

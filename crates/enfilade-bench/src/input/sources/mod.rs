@@ -11,10 +11,6 @@ mod scan;
 mod twins;
 mod volume;
 
-use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
-use enfilade::cpg::World;
-use enfilade::geom::scene::Scene;
-
 use crate::rows::Row;
 
 /// Implicit scenes with as many rooms and openings as they were made with.
@@ -103,9 +99,3 @@ pub(crate) const ROWS: &[Row] = &[
     Row::made("land: visible share", CITIES, land::seen),
     Row::made("bad input", BAD, bad::not_refused),
 ];
-
-/// Bakes with default settings.
-fn baked(scene: &Scene) -> anyhow::Result<World> {
-    let context = BakeContext::new(&Silent, None);
-    Ok(bake(scene, &BakeConfig::default(), &context)?.world)
-}

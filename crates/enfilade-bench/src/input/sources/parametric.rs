@@ -7,8 +7,8 @@ use enfilade::cpg::World;
 use enfilade::geom::DMat4;
 use enfilade::import::{ArrayMesh, ImportOptions, decode_patches, import_arrays};
 
-use super::{baked, twins};
-use crate::rows::Figure;
+use super::twins;
+use crate::rows::{Figure, baked};
 
 /// Patches in JSON, and the same surfaces as triangles.
 #[derive(Default)]

@@ -13,9 +13,8 @@ use enfilade::import::{ImportOptions, decode_ply, import};
 use enfilade_testkit::Rng;
 use serde_json::{Value, json};
 
-use super::baked;
 use crate::rooms::score::{Score, inspect, list, score_world, text, vec3};
-use crate::rows::{Figure, folder_of};
+use crate::rows::{Figure, baked, folder_of};
 
 /// Bars of the issue: shares of rooms and of doors that are not found.
 const ROOMS: f64 = 0.15;

@@ -9,9 +9,8 @@ use enfilade::geom::{Aabb, Bvh, DVec3, Ray, closest_point_on_segment};
 use enfilade::import::{AirSide, ImportOptions, VolumeOptions, decode_volume, import};
 use enfilade_testkit::Rng;
 
-use super::baked;
 use crate::measure::files_of;
-use crate::rows::{Figure, folder_of};
+use crate::rows::{Figure, baked, folder_of};
 
 /// Enlargement that the importer gives to bodies: meters for a millimeter.
 const METERS: f64 = 0.128;

@@ -4,6 +4,8 @@ use enfilade::cpg::Portal;
 use enfilade::geom::DVec3;
 use enfilade_render::{Camera, Picture};
 
+use crate::measure::point;
+
 /// Pixels of a picture, rows from the top: `true` for those that count.
 pub(super) type Mask = Vec<bool>;
 
@@ -17,7 +19,6 @@ pub(super) fn portal_mask<'p>(
     let tan = f64::from((camera.fov_y * 0.5).tan());
     let aspect = f64::from(width) / f64::from(height);
     let [right, up, forward] = camera.axes().map(|a| a.as_dvec3());
-    let point = |p: [f32; 3]| DVec3::from(p.map(f64::from));
     let eye = point(camera.eye);
     let mut mask = vec![false; (width * height) as usize];
     for portal in portals {

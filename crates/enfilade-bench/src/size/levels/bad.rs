@@ -6,8 +6,8 @@ use enfilade::kit::{Assembly, Choice, Chosen, End, Kit, Piece, PlaceOptions, Spo
 use enfilade::world::Pose;
 use enfilade_testkit::dungeon_kit;
 
-use super::scenes::{baked, kit_of};
-use crate::rows::Figure;
+use super::scenes::kit_of;
+use crate::rows::{Figure, baked};
 
 /// Bad inputs that are taken, or refused in other words.
 pub(super) fn taken(_scene: &str) -> anyhow::Result<Figure> {

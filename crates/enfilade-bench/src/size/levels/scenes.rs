@@ -4,21 +4,16 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use anyhow::{Context, bail};
-use enfilade::World;
-use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::geom::scene::Scene;
 use enfilade::kit::{Assembly, Choice, Kit, Piece, generate};
 use enfilade_testkit::{PieceScene, dungeon_kit, maze_kit, office_kit};
+
+use crate::rows::baked;
 
 /// A level and the models of its pieces.
 pub(super) struct Level {
     pub(super) level: Assembly,
     models: Vec<PieceScene>,
-}
-
-pub(super) fn baked(scene: &Scene) -> anyhow::Result<World> {
-    let context = BakeContext::new(&Silent, None);
-    Ok(bake(scene, &BakeConfig::default(), &context)?.world)
 }
 
 pub(super) fn kit_of(models: &[PieceScene]) -> anyhow::Result<Kit> {

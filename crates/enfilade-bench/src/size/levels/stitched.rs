@@ -13,9 +13,9 @@ use enfilade::{World, save};
 use enfilade_testkit::Rng;
 use serde_json::Value;
 
-use super::scenes::{baked, level};
+use super::scenes::level;
 use crate::process::{binary, target_dir};
-use crate::rows::Figure;
+use crate::rows::{Figure, baked};
 
 /// Points that place a cell among those of the other world.
 const POINTS: usize = 60;

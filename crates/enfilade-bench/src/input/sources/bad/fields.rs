@@ -5,7 +5,7 @@ use std::io::Write as _;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::cases::{BadSource, cuts};
+use super::cases::{BadSource, Cases, table};
 use enfilade_testkit::Rng;
 
 const BALL: &str = r#"{"ball":{"at":[0,2,0],"radius":3}}"#;
@@ -14,126 +14,68 @@ fn scene(fields: &str) -> String {
     format!(r#"{{"enfilade":"implicit",{fields}}}"#)
 }
 
+/// Shapes by name.
+const SHAPES: &str = r#"
+a gyroid of nothing | {"gyroid":{"period":0,"at":[0,0,0]}}
+a fine gyroid | {"gyroid":{"period":1e-9,"at":[0,0,0]}}
+a thin shell | {"shell":{"of":{"ball":{"at":[0,0,0],"radius":3}},"thickness":1e-300}}
+grown to the moon | {"grow":{"of":{"ball":{"at":[0,0,0],"radius":3}},"by":1e300}}
+shrunk to nothing | {"grow":{"of":{"ball":{"at":[0,0,0],"radius":3}},"by":-9}}
+scaled to nothing | {"place":{"of":{"ball":{"at":[0,0,0],"radius":3}},"scale":0}}
+scaled by the least | {"place":{"of":{"ball":{"at":[0,0,0],"radius":3}},"scale":1e-308}}
+turned by the most | {"place":{"of":{"ball":{"at":[0,0,0],"radius":3}},"turn":[1e308,1e308,1e308]}}
+a box inside out | {"box":{"min":[3,3,3],"max":[0,0,0]}}
+a flat box | {"box":{"min":[0,0,0],"max":[3,0,3]}}
+a tube of one point | {"tube":{"points":[[0,0,0]],"radius":1}}
+a tube of equal points | {"tube":{"points":[[0,0,0],[0,0,0]],"radius":1}}
+a torus without an axis | {"torus":{"at":[0,0,0],"axis":[0,0,0],"radii":[3,1]}}
+a plane without an end | {"plane":{"at":[0,0,0],"normal":[0,1,0]}}
+a plane without a normal | {"plane":{"at":[0,0,0],"normal":[0,0,0]}}
+a union of nothing | {"union":[]}
+a smooth union by too much | {"smooth_union":{"by":1e300,"of":[{"ball":{"at":[0,0,0],"radius":3}},{"ball":{"at":[1,0,0],"radius":3}}]}}
+nothing in common | {"intersection":[{"ball":{"at":[0,0,0],"radius":1}},{"ball":{"at":[9,0,0],"radius":1}}]}
+not a shape | {"sphere":{"at":[0,0,0],"radius":3}}
+two shapes | {"ball":{"at":[0,0,0],"radius":3},"box":{"min":[0,0,0],"max":[1,1,1]}}
+"#;
+
 /// Steps, sizes and numbers out of all proportion, expressions without end, and text cut off.
 pub(super) fn implicit() -> Vec<BadSource> {
-    [sizes(), shapes(), endless(), texts()]
-        .into_iter()
-        .flatten()
-        .collect()
+    let mut all = Cases::new("json", &[]);
+    sizes(&mut all);
+    for (name, shape) in table(SHAPES) {
+        all.add(name, scene(&format!(r#""air":{shape}"#)));
+    }
+    endless(&mut all);
+    texts(&mut all);
+    all.all
 }
 
-fn sizes() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
+fn sizes(all: &mut Cases) {
     for step in [
         "0.0002", "1e-9", "1e-300", "0", "-1", "1e300", "1e999", "null", "\"a\"",
     ] {
-        add(
+        all.add(
             format!("step {step}"),
             scene(&format!(r#""step":{step},"air":{BALL}"#)),
         );
     }
     for radius in ["0", "-1", "1e-300", "1e9", "1e30", "1e308", "1e999", "[]"] {
         let ball = format!(r#"{{"ball":{{"at":[0,2,0],"radius":{radius}}}}}"#);
-        add(
+        all.add(
             format!("radius {radius}"),
             scene(&format!(r#""air":{ball}"#)),
         );
-        add(
+        all.add(
             format!("radius {radius}, step"),
             scene(&format!(r#""step":0.05,"air":{ball}"#)),
         );
     }
-    all
 }
 
-fn shapes() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
-    for (name, shape) in [
-        (
-            "a gyroid of nothing",
-            r#"{"gyroid":{"period":0,"at":[0,0,0]}}"#,
-        ),
-        (
-            "a fine gyroid",
-            r#"{"gyroid":{"period":1e-9,"at":[0,0,0]}}"#,
-        ),
-        (
-            "a thin shell",
-            r#"{"shell":{"of":{"ball":{"at":[0,0,0],"radius":3}},"thickness":1e-300}}"#,
-        ),
-        (
-            "grown to the moon",
-            r#"{"grow":{"of":{"ball":{"at":[0,0,0],"radius":3}},"by":1e300}}"#,
-        ),
-        (
-            "shrunk to nothing",
-            r#"{"grow":{"of":{"ball":{"at":[0,0,0],"radius":3}},"by":-9}}"#,
-        ),
-        (
-            "scaled to nothing",
-            r#"{"place":{"of":{"ball":{"at":[0,0,0],"radius":3}},"scale":0}}"#,
-        ),
-        (
-            "scaled by the least",
-            r#"{"place":{"of":{"ball":{"at":[0,0,0],"radius":3}},"scale":1e-308}}"#,
-        ),
-        (
-            "turned by the most",
-            r#"{"place":{"of":{"ball":{"at":[0,0,0],"radius":3}},"turn":[1e308,1e308,1e308]}}"#,
-        ),
-        (
-            "a box inside out",
-            r#"{"box":{"min":[3,3,3],"max":[0,0,0]}}"#,
-        ),
-        ("a flat box", r#"{"box":{"min":[0,0,0],"max":[3,0,3]}}"#),
-        (
-            "a tube of one point",
-            r#"{"tube":{"points":[[0,0,0]],"radius":1}}"#,
-        ),
-        (
-            "a tube of equal points",
-            r#"{"tube":{"points":[[0,0,0],[0,0,0]],"radius":1}}"#,
-        ),
-        (
-            "a torus without an axis",
-            r#"{"torus":{"at":[0,0,0],"axis":[0,0,0],"radii":[3,1]}}"#,
-        ),
-        (
-            "a plane without an end",
-            r#"{"plane":{"at":[0,0,0],"normal":[0,1,0]}}"#,
-        ),
-        (
-            "a plane without a normal",
-            r#"{"plane":{"at":[0,0,0],"normal":[0,0,0]}}"#,
-        ),
-        ("a union of nothing", r#"{"union":[]}"#),
-        (
-            "a smooth union by too much",
-            r#"{"smooth_union":{"by":1e300,"of":[{"ball":{"at":[0,0,0],"radius":3}},{"ball":{"at":[1,0,0],"radius":3}}]}}"#,
-        ),
-        (
-            "nothing in common",
-            r#"{"intersection":[{"ball":{"at":[0,0,0],"radius":1}},{"ball":{"at":[9,0,0],"radius":1}}]}"#,
-        ),
-        ("not a shape", r#"{"sphere":{"at":[0,0,0],"radius":3}}"#),
-        (
-            "two shapes",
-            r#"{"ball":{"at":[0,0,0],"radius":3},"box":{"min":[0,0,0],"max":[1,1,1]}}"#,
-        ),
-    ] {
-        add(name.into(), scene(&format!(r#""air":{shape}"#)));
-    }
-    all
-}
-
-fn endless() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
+fn endless(all: &mut Cases) {
     for depth in [65, 120, 1000, 200_000] {
         let text = format!("{}{BALL}{}", r#"{"not":"#.repeat(depth), "}".repeat(depth));
-        add(format!("{depth} deep"), scene(&format!(r#""air":{text}"#)));
+        all.add(format!("{depth} deep"), scene(&format!(r#""air":{text}"#)));
     }
     for n in [20_000, 99_000, 100_001] {
         let mut random = Rng::new(n as u64);
@@ -144,11 +86,11 @@ fn endless() -> Vec<BadSource> {
             })
             .collect();
         let near = near.join(",");
-        add(
+        all.add(
             format!("{n} balls at one place"),
             scene(&format!(r#""air":{{"union":[{near}]}}"#)),
         );
-        add(
+        all.add(
             format!("{n} smooth balls"),
             scene(&format!(
                 r#""step":0.01,"air":{{"smooth_union":{{"by":0.3,"of":[{near}]}}}}"#
@@ -162,23 +104,20 @@ fn endless() -> Vec<BadSource> {
         r#"{{"tube":{{"points":[{}],"radius":0.4}}}}"#,
         points.join(",")
     );
-    add(
-        "a tube of 90,000 points".into(),
+    all.add(
+        "a tube of 90,000 points",
         scene(&format!(r#""air":{tube}"#)),
     );
-    all
 }
 
-fn texts() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
-    add(
-        "air and matter".into(),
+fn texts(all: &mut Cases) {
+    all.add(
+        "air and matter",
         scene(&format!(r#""air":{BALL},"matter":{BALL}"#)),
     );
-    add("neither".into(), scene(r#""step":1"#));
-    add(
-        "an endless box".into(),
+    all.add("neither", scene(r#""step":1"#));
+    all.add(
+        "an endless box",
         scene(&format!(
             r#""box":[[-1e308,-1e308,-1e308],[1e308,1e308,1e308]],"air":{BALL}"#
         )),
@@ -187,10 +126,9 @@ fn texts() -> Vec<BadSource> {
     for n in 0..whole.len() {
         // The name alone tells no format.
         if n > 24 && n % 5 == 0 {
-            add(format!("cut after {n}"), whole[..n].into());
+            all.add(format!("cut after {n}"), &whole[..n]);
         }
     }
-    all
 }
 
 /// Contents of a header of NIfTI-1.
@@ -277,35 +215,29 @@ fn nrrd(head: &str, samples: &[u8]) -> Vec<u8> {
 
 /// Volumes cut off, of wrong sizes, without values, with more samples than there are, and of noise.
 pub(super) fn volumes() -> Vec<BadSource> {
-    [cut_off(), niftis(), values(), nrrds(), raws()]
-        .into_iter()
-        .flatten()
-        .collect()
+    let mut all = Cases::new("nii", &LEVEL);
+    cut_off(&mut all);
+    niftis(&mut all);
+    values(&mut all);
+    nrrds(&mut all);
+    raws(&mut all);
+    all.all
 }
 
-fn cut_off() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
+fn cut_off(all: &mut Cases) {
     let samples = ball(N);
     let good = Nifti::of([20; 3], F32).bytes(&samples);
     let zip = zipped(&good);
     let sized = nrrd("sizes: 20 20 20\nencoding: raw\nendian: little", &samples);
     for (ending, whole) in [("nii", &good), ("nii.gz", &zip), ("nrrd", &sized)] {
-        for cut in cuts(whole.len()) {
-            all.push(
-                BadSource::new(format!("{ending} cut after {cut}"), ending, &whole[..cut])
-                    .with(&LEVEL),
-            );
-        }
+        all.ending = ending;
+        all.cut(&format!("{ending} "), whole, |_| true);
     }
-    all
+    all.ending = "nii";
 }
 
-fn niftis() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
+fn niftis(all: &mut Cases) {
     let samples = ball(N);
-    let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(BadSource::new(name, ending, bytes).with(&LEVEL));
-    };
     for size in [
         [0; 3],
         [-1, 20, 20],
@@ -314,43 +246,35 @@ fn niftis() -> Vec<BadSource> {
         [20, 20, 21],
         [8000, 1, 1],
     ] {
-        add(
-            &format!("nii of {size:?}"),
-            "nii",
+        all.add(
+            format!("nii of {size:?}"),
             Nifti::of(size, F32).bytes(&samples),
         );
     }
     for kind in [0, 1, 32, 128, 1024, -7] {
-        add(
-            &format!("nii of type {kind}"),
-            "nii",
+        all.add(
+            format!("nii of type {kind}"),
             Nifti::of([20; 3], kind).bytes(&samples),
         );
     }
     for dims in [0, -1, 1, 4, 8, i16::MAX] {
         let mut head = Nifti::of([20; 3], F32);
         head.dims[0] = dims;
-        add(
-            &format!("nii of {dims} dimensions"),
-            "nii",
-            head.bytes(&samples),
-        );
+        all.add(format!("nii of {dims} dimensions"), head.bytes(&samples));
     }
     for spacing in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-30, 1e30] {
         let mut head = Nifti::of([20; 3], F32);
         head.spacing[1] = spacing;
-        add(
-            &format!("nii with a spacing of {spacing}"),
-            "nii",
+        all.add(
+            format!("nii with a spacing of {spacing}"),
             head.bytes(&samples),
         );
     }
     for offset in [0.0, -1.0, f32::NAN, 1e30, 8000.0] {
         let mut head = Nifti::of([20; 3], F32);
         head.offset = offset;
-        add(
-            &format!("nii with an offset of {offset}"),
-            "nii",
+        all.add(
+            format!("nii with an offset of {offset}"),
             head.bytes(&samples),
         );
     }
@@ -362,20 +286,11 @@ fn niftis() -> Vec<BadSource> {
     ] {
         let mut head = Nifti::of([20; 3], F32);
         head.scale = scale;
-        add(
-            &format!("nii scaled by {scale:?}"),
-            "nii",
-            head.bytes(&samples),
-        );
+        all.add(format!("nii scaled by {scale:?}"), head.bytes(&samples));
     }
-    all
 }
 
-fn values() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(BadSource::new(name, ending, bytes).with(&LEVEL));
-    };
+fn values(all: &mut Cases) {
     let cube = N * N * N;
     for (name, values) in [
         ("all NaN", floats(cube, |_| f32::NAN)),
@@ -399,15 +314,14 @@ fn values() -> Vec<BadSource> {
             floats(cube, |i| if i % 2 == 0 { 1e-45 } else { -1e-45 }),
         ),
     ] {
-        add(name, "nii", Nifti::of([20; 3], F32).bytes(&values));
+        all.add(name, Nifti::of([20; 3], F32).bytes(&values));
     }
     let mut random = Rng::new(7);
     for edge in [60_i16, 160] {
         let n = edge as usize;
         let noise = floats(n * n * n, |_| random.unit() as f32 - 0.5);
-        add(
-            &format!("noise of {edge} samples"),
-            "nii",
+        all.add(
+            format!("noise of {edge} samples"),
             Nifti::of([edge; 3], F32).bytes(&noise),
         );
     }
@@ -418,20 +332,13 @@ fn values() -> Vec<BadSource> {
     for _ in 0..1000 {
         let _ = bomb.write_all(&vec![0_u8; 1_000_000]);
     }
-    add(
-        "1e9 samples of nothing",
-        "nii.gz",
-        bomb.finish().unwrap_or_default(),
-    );
-    all
+    all.ending = "nii.gz";
+    all.add("1e9 samples of nothing", bomb.finish().unwrap_or_default());
 }
 
-fn nrrds() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
+fn nrrds(all: &mut Cases) {
+    all.ending = "nrrd";
     let samples = ball(N);
-    let mut add = |name: &str, ending: &str, bytes: Vec<u8>| {
-        all.push(BadSource::new(name, ending, bytes).with(&LEVEL));
-    };
     for head in [
         "sizes: 1000 1000 1000\nencoding: raw\nendian: little",
         "sizes: 1000000 1000000 1000000\nencoding: raw\nendian: little",
@@ -448,22 +355,19 @@ fn nrrds() -> Vec<BadSource> {
         "sizes: 20 20 20\nencoding: raw\ndata file: ../../../../../../etc/passwd",
         "encoding: raw\nendian: little",
     ] {
-        add(
-            &format!("nrrd {}", head.replace('\n', ", ")),
-            "nrrd",
+        all.add(
+            format!("nrrd {}", head.replace('\n', ", ")),
             nrrd(head, &samples),
         );
     }
-    all
 }
 
-fn raws() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
+fn raws(all: &mut Cases) {
     let samples = ball(N);
     let mut raw = |name: &str, fields: &str| {
         let head = format!(r#"{{"enfilade":"volume","file":"case.raw",{fields}}}"#);
         let case = BadSource::new(format!("raw: {name}"), "json", head).with(&LEVEL);
-        all.push(case.beside("case.raw", samples.clone()));
+        all.all.push(case.beside("case.raw", samples.clone()));
     };
     for size in [
         "[20,20,21]",
@@ -495,5 +399,4 @@ fn raws() -> Vec<BadSource> {
         "other file",
         r#""size":[20,20,20],"type":"float32","file":"none.raw""#,
     );
-    all
 }

@@ -6,7 +6,7 @@ use enfilade_testkit::Rng;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::cases::{BadSource, cuts};
+use super::cases::{BadSource, Cases};
 
 const OPTIONS: [&str; 4] = ["--cell", "1", "--heights", "0,10"];
 
@@ -75,7 +75,18 @@ fn tiff([w, h]: [u32; 2], samples: &[f32], other: &[[u32; 4]]) -> Vec<u8> {
 }
 
 pub(super) fn cases() -> Vec<BadSource> {
-    [pngs(), tiffs(), cut_off()].into_iter().flatten().collect()
+    let mut all = Cases::new("png", &OPTIONS);
+    pngs(&mut all);
+    all.ending = "tif";
+    tiffs(&mut all);
+    let good = png([20, 20], 8, 0, &rows(20, 20));
+    all.ending = "png";
+    all.cut("png ", &good, |c| c >= 12);
+    all.ending = "tif";
+    all.cut("tif ", &tiff([20, 20], &slope(), &[]), |c| c >= 12);
+    all.all
+        .push(BadSource::new("png without options", "png", good));
+    all.all
 }
 
 fn field(n: usize, of: impl Fn(usize) -> f32) -> Vec<f32> {
@@ -94,11 +105,7 @@ fn slope() -> Vec<f32> {
     field(400, |i| (i % 20) as f32)
 }
 
-fn pngs() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
-        all.push(BadSource::new(name, ending, bytes).with(&OPTIONS));
-    };
+fn pngs(all: &mut Cases) {
     for size in [
         [0, 0],
         [0, 20],
@@ -111,11 +118,7 @@ fn pngs() -> Vec<BadSource> {
         [8192, 8192],
         [20, 21],
     ] {
-        add(
-            format!("png of {size:?}"),
-            "png",
-            png(size, 8, 0, &rows(20, 20)),
-        );
+        all.add(format!("png of {size:?}"), png(size, 8, 0, &rows(20, 20)));
     }
     for (depth, color) in [
         (0, 0),
@@ -127,16 +130,14 @@ fn pngs() -> Vec<BadSource> {
         (255, 0),
         (8, 255),
     ] {
-        add(
+        all.add(
             format!("png of {depth} bits, color {color}"),
-            "png",
             png([20, 20], depth, color, &rows(20, 20)),
         );
     }
     // Rows of nothing, packed a thousandfold.
-    add(
-        "png of 67 million samples of nothing".into(),
-        "png",
+    all.add(
+        "png of 67 million samples of nothing",
         png([8192, 8192], 8, 0, &vec![0; 8193 * 8192]),
     );
     let mut rng = Rng::new(3);
@@ -146,19 +147,10 @@ fn pngs() -> Vec<BadSource> {
         .enumerate()
         .filter(|(i, _)| i % 2050 != 0)
         .for_each(|(_, b)| *b = rng.below(256) as u8);
-    add(
-        "png of noise".into(),
-        "png",
-        png([2049, 2049], 8, 0, &noise),
-    );
-    all
+    all.add("png of noise", png([2049, 2049], 8, 0, &noise));
 }
 
-fn tiffs() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
-        all.push(BadSource::new(name, ending, bytes).with(&OPTIONS));
-    };
+fn tiffs(all: &mut Cases) {
     let slope = slope();
     for size in [
         [0, 0],
@@ -170,7 +162,7 @@ fn tiffs() -> Vec<BadSource> {
         [u32::MAX, u32::MAX],
         [8192, 8192],
     ] {
-        add(format!("tiff of {size:?}"), "tif", tiff(size, &slope, &[]));
+        all.add(format!("tiff of {size:?}"), tiff(size, &slope, &[]));
     }
     for entry in [
         [258, 3, 1, 0],
@@ -200,9 +192,8 @@ fn tiffs() -> Vec<BadSource> {
         [34735, 3, 1 << 31, 8],
         [42113, 2, 1 << 31, 8],
     ] {
-        add(
+        all.add(
             format!("tiff with {entry:?}"),
-            "tif",
             tiff([20, 20], &slope, &[entry]),
         );
     }
@@ -231,27 +222,6 @@ fn tiffs() -> Vec<BadSource> {
             field(400, |i| if i % 2 == 0 { 9e5 } else { -9e5 }),
         ),
     ] {
-        add(format!("tiff {name}"), "tif", tiff([20, 20], &samples, &[]));
+        all.add(format!("tiff {name}"), tiff([20, 20], &samples, &[]));
     }
-    all
-}
-
-fn cut_off() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, ending: &str, bytes: Vec<u8>| {
-        all.push(BadSource::new(name, ending, bytes).with(&OPTIONS));
-    };
-    let good = png([20, 20], 8, 0, &rows(20, 20));
-    let whole = tiff([20, 20], &slope(), &[]);
-    for (ending, whole) in [("png", &good), ("tif", &whole)] {
-        for cut in cuts(whole.len()).into_iter().filter(|&c| c >= 12) {
-            add(
-                format!("{ending} cut after {cut}"),
-                ending,
-                whole[..cut].to_vec(),
-            );
-        }
-    }
-    all.push(BadSource::new("png without options", "png", good));
-    all
 }

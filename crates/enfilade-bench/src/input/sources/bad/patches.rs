@@ -2,24 +2,46 @@
 
 use enfilade_testkit::Rng;
 
-use super::cases::{BadSource, cuts};
+use super::cases::{BadSource, Cases, table};
 
 const POINTS: &str = "[[[0,0,0],[2,3,0],[4,0,0]],[[0,0,6],[2,3,6],[4,0,6]]]";
+
+/// Nets of points.
+const NETS: &str = "
+none | []
+rows of none | [[],[]]
+uneven rows | [[[0,0,0],[2,3,0],[4,0,0]],[[0,0,6]]]
+all the same | [[[1,1,1],[1,1,1],[1,1,1]],[[1,1,1],[1,1,1],[1,1,1]]]
+in a line | [[[0,0,0],[1,0,0],[2,0,0]],[[0,0,0],[1,0,0],[2,0,0]]]
+";
+/// Changes of [`POINTS`].
+const CHANGES: &str = "
+not finite | 6 to 1e999
+no numbers | 6 to null
+far apart | 6 to 1e8
+farther apart | 6 to 1e300
+far up | 2,3 to 2,9e8
+of no weight | 2,3,0 to 2,3,0,0
+of negative weight | 2,3,0 to 2,3,0,-1
+of all weight | 2,3,0 to 2,3,0,1e300
+of five numbers | 2,3,0 to 2,3,0,1,1
+";
 
 fn patch(fields: &str) -> String {
     format!(r#"{{"enfilade":"patches","patches":[{{{fields}}}]}}"#)
 }
 
 pub(super) fn cases() -> Vec<BadSource> {
-    [numbers(), many(), loops(), objs()]
-        .into_iter()
-        .flatten()
-        .collect()
+    let mut all = Cases::new("json", &[]);
+    numbers(&mut all);
+    many(&mut all);
+    loops(&mut all);
+    all.ending = "obj";
+    objs(&mut all);
+    all.all
 }
 
-fn numbers() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
+fn numbers(all: &mut Cases) {
     for degrees in [
         "[0,0]",
         "[2]",
@@ -30,7 +52,7 @@ fn numbers() -> Vec<BadSource> {
         "[3,1]",
         "null",
     ] {
-        add(
+        all.add(
             format!("degrees {degrees}"),
             patch(&format!(r#""degrees":{degrees},"points":{POINTS}"#)),
         );
@@ -47,44 +69,22 @@ fn numbers() -> Vec<BadSource> {
         "[[0,0,0,null,1,1],[0,0,1,1]]",
     ] {
         let fields = format!(r#""degrees":[2,1],"points":{POINTS},"knots":{knots}"#);
-        add(format!("knots {knots}"), patch(&fields));
+        all.add(format!("knots {knots}"), patch(&fields));
     }
-    for (name, points) in [
-        ("none", "[]".to_owned()),
-        ("rows of none", "[[],[]]".to_owned()),
-        (
-            "uneven rows",
-            "[[[0,0,0],[2,3,0],[4,0,0]],[[0,0,6]]]".to_owned(),
-        ),
-        (
-            "all the same",
-            "[[[1,1,1],[1,1,1],[1,1,1]],[[1,1,1],[1,1,1],[1,1,1]]]".to_owned(),
-        ),
-        (
-            "in a line",
-            "[[[0,0,0],[1,0,0],[2,0,0]],[[0,0,0],[1,0,0],[2,0,0]]]".to_owned(),
-        ),
-        ("not finite", POINTS.replace('6', "1e999")),
-        ("no numbers", POINTS.replace('6', "null")),
-        ("far apart", POINTS.replace('6', "1e8")),
-        ("farther apart", POINTS.replace('6', "1e300")),
-        ("far up", POINTS.replace("2,3", "2,9e8")),
-        ("of no weight", POINTS.replace("2,3,0", "2,3,0,0")),
-        ("of negative weight", POINTS.replace("2,3,0", "2,3,0,-1")),
-        ("of all weight", POINTS.replace("2,3,0", "2,3,0,1e300")),
-        ("of five numbers", POINTS.replace("2,3,0", "2,3,0,1,1")),
-    ] {
-        add(
-            format!("points: {name}"),
-            patch(&format!(r#""degrees":[2,1],"points":{points}"#)),
-        );
+    let points = |all: &mut Cases, name: &str, points: &str| {
+        let fields = format!(r#""degrees":[2,1],"points":{points}"#);
+        all.add(format!("points: {name}"), patch(&fields));
+    };
+    for (name, text) in table(NETS) {
+        points(all, name, text);
     }
-    all
+    for (name, change) in table(CHANGES) {
+        let (from, to) = change.split_once(" to ").unwrap_or_default();
+        points(all, name, &POINTS.replace(from, to));
+    }
 }
 
-fn many() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
+fn many(all: &mut Cases) {
     let mut rng = Rng::new(5);
     for n in [40, 250] {
         let mut row = || {
@@ -102,14 +102,11 @@ fn many() -> Vec<BadSource> {
         };
         let rows: Vec<String> = (0..n).map(|_| row()).collect();
         let fields = format!(r#""degrees":[3,3],"points":[{}]"#, rows.join(","));
-        add(format!("{n} × {n} points at random"), patch(&fields));
+        all.add(format!("{n} × {n} points at random"), patch(&fields));
     }
-    all
 }
 
-fn loops() -> Vec<BadSource> {
-    let mut all: Vec<BadSource> = Vec::new();
-    let mut add = |name: String, text: String| all.push(BadSource::new(name, "json", text));
+fn loops(all: &mut Cases) {
     let bow = |by: f64| format!("[[0.2,0.2],[{by},0.8],[0.8,0.2],[0.2,{by}],[0.2,0.2]]");
     for (name, loops) in [
         ("crossing", format!(r#"[[{{"points":{}}}]]"#, bow(0.8))),
@@ -121,7 +118,7 @@ fn loops() -> Vec<BadSource> {
         ("of a curve out of proportion", r#"[[{"degree":2,"points":[[0.1,0.1,1e-6],[0.9,0.5,1e6],[0.1,0.9,1e-6],[0.1,0.1,1e6]]}]]"#.to_owned()),
     ] {
         let fields = format!(r#""degrees":[2,1],"points":{POINTS},"trim":{loops}"#);
-        add(format!("loops {name}"), patch(&fields));
+        all.add(format!("loops {name}"), patch(&fields));
     }
     // As many edges as there can be, in one step of the lattice.
     for n in [3_000, 100_000] {
@@ -137,27 +134,21 @@ fn loops() -> Vec<BadSource> {
             r#""degrees":[1,1],"points":{flat},"holes":[[{{"points":[{}]}}]]"#,
             star.join(",")
         );
-        add(format!("a star of {n} rays"), patch(&fields));
+        all.add(format!("a star of {n} rays"), patch(&fields));
     }
     let one = format!(r#"{{"degrees":[2,1],"points":{POINTS}}}"#);
     let many = vec![one.as_str(); 50_000].join(",");
-    add(
-        "50,000 patches at one place".into(),
+    all.add(
+        "50,000 patches at one place",
         format!(r#"{{"enfilade":"patches","patches":[{many}]}}"#),
     );
-    add(
-        "no patches".into(),
-        r#"{"enfilade":"patches","patches":[]}"#.into(),
-    );
+    all.add("no patches", r#"{"enfilade":"patches","patches":[]}"#);
     let whole = patch(&format!(r#""degrees":[2,1],"points":{POINTS}"#));
-    for cut in cuts(whole.len()).into_iter().filter(|&c| c > 24) {
-        add(format!("cut after {cut}"), whole[..cut].into());
-    }
-    all
+    all.cut("", whole.as_bytes(), |c| c > 24);
 }
 
 /// Surfaces in OBJ.
-fn objs() -> Vec<BadSource> {
+fn objs(all: &mut Cases) {
     let vertices: String = (0..3)
         .flat_map(|j| (0..3).map(move |i| format!("v {i} {} {j}\n", i % 2)))
         .collect();
@@ -165,7 +156,7 @@ fn objs() -> Vec<BadSource> {
     let knots = "parm u 0 0 0 1 1 1\nparm v 0 0 0 1 1 1\n";
     let surf = "surf 0 1 0 1 1 2 3 4 5 6 7 8 9\n";
     let many = "0 ".repeat(300_000);
-    [
+    for (name, text) in [
         ("no knots", with(surf)),
         (
             "no end",
@@ -208,8 +199,7 @@ fn objs() -> Vec<BadSource> {
             "points of no number",
             format!("v nan inf 1e999\n{}", with(&format!("{surf}{knots}"))),
         ),
-    ]
-    .into_iter()
-    .map(|(name, text)| BadSource::new(format!("obj: {name}"), "obj", text))
-    .collect()
+    ] {
+        all.add(format!("obj: {name}"), text);
+    }
 }
