@@ -1,7 +1,5 @@
 //! Paths: distances between all cells, size of their table, time of hops and flips; lengths of walks beside Recast.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -12,6 +10,7 @@ use enfilade::world::{
     Agent, Exit, Hops, Layout, LengthSearch, PartId, Path, PathSearch, Place, Sampling, Space,
     WalkMap, Ways,
 };
+use enfilade_testkit::oracle::least_lengths;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
 use super::graphs::graph;
@@ -44,16 +43,11 @@ fn hops(name: &str) -> anyhow::Result<(Space, Vec<f64>, Hops)> {
 
 /// Returns lengths from a cell to all others, in whole tenths of a millimeter.
 fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -> Vec<u64> {
-    let mut lengths = vec![u64::MAX; layout.n_cells()];
-    let mut heap = BinaryHeap::from([Reverse((0, from.0))]);
-    while let Some(Reverse((length, cell))) = heap.pop() {
-        if lengths[cell as usize] == u64::MAX {
-            lengths[cell as usize] = length;
-            let exits = layout.exits(CellId(cell)).iter();
-            heap.extend(exits.filter_map(|&e| Some(Reverse((length + step(e)?, e.to.0)))));
-        }
-    }
-    lengths
+    let lengths = least_lengths(layout.n_cells(), from.0, |cell| {
+        let exits = layout.exits(CellId(cell)).iter();
+        exits.filter_map(|&e| Some((e.to.0, step(e)?)))
+    });
+    lengths.into_iter().map(|l| l.unwrap_or(u64::MAX)).collect()
 }
 
 /// Counts pairs of cells whose distance differs from Dijkstra's algorithm on all cells, or whose next portal leads

@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 
 use enfilade::World;
-use enfilade::geom::{Aabb, Bvh, DVec3, Ray, Triangle};
+use enfilade::geom::{Aabb, Bvh, DMat4, DVec3, Ray};
 use enfilade::runtime::{ChunkId, DetailId};
 use enfilade::world::{PartId, Space, SpaceSeen};
+use enfilade_testkit::Solids;
 
 use crate::measure::point;
 
@@ -25,26 +26,16 @@ pub(super) struct Solid {
 impl Solid {
     pub(super) fn of(space: &Space, part: PartId) -> Self {
         let (world, sight) = (space.world(part), space.sight(part));
-        let (mut triangles, mut items): (Vec<Triangle>, Vec<PartItem>) = (Vec::new(), Vec::new());
+        let mut all = Solids::default();
         for (id, chunk) in (0..).map(ChunkId).zip(sight.chunks()) {
-            let positions = &world.batches[chunk.batch as usize].primitive.positions;
-            let first = chunk.first_index as usize;
-            let indices = &sight.indices(chunk.batch)[first..first + chunk.n_indices as usize];
-            for t in indices.chunks_exact(3) {
-                triangles.push([0, 1, 2].map(|k| point(positions[t[k] as usize])));
-                items.push(PartItem::Chunk(id));
-            }
+            let indices = &sight.indices(chunk.batch)[chunk.first_index as usize..];
+            let indices = &indices[..chunk.n_indices as usize];
+            all.add((world, chunk.batch), indices, |p| p, PartItem::Chunk(id));
         }
-        for (id, object) in (0..).map(DetailId).zip(&world.details) {
-            for primitive in &world.detail_meshes[object.mesh as usize].primitives {
-                triangles.extend(primitive.placed_triangles(object.placement()));
-                items.resize(triangles.len(), PartItem::Detail(id));
-            }
-        }
-        Self {
-            tree: Bvh::build(&triangles),
-            items,
-        }
+        let detail = |id| PartItem::Detail(DetailId(id));
+        all.add_objects(world, DMat4::IDENTITY, detail);
+        let (tree, items) = all.built();
+        Self { tree, items }
     }
 
     pub(super) fn is_free(&self, bounds: &Aabb) -> bool {

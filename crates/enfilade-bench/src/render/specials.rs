@@ -15,7 +15,7 @@ use enfilade::world::{PartId, Place, Space, SpaceSeen, SpaceViewer};
 use enfilade::{CellId, World};
 use enfilade_render::{AdapterChoice, Camera, Gpu, SpaceShot, Studio, Style};
 use enfilade_testkit::{
-    Chain, GridParams, Rng, Traced, TracedCamera, painted, room_grid, with_specials,
+    Chain, GridParams, Rng, Traced, TracedCamera, chains_of, painted, room_grid, with_specials,
 };
 
 use crate::measure::point;
@@ -353,14 +353,7 @@ fn traced_camera(camera: &Camera) -> TracedCamera {
 
 /// Returns the chains of special portals that are looked into.
 fn chains(seen: &SpaceSeen<'_>) -> HashSet<Chain> {
-    let mut all: Vec<Chain> = Vec::new();
-    for context in seen.contexts() {
-        let chain = context.via().map_or_else(Vec::new, |via| {
-            let mut chain = all[via.parent].clone();
-            chain.push((via.special.0, via.pass));
-            chain
-        });
-        all.push(chain);
-    }
-    all.into_iter().collect()
+    let vias = seen.contexts().map(|context| context.via());
+    let vias = vias.map(|via| via.map(|via| (via.parent, via.special.0, via.pass)));
+    chains_of(vias).into_iter().collect()
 }

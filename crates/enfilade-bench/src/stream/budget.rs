@@ -8,9 +8,10 @@ use enfilade::stream::{
     Catalog, Changes, Eye, Frame, InView, LinkOptions, Piece, PieceId, Policy, Reply,
     SimulatedLink, Source, StreamOptions, Streamer,
 };
+use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
-use super::site::{FRAME, near_sets};
+use super::site::FRAME;
 use crate::rows::Figure;
 
 const WORLDS: u64 = 1000;
@@ -107,7 +108,7 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
             open: HashSet::new(),
             n_twice: 0,
         };
-        let pvs = rng.chance(0.8).then(|| near_sets(&world));
+        let pvs = rng.chance(0.8).then(|| near_sets(&world.graph));
         let mut streamer = Streamer::new(catalog, &world.graph, pvs, options.clone());
         let mut changes = Changes::default();
         let mut resident: HashSet<PieceId> = HashSet::new();

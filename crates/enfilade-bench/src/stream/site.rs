@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Context;
-use enfilade::cpg::{CellSet, Pvs};
+use enfilade::cpg::Pvs;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState, View, Viewer};
 use enfilade::stream::{Catalog, InView, PieceId, WorldPieces, images_of};
@@ -72,23 +72,6 @@ pub(super) fn visible_sets(world: &World) -> anyhow::Result<Pvs> {
 pub(super) fn offices(scene: &str) -> anyhow::Result<World> {
     let (_, n) = scene.rsplit_once('-').context("no number of rooms")?;
     Ok(room_grid(&GridParams::offices(n.parse()?, 1)))
-}
-
-/// Cells behind up to two portals, for worlds whose visible sets would take long to find.
-pub(super) fn near_sets(world: &World) -> Pvs {
-    let graph = &world.graph;
-    let row = |cell| {
-        let mut set = CellSet::new(graph.cells.len());
-        set.insert(cell);
-        for exit in graph.exits(cell) {
-            set.insert(exit.to);
-            for next in graph.exits(exit.to) {
-                set.insert(next.to);
-            }
-        }
-        set
-    };
-    Pvs::of_rows(&graph.cell_ids().map(row).collect::<Vec<_>>())
 }
 
 /// A frame of a recorded walk.
