@@ -9,10 +9,9 @@ use anyhow::Context;
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::World;
 use enfilade::geom::scene::Scene;
-use enfilade::import::{ImportOptions, import};
 use serde_json::json;
 
-use crate::measure::files_of;
+use crate::measure::imported;
 use crate::process::scenes_and;
 
 /// A figure and its scenes, or a part of rows that prints itself. `S` is what the rows of one list share.
@@ -311,9 +310,7 @@ pub(crate) fn baked_scene(name: &str) -> anyhow::Result<Option<World>> {
     let Some(dir) = folder_of(name) else {
         return Ok(None);
     };
-    let (files, detail) = files_of(&dir);
-    let imported = import(&files, &detail, &ImportOptions::default())?;
-    let world = baked(&imported.scene).with_context(|| name.to_owned())?;
+    let world = baked(&imported(&dir)?).with_context(|| name.to_owned())?;
     Ok(Some(world))
 }
 

@@ -20,7 +20,7 @@ impl<T> Default for Solids<T> {
 }
 
 impl<T: Copy> Solids<T> {
-    /// Adds triangles of a batch by the indices of their corners, each corner mapped by `place`.
+    /// Adds triangles of a batch by the indices of their vertices, each mapped by `place`.
     pub fn add(
         &mut self,
         (world, batch): (&World, u32),
@@ -29,10 +29,10 @@ impl<T: Copy> Solids<T> {
         item: T,
     ) {
         let positions = &world.batches[batch as usize].primitive.positions;
-        let corner = |i: u32| place(DVec3::from_array(positions[i as usize].map(f64::from)));
+        let vertex = |i: u32| place(DVec3::from_array(positions[i as usize].map(f64::from)));
         let triples = indices.chunks_exact(3);
         self.triangles
-            .extend(triples.map(|t| [t[0], t[1], t[2]].map(corner)));
+            .extend(triples.map(|t| [t[0], t[1], t[2]].map(vertex)));
         self.items.resize(self.triangles.len(), item);
     }
 

@@ -1,11 +1,9 @@
 //! Budgets of all commands but `bake`: nasty input, with limits on time and memory.
 
-use std::io::Write as _;
-
-use flate2::Crc;
-use flate2::write::ZlibEncoder;
+use flate2::Compression;
 
 use super::figures::{Figures, Ran};
+use super::formats::png;
 use super::nasty::{Triangle, cuboid, obj, scenes};
 
 /// Limits given to each command. [Units: s, MiB]
@@ -130,27 +128,8 @@ fn rooms() -> Vec<Triangle> {
 
 /// Returns a black image of this size a side, as PNG of a few hundred kilobytes.
 fn black(side: u32) -> Vec<u8> {
-    let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
-    let mut chunk = |name: &[u8; 4], data: &[u8]| {
-        out.extend((data.len() as u32).to_be_bytes());
-        let mut sum = Crc::new();
-        sum.update(name);
-        sum.update(data);
-        out.extend_from_slice(name);
-        out.extend_from_slice(data);
-        out.extend(sum.sum().to_be_bytes());
-    };
-    let mut head = [side.to_be_bytes(), side.to_be_bytes()].concat();
-    // Eight bits of red, green and blue.
-    head.extend([8, 2, 0, 0, 0]);
-    chunk(b"IHDR", &head);
-    let mut pixels = ZlibEncoder::new(Vec::new(), flate2::Compression::best());
     let row = vec![0; 1 + 3 * side as usize];
-    for _ in 0..side {
-        // Writing to memory cannot fail.
-        let _ = pixels.write_all(&row);
-    }
-    chunk(b"IDAT", &pixels.finish().unwrap_or_default());
-    chunk(b"IEND", &[]);
-    out
+    let rows = (0..side).map(|_| row.as_slice());
+    // Eight bits of red, green and blue.
+    png([side; 2], [8, 2], Compression::best(), rows)
 }

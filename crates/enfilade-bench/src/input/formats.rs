@@ -1,10 +1,13 @@
 //! Boxes written in the formats that are read.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 
+use flate2::write::ZlibEncoder;
+use flate2::{Compression, Crc};
 use serde_json::json;
 
-use super::nasty::{Triangle, cuboid};
+use super::nasty::{self, Triangle, cuboid};
 
 pub(super) type Corners = [[f64; 3]; 2];
 
@@ -19,12 +22,7 @@ pub(super) fn obj(boxes: &[(&str, Corners)]) -> String {
     let mut text = "mtllib two.mtl\n".to_owned();
     for (name, [low, high]) in boxes {
         let _ = writeln!(text, "o {name}\nusemtl wall");
-        for triangle in cuboid(*low, *high) {
-            for [x, y, z] in triangle {
-                let _ = writeln!(text, "v {x} {y} {z}");
-            }
-            text.push_str("f -3 -2 -1\n");
-        }
+        text += &nasty::obj(&cuboid(*low, *high));
     }
     text
 }
@@ -208,4 +206,31 @@ pub(super) fn prt() -> String {
         text.push('\n');
     }
     text
+}
+
+/// Returns a PNG of this size, depth and color, whose rows are given as bytes with the filter of each.
+pub(in crate::input) fn png<'a>(
+    [w, h]: [u32; 2],
+    kind: [u8; 2],
+    level: Compression,
+    rows: impl IntoIterator<Item = &'a [u8]>,
+) -> Vec<u8> {
+    let mut packed = ZlibEncoder::new(Vec::new(), level);
+    for row in rows {
+        // Writing to memory cannot fail.
+        let _ = packed.write_all(row);
+    }
+    let head = [&w.to_be_bytes()[..], &h.to_be_bytes(), &kind, &[0; 3]].concat();
+    let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
+    let data = packed.finish().unwrap_or_default();
+    for (name, data) in [(b"IHDR", head), (b"IDAT", data), (b"IEND", Vec::new())] {
+        let mut sum = Crc::new();
+        sum.update(name);
+        sum.update(&data);
+        out.extend((data.len() as u32).to_be_bytes());
+        out.extend_from_slice(name);
+        out.extend(data);
+        out.extend(sum.sum().to_be_bytes());
+    }
+    out
 }

@@ -8,23 +8,21 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::Context;
+use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
-use enfilade::cpg::{SightGraph, World};
 use enfilade::geom::Triangle;
 use enfilade::geom::scene::{Role, Scene};
-use enfilade::import::{ImportOptions, import};
-use enfilade::vis::{VisConfig, VisContext, see_all, see_parts};
+use enfilade::vis::see_parts;
 use enfilade_testkit::furnished_house;
 use enfilade_testkit::tamper::{ShownBy, tamperings};
-use enfilade_verify::{
-    SourceDetail, VerifyOptions, compare_details, compare_scene, structural_triangles, verify_world,
-};
+use enfilade_verify::{SourceDetail, VerifyOptions, compare_details, compare_scene, verify_world};
 use serde_json::{Value, json};
 
 use super::figures::Figures;
-use crate::measure::files_of;
+use crate::measure::{file_name, imported};
 use crate::process::{binary, output_of, scenes};
 use crate::rows::baked;
+use crate::sight::visible_past_walls;
 
 /// Numbers of rays tried one after the other until a problem is found; the last is the default of `verify`.
 const RAYS: [u64; 4] = [0, 20_000, 200_000, 1_000_000];
@@ -84,10 +82,7 @@ pub(super) fn run(rows: &mut Figures<'_>) -> anyhow::Result<()> {
 pub(crate) fn bench_tampered(scenes: &[PathBuf], kinds: &[String]) -> anyhow::Result<()> {
     bench_scene("house", &named(furnished_house().scene), kinds)?;
     for dir in scenes {
-        let (files, detail) = files_of(dir);
-        let imported = import(&files, &detail, &ImportOptions::default())?;
-        let name = dir.file_name().unwrap_or_default().to_string_lossy();
-        bench_scene(&name, &imported.scene, kinds)?;
+        bench_scene(&file_name(dir), &imported(dir)?, kinds)?;
     }
     Ok(())
 }
@@ -169,14 +164,7 @@ fn named(mut scene: Scene) -> Scene {
 
 /// Adds visible volumes and parts for each cell.
 fn seen(mut world: World) -> anyhow::Result<World> {
-    let walls: Vec<Triangle> = structural_triangles(&world).iter().map(|t| t.0).collect();
-    let mut context = VisContext {
-        on_round: &mut |_, _| true,
-        walls: Some(&walls),
-        checkpoint: None,
-    };
-    let graph = SightGraph::of_graph(&world.graph);
-    let mut pvs = see_all(&graph, &VisConfig::default(), &mut context)?.cells;
+    let mut pvs = visible_past_walls(&world)?;
     let (volumes, parts) = see_parts(&world, &pvs)?;
     (pvs.volumes, pvs.parts) = (Some(volumes), Some(parts));
     world.pvs = Some(pvs);

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use enfilade::geom::{DQuat, DVec3};
 use enfilade::runtime::{Sightlines, View};
 use enfilade::world::{PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie};
@@ -12,7 +12,7 @@ use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 use super::lit::Lit;
 use super::solids::{Solid, first_item, items_of};
 use super::things::{offices, random_indoors};
-use crate::measure::point;
+use crate::measure::{median, point};
 use crate::rows::Figure;
 
 const MOTIONS: usize = 1_000_000;
@@ -279,6 +279,5 @@ fn frame_us(n_cells: usize) -> anyhow::Result<f64> {
             times.push(start.elapsed().as_secs_f64() * 1e6);
         }
     }
-    times.sort_by(f64::total_cmp);
-    times.get(times.len() / 2).copied().context("no frames")
+    Ok(median(&mut times))
 }

@@ -12,6 +12,7 @@ use enfilade::{PortalId, World};
 use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
 use super::solids::{PartItem, Solid, hull};
+use crate::measure::median;
 use crate::rows::Figure;
 
 /// Rounds of motions, of which the median counts.
@@ -56,8 +57,7 @@ fn motion_us(n: usize) -> anyhow::Result<f64> {
         }
         times.push(start.elapsed().as_secs_f64() * 1e6 / n as f64);
     }
-    times.sort_by(f64::total_cmp);
-    times.get(times.len() / 2).copied().context("no rounds")
+    Ok(median(&mut times))
 }
 
 /// Measures the time of moving one of many parts. [Units: µs]

@@ -35,8 +35,7 @@ pub(crate) fn bench_bsp(
 ) -> anyhow::Result<()> {
     table.push(
         "| scene | heuristic | faces | polygons in | BSP s | polygons out | splits | leaves | portals | grouping s | \
-         valid | crossing | separators | cells before | cells | fewer | final portals | fewer |"
-            .into(),
+         valid | crossing | separators | cells before | cells | fewer | final portals | fewer |",
     );
     table.push("| --- | --- |".to_owned() + &" ---: |".repeat(16));
     let options = ImportOptions::default();
@@ -141,11 +140,8 @@ fn measure(
 /// Prints expected triangles per view before and after, by both metrics, at the same share of portals.
 pub(crate) fn bench_simplify(table: &mut Table, worlds: &[PathBuf]) -> anyhow::Result<()> {
     const VIEWS: usize = 1000;
-    table.push(
-        "| world | cells | portals | metric | cells after | portals after | triangles a view | after |"
-            .into(),
-    );
-    table.push("| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: |".into());
+    table.push("| world | cells | portals | metric | cells after | portals after | triangles a view | after |");
+    table.push("| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: |");
     for path in worlds {
         let world = read_world(path)?;
         let cost = CostModel::default();

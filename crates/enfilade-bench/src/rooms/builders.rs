@@ -6,11 +6,10 @@ use enfilade::bake::{BakeConfig, BakeContext, BakeError, BakeOutput, Method, Sil
 use enfilade::cpg::{CellPortalGraph, PortalKind};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::{Aabb, DVec3};
-use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::Rng;
 use enfilade_verify::{VerifyOptions, verify_world};
 
-use crate::measure::{cpu_seconds, files_of, name};
+use crate::measure::{cpu_seconds, imported, name};
 use crate::table::Table;
 
 /// Points for the agreement of two graphs.
@@ -22,15 +21,10 @@ pub(crate) fn bench_builders(
     paths: &[PathBuf],
     rays: u64,
 ) -> anyhow::Result<()> {
-    table.push(
-        "| scene | triangles | builder | s | cells indoors | portals | cracks | agreement | broken |"
-            .to_owned(),
-    );
+    table.push("| scene | triangles | builder | s | cells indoors | portals | cracks | agreement | broken |");
     table.push("| --- | ---: | --- |".to_owned() + &" ---: |".repeat(6));
     for path in paths {
-        let (files, detail) = files_of(path);
-        let imported = import(&files, &detail, &ImportOptions::default())?;
-        compare(table, &name(path), &imported.scene, rays)?;
+        compare(table, &name(path), &imported(path)?, rays)?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use enfilade::geom::scene::GivenPortal;
 use enfilade::geom::{Aabb, DVec3};
 use enfilade::import::{ImportOptions, export_glb, import};
@@ -110,6 +110,5 @@ fn seconds(file: &Path) -> anyhow::Result<f64> {
         ensure!(done.status.success(), "{}: not baked", file.display());
         times.push(began.elapsed().as_secs_f64());
     }
-    times.sort_by(f64::total_cmp);
-    times.get(N_BAKES / 2).copied().context("no bake")
+    Ok(measure::median(&mut times))
 }

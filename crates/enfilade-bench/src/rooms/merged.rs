@@ -10,11 +10,10 @@ use std::process::Command;
 use anyhow::Context;
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::Scene;
-use enfilade::import::{ImportOptions, import};
 
 use super::bakes::{folder, shared};
 use super::score::{Score, inspect, score_scene, score_world};
-use crate::measure::files_of;
+use crate::measure::imported;
 use crate::process::{bake_file, output_of};
 use crate::rows::RowPrinter;
 
@@ -32,7 +31,7 @@ pub(super) fn run(out: &mut RowPrinter<'_>) -> anyhow::Result<()> {
             continue;
         }
         let whole = score_scene(&dir, None)?;
-        let scene = scene_of(&dir)?;
+        let scene = imported(&dir)?;
         for (form, ending) in FORMS {
             let merged = merged_score(&dir, &scene, &name, ending)?;
             // Rooms and doors are the first of the columns.
@@ -46,12 +45,6 @@ pub(super) fn run(out: &mut RowPrinter<'_>) -> anyhow::Result<()> {
         }
     }
     Ok(())
-}
-
-/// Returns all objects of a scene, furniture and leaves included.
-pub(crate) fn scene_of(dir: &Path) -> anyhow::Result<Scene> {
-    let (scene, detail) = files_of(dir);
-    Ok(import(&scene, &detail, &ImportOptions::default())?.scene)
 }
 
 /// Writes a scene as one mesh, bakes and scores it.

@@ -13,6 +13,7 @@ use anyhow::{Context, bail};
 use serde_json::Value;
 
 use super::floors::{self, COLUMNS};
+use crate::measure::file_name;
 use crate::process::{bake_command, binary, output_of, scenes, target_dir, write_between_marks};
 use crate::table::Table;
 
@@ -216,7 +217,7 @@ fn groups(rooms: &[Value], openings: &[Value]) -> BTreeMap<String, String> {
 
 /// Bakes and scores a scene, or scores the world in the folder `baked`.
 pub(crate) fn score_scene(dir: &Path, baked: Option<&Path>) -> anyhow::Result<Score> {
-    let name = dir.file_name().unwrap_or_default().to_string_lossy();
+    let name = file_name(dir);
     let world = match baked {
         Some(folder) => folder.join(format!("{name}.glb")),
         None => target_dir().join(format!("score-{name}.glb")),
@@ -239,11 +240,7 @@ pub(crate) fn inspect(world: &Path) -> anyhow::Result<Value> {
 
 /// Scores a world, given its output of `inspect`, against the truth in its scene's folder.
 pub(crate) fn score_world(dir: &Path, world: &Path, graph: &Value) -> anyhow::Result<Score> {
-    let name = dir
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let name = file_name(dir);
     let truth: Value = serde_json::from_str(&std::fs::read_to_string(dir.join("truth.json"))?)
         .with_context(|| format!("{name}/truth.json"))?;
     let (rooms, openings) = (list(&truth["rooms"]), list(&truth["openings"]));

@@ -9,9 +9,9 @@ use anyhow::Context;
 use serde_json::Value;
 
 use super::cases::{Found, SmallCase};
-use super::merged::{merged_bake, scene_of};
+use super::merged::merged_bake;
 use super::score::{Score, inspect, score_world};
-use crate::measure;
+use crate::measure::{self, imported};
 use crate::process::{bake_command, generate, output_of, scenes_and, target_dir};
 use crate::rows::{Chosen, RowPrinter};
 
@@ -104,7 +104,7 @@ impl Worlds {
                     generate(&[&[from.as_str()], how].concat(), &spoilt)?;
                     bake_command(&spoilt, world)
                 }
-                Form::Merged => merged_bake(&scene_of(dir)?, &name, "obj", world)?,
+                Form::Merged => merged_bake(&imported(dir)?, &name, "obj", world)?,
                 Form::Method(method) => {
                     let mut command = bake_command(dir, world);
                     command.args(["--method", method, "--max-time", LONGEST]);

@@ -58,10 +58,7 @@ pub(crate) fn bench_facade(
     windows: &[usize],
     views: usize,
 ) -> anyhow::Result<()> {
-    table.push(
-        "| windows | portals | eye | cells seen | clips | one by one, µs | in groups, µs | ratio | p99 one by one | p99 in groups |"
-            .into(),
-    );
+    table.push("| windows | portals | eye | cells seen | clips | one by one, µs | in groups, µs | ratio | p99 one by one | p99 in groups |");
     table.push("| ---: | ---: | --- |".to_owned() + &" ---: |".repeat(7));
     for &n in windows {
         // As many storeys as squares a side, four windows each: n = 4 k².

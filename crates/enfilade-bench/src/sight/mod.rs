@@ -7,9 +7,12 @@ mod pvs;
 pub(crate) mod see;
 mod statistics;
 mod subject;
+mod visible;
 pub(crate) mod walkthrough;
 
 use crate::rows::Row;
+
+pub(crate) use visible::{visible, visible_past_walls};
 
 /// Real buildings whose doorways become special.
 const BUILDINGS: &[&str] = &["kit-edc", "institute", "smiley-west"];

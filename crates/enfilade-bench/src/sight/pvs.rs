@@ -3,13 +3,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use anyhow::{Context, ensure};
-use enfilade::cpg::{CellPortalGraph, Pvs};
+use anyhow::ensure;
+use enfilade::cpg::Pvs;
 use enfilade::geom::{DQuat, DVec3, Similarity};
-use enfilade::vis::{VisConfig, VisContext, WorldVis, see_world};
 use enfilade::{CellId, PortalId, World};
 use enfilade_testkit::linked_copies;
 
+use super::visible::visible;
 use crate::rows::Figure;
 
 /// Doorways of a building, one after the other: those at these shares of the list of doorways indoors.
@@ -46,7 +46,7 @@ pub(super) fn pvs(world: &World) -> anyhow::Result<Figure> {
     }
     ensure!(ids.len() >= DOORWAYS, "too few doorways");
     let start = std::time::Instant::now();
-    let plain = see(&world.graph)?.vis.cells;
+    let plain = visible(&world.graph)?.vis.cells;
     let plain_s = start.elapsed().as_secs_f64();
     let n = world.graph.cells.len() as u32;
     let (mut n_rows, mut n_wrong, mut n_lost, mut n_chains, mut n_cut) = (0, 0, 0, 0, 0);
@@ -57,7 +57,7 @@ pub(super) fn pvs(world: &World) -> anyhow::Result<Figure> {
         let map = Similarity::rigid(turn, DVec3::new(256.0, 32.0, 0.0));
         let linked = linked_copies(&world, portal, &map).graph;
         let start = std::time::Instant::now();
-        let found = see(&linked)?;
+        let found = visible(&linked)?;
         seconds += start.elapsed().as_secs_f64();
         n_chains += found.n_chains;
         n_cut += found.n_cut;
@@ -74,15 +74,6 @@ pub(super) fn pvs(world: &World) -> anyhow::Result<Figure> {
         seconds / DOORWAYS as f64
     );
     Ok(Figure::new(n_wrong as f64, 0.0, note))
-}
-
-fn see(graph: &CellPortalGraph) -> anyhow::Result<WorldVis> {
-    let mut context = VisContext {
-        on_round: &mut |_, _| true,
-        walls: None,
-        checkpoint: None,
-    };
-    see_world(graph, &VisConfig::default(), &mut context).context("visibility")
 }
 
 /// The cells seen from a cell, those of copies as their originals.

@@ -40,11 +40,8 @@ pub(crate) fn bench_see(
             });
         }
     }
-    table.push("| scene | cells | portals | narrowed by | warm µs | cold µs | p99 µs | worst µs | visits | cells seen | clips | most clips | triangles |".into());
-    table.push(
-        "| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
-            .into(),
-    );
+    table.push("| scene | cells | portals | narrowed by | warm µs | cold µs | p99 µs | worst µs | visits | cells seen | clips | most clips | triangles |");
+    table.push("| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for subject in &all {
         let sight = Sight::build(&subject.world).with_context(|| subject.name.clone())?;
         let state = SightState::new(&sight);
@@ -117,10 +114,9 @@ pub(crate) fn bench_tight(
     rays: u64,
 ) -> anyhow::Result<()> {
     table.push(
-        "| scene | narrowed by | triangles ÷ hit | details ÷ hit | cells ÷ reached | missed |"
-            .into(),
+        "| scene | narrowed by | triangles ÷ hit | details ÷ hit | cells ÷ reached | missed |",
     );
-    table.push("| --- | --- | ---: | ---: | ---: | ---: |".into());
+    table.push("| --- | --- | ---: | ---: | ---: | ---: |");
     for subject in subjects(scenes, &[])? {
         let sight = Sight::build(&subject.world).with_context(|| subject.name.clone())?;
         let answers = Answers::new(&subject.world, &sight);
@@ -188,8 +184,8 @@ pub(crate) fn bench_maze(
         all
     ));
     table.push(String::new());
-    table.push("| processed | least | mean | most |".into());
-    table.push("| --- | ---: | ---: | ---: |".into());
+    table.push("| processed | least | mean | most |");
+    table.push("| --- | ---: | ---: | ---: |");
     let modes = [("view frustum alone", None)]
         .into_iter()
         .chain(MODES.map(|(mode, narrowing)| (mode, Some(narrowing))));
@@ -225,8 +221,8 @@ pub(crate) fn bench_los(
     rooms: &[usize],
     pairs: usize,
 ) -> anyhow::Result<()> {
-    table.push("| scene | triangles | pairs | hit | differ | by cells | ns by cells | ns by one tree | ratio |".into());
-    table.push("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |".into());
+    table.push("| scene | triangles | pairs | hit | differ | by cells | ns by cells | ns by one tree | ratio |");
+    table.push("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for subject in subjects(scenes, rooms)? {
         let world = &subject.world;
         let lines = Sightlines::build(world);

@@ -1,13 +1,13 @@
 //! Accuracy of the statistics for modelers: triangles that count as visible from a cell, against those that rays reach.
 
-use enfilade::cpg::{CellId, PartNumbers, SightGraph, VisibleParts, World};
+use enfilade::cpg::{CellId, PartNumbers, VisibleParts, World};
 use enfilade::geom::scene::Material;
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::runtime::{Sight, SightState, Sightlines, Target};
-use enfilade::vis::{VisConfig, VisContext, see_all, see_parts};
+use enfilade::vis::see_parts;
 use enfilade_testkit::Rng;
-use enfilade_verify::structural_triangles;
 
+use super::visible::visible_past_walls;
 use crate::rows::Figure;
 
 /// Rays from each cell.
@@ -28,17 +28,7 @@ const BAR: f64 = 2.0;
 /// the number of triangles that rays aimed at each of them reach, a lower bound for every set that leaves nothing
 /// out.
 pub(super) fn measure(world: &World) -> anyhow::Result<Figure> {
-    let walls: Vec<Triangle> = structural_triangles(world)
-        .into_iter()
-        .map(|t| t.0)
-        .collect();
-    let mut context = VisContext {
-        on_round: &mut |_, _| true,
-        walls: Some(&walls),
-        checkpoint: None,
-    };
-    let graph = SightGraph::of_graph(&world.graph);
-    let pvs = see_all(&graph, &VisConfig::default(), &mut context)?.cells;
+    let pvs = visible_past_walls(world)?;
     let (_, parts) = see_parts(world, &pvs)?;
     let sums = Sums::new(world);
     let sight = Sight::build(world)?;

@@ -88,10 +88,9 @@ pub(crate) fn bench(table: &mut Table, args: &Walkthrough) -> anyhow::Result<()>
     if worlds.is_empty() {
         bail!("give a world, --tower ROOMS or --clinic POLYGONS");
     }
-    table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | ms of all threads | the same to frustum culling | triangles drawn | draws | ms to hand in |".into());
+    table.push("| scene | triangles | drawn | min ms | mean ms | max ms | frames/s to frustum culling | ms of all threads | the same to frustum culling | triangles drawn | draws | ms to hand in |");
     table.push(
-        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
-            .into(),
+        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     );
     if args.also.is_some() && worlds.len() != 1 {
         bail!("--also needs exactly one world");

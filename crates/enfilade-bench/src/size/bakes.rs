@@ -6,11 +6,10 @@ use anyhow::{Context, bail};
 use enfilade::cpg::{Cell, World};
 use enfilade::geom::scene::{Object, Role, Scene};
 use enfilade::geom::{Aabb, DMat4, DVec3};
-use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::hills;
 
 use super::growth::{Used, bake_tower, used_by};
-use crate::measure::files_of;
+use crate::measure::imported;
 use crate::process::{bake_command, target_dir};
 use crate::rows::{Figure, baked, folder_of};
 
@@ -161,8 +160,7 @@ fn lost(alone: &World, scene: &str, places: &[DVec3]) -> anyhow::Result<Figure> 
 /// Places copies of a scene on hills, each on level ground of its own.
 pub(super) fn on_land(alone: &World, name: &str, places: &[DVec3]) -> anyhow::Result<Scene> {
     let dir = folder_of(name).context("the scene is missing")?;
-    let (files, details) = files_of(&dir);
-    let mut scene = import(&files, &details, &ImportOptions::default())?.scene;
+    let mut scene = imported(&dir)?;
     if !scene.solids.is_empty() {
         bail!("brushes have no land");
     }

@@ -7,11 +7,11 @@ use enfilade::cpg::Pvs;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState, View, Viewer};
 use enfilade::stream::{Catalog, InView, PieceId, WorldPieces, images_of};
-use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
 use crate::measure::point;
+use crate::sight::visible;
 
 /// Length of a frame.
 pub(super) const FRAME: Duration = Duration::from_micros(16_667);
@@ -59,13 +59,7 @@ impl Streamed {
 
 /// Finds what may be seen from each cell.
 pub(super) fn visible_sets(world: &World) -> anyhow::Result<Pvs> {
-    let mut context = VisContext {
-        on_round: &mut |_, _| true,
-        walls: None,
-        checkpoint: None,
-    };
-    let found = see_world(&world.graph, &VisConfig::default(), &mut context)?;
-    Ok(found.vis.cells)
+    Ok(visible(&world.graph)?.vis.cells)
 }
 
 /// Generates offices by name, such as `offices-1000`.

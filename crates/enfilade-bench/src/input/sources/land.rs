@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use enfilade::bake::{BakeConfig, BakeContext, Outdoors, Silent, bake};
 use enfilade::cpg::{CellId, World};
-use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade_testkit::{OpenLand, city, hamlets, valleys};
 use enfilade_verify::{VerifyOptions, verify_world};
 
 use crate::rows::Figure;
+use crate::sight::visible;
 
 /// Bars of the issue: share of places without a cell of their own, and seconds for a square kilometer.
 const MISSED: f64 = 0.05;
@@ -129,12 +129,7 @@ pub(super) fn broken(name: &str) -> anyhow::Result<Figure> {
 pub(super) fn seen(name: &str) -> anyhow::Result<Figure> {
     let baked = baked(name)?;
     let graph = &baked.world.graph;
-    let mut context = VisContext {
-        on_round: &mut |_, _| true,
-        walls: None,
-        checkpoint: None,
-    };
-    let found = see_world(graph, &VisConfig::default(), &mut context).context("visibility")?;
+    let found = visible(graph)?;
     let land: Vec<CellId> = (graph.indoor_cells().filter(|c| c.1.is_land))
         .map(|c| c.0)
         .collect();

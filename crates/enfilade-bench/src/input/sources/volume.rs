@@ -6,10 +6,10 @@ use anyhow::Context;
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::scene::Role;
 use enfilade::geom::{Aabb, Bvh, DVec3, Ray, closest_point_on_segment};
-use enfilade::import::{AirSide, ImportOptions, VolumeOptions, decode_volume, import};
+use enfilade::import::{AirSide, ImportOptions, VolumeOptions, decode_volume};
 use enfilade_testkit::Rng;
 
-use crate::measure::files_of;
+use crate::measure::imported;
 use crate::rows::{Figure, baked, folder_of};
 
 /// Enlargement that the importer gives to bodies: meters for a millimeter.
@@ -59,8 +59,7 @@ fn options(level: f64, air: AirSide) -> ImportOptions {
 /// Cells of the rasterised aorta more or fewer than those of its triangles. Contrast has 300 units, tissue 40, with noise of 20.
 pub(super) fn cells(world: &World, name: &str, spacing: f64) -> anyhow::Result<Figure> {
     let folder = folder_of(name).context("the scene is missing")?;
-    let (files, detail) = files_of(&folder);
-    let scene = import(&files, &detail, &ImportOptions::default())?.scene;
+    let scene = imported(&folder)?;
     let sources = scene.triangle_sources(Role::Structural);
     let triangles: Vec<_> = sources.map(|s| scene.world_triangle(s)).collect();
     let bvh = Bvh::build(&triangles);

@@ -1,41 +1,15 @@
 //! Height maps: of no size and of all sizes, cut off, without heights.
 
-use std::io::Write as _;
-
 use enfilade_testkit::Rng;
 use flate2::Compression;
-use flate2::write::ZlibEncoder;
 
 use super::cases::{BadSource, Cases};
 
 const OPTIONS: [&str; 4] = ["--cell", "1", "--heights", "0,10"];
 
-fn crc(bytes: &[u8]) -> u32 {
-    let mut crc = flate2::Crc::new();
-    crc.update(bytes);
-    crc.sum()
-}
-
-fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
-    let length = (data.len() as u32).to_be_bytes();
-    let body = [&kind[..], data].concat();
-    [&length[..], &body, &crc(&body).to_be_bytes()].concat()
-}
-
 /// A PNG with a head of its own and rows of its own.
-fn png([w, h]: [u32; 2], depth: u8, color: u8, rows: &[u8]) -> Vec<u8> {
-    let mut head = [w.to_be_bytes(), h.to_be_bytes()].concat();
-    head.extend([depth, color, 0, 0, 0]);
-    let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
-    // A vector takes all.
-    let _ = packed.write_all(rows);
-    let packed = packed.finish().unwrap_or_default();
-    let chunks = [
-        chunk(b"IHDR", &head),
-        chunk(b"IDAT", &packed),
-        chunk(b"IEND", &[]),
-    ];
-    [&b"\x89PNG\r\n\x1a\n"[..], &chunks.concat()].concat()
+fn png(size: [u32; 2], depth: u8, color: u8, rows: &[u8]) -> Vec<u8> {
+    crate::input::formats::png(size, [depth, color], Compression::fast(), [rows])
 }
 
 /// A TIFF of one strip of 32-bit numbers, with entries that replace its own: tag, kind, count, value.
