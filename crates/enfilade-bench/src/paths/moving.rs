@@ -3,14 +3,14 @@
 use std::time::Instant;
 
 use anyhow::ensure;
-use enfilade::geom::{DQuat, DVec3};
+use enfilade::geom::{DQuat, DVec3, Ray};
 use enfilade::runtime::{Sightlines, View};
 use enfilade::world::{PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie};
 use enfilade::{PortalId, World};
 use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
 
 use super::lit::Lit;
-use super::solids::{Solid, first_item, items_of};
+use super::solids::{items_of, model};
 use super::things::{offices, random_indoors};
 use crate::measure::{median, point};
 use crate::rows::Figure;
@@ -104,8 +104,6 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
     for world in &worlds[1..] {
         host = space.add_part(world.clone(), host, Pose::IDENTITY)?;
     }
-    let parts = (0..worlds.len() as u32).map(PartId);
-    let solids: Vec<(PartId, Solid)> = parts.map(|p| (p, Solid::of(&space, p))).collect();
     let mut viewer = SpaceViewer::new(&space);
     let mut rng = Rng::new(1);
     let (mut n_lost, mut n_hits, mut n_parts) = (0_usize, 0_usize, 0_usize);
@@ -114,6 +112,7 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
             let pose = pose_within(&mut rng, &worlds[k], &worlds[k - 1]);
             space.set_pose(PartId(k as u32), pose)?;
         }
+        let (tree, items) = model(&space, worlds.len());
         let frame = PartId(rng.below(worlds.len()) as u32);
         let [low, high] = worlds[frame.0 as usize].graph.cells[0].aabb.map(point);
         let eye = DVec3::from_array([0, 1, 2].map(|k| rng.range(low[k], high[k]))).as_vec3();
@@ -127,14 +126,19 @@ pub(super) fn poses(_: &str) -> anyhow::Result<Figure> {
         let forward = toward.as_dvec3().normalize();
         let right = forward.cross(DVec3::Y).normalize();
         let (up, tan) = (right.cross(forward), 0.55_f64.tan());
+        let pose = space.pose(frame);
         for i in 0..PICTURE[0] * PICTURE[1] {
             let [x, y] = [(i % PICTURE[0], 0), (i / PICTURE[0], 1)]
                 .map(|(i, k)| (i as f64 + 0.5) / PICTURE[k] as f64 * 2.0 - 1.0);
             let direction = forward + right * (x * tan * f64::from(aspect)) + up * (y * tan);
-            let line = [eye.as_dvec3(), direction];
-            if let Some(item) = first_item(&space, &solids, frame, line) {
+            let ray = Ray {
+                origin: pose.point(eye.as_dvec3()),
+                direction: pose.direction(direction),
+                t_max: f64::INFINITY,
+            };
+            if let Some(hit) = tree.closest_hit(&ray, |_| false) {
                 n_hits += 1;
-                n_lost += usize::from(!known.contains(&item));
+                n_lost += usize::from(!known.contains(&items[hit.triangle as usize]));
             }
         }
     }

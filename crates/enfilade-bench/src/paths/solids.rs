@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 
 use enfilade::World;
-use enfilade::geom::{Aabb, Bvh, DMat4, DVec3, Ray};
+use enfilade::geom::{Aabb, Bvh, DVec3, Ray};
 use enfilade::runtime::{ChunkId, DetailId};
-use enfilade::world::{PartId, Space, SpaceSeen};
+use enfilade::world::{PartId, Pose, Space, SpaceSeen};
 use enfilade_testkit::Solids;
 
 use crate::measure::point;
@@ -25,15 +25,8 @@ pub(super) struct Solid {
 
 impl Solid {
     pub(super) fn of(space: &Space, part: PartId) -> Self {
-        let (world, sight) = (space.world(part), space.sight(part));
         let mut all = Solids::default();
-        for (id, chunk) in (0..).map(ChunkId).zip(sight.chunks()) {
-            let indices = &sight.indices(chunk.batch)[chunk.first_index as usize..];
-            let indices = &indices[..chunk.n_indices as usize];
-            all.add((world, chunk.batch), indices, |p| p, PartItem::Chunk(id));
-        }
-        let detail = |id| PartItem::Detail(DetailId(id));
-        all.add_objects(world, DMat4::IDENTITY, detail);
+        add(&mut all, space, part, &Pose::IDENTITY, |item| item);
         let (tree, items) = all.built();
         Self { tree, items }
     }
@@ -41,6 +34,41 @@ impl Solid {
     pub(super) fn is_free(&self, bounds: &Aabb) -> bool {
         !self.tree.any_in_box(bounds, |_| true)
     }
+}
+
+/// Adds the triangles of a part that stands at a pose.
+fn add<T: Copy>(
+    all: &mut Solids<T>,
+    space: &Space,
+    part: PartId,
+    pose: &Pose,
+    item: impl Fn(PartItem) -> T,
+) {
+    let (world, sight) = (space.world(part), space.sight(part));
+    for (id, chunk) in (0..).map(ChunkId).zip(sight.chunks()) {
+        let indices = &sight.indices(chunk.batch)[chunk.first_index as usize..];
+        let indices = &indices[..chunk.n_indices as usize];
+        let place = |p| pose.point(p);
+        all.add(
+            (world, chunk.batch),
+            indices,
+            place,
+            item(PartItem::Chunk(id)),
+        );
+    }
+    let detail = |id| item(PartItem::Detail(DetailId(id)));
+    all.add_objects(world, pose.matrix(), detail);
+}
+
+/// Returns all triangles of the first parts where they are now, as one model, and the item of each.
+pub(super) fn model(space: &Space, n_parts: usize) -> (Bvh, Vec<(PartId, PartItem)>) {
+    let mut all = Solids::default();
+    for part in (0..n_parts as u32).map(PartId) {
+        add(&mut all, space, part, &space.pose(part), |item| {
+            (part, item)
+        });
+    }
+    all.built()
 }
 
 /// Returns the item that a ray, given by origin and direction in the frame of a part, meets first among all parts.
