@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout)]
 
 mod input;
+mod kept;
 mod measure;
 mod paths;
 mod process;

@@ -1,7 +1,6 @@
 //! Visibility in graphs of any size: memory, time for a cell, and the lines that it has to cover.
 
-use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use enfilade::cpg::CellId;
@@ -10,6 +9,7 @@ use enfilade::vis::{VisConfig, VisContext, see_all};
 use enfilade_testkit::{Rng, Town, town, village};
 use serde_json::{Value, json};
 
+use crate::kept::Kept;
 use crate::measure::{cpu_seconds, memory, quantile};
 use crate::process::step;
 use crate::rows::Figure;
@@ -80,17 +80,9 @@ fn of(figures: &Value, name: &str) -> anyhow::Result<f64> {
 }
 
 /// Returns the figures of a scene, made once.
-fn measured(scene: &str) -> anyhow::Result<Value> {
-    static FOUND: Mutex<BTreeMap<String, Value>> = Mutex::new(BTreeMap::new());
-    let known = |scene: &str| FOUND.lock().ok()?.get(scene).cloned();
-    if let Some(figures) = known(scene) {
-        return Ok(figures);
-    }
-    let figures = step(&["size-step", "pvs", scene])?;
-    if let Ok(mut found) = FOUND.lock() {
-        found.insert(scene.to_owned(), figures.clone());
-    }
-    Ok(figures)
+fn measured(scene: &str) -> anyhow::Result<Arc<Value>> {
+    static FOUND: Kept<Value> = Kept::new();
+    FOUND.get(scene, || step(&["size-step", "pvs", scene]))
 }
 
 /// Makes a town, searches it, and follows lines through it.

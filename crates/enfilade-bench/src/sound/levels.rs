@@ -1,7 +1,7 @@
 //! Jumps of what is heard on walks through doorways, centimeter by centimeter. A listener hears what a fresh one hears, so that nothing
 //! is smoothed: compared every 29 cm.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Arc;
 
 use anyhow::Context;
 use enfilade::cpg::PortalKind;
@@ -11,6 +11,7 @@ use enfilade::{PortalId, World};
 use enfilade_testkit::Rng;
 
 use super::heard::Office;
+use crate::kept::Kept;
 use crate::rows::Figure;
 
 /// Number of walks in a building, half of them through doors that stand half open.
@@ -23,7 +24,7 @@ const REACH: i32 = 150;
 const DOORWAY: f64 = 1.0;
 
 /// The largest change from one centimeter to the next, and the walk on which it was.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 struct Jump {
     value: f64,
     at: String,
@@ -37,11 +38,10 @@ impl Jump {
     }
 }
 
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 struct Jumps {
-    level: Jump,
-    direction: Jump,
-    length: Jump,
+    /// Of level, direction and length.
+    most: [Jump; 3],
     n_walks: usize,
     n_steps: usize,
     /// Steps with a change of level, direction or length above the bar.
@@ -56,10 +56,8 @@ impl Jumps {
         let length = (a.length - b.length).abs();
         for (i, value) in [level, turn, length].into_iter().enumerate() {
             self.n_above[i] += usize::from(value > BARS[i]);
+            self.most[i].raise(value, &place);
         }
-        self.level.raise(level, &place);
-        self.direction.raise(turn, &place);
-        self.length.raise(length, &place);
     }
 }
 
@@ -158,30 +156,21 @@ fn jumps_of(site: &mut Office) -> anyhow::Result<Jumps> {
     Ok(jumps)
 }
 
-/// The jumps of sites measured so far: three rows share them.
-static KNOWN: Mutex<Vec<(String, Jumps)>> = Mutex::new(Vec::new());
-
-fn jumps(name: String, site: impl FnOnce() -> anyhow::Result<Office>) -> anyhow::Result<Jumps> {
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, jumps)) = known.iter().find(|(other, _)| *other == name) {
-        return Ok(jumps.clone());
-    }
-    let jumps = jumps_of(&mut site()?)?;
-    known.push((name, jumps.clone()));
-    Ok(jumps)
+/// Returns the jumps of a site: three rows share them.
+fn jumps(name: &str, site: impl FnOnce() -> anyhow::Result<Office>) -> anyhow::Result<Arc<Jumps>> {
+    static KNOWN: Kept<Jumps> = Kept::new();
+    KNOWN.get(name, || jumps_of(&mut site()?))
 }
 
-fn jumps_baked(world: &World) -> anyhow::Result<Jumps> {
-    let graph = &world.graph;
-    let sizes = [graph.cells.len(), graph.portals.len(), world.batches.len()];
-    jumps(format!("{sizes:?}"), || Office::new(world))
-}
+/// The rows: levels, directions and lengths.
+pub(super) const LEVEL: usize = 0;
+pub(super) const DIRECTION: usize = 1;
+pub(super) const LENGTH: usize = 2;
 
-fn jumps_made(name: &str) -> anyhow::Result<Jumps> {
-    jumps(name.to_owned(), || Office::offices(100, 5))
-}
-
-fn figure(jumps: &Jumps, jump: &Jump, kind: usize, scale: f64, unit: &str) -> Figure {
+fn figure(jumps: &Jumps, kind: usize) -> Figure {
+    let scale = [1.0, 1.0, 100.0][kind];
+    let unit = ["dB", "degrees", "centimeters"][kind];
+    let jump = &jumps.most[kind];
     let note = format!(
         "{unit} per centimeter, the largest on {} walks, {} of {} steps above the bar; {}",
         jumps.n_walks, jumps.n_above[kind], jumps.n_steps, jump.at
@@ -189,38 +178,16 @@ fn figure(jumps: &Jumps, jump: &Jump, kind: usize, scale: f64, unit: &str) -> Fi
     Figure::new(jump.value * scale, BARS[kind] * scale, note)
 }
 
-fn level_of(jumps: &Jumps) -> Figure {
-    figure(jumps, &jumps.level, 0, 1.0, "dB")
+/// Measures the largest change of a kind in a building.
+pub(super) fn baked<const KIND: usize>(world: &World) -> anyhow::Result<Figure> {
+    let graph = &world.graph;
+    let sizes = [graph.cells.len(), graph.portals.len(), world.batches.len()];
+    let jumps = jumps(&format!("{sizes:?}"), || Office::new(world))?;
+    Ok(figure(&jumps, KIND))
 }
 
-fn direction_of(jumps: &Jumps) -> Figure {
-    figure(jumps, &jumps.direction, 1, 1.0, "degrees")
-}
-
-fn length_of(jumps: &Jumps) -> Figure {
-    figure(jumps, &jumps.length, 2, 100.0, "centimeters")
-}
-
-pub(super) fn level(world: &World) -> anyhow::Result<Figure> {
-    Ok(level_of(&jumps_baked(world)?))
-}
-
-pub(super) fn level_in(name: &str) -> anyhow::Result<Figure> {
-    Ok(level_of(&jumps_made(name)?))
-}
-
-pub(super) fn direction(world: &World) -> anyhow::Result<Figure> {
-    Ok(direction_of(&jumps_baked(world)?))
-}
-
-pub(super) fn direction_in(name: &str) -> anyhow::Result<Figure> {
-    Ok(direction_of(&jumps_made(name)?))
-}
-
-pub(super) fn length(world: &World) -> anyhow::Result<Figure> {
-    Ok(length_of(&jumps_baked(world)?))
-}
-
-pub(super) fn length_in(name: &str) -> anyhow::Result<Figure> {
-    Ok(length_of(&jumps_made(name)?))
+/// Measures the same in generated offices.
+pub(super) fn made<const KIND: usize>(name: &str) -> anyhow::Result<Figure> {
+    let jumps = jumps(name, || Office::offices(100, 5))?;
+    Ok(figure(&jumps, KIND))
 }

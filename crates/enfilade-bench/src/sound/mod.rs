@@ -7,6 +7,7 @@ mod levels;
 mod walls;
 
 use crate::rows::Row;
+use levels::{DIRECTION, LENGTH, LEVEL};
 
 /// Real buildings to listen in.
 const HEARD_IN: &[&str] = &[
@@ -35,12 +36,16 @@ pub(crate) const ROWS: &[Row] = &[
     Row::baked("sound: lengths", &["duplex"], lengths::duplex),
     Row::baked("sound: lengths", &["fzk-haus"], lengths::fzk_haus),
     Row::baked("sound: lengths", &["institute"], lengths::institute),
-    Row::made("levels", &["offices-100"], levels::level_in),
-    Row::baked("levels", HEARD_IN, levels::level),
-    Row::made("levels: directions", &["offices-100"], levels::direction_in),
-    Row::baked("levels: directions", HEARD_IN, levels::direction),
-    Row::made("levels: lengths", &["offices-100"], levels::length_in),
-    Row::baked("levels: lengths", HEARD_IN, levels::length),
+    Row::made("levels", &["offices-100"], levels::made::<LEVEL>),
+    Row::baked("levels", HEARD_IN, levels::baked::<LEVEL>),
+    Row::made(
+        "levels: directions",
+        &["offices-100"],
+        levels::made::<DIRECTION>,
+    ),
+    Row::baked("levels: directions", HEARD_IN, levels::baked::<DIRECTION>),
+    Row::made("levels: lengths", &["offices-100"], levels::made::<LENGTH>),
+    Row::baked("levels: lengths", HEARD_IN, levels::baked::<LENGTH>),
     Row::made("sound: reverb", &["coupled-rooms"], heard::reverb),
     Row::made("reverberation: RT60", &["boxes"], decays::rt60),
     Row::named("reverberation: areas", WITH_ROOMS, walls::areas),

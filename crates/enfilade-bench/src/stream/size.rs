@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
@@ -21,6 +21,7 @@ use super::first::furnished;
 use super::replay::frame_of;
 use super::settled::draw_stands;
 use super::site::{FRAME, Recorder, Streamed, offices, route, visible_sets};
+use crate::kept::Kept;
 use crate::measure::memory;
 use crate::process::{step, target_dir};
 use crate::rows::Figure;
@@ -244,18 +245,17 @@ fn walk(dir: &Path) -> anyhow::Result<Value> {
 }
 
 /// Returns the figures of the walk through a town, made once.
-fn measured(scene: &str) -> anyhow::Result<&'static Value> {
-    static FOUND: OnceLock<Value> = OnceLock::new();
-    if FOUND.get().is_none() {
+fn measured(scene: &str) -> anyhow::Result<Arc<Value>> {
+    static FOUND: Kept<Value> = Kept::new();
+    FOUND.get(scene, || {
         let dir: PathBuf = target_dir().join("town");
         std::fs::create_dir_all(&dir)?;
         let place = dir.display().to_string();
         let run = |name: &str| step(&["town", name, scene, &place]);
         let found = run("make").and_then(|_| run("walk"));
         std::fs::remove_dir_all(&dir)?;
-        let _ = FOUND.set(found?);
-    }
-    FOUND.get().context("no figures")
+        found
+    })
 }
 
 fn number(found: &Value, name: &str) -> f64 {
@@ -263,21 +263,21 @@ fn number(found: &Value, name: &str) -> f64 {
 }
 
 fn megabytes(found: &Value, name: &str) -> String {
-    format!("{:.1} MB", number(found, name) / 1e6)
+    format!("{:.1} MB", number(&found, name) / 1e6)
 }
 
 /// Returns the most memory of pieces on the walk.
 pub(super) fn memory_of(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
-    let value = number(found, "kept") / f64::from(1 << 20);
+    let value = number(&found, "kept") / f64::from(1 << 20);
     let note = format!(
         "MiB of pieces; {} cells, {} pieces, {} unpacked, {} packed; the process {} at most, {} after opening",
         found["cells"],
         found["pieces"],
-        megabytes(found, "unpacked"),
-        megabytes(found, "packed"),
-        megabytes(found, "peak"),
-        megabytes(found, "peakOfHead"),
+        megabytes(&found, "unpacked"),
+        megabytes(&found, "packed"),
+        megabytes(&found, "peak"),
+        megabytes(&found, "peakOfHead"),
     );
     Ok(Figure::new(value, 256.0, note))
 }
@@ -289,9 +289,9 @@ pub(super) fn absent(scene: &str) -> anyhow::Result<Figure> {
         "frame × piece; {} of {} frames, 10 MB/s, 50 ms, 1.4 m/s; {} asked for",
         found["late"],
         found["frames"],
-        megabytes(found, "requested"),
+        megabytes(&found, "requested"),
     );
-    Ok(Figure::new(number(found, "absent"), 0.0, note))
+    Ok(Figure::new(number(&found, "absent"), 0.0, note))
 }
 
 /// Returns the share of bytes after which all that is in view is complete: the worst of several places.
@@ -299,14 +299,14 @@ pub(super) fn first_picture(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
     let first = found["first"].as_array().context("no first pictures")?;
     let bytes: Vec<f64> = first.iter().filter_map(Value::as_f64).collect();
-    let packed = number(found, "packed");
+    let packed = number(&found, "packed");
     let last = bytes.last().context("no first pictures")?;
     let note = format!(
         "all in view from the worst of {VIEWS} places after {:.1} MB of {}, the median after {:.1} MB; head {}",
         last / 1e6,
-        megabytes(found, "packed"),
+        megabytes(&found, "packed"),
         bytes[bytes.len() / 2] / 1e6,
-        megabytes(found, "head"),
+        megabytes(&found, "head"),
     );
     Ok(Figure::new(last / packed, 0.01, note))
 }

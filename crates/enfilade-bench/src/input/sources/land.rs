@@ -1,7 +1,7 @@
 //! Open land divided into cells: valleys, hamlets among hollows, cities, a square kilometer each.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::bail;
@@ -10,6 +10,7 @@ use enfilade::cpg::{CellId, World};
 use enfilade_testkit::{OpenLand, city, hamlets, valleys};
 use enfilade_verify::{VerifyOptions, verify_world};
 
+use crate::kept::Kept;
 use crate::rows::Figure;
 use crate::sight::visible;
 
@@ -26,34 +27,32 @@ struct BakedLand {
     seconds: f64,
 }
 
-/// Bakes that rows share.
-static BAKED: LazyLock<Mutex<BTreeMap<String, Arc<BakedLand>>>> = LazyLock::new(Mutex::default);
-
 fn baked(name: &str) -> anyhow::Result<Arc<BakedLand>> {
-    let mut all = BAKED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(known) = all.get(name) {
-        return Ok(Arc::clone(known));
+    static BAKED: Kept<BakedLand> = Kept::new();
+    BAKED.get(name, || BakedLand::of(name))
+}
+
+impl BakedLand {
+    fn of(name: &str) -> anyhow::Result<Self> {
+        let land = match name.split_once('-') {
+            Some(("city", seed)) => city(seed.parse()?),
+            _ if name == "valleys" => valleys(),
+            _ if name == "hamlets" => hamlets(),
+            _ => bail!("no land {name}"),
+        };
+        let config = BakeConfig {
+            outdoors: Outdoors::Split { minima: Vec::new() },
+            ..BakeConfig::default()
+        };
+        let start = Instant::now();
+        let world = bake(&land.scene, &config, &BakeContext::new(&Silent, None))?.world;
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(Self {
+            land,
+            world,
+            seconds,
+        })
     }
-    let land = match name.split_once('-') {
-        Some(("city", seed)) => city(seed.parse()?),
-        _ if name == "valleys" => valleys(),
-        _ if name == "hamlets" => hamlets(),
-        _ => bail!("no land {name}"),
-    };
-    let config = BakeConfig {
-        outdoors: Outdoors::Split { minima: Vec::new() },
-        ..BakeConfig::default()
-    };
-    let start = Instant::now();
-    let world = bake(&land.scene, &config, &BakeContext::new(&Silent, None))?.world;
-    let seconds = start.elapsed().as_secs_f64();
-    let baked = Arc::new(BakedLand {
-        land,
-        world,
-        seconds,
-    });
-    all.insert(name.to_owned(), Arc::clone(&baked));
-    Ok(baked)
 }
 
 /// Share of valleys, streets, squares and courtyards without a cell of their own: a point of theirs is in no area of land,

@@ -43,15 +43,9 @@ const BAD: &[&str] = &[
 ];
 
 pub(crate) const ROWS: &[Row] = &[
-    Row::named("volume: cells, 0.5 mm", AORTA, |w, s| {
-        volume::cells(w, s, 0.5)
-    }),
-    Row::named("volume: cells, 0.8 mm", AORTA, |w, s| {
-        volume::cells(w, s, 0.8)
-    }),
-    Row::named("volume: cells, 1.2 mm", AORTA, |w, s| {
-        volume::cells(w, s, 1.2)
-    }),
+    Row::named("volume: cells, 0.5 mm", AORTA, volume::cells::<5>),
+    Row::named("volume: cells, 0.8 mm", AORTA, volume::cells::<8>),
+    Row::named("volume: cells, 1.2 mm", AORTA, volume::cells::<12>),
     Row::made("volume: branches missed", AIRWAYS, volume::missed),
     Row::made("implicit: cells", SHAPES, implicit::cells),
     Row::made("implicit: portals", SHAPES, implicit::portals),

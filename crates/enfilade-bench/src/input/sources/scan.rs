@@ -1,8 +1,8 @@
 //! Scans of shared buildings, rendered: rays from stations, with the noise of a scanner, holes, and clutter in the rooms.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::Arc;
 
 use anyhow::Context;
 use enfilade::cpg::World;
@@ -13,6 +13,7 @@ use enfilade::import::{ImportOptions, decode_ply, import};
 use enfilade_testkit::Rng;
 use serde_json::{Value, json};
 
+use crate::kept::Kept;
 use crate::rooms::score::{Score, inspect, list, score_world, text, vec3};
 use crate::rows::{Figure, baked, folder_of};
 
@@ -234,22 +235,12 @@ fn ply(triangles: &[Triangle], stations: &[DVec3], rng: &mut Rng) -> Vec<u8> {
 /// Number of stations in rooms; and whether there are some outdoors.
 pub(super) type Stations = (usize, bool);
 
-/// A score, or the reason why a scan could not be baked.
-type Scored = Result<Arc<Score>, String>;
-
-/// Scores that rows share.
-static SCORES: LazyLock<Mutex<BTreeMap<(String, Stations), Scored>>> =
-    LazyLock::new(Mutex::default);
-
-fn score(name: &str, n_stations: Stations) -> Scored {
-    let mut all = SCORES.lock().unwrap_or_else(PoisonError::into_inner);
-    let key = (name.to_owned(), n_stations);
-    let new = || {
-        scored(name, n_stations)
-            .map(Arc::new)
-            .map_err(|e| format!("{e:#}"))
-    };
-    all.entry(key).or_insert_with(new).clone()
+/// Returns a score, or the reason why a scan could not be baked.
+fn score(name: &str, stations: Stations) -> anyhow::Result<Arc<Result<Score, String>>> {
+    static SCORES: Kept<Result<Score, String>> = Kept::new();
+    let key = format!("{name} {stations:?}");
+    let new = || Ok(scored(name, stations).map_err(|e| format!("{e:#}")));
+    SCORES.get(&key, new)
 }
 
 fn scored(name: &str, n_stations: Stations) -> anyhow::Result<Score> {
@@ -285,40 +276,34 @@ fn scored(name: &str, n_stations: Stations) -> anyhow::Result<Score> {
     scored
 }
 
-/// Returns the figure of a scan that was not baked.
-fn not_baked(most: f64, reason: String) -> Figure {
-    Figure::new(1.0, most, reason)
+/// Returns what a score lacks to 1; all of it if the scan was not baked.
+fn lacking(
+    (name, stations): (&str, Stations),
+    most: f64,
+    share: usize,
+    note: impl Fn(&Score) -> String,
+) -> anyhow::Result<Figure> {
+    Ok(match &*score(name, stations)? {
+        Ok(score) => {
+            let value = 1.0 - score.figures[share].unwrap_or(0.0);
+            Figure::new(value, most, note(score))
+        }
+        Err(reason) => Figure::new(1.0, most, reason.as_str()),
+    })
 }
 
 /// Share of the rooms with a station without a cell of their own.
-pub(super) fn rooms(_: &World, name: &str, n_stations: Stations) -> anyhow::Result<Figure> {
-    let score = match score(name, n_stations) {
-        Ok(score) => score,
-        Err(reason) => return Ok(not_baked(ROOMS, reason)),
-    };
-    let note = format!(
-        "{} rooms with a station; {} cells; {}",
-        score.n_rooms,
-        score.n_cells,
-        score.failed.join("; ")
-    );
-    Ok(Figure::new(
-        1.0 - score.figures[0].unwrap_or(0.0),
-        ROOMS,
-        note,
-    ))
+pub(super) fn rooms(_: &World, name: &str, stations: Stations) -> anyhow::Result<Figure> {
+    lacking((name, stations), ROOMS, 0, |score| {
+        let (n, n_cells) = (score.n_rooms, score.n_cells);
+        let failed = score.failed.join("; ");
+        format!("{n} rooms with a station; {n_cells} cells; {failed}")
+    })
 }
 
 /// Share of the doors between rooms with stations and to the outdoors without a portal.
-pub(super) fn doors(_: &World, name: &str, n_stations: Stations) -> anyhow::Result<Figure> {
-    let score = match score(name, n_stations) {
-        Ok(score) => score,
-        Err(reason) => return Ok(not_baked(DOORS, reason)),
-    };
-    let note = format!("{} doors", score.n_doors);
-    Ok(Figure::new(
-        1.0 - score.figures[1].unwrap_or(0.0),
-        DOORS,
-        note,
-    ))
+pub(super) fn doors(_: &World, name: &str, stations: Stations) -> anyhow::Result<Figure> {
+    lacking((name, stations), DOORS, 1, |score| {
+        format!("{} doors", score.n_doors)
+    })
 }

@@ -56,8 +56,9 @@ fn options(level: f64, air: AirSide) -> ImportOptions {
     }
 }
 
-/// Cells of the rasterised aorta more or fewer than those of its triangles. Contrast has 300 units, tissue 40, with noise of 20.
-pub(super) fn cells(world: &World, name: &str, spacing: f64) -> anyhow::Result<Figure> {
+/// Cells of the rasterised aorta, at so many tenths of a millimeter, more or fewer than those of its triangles. Contrast has 300 units, tissue 40, with noise of 20.
+pub(super) fn cells<const TENTHS: u32>(world: &World, name: &str) -> anyhow::Result<Figure> {
+    let spacing = f64::from(TENTHS) / 10.0;
     let folder = folder_of(name).context("the scene is missing")?;
     let scene = imported(&folder)?;
     let sources = scene.triangle_sources(Role::Structural);

@@ -1,7 +1,7 @@
 //! Worlds rebaked after random edits, against bakes of the edited scenes.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
@@ -12,6 +12,7 @@ use enfilade::geom::scene::Scene;
 use enfilade::import::{ImportOptions, import};
 use enfilade_testkit::{Edit, Rng, TowerParams, differences, edited, office_tower, with_cupboards};
 
+use crate::kept::Kept;
 use crate::process::scenes;
 use crate::rows::Figure;
 
@@ -50,10 +51,11 @@ fn base(name: &str) -> anyhow::Result<Scene> {
 }
 
 fn edits(name: &str) -> anyhow::Result<Arc<Edits>> {
-    static KNOWN: Mutex<BTreeMap<String, Arc<Edits>>> = Mutex::new(BTreeMap::new());
-    if let Some(known) = KNOWN.lock().ok().and_then(|k| k.get(name).cloned()) {
-        return Ok(known);
-    }
+    static KNOWN: Kept<Edits> = Kept::new();
+    KNOWN.get(name, || measured(name))
+}
+
+fn measured(name: &str) -> anyhow::Result<Edits> {
     let n = std::env::var(NUMBER)
         .ok()
         .map(|n| n.parse())
@@ -86,10 +88,6 @@ fn edits(name: &str) -> anyhow::Result<Arc<Edits>> {
         if let Some(first) = off.first() {
             out.off.push(format!("edit {i}, {edit:?}: {first}"));
         }
-    }
-    let out = Arc::new(out);
-    if let Ok(mut known) = KNOWN.lock() {
-        known.insert(name.to_owned(), Arc::clone(&out));
     }
     Ok(out)
 }

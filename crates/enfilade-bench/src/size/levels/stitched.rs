@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
@@ -14,6 +14,7 @@ use enfilade_testkit::Rng;
 use serde_json::Value;
 
 use super::scenes::level;
+use crate::kept::Kept;
 use crate::process::{binary, target_dir};
 use crate::rows::{Figure, baked};
 
@@ -39,29 +40,28 @@ struct Both {
 }
 
 fn both(scene: &str) -> anyhow::Result<Arc<Both>> {
-    static KNOWN: Mutex<BTreeMap<String, Arc<Both>>> = Mutex::new(BTreeMap::new());
-    if let Some(known) = KNOWN.lock().ok().and_then(|k| k.get(scene).cloned()) {
-        return Ok(known);
+    static KNOWN: Kept<Both> = Kept::new();
+    KNOWN.get(scene, || Both::of(scene))
+}
+
+impl Both {
+    fn of(scene: &str) -> anyhow::Result<Self> {
+        let level = level(scene)?;
+        let start = Instant::now();
+        let stitched = level.level.flattened()?;
+        let flattened = start.elapsed().as_secs_f64();
+        // As `bake` reads it, in the order of its file.
+        let merged = export_glb(&level.merged());
+        let merged = decode_gltf(&merged, &ImportOptions::default())?.scene;
+        let start = Instant::now();
+        let whole = baked(&merged)?;
+        Ok(Self {
+            stitched,
+            whole,
+            n_instances: level.level.len(),
+            seconds: [flattened, start.elapsed().as_secs_f64()],
+        })
     }
-    let level = level(scene)?;
-    let start = Instant::now();
-    let stitched = level.level.flattened()?;
-    let flattened = start.elapsed().as_secs_f64();
-    // As `bake` reads it, in the order of its file.
-    let merged = export_glb(&level.merged());
-    let merged = decode_gltf(&merged, &ImportOptions::default())?.scene;
-    let start = Instant::now();
-    let whole = baked(&merged)?;
-    let both = Arc::new(Both {
-        stitched,
-        whole,
-        n_instances: level.level.len(),
-        seconds: [flattened, start.elapsed().as_secs_f64()],
-    });
-    if let Ok(mut known) = KNOWN.lock() {
-        known.insert(scene.to_owned(), Arc::clone(&both));
-    }
-    Ok(both)
 }
 
 fn dvec(p: [f32; 3]) -> DVec3 {
@@ -158,10 +158,6 @@ pub(super) fn portals(scene: &str) -> anyhow::Result<Figure> {
 
 /// Returns the report of `enfilade verify` on a level put together.
 fn verified(scene: &str) -> anyhow::Result<Value> {
-    static KNOWN: Mutex<BTreeMap<String, Value>> = Mutex::new(BTreeMap::new());
-    if let Some(known) = KNOWN.lock().ok().and_then(|k| k.get(scene).cloned()) {
-        return Ok(known);
-    }
     let folder = target_dir().join("constructive");
     std::fs::create_dir_all(&folder)?;
     let file = folder.join(format!("{scene}.glb"));
@@ -180,17 +176,14 @@ fn verified(scene: &str) -> anyhow::Result<Value> {
     let done = command
         .output()
         .context("`cargo build -p enfilade-cli` first")?;
-    let report: Value = serde_json::from_slice(&done.stdout)
-        .with_context(|| String::from_utf8_lossy(&done.stderr).into_owned())?;
-    if let Ok(mut known) = KNOWN.lock() {
-        known.insert(scene.to_owned(), report.clone());
-    }
-    Ok(report)
+    serde_json::from_slice(&done.stdout)
+        .with_context(|| String::from_utf8_lossy(&done.stderr).into_owned())
 }
 
 /// Broken promises: unsealed segments, incomplete triangles, missed hits, and problems of the file.
 pub(super) fn promises(scene: &str) -> anyhow::Result<Figure> {
-    let report = verified(scene)?;
+    static KNOWN: Kept<Value> = Kept::new();
+    let report = KNOWN.get(scene, || verified(scene))?;
     let number = |pointer: &str| {
         let value = report.pointer(pointer).and_then(Value::as_f64);
         value.with_context(|| pointer.to_owned())
@@ -211,7 +204,8 @@ pub(super) fn promises(scene: &str) -> anyhow::Result<Figure> {
 
 /// Pixels that culling by portals changes.
 pub(super) fn pixels(scene: &str) -> anyhow::Result<Figure> {
-    let report = verified(scene)?;
+    static KNOWN: Kept<Value> = Kept::new();
+    let report = KNOWN.get(scene, || verified(scene))?;
     let exact = &report["exact"];
     let drawn: Vec<f64> = exact["triangles"]
         .as_array()
