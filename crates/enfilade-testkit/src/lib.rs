@@ -21,6 +21,7 @@ mod disturb;
 mod edits;
 mod faults;
 mod gjorup;
+mod glb;
 mod graphs;
 mod land;
 pub mod mixed;
@@ -46,6 +47,7 @@ pub use disturb::{Disturbance, disturb, disturbed};
 pub use edits::{Edit, edited, with_cupboards};
 pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
+pub use glb::glb;
 pub use graphs::{
     Dwelling, DwellingParams, GridParams, cabin, courtyard, dwelling, endless_room, linked_copies,
     room_grid, scaled_world, traced_step, window_tower, with_doors, with_specials,

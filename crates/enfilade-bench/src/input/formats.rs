@@ -124,23 +124,6 @@ pub(super) fn gltf(boxes: &[(&str, Corners)]) -> (serde_json::Value, Vec<u8>) {
     (json, bin)
 }
 
-pub(super) fn glb(mut json: String, bin: &[u8]) -> Vec<u8> {
-    while !json.len().is_multiple_of(4) {
-        json.push(' ');
-    }
-    let all = 12 + 8 + json.len() + 8 + bin.len();
-    let mut bytes = b"glTF".to_vec();
-    for n in [2, all, json.len()] {
-        bytes.extend((n as u32).to_le_bytes());
-    }
-    bytes.extend(b"JSON");
-    bytes.extend(json.as_bytes());
-    bytes.extend((bin.len() as u32).to_le_bytes());
-    bytes.extend(b"BIN\0");
-    bytes.extend(bin);
-    bytes
-}
-
 /// Returns brushes, z up, 32 units per meter; the window is filled, since a map must not leak.
 pub(super) fn map(boxes: &[(&str, Corners)]) -> String {
     let mut text = "{\n\"classname\" \"worldspawn\"\n".to_owned();

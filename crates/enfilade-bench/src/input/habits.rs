@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use anyhow::Context;
+use enfilade_testkit::glb;
 
 use super::figures::{Figures, holds};
 use crate::process::binary;
@@ -85,24 +86,12 @@ fn names(rows: &mut Figures<'_>, folder: &Path) -> anyhow::Result<()> {
 }
 
 /// Returns a GLB with all its names replaced by an odd one.
-fn renamed(glb: &[u8], name: &str) -> anyhow::Result<Vec<u8>> {
-    let n = u32::from_le_bytes(glb[12..16].try_into()?) as usize;
-    let json = std::str::from_utf8(&glb[20..20 + n])?.trim_end();
+fn renamed(file: &[u8], name: &str) -> anyhow::Result<Vec<u8>> {
+    let n = u32::from_le_bytes(file[12..16].try_into()?) as usize;
+    let json = std::str::from_utf8(&file[20..20 + n])?.trim_end();
     let name = name.trim_matches('"');
-    let mut json = json.replace("\"name\":\"", &format!("\"name\":\"{name}"));
-    while !json.len().is_multiple_of(4) {
-        json.push(' ');
-    }
-    let rest = &glb[20 + n..];
-    let length = (20 + json.len() + rest.len()) as u32;
-    let head = [&b"glTF\x02\0\0\0"[..], &length.to_le_bytes()].concat();
-    let chunk = [
-        &(json.len() as u32).to_le_bytes()[..],
-        b"JSON",
-        json.as_bytes(),
-    ]
-    .concat();
-    Ok([&head, &chunk, rest].concat())
+    let json = json.replace("\"name\":\"", &format!("\"name\":\"{name}"));
+    Ok(glb(&json, &file[28 + n..]))
 }
 
 /// Files not named as output are not overwritten, nor the targets of links.

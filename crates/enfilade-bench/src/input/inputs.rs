@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use anyhow::Context;
+use enfilade_testkit::glb;
 use serde_json::json;
 
-use super::formats::{Corners, binary_ply, glb, gltf, map, obj, ply, prt, stl, wav};
+use super::formats::{Corners, binary_ply, gltf, map, obj, ply, prt, stl, wav};
 
 /// A file to damage, the commands that read it (words; `@` is the file, the word after `<` is standard input), and
 /// how often it is chosen.
@@ -226,7 +227,7 @@ pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
             "newmtl wall\nKd 0.8 0.7 0.6\nmap_Kd picture.png\nnewmtl glass\nKd 0 0 1\nd 0.3\n"
                 .into(),
         ),
-        ("two.glb", glb(inline, &bin)),
+        ("two.glb", glb(&inline, &bin)),
         ("two.gltf", outside.into()),
         ("two.bin", bin),
         ("picture.png", PICTURE.into()),
@@ -310,7 +311,7 @@ mod tests {
     #[test]
     fn a_glb_says_how_long_it_is() {
         let (json, bin) = gltf(&boxes());
-        let bytes = glb(json.to_string(), &bin);
+        let bytes = glb(&json.to_string(), &bin);
         assert_eq!(bytes[8..12], (bytes.len() as u32).to_le_bytes());
         assert!(bytes.ends_with(&bin));
     }

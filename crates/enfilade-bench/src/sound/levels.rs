@@ -40,7 +40,7 @@ impl Jump {
 
 #[derive(Debug, Default)]
 struct Jumps {
-    /// Of level, direction and length.
+    /// Largest changes of level, direction and length.
     most: [Jump; 3],
     n_walks: usize,
     n_steps: usize,
