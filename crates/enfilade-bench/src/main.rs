@@ -4,33 +4,19 @@
 // A program that prints tables, which the workspace's lints forbid.
 #![allow(clippy::print_stdout)]
 
-mod any_size;
-mod any_source;
-mod bring;
-mod bsp;
-mod builders;
-mod constructive;
-mod facade;
-mod floors;
-mod growth;
-mod judge;
-mod living;
+mod input;
+mod kept;
 mod measure;
-mod messy;
-mod portals;
+mod paths;
 mod process;
+mod render;
 mod rooms;
 mod rows;
-mod score;
 mod sight;
-mod stranger;
+mod size;
+mod sound;
 mod stream;
-mod subject;
 mod table;
-mod tampered;
-mod textures;
-mod trust;
-mod walkthrough;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,20 +24,24 @@ use std::process::ExitCode;
 use clap::Parser;
 use enfilade::runtime::SightOptions;
 
-use bsp::{bench_bsp, bench_simplify};
-use builders::bench_builders;
-use facade::bench_facade;
-use growth::bench_growth;
-use messy::{Messy, bench_messy};
+use input::Trust;
+use input::tampered::bench_tampered;
 use process::scenes_in;
-use rows::{Chosen, bench_rows};
-use score::bench_score;
-use sight::{bench_los, bench_maze, bench_see, bench_tight};
+use render::textures::{PortalTextures, bench_portal_textures};
+use rooms::bsp::{bench_bsp, bench_simplify};
+use rooms::builders::bench_builders;
+use rooms::facts::bench_facts;
+use rooms::score::bench_score;
+use rooms::{Messy, Worlds};
+use rows::{Chosen, Row, RowPrinter, bench_rows};
+use sight::facade::bench_facade;
+use sight::see::{bench_los, bench_maze, bench_see, bench_tight};
+use sight::walkthrough::{self, Walkthrough};
+use size::growth::bench_growth;
 use table::Table;
-use tampered::bench_tampered;
-use textures::{PortalTextures, bench_portal_textures};
-use trust::{Trust, bench_trust};
-use walkthrough::Walkthrough;
+
+/// Segments and rays of `verify`.
+const RAYS: u64 = 1_000_000;
 
 /// Measure, and print the tables of the documentation.
 #[derive(Parser)]
@@ -71,7 +61,7 @@ enum What {
     /// A measurement of `any-size`, in a process of its own.
     #[command(hide = true)]
     SizeStep {
-        step: any_size::SizeStep,
+        step: size::SizeStep,
         /// The generated scene, such as `town-1000`.
         scene: String,
     },
@@ -81,7 +71,7 @@ enum What {
     /// A measurement of `constructive`, in a process of its own.
     #[command(hide = true)]
     LevelStep {
-        step: constructive::LevelStep,
+        step: size::levels::LevelStep,
         /// The generated level, such as `dungeon-380`.
         scene: String,
     },
@@ -91,7 +81,16 @@ enum What {
     Bring(Chosen),
     /// Rooms and doors as architects mean them: a row per figure, with the value that it must reach.
     /// Rows: first, more, scenes3 (each with rooms, doors, windows, extra, spare, cells, cracks), openings, levels, spoilt, verify.
-    Rooms(rooms::Rooms),
+    Rooms {
+        #[command(flatten)]
+        chosen: Chosen,
+        /// Segments that `verify` tries, and as many rays; a hundredth as many views.
+        #[arg(long, default_value_t = RAYS)]
+        rays: u64,
+        /// Do not bake again what an earlier run of the same build has baked.
+        #[arg(long)]
+        keep: bool,
+    },
     /// Levels of games and small cases with known answers: a row per figure, with the value that it must reach.
     Levels(Chosen),
     /// Decisions of a bake: numbers, code, answers to why, and how well the verdict knows which worlds are wrong. Rows: one labelling,
@@ -111,7 +110,12 @@ enum What {
     Portals(Chosen),
     /// Doorways drawn as pictures: a row per figure, with the value that it must reach. Rows: model, portal culling, error,
     /// pops, figures.
-    PortalTextures(PortalTextures),
+    PortalTextures {
+        #[command(flatten)]
+        chosen: Chosen,
+        #[command(flatten)]
+        options: PortalTextures,
+    },
     /// Worlds in pieces over a simulated link: a row per figure, with the value that it must reach.
     Stream(Chosen),
     /// A step of the row `size` of `stream`, in a process of its own.
@@ -152,10 +156,21 @@ enum What {
     Stranger(Chosen),
     /// Robustness of rooms and doors against disturbed models: a row per figure, with the value that it must reach.
     /// Rows: moved, missing, quantized, unnamed, exact, undisturbed, fault, foreign.
-    Messy(Messy),
+    Messy {
+        #[command(flatten)]
+        chosen: Chosen,
+        /// Segments that `verify` tries, and as many rays.
+        #[arg(long, default_value_t = RAYS)]
+        rays: u64,
+    },
     /// Hostile and huge input: a row per figure, with the value that it must reach. Rows: bound, case, commands,
     /// estimate, gate, habits, large, mutated, nasty, order, tampered, tight.
-    Trust(Trust),
+    Trust {
+        #[command(flatten)]
+        chosen: Chosen,
+        #[command(flatten)]
+        options: Trust,
+    },
     /// Tampered worlds, those of a generated house included: at how many of three places the defaults find each kind.
     /// Prints lines of JSON, the input of `bench trust`.
     Tampered {
@@ -256,28 +271,61 @@ enum What {
     },
 }
 
+/// Returns the rows that a name stands for, if they share nothing.
+fn rows_of(what: &What) -> Option<(&Chosen, &'static [&'static [Row]])> {
+    Some(match what {
+        What::AnySize(chosen) => (chosen, &[size::ROWS]),
+        What::AnySource(chosen) => (chosen, &[input::sources::ROWS]),
+        What::Constructive(chosen) => (chosen, &[size::levels::ROWS]),
+        What::Bring(chosen) => (chosen, &[sight::VALUE]),
+        What::Judge(chosen) => (chosen, &[rooms::DECISIONS]),
+        What::Living(chosen) => (
+            chosen,
+            &[paths::MOVING, render::LAMPS, paths::WALKING, sound::ROWS],
+        ),
+        What::Portals(chosen) => (chosen, &[render::SPECIALS, sight::SPECIALS]),
+        What::Stranger(chosen) => (chosen, &[rooms::FOREIGN]),
+        What::Stream(chosen) => (chosen, &[stream::ROWS]),
+        _ => return None,
+    })
+}
+
 fn run(args: &Cli) -> anyhow::Result<()> {
+    let json = args.json;
+    if let Some((chosen, lists)) = rows_of(&args.what) {
+        return bench_rows(lists, json, chosen, ());
+    }
+    match &args.what {
+        What::Levels(chosen) => {
+            bench_rows(&[rooms::LEVELS], json, chosen, Worlds::new(RAYS, false)?)
+        }
+        What::Rooms { chosen, rays, keep } => {
+            let worlds = Worlds::new(*rays, *keep)?;
+            bench_rows(&[rooms::BUILDINGS], json, chosen, worlds)
+        }
+        What::Messy { chosen, rays } => {
+            let mut out = RowPrinter::new(json, chosen, Messy::new(*rays));
+            out.run(rooms::DISTURBED)?;
+            out.report();
+            Ok(())
+        }
+        What::Trust { chosen, options } => {
+            bench_rows(&[input::HOSTILE], json, chosen, options.begin()?)
+        }
+        What::PortalTextures { chosen, options } => bench_portal_textures(options, chosen, json),
+        What::SizeStep { step, scene } => size::run_step(*step, scene),
+        What::LevelStep { step, scene } => size::levels::run_step(*step, scene),
+        What::Town { step, scene, dir } => stream::run_step(*step, scene, dir),
+        What::Facts { chosen, csv } => bench_facts(chosen, *csv),
+        What::Tampered { scenes, kinds } => bench_tampered(scenes, kinds),
+        _ => print_table(args),
+    }
+}
+
+/// Prints a table of the documentation.
+fn print_table(args: &Cli) -> anyhow::Result<()> {
     let mut table = Table::new(args.json);
     match &args.what {
-        What::AnySize(chosen) => return bench_rows(any_size::ROWS, args.json, chosen),
-        What::AnySource(chosen) => return bench_rows(any_source::ROWS, args.json, chosen),
-        What::SizeStep { step, scene } => return any_size::run_step(*step, scene),
-        What::Constructive(chosen) => return bench_rows(constructive::ROWS, args.json, chosen),
-        What::LevelStep { step, scene } => return constructive::run_step(*step, scene),
-        What::Bring(chosen) => return bench_rows(&bring::ROWS, args.json, chosen),
-        What::Levels(chosen) => return rooms::bench_levels(chosen, args.json),
-        What::Rooms(options) => return rooms::bench_rooms(options, args.json),
-        What::Judge(chosen) => return judge::bench_judge(chosen, args.json),
-        What::Facts { chosen, csv } => return judge::bench_facts(chosen, *csv),
-        What::Living(chosen) => return bench_rows(living::ROWS, args.json, chosen),
-        What::Portals(chosen) => return bench_rows(portals::ROWS, args.json, chosen),
-        What::PortalTextures(options) => return bench_portal_textures(options, args.json),
-        What::Stream(chosen) => return bench_rows(stream::ROWS, args.json, chosen),
-        What::Town { step, scene, dir } => return stream::run_step(*step, scene, dir),
-        What::Stranger(chosen) => return stranger::bench_stranger(chosen, args.json),
-        What::Messy(options) => return bench_messy(options, args.json),
-        What::Trust(options) => return bench_trust(options, args.json),
-        What::Tampered { scenes, kinds } => return bench_tampered(scenes, kinds),
         What::Score {
             dirs,
             folders,
@@ -327,6 +375,7 @@ fn run(args: &Cli) -> anyhow::Result<()> {
             rooms,
             pairs,
         } => bench_los(&mut table, scenes, rooms, *pairs)?,
+        _ => {}
     }
     table.finish()
 }

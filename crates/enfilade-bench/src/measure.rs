@@ -2,6 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use enfilade::geom::DVec3;
+use enfilade::geom::scene::Scene;
+use enfilade::import::{ImportOptions, import};
+
 /// Returns the processor seconds that this process has used so far, all threads together; 0 if the system does not
 /// provide them.
 pub(crate) fn cpu_seconds() -> f64 {
@@ -28,6 +32,17 @@ pub(crate) fn name(path: &Path) -> String {
         .unwrap_or_default()
 }
 
+/// Returns a file's or folder's name with its extension.
+pub(crate) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Returns a stored point.
+pub(crate) fn point(p: [f32; 3]) -> DVec3 {
+    DVec3::from(p.map(f64::from))
+}
+
 /// Returns the structure and detail files of a scene: a file, or a folder with `scene.glb` and optionally `detail.glb`.
 pub(crate) fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     if !path.is_dir() {
@@ -40,6 +55,18 @@ pub(crate) fn files_of(path: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
         Vec::new()
     };
     (vec![path.join("scene.glb")], detail)
+}
+
+/// Returns the scene of a file or folder.
+pub(crate) fn imported(path: &Path) -> anyhow::Result<Scene> {
+    let (files, detail) = files_of(path);
+    Ok(import(&files, &detail, &ImportOptions::default())?.scene)
+}
+
+/// Returns the middle of the values, the upper of two; sorts them. Not a number if there are none.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Returns the value that this share of `values` does not exceed; sorts them. Not a number if there are none.

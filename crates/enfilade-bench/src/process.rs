@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, bail};
+use serde_json::Value;
 
 use crate::measure::files_of;
 
@@ -60,6 +61,19 @@ pub(crate) fn scenes() -> Vec<PathBuf> {
     scenes_dir().map_or_else(Vec::new, |dir| scenes_in(&dir))
 }
 
+/// Returns the real scenes, and those in folders of these names beside them.
+pub(crate) fn scenes_and(beside: &[&str]) -> Vec<PathBuf> {
+    let dir = scenes_dir();
+    let beside = beside.iter().filter_map(|name| beside_scenes(name));
+    let all = dir.iter().cloned().chain(beside);
+    all.flat_map(|dir| scenes_in(&dir)).collect()
+}
+
+/// Returns the path of a file or folder beside the folder of real scenes, if there is one.
+pub(crate) fn beside_scenes(name: &str) -> Option<PathBuf> {
+    scenes_dir().map(|dir| dir.with_file_name(name))
+}
+
 /// Returns the folders with a `scene.glb` in `dir`, by name.
 pub(crate) fn scenes_in(dir: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(dir) else {
@@ -72,6 +86,20 @@ pub(crate) fn scenes_in(dir: &Path) -> Vec<PathBuf> {
         .collect();
     found.sort();
     found
+}
+
+/// Runs the test kit's `generate`.
+pub(crate) fn generate(args: &[&str], to: &Path) -> anyhow::Result<()> {
+    let example = binary("examples/generate");
+    output_of(Command::new(example).args(args).arg("-o").arg(to), None).map(drop)
+}
+
+/// Returns a bake of one file, with these arguments.
+pub(crate) fn bake_file(file: &Path, args: &[&str], world: &Path) -> Command {
+    let mut command = Command::new(binary("enfilade"));
+    command.arg("bake").arg(file).args(args);
+    command.arg("-o").arg(world);
+    command
 }
 
 /// Writes `text` between the two marks of a page of `docs/benchmarks/`; text around it stays.
@@ -88,6 +116,16 @@ pub(crate) fn write_between_marks(page: &str, text: &str) -> anyhow::Result<()> 
     let (begin, end) = marks().with_context(|| format!("{page} has lost its marks"))?;
     let new = format!("{}\n{}\n\n{}", &old[..begin], text.trim_end(), &old[end..]);
     std::fs::write(&path, new).with_context(|| path.display().to_string())
+}
+
+/// Runs a hidden command of this program in a process of its own, as its memory counts; returns the JSON that it prints, if any.
+pub(crate) fn step(args: &[&str]) -> anyhow::Result<Value> {
+    let program = std::env::current_exe().context("this program has no path")?;
+    let said = output_of(Command::new(program).args(args), None)?;
+    if said.is_empty() {
+        return Ok(Value::Null);
+    }
+    serde_json::from_str(&said).context("a step that prints JSON")
 }
 
 /// Returns the standard output of a command that must succeed; an error contains its standard error.

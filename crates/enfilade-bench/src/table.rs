@@ -24,7 +24,8 @@ impl Table {
     }
 
     /// Prints a line.
-    pub(crate) fn push(&mut self, line: String) {
+    pub(crate) fn push(&mut self, line: impl Into<String>) {
+        let line = line.into();
         let line = if self.is_json {
             self.as_json(&line)
         } else {
@@ -40,7 +41,7 @@ impl Table {
 
     /// Prints lines.
     pub(crate) fn push_text(&mut self, text: &str) {
-        text.lines().for_each(|line| self.push(line.to_owned()));
+        text.lines().for_each(|line| self.push(line));
     }
 
     /// # Errors

@@ -10,7 +10,7 @@ use std::process::{Command, Output};
 
 use enfilade_geom::DVec3;
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_testkit::{furnished_house, mixed};
+use enfilade_testkit::{furnished_house, glb, mixed};
 
 /// A folder for one test, removed at its end.
 struct Folder(PathBuf);
@@ -83,22 +83,6 @@ impl Drop for Folder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
-}
-
-/// A GLB with this JSON and binary chunk.
-fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
-    let mut json = json.as_bytes().to_vec();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let mut bin = bin.to_vec();
-    bin.resize(bin.len().next_multiple_of(4), 0);
-    let mut out = b"glTF\x02\0\0\0".to_vec();
-    out.extend((28 + json.len() as u32 + bin.len() as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", json), (b"BIN\0", bin)] {
-        out.extend((chunk.len() as u32).to_le_bytes());
-        out.extend(kind);
-        out.extend(chunk);
-    }
-    out
 }
 
 /// The parts of a small glTF document that cases vary.

@@ -6,7 +6,7 @@ use enfilade_cpg::{MonitorCamera, Pass, SpecialId, SpecialPortal, SpecialShape, 
 use enfilade_geom::DVec3;
 use enfilade_render::{AdapterChoice, Camera, Gpu, Picture, SpaceCounts, SpaceShot, Studio, Style};
 use enfilade_testkit::{
-    Chain, GridParams, Rng, Traced, TracedCamera, painted, room_grid, with_specials,
+    Chain, GridParams, Rng, Traced, TracedCamera, chains_of, painted, room_grid, with_specials,
 };
 use enfilade_world::{PartId, Space, SpaceSeen, SpaceViewer};
 
@@ -136,16 +136,9 @@ impl Scene {
 
 /// Returns the chains of special portals that are looked into.
 fn chains(seen: &SpaceSeen<'_>) -> HashSet<Chain> {
-    let mut all: Vec<Chain> = Vec::new();
-    for context in seen.contexts() {
-        let chain = context.via().map_or_else(Vec::new, |via| {
-            let mut chain = all[via.parent].clone();
-            chain.push((via.special.0, via.pass));
-            chain
-        });
-        all.push(chain);
-    }
-    all.into_iter().collect()
+    let vias = seen.contexts().map(|context| context.via());
+    let vias = vias.map(|via| via.map(|via| (via.parent, via.special.0, via.pass)));
+    chains_of(vias).into_iter().collect()
 }
 
 fn traced_camera(camera: &Camera, size: [u32; 2]) -> TracedCamera {

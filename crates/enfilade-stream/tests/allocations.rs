@@ -2,8 +2,9 @@
 
 mod common;
 
-use common::{Program, piece_a_cell, visible_sets};
+use common::{Program, piece_a_cell};
 use enfilade_stream::{Frame, LinkOptions, StreamOptions};
+use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, room_grid};
 
 // Covers W1.
@@ -16,7 +17,7 @@ fn idle_frames_allocate_nothing() {
             max_resident,
             ..StreamOptions::default()
         };
-        let pvs = Some(visible_sets(&world));
+        let pvs = Some(near_sets(&world.graph));
         let link = LinkOptions::default();
         let mut program = Program::new(&world, &catalog, pvs, options, link);
         let view: Vec<(u32, f32)> = (0..60).map(|c| (c, 0.01)).collect();

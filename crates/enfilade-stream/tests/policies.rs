@@ -4,12 +4,13 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Program, piece_a_cell, visible_sets};
+use common::{Program, piece_a_cell};
 use enfilade_cpg::{CellId, CellSet, Pvs, World};
 use enfilade_stream::{
     Catalog, Cause, FetchError, Frame, LinkOptions, Piece, PieceId, PinError, Policy, Reply,
     Source, StreamOptions,
 };
+use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, room_grid};
 
 /// Rooms in a row with a doorway between each two, 3 to 6 m deep.
@@ -475,7 +476,7 @@ fn an_eye_in_no_cell_and_numbers_that_are_none_do_no_harm() {
 fn a_cut_link_is_told_and_all_comes_once_it_is_mended() {
     let world = row_of_rooms(8);
     let catalog = piece_a_cell(&world, SIZE);
-    let pvs = visible_sets(&world);
+    let pvs = near_sets(&world.graph);
     let resident_after = |is_cut: bool| {
         let options = options(Policy::default(), 6);
         let link = LinkOptions::default();

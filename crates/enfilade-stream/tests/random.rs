@@ -5,9 +5,10 @@ mod common;
 use std::collections::HashSet;
 use std::time::Duration;
 
-use common::{Program, random_catalog, visible_sets};
+use common::{Program, random_catalog};
 use enfilade_cpg::{CellId, Pvs, World};
 use enfilade_stream::{Catalog, Cause, LinkOptions, PieceId, Policy, StreamOptions};
+use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 use proptest::prelude::*;
 
@@ -52,7 +53,7 @@ fn draw_program(seed: u64, policy: Policy) -> (World, Pvs, Program, bool, Rng) {
         short_read_rate: rng.range(0.0, 0.5),
         seed,
     };
-    let pvs = visible_sets(&world);
+    let pvs = near_sets(&world.graph);
     let has_pvs = rng.chance(0.8);
     let given = has_pvs.then(|| pvs.clone());
     let program = Program::new(&world, &catalog, given, options, link);

@@ -21,6 +21,7 @@ mod disturb;
 mod edits;
 mod faults;
 mod gjorup;
+mod glb;
 mod graphs;
 mod land;
 pub mod mixed;
@@ -28,6 +29,7 @@ mod open_land;
 pub mod oracle;
 mod same_graph;
 mod shuffle;
+mod solids;
 mod surface_net;
 pub mod tamper;
 mod tower;
@@ -45,6 +47,7 @@ pub use disturb::{Disturbance, disturb, disturbed};
 pub use edits::{Edit, edited, with_cupboards};
 pub use faults::Fault;
 pub use gjorup::{Variant, gjorup_cavern, gjorup_rooms};
+pub use glb::glb;
 pub use graphs::{
     Dwelling, DwellingParams, GridParams, cabin, courtyard, dwelling, endless_room, linked_copies,
     room_grid, scaled_world, traced_step, window_tower, with_doors, with_specials,
@@ -53,8 +56,9 @@ pub use land::hills;
 pub use open_land::{OpenLand, city, hamlets, valleys};
 pub use same_graph::differences;
 pub use shuffle::{shuffled_glb, shuffled_map, shuffled_obj};
+pub use solids::Solids;
 pub use tower::{TowerParams, office_tower};
 pub use town::{Town, town, village};
-pub use traced::{Chain, Traced, TracedCamera, painted};
+pub use traced::{Chain, Traced, TracedCamera, chains_of, painted};
 pub use transform::{reordered, rotated, scaled, shuffled, transformed};
 pub use tubes::{Tube, surface_of, tubes};

@@ -1,7 +1,9 @@
 //! Slow, plain checks that share no code with the kernels under test.
 
-use std::collections::HashMap;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
 
+use enfilade_cpg::{CellPortalGraph, CellSet, Pvs};
 use enfilade_geom::ray::segment_to_triangle_distance;
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{
@@ -294,4 +296,40 @@ fn touches_cube(t: &Triangle, center: DVec3, half: f64) -> bool {
     !edges
         .into_iter()
         .any(|e| axes.into_iter().any(|a| separates(a.cross(e))))
+}
+
+/// Returns the least lengths from a cell to all of `n_cells` after Dijkstra, given the cells and steps beside each; `None` where no way
+/// leads.
+pub fn least_lengths<I: IntoIterator<Item = (u32, u64)>>(
+    n_cells: usize,
+    from: u32,
+    beside: impl Fn(u32) -> I,
+) -> Vec<Option<u64>> {
+    let mut lengths = vec![None; n_cells];
+    let mut heap = BinaryHeap::from([Reverse((0, from))]);
+    while let Some(Reverse((length, cell))) = heap.pop() {
+        if lengths[cell as usize].is_none() {
+            lengths[cell as usize] = Some(length);
+            let beside = beside(cell).into_iter();
+            heap.extend(beside.map(|(to, step)| Reverse((length + step, to))));
+        }
+    }
+    lengths
+}
+
+/// Returns the cells behind up to two portals of each cell, as visible sets of worlds whose own would take long to find.
+#[must_use]
+pub fn near_sets(graph: &CellPortalGraph) -> Pvs {
+    let row = |cell| {
+        let mut set = CellSet::new(graph.cells.len());
+        set.insert(cell);
+        for exit in graph.exits(cell) {
+            set.insert(exit.to);
+            for next in graph.exits(exit.to) {
+                set.insert(next.to);
+            }
+        }
+        set
+    };
+    Pvs::of_rows(&graph.cell_ids().map(row).collect::<Vec<_>>())
 }

@@ -36,6 +36,21 @@ const BLUR: f64 = 0.04;
 /// The special portals and passes on the way to a surface.
 pub type Chain = Vec<(u32, usize)>;
 
+/// Returns the chains of the views of a frame. Each view is given by the view in which its special portal is seen, that portal and the
+/// pass, or nothing for the first.
+pub fn chains_of(vias: impl IntoIterator<Item = Option<(usize, u32, usize)>>) -> Vec<Chain> {
+    let mut all: Vec<Chain> = Vec::new();
+    for via in vias {
+        let chain = via.map_or_else(Vec::new, |(parent, special, pass)| {
+            let mut chain = all[parent].clone();
+            chain.push((special, pass));
+            chain
+        });
+        all.push(chain);
+    }
+    all
+}
+
 /// A camera: eye, axes right, up and forward, and tangents of half its angles across and up.
 #[derive(Clone, Copy, Debug)]
 pub struct TracedCamera {

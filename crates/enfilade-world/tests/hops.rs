@@ -2,10 +2,8 @@
 //!
 //! Covers W10.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use enfilade_cpg::{Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, World};
+use enfilade_testkit::oracle::least_lengths;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 use enfilade_world::{Exit, Hop, Hops, Layout, PartId, Place, Space};
 
@@ -54,18 +52,10 @@ fn graph_by_chance(n: usize, n_links: usize, seed: u64) -> Space {
 
 /// Least lengths from a cell, in tenths of a millimeter.
 fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -> Vec<Option<u64>> {
-    let mut lengths = vec![None; layout.n_cells()];
-    let mut heap = BinaryHeap::from([Reverse((0, from.0))]);
-    while let Some(Reverse((length, cell))) = heap.pop() {
-        if lengths[cell as usize].is_some() {
-            continue;
-        }
-        lengths[cell as usize] = Some(length);
-        for &e in layout.exits(CellId(cell)) {
-            heap.extend(step(e).map(|s| Reverse((length + s, e.to.0))));
-        }
-    }
-    lengths
+    least_lengths(layout.n_cells(), from.0, |cell| {
+        let exits = layout.exits(CellId(cell)).iter();
+        exits.filter_map(|&e| Some((e.to.0, step(e)?)))
+    })
 }
 
 /// Flips random portals and compares all pairs.

@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 
 use enfilade_cpg::{CellId, PortalId, World};
-use enfilade_geom::{Bvh, DQuat, DVec3, Ray, Triangle};
+use enfilade_geom::{Bvh, DQuat, DVec3, Ray};
 use enfilade_runtime::{ChunkId, DetailId, Sight, View};
-use enfilade_testkit::{GridParams, Rng, cabin, room_grid};
+use enfilade_testkit::{GridParams, Rng, Solids, cabin, room_grid};
 use enfilade_world::{PartId, Place, Pose, Space, SpaceError, SpaceViewer};
 
 fn point(p: [f32; 3]) -> DVec3 {
@@ -38,32 +38,19 @@ struct Model {
 
 impl Model {
     fn new(space: &Space, worlds: &[&World]) -> Self {
-        let mut triangles: Vec<Triangle> = Vec::new();
-        let mut items = Vec::new();
+        let mut all = Solids::default();
         for (part, world) in (0..).map(PartId).zip(worlds) {
             let (sight, pose) = (space.sight(part), space.pose(part));
             for (id, chunk) in (0..).map(ChunkId).zip(sight.chunks()) {
-                let positions = &world.batches[chunk.batch as usize].primitive.positions;
-                let first = chunk.first_index as usize;
-                let indices = &sight.indices(chunk.batch)[first..first + chunk.n_indices as usize];
-                for t in indices.chunks_exact(3) {
-                    triangles.push([0, 1, 2].map(|k| pose.point(point(positions[t[k] as usize]))));
-                    items.push(Item::Chunk(part, id));
-                }
+                let indices = &sight.indices(chunk.batch)[chunk.first_index as usize..];
+                let indices = &indices[..chunk.n_indices as usize];
+                let item = Item::Chunk(part, id);
+                all.add((world, chunk.batch), indices, |p| pose.point(p), item);
             }
-            for (id, object) in (0..).map(DetailId).zip(&world.details) {
-                let placement = pose.matrix() * object.placement();
-                for p in &world.detail_meshes[object.mesh as usize].primitives {
-                    for t in p.indices.chunks_exact(3) {
-                        triangles.push([0, 1, 2].map(|k| {
-                            placement.transform_point3(point(p.positions[t[k] as usize]))
-                        }));
-                        items.push(Item::Detail(part, id));
-                    }
-                }
-            }
+            let item = |id| Item::Detail(part, DetailId(id));
+            all.add_objects(world, pose.matrix(), item);
         }
-        let bvh = Bvh::build(&triangles);
+        let (bvh, items) = all.built();
         Self { bvh, items }
     }
 }

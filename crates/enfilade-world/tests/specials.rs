@@ -5,11 +5,8 @@ use std::collections::{HashMap, HashSet};
 use enfilade_cpg::{Pass, PortalId, SpecialId, SpecialPortal, SpecialShape, Way, World};
 use enfilade_geom::{Bvh, DMat3, DVec3, Ray, Triangle};
 use enfilade_runtime::{Seen, Sight, View};
-use enfilade_testkit::{GridParams, Rng, room_grid, with_specials};
+use enfilade_testkit::{Chain, GridParams, Rng, chains_of, room_grid, with_specials};
 use enfilade_world::{PartId, Space, SpaceSeen, SpaceViewer};
-
-/// The special portals and passes on the way to a triangle.
-type Chain = Vec<(u32, usize)>;
 
 /// A structural triangle: batch and vertices.
 type Name = (u32, [u32; 3]);
@@ -132,18 +129,13 @@ fn triangles_of(sight: &Sight, seen: &Seen<'_>) -> HashSet<Name> {
 
 /// Returns the visible triangles by the special portals in which they are seen.
 fn answered(space: &Space, seen: &SpaceSeen<'_>) -> HashMap<Chain, HashSet<Name>> {
-    let mut chains: Vec<Chain> = Vec::new();
+    let vias = seen.contexts().map(|context| context.via());
+    let chains = chains_of(vias.map(|v| v.map(|v| (v.parent, v.special.0, v.pass))));
     let mut answer = HashMap::new();
-    for context in seen.contexts() {
-        let chain = context.via().map_or_else(Vec::new, |via| {
-            let mut chain = chains[via.parent].clone();
-            chain.push((via.special.0, via.pass));
-            chain
-        });
+    for (context, chain) in seen.contexts().zip(chains) {
         let of_root = context.of_part(PartId::ROOT);
         let names = of_root.map(|seen| triangles_of(space.sight(PartId::ROOT), &seen));
-        answer.insert(chain.clone(), names.unwrap_or_default());
-        chains.push(chain);
+        answer.insert(chain, names.unwrap_or_default());
     }
     answer
 }

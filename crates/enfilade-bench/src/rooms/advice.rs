@@ -5,12 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::judge::buildings;
-use crate::judge::cases::cases;
+use super::cases::cases;
+use super::score::list;
+use super::worlds::RoomRows;
 use crate::measure;
 use crate::process::{bake_command, target_dir};
-use crate::rows::{Chosen, RowPrinter};
-use crate::score::list;
 
 /// Largest scene that is tried. [Units: bytes]
 const SMALL: u64 = 3 << 20;
@@ -78,20 +77,20 @@ fn can_be_followed(option: &str) -> bool {
 }
 
 /// Prints a row for each file whose bake proposes something, and their sum.
-pub(super) fn run(chosen: &Chosen, out: &mut RowPrinter) -> anyhow::Result<()> {
-    if !chosen.has_row("levels: advice") {
+pub(super) fn run(out: &mut RoomRows<'_>) -> anyhow::Result<()> {
+    if !out.chosen.has_row("levels: advice") {
         return Ok(());
     }
     let given = cases().map(|(case, file)| (file, case.given));
     let is_small =
         |dir: &PathBuf| std::fs::metadata(dir.join("scene.glb")).is_ok_and(|m| m.len() <= SMALL);
-    let scenes = buildings().into_iter().filter(is_small);
+    let scenes = out.buildings().into_iter().filter(is_small);
     let levels = super::levels::files().into_iter().map(|(_, file)| file);
     let others = scenes.chain(levels).map(|file| (file, &[][..]));
     let (mut n, mut n_wrong) = (0, 0);
     for (file, given) in given
         .chain(others)
-        .filter(|(f, _)| chosen.has_scene(&measure::name(f)))
+        .filter(|(f, _)| out.chosen.has_scene(&measure::name(f)))
     {
         let first = Advised::of(&file, given, "")?;
         for option in &first.options {

@@ -9,7 +9,7 @@
 
 use serde_json::Value;
 
-use crate::score::{V3, along, cross, dot, list, sub, unit, vec3};
+use super::score::{V3, along, cross, dot, list, sub, unit, vec3};
 
 /// Space around the opening's rectangle in which the hole must end. [Units: wu]
 const AROUND: f64 = 0.5;

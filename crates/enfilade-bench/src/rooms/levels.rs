@@ -7,14 +7,13 @@ use enfilade::geom::{Aabb, DVec3};
 use enfilade::import::{ImportOptions, RoleRules, import};
 use serde_json::Value;
 
-use crate::judge::cases::cases;
+use super::cases::cases;
+use super::score::{V3, list, vec3};
 use crate::measure;
-use crate::process::scenes_dir;
-use crate::rows::RowPrinter;
-use crate::score::{V3, list, vec3};
+use crate::process::beside_scenes;
 
 use super::bars::Bar;
-use super::worlds::Worlds;
+use super::worlds::RoomRows;
 
 /// A level, and what its page says.
 struct GameLevel {
@@ -45,28 +44,27 @@ const LEVELS: [GameLevel; 2] = [
 const ROOM: f64 = 10.0;
 
 /// Prints the rows of the levels and of the small cases.
-pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) -> anyhow::Result<()> {
-    let folder = scenes_dir().map(|dir| dir.with_file_name("levels"));
+pub(super) fn run(out: &mut RoomRows<'_>) -> anyhow::Result<()> {
+    let folder = beside_scenes("levels");
     for level in &LEVELS {
         let file = folder.as_ref().map(|dir| dir.join(level.file));
-        let is_wanted =
-            worlds.chosen.has_row("levels: rooms") && worlds.chosen.has_scene(level.file);
+        let is_wanted = out.chosen.has_row("levels: rooms") && out.chosen.has_scene(level.file);
         let Some(file) = file.filter(|f| is_wanted && f.is_file()) else {
             continue;
         };
-        let baked = worlds.level(&file);
+        let baked = out.state.level(&file);
         match &baked.graph {
             Ok(graph) => level.print(&file, graph, out)?,
             Err(why) => out.print("levels", level.file, None, "a world", Some(false), why),
         }
     }
-    if !worlds.chosen.has_row("levels: case") {
+    if !out.chosen.has_row("levels: case") {
         return Ok(());
     }
     for (case, file) in cases() {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        if worlds.chosen.has_scene(&name) {
-            let (ok, found) = worlds.case(case, &file)?.judged(case);
+        let name = measure::file_name(&file);
+        if out.chosen.has_scene(&name) {
+            let (ok, found) = out.state.case(case, &file)?.judged(case);
             let value = Some(f64::from(u8::from(ok)));
             out.print(
                 "levels: case",
@@ -82,7 +80,7 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) -> anyhow::Resu
 }
 
 impl GameLevel {
-    fn print(&self, file: &Path, graph: &Value, out: &mut RowPrinter) -> anyhow::Result<()> {
+    fn print(&self, file: &Path, graph: &Value, out: &mut RoomRows<'_>) -> anyhow::Result<()> {
         let mut print = |row: &str, value: f64, bar: Bar, note: &str| {
             let ok = Some(bar.passes(value));
             out.print(row, self.file, Some(value), &bar.text(), ok, note);
@@ -162,7 +160,7 @@ fn n_doors_with_portal(scene: &Scene, graph: &Value) -> (usize, Vec<String>) {
 
 /// Returns the name of a level or case for rows.
 pub(super) fn files() -> Vec<(String, std::path::PathBuf)> {
-    let folder = scenes_dir().map(|dir| dir.with_file_name("levels"));
+    let folder = beside_scenes("levels");
     let levels = LEVELS
         .iter()
         .filter_map(|l| Some(folder.as_ref()?.join(l.file)));

@@ -4,16 +4,16 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use enfilade::geom::scene::GivenPortal;
 use enfilade::geom::{Aabb, DVec3};
 use enfilade::import::{ImportOptions, export_glb, import};
 use serde_json::Value;
 
+use super::score::{inspect, list, vec3};
+use super::worlds::RoomRows;
 use crate::measure;
-use crate::process::{bake_command, scenes_dir, target_dir};
-use crate::rows::{Chosen, RowPrinter};
-use crate::score::{inspect, list, vec3};
+use crate::process::{bake_command, beside_scenes, target_dir};
 
 /// Files in which openings are marked, beside the real scenes.
 const MARKED: [&str; 5] = [
@@ -31,20 +31,19 @@ const N_BAKES: usize = 5;
 const OFF: f64 = 0.05;
 
 /// Prints both rows.
-pub(super) fn run(chosen: &Chosen, out: &mut RowPrinter) -> anyhow::Result<()> {
-    let beside = |file: &str| scenes_dir().map(|dir| dir.with_file_name(file));
-    let there = |file: &str| beside(file).filter(|f| f.is_file());
-    if chosen.has_row("levels: given portals") {
+pub(super) fn run(out: &mut RoomRows<'_>) -> anyhow::Result<()> {
+    let there = |file: &str| beside_scenes(file).filter(|f| f.is_file());
+    if out.chosen.has_row("levels: given portals") {
         let files = MARKED.iter().filter_map(|file| there(file));
-        for file in files.filter(|f| chosen.has_scene(&measure::name(f))) {
+        for file in files.filter(|f| out.chosen.has_scene(&measure::name(f))) {
             given(&file, out)?;
         }
     }
-    if chosen.has_row("levels: sky time") {
+    if out.chosen.has_row("levels: sky time") {
         let skies = SKIES
             .iter()
             .filter_map(|name| there(&format!("cases/levels/{name}")));
-        for file in skies.filter(|f| chosen.has_scene(&measure::name(f))) {
+        for file in skies.filter(|f| out.chosen.has_scene(&measure::name(f))) {
             // The same level as it is read: without its sky.
             let plain = import(std::slice::from_ref(&file), &[], &ImportOptions::default())?;
             let without = target_dir().join("without-sky.glb");
@@ -60,7 +59,7 @@ pub(super) fn run(chosen: &Chosen, out: &mut RowPrinter) -> anyhow::Result<()> {
 }
 
 /// Prints the share of a file's marks that are portals of its world.
-fn given(file: &Path, out: &mut RowPrinter) -> anyhow::Result<()> {
+fn given(file: &Path, out: &mut RoomRows<'_>) -> anyhow::Result<()> {
     let marks = import(&[file.to_owned()], &[], &ImportOptions::default())?;
     let marks = marks.scene.given_portals;
     let world = target_dir().join("given.glb");
@@ -111,6 +110,5 @@ fn seconds(file: &Path) -> anyhow::Result<f64> {
         ensure!(done.status.success(), "{}: not baked", file.display());
         times.push(began.elapsed().as_secs_f64());
     }
-    times.sort_by(f64::total_cmp);
-    times.get(N_BAKES / 2).copied().context("no bake")
+    Ok(measure::median(&mut times))
 }

@@ -1,55 +1,69 @@
-//! `bench rooms`: rooms, doors and openings as architects mean them, clean and spoilt, on buildings and levels; each figure with its
-//! bar. `bench levels`: those of levels of games alone.
+//! Rooms and doors: as architects mean them, clean, spoilt, disturbed and merged; what a bake says of itself; other builders.
 
 mod advice;
+mod axes;
+mod bakes;
 mod bars;
+pub(crate) mod bsp;
+pub(crate) mod builders;
+mod cases;
+mod code;
+mod disturbed;
+pub(crate) mod facts;
+mod figures;
+mod floors;
+mod foreign;
 mod hole;
+mod judge;
+mod kinds;
 mod levels;
 mod marked;
+mod merged;
 mod openings;
+pub(crate) mod score;
 mod sets;
 mod spoilt;
+mod trust;
 mod verified;
 mod worlds;
 
-use crate::rows::{Chosen, RowPrinter};
-use worlds::Worlds;
+use crate::rows::Row;
 
-/// Segments and rays of `verify`.
-const RAYS: u64 = 1_000_000;
+pub(crate) use disturbed::Messy;
+pub(crate) use worlds::Worlds;
 
-/// The options of the bench.
-#[derive(clap::Args)]
-pub(crate) struct Rooms {
-    #[command(flatten)]
-    chosen: Chosen,
-    /// Segments that `verify` tries, and as many rays; a hundredth as many views.
-    #[arg(long, default_value_t = RAYS)]
-    rays: u64,
-    /// Do not bake again what an earlier run of the same build has baked.
-    #[arg(long)]
-    keep: bool,
-}
+/// Buildings and levels, clean and spoilt, beside what architects mean.
+pub(crate) const BUILDINGS: &[Row<Worlds>] = &[
+    Row::part("", sets::run),
+    Row::part("openings", openings::run),
+    Row::part("levels", levels::run),
+    Row::part("spoilt", spoilt::run),
+    Row::part("verify", verified::run),
+];
 
-/// Measures the rows of levels alone, each baked anew; an error if a bar is missed.
-pub(crate) fn bench_levels(chosen: &Chosen, is_json: bool) -> anyhow::Result<()> {
-    let mut out = RowPrinter::new(is_json);
-    let mut worlds = Worlds::new(chosen, false)?;
-    levels::run(&mut worlds, &mut out)?;
-    verified::run_levels(&mut worlds, RAYS, &mut out)?;
-    marked::run(chosen, &mut out)?;
-    advice::run(chosen, &mut out)?;
-    out.finish()
-}
+/// Levels of games alone.
+pub(crate) const LEVELS: &[Row<Worlds>] = &[
+    Row::part("levels", levels::run),
+    Row::part("verify: levels", verified::run_levels),
+    Row::part("levels", marked::run),
+    Row::part("levels", advice::run),
+];
 
-/// Measures the rows; an error if a bar is missed.
-pub(crate) fn bench_rooms(options: &Rooms, is_json: bool) -> anyhow::Result<()> {
-    let mut out = RowPrinter::new(is_json);
-    let mut worlds = Worlds::new(&options.chosen, options.keep)?;
-    sets::run(&mut worlds, &mut out);
-    openings::run(&mut worlds, &mut out)?;
-    levels::run(&mut worlds, &mut out)?;
-    spoilt::run(&mut worlds, &mut out);
-    verified::run(&mut worlds, options.rays, &mut out)?;
-    out.finish()
-}
+/// Decisions of a bake, and its verdict.
+pub(crate) const DECISIONS: &[Row] = &[Row::part("", code::run), Row::part("", judge::run)];
+
+/// Scenes of strangers.
+pub(crate) const FOREIGN: &[Row] = &[
+    Row::part("axes", axes::run),
+    Row::part("kinds", kinds::run),
+    Row::part("merged", merged::run),
+    Row::part("verdict", trust::run),
+];
+
+/// Disturbed models.
+pub(crate) const DISTURBED: &[Row<Messy>] = &[
+    Row::part("", disturbed::cases),
+    Row::part("undisturbed", disturbed::undisturbed),
+    Row::part("fault", disturbed::faults),
+    Row::part("foreign", foreign::run),
+];

@@ -5,13 +5,12 @@ use std::path::Path;
 use anyhow::Context;
 use serde_json::Value;
 
+use super::score::{Match, V3, dot, list, sub, unit, vec3};
 use crate::measure::{self, files_of};
-use crate::rows::RowPrinter;
-use crate::score::{Match, V3, dot, list, sub, unit, vec3};
 
 use super::hole::{Hole, HolePlace};
 use super::levels::objects_of;
-use super::worlds::{Form, Worlds};
+use super::worlds::{Form, RoomRows};
 
 /// The largest difference of the areas, as a share of the hole's.
 const AREA: f64 = 0.05;
@@ -38,14 +37,14 @@ struct MeasuredOpenings {
 }
 
 /// Prints a row for each building, and one for all.
-pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) -> anyhow::Result<()> {
-    if !worlds.chosen.has_row("openings") {
+pub(super) fn run(out: &mut RoomRows<'_>) -> anyhow::Result<()> {
+    if !out.chosen.has_row("openings") {
         return Ok(());
     }
     let mut all = MeasuredOpenings::default();
-    for dir in worlds.buildings() {
+    for dir in out.buildings() {
         let name = measure::name(&dir);
-        let baked = worlds.building(&dir, Form::Clean);
+        let baked = out.state.building(&dir, Form::Clean);
         match (&baked.graph, &baked.score) {
             (Ok(graph), Some(score)) => {
                 let measured =
@@ -115,7 +114,7 @@ impl MeasuredOpenings {
         }
     }
 
-    fn print(&self, scene: &str, out: &mut RowPrinter) {
+    fn print(&self, scene: &str, out: &mut RoomRows<'_>) {
         let mut off: Vec<&(f64, String)> = self.off.iter().collect();
         off.sort_by(|a, b| b.0.total_cmp(&a.0));
         let n_right = self.n - off.len();

@@ -3,12 +3,11 @@
 //! The first six buildings are those of `cargo xtask score`. The method was made without the four of `scenes2` and the six of
 //! `scenes3`, from exporters of other kinds.
 
+use super::score::Score;
 use crate::measure;
-use crate::rows::RowPrinter;
-use crate::score::Score;
 
 use super::bars::Bar;
-use super::worlds::{Form, Worlds};
+use super::worlds::{Form, RoomRows};
 
 /// A set of buildings, and bars of its figures over all its buildings.
 struct Set {
@@ -99,19 +98,18 @@ const FIGURES: [SetFigure; 7] = [
 ];
 
 /// Prints the rows of each set.
-pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
-    let there = worlds.buildings();
+pub(super) fn run(out: &mut RoomRows<'_>) -> anyhow::Result<()> {
+    let (there, chosen) = (out.buildings(), out.chosen);
     for set in &SETS {
-        let is_wanted =
-            |f: &&SetFigure| worlds.chosen.has_row(&format!("{}: {}", set.name, f.name));
+        let is_wanted = |f: &&SetFigure| chosen.has_row(&format!("{}: {}", set.name, f.name));
         let figures: Vec<&SetFigure> = FIGURES.iter().filter(is_wanted).collect();
         if figures.is_empty() {
             continue;
         }
         let mut baked = Vec::new();
-        for scene in set.scenes.iter().filter(|s| worlds.chosen.has_scene(s)) {
+        for scene in set.scenes.iter().filter(|s| chosen.has_scene(s)) {
             match there.iter().find(|dir| measure::name(dir) == *scene) {
-                Some(dir) => baked.push(worlds.building(dir, Form::Clean)),
+                Some(dir) => baked.push(out.state.building(dir, Form::Clean)),
                 None => out.print(set.name, scene, None, "", None, "the scene is not there"),
             }
             if let Some(Err(why)) = baked.last().map(|b| b.graph.as_ref()) {
@@ -123,11 +121,12 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
             set.print(figure, &scores, out);
         }
     }
+    Ok(())
 }
 
 impl Set {
     /// Prints a figure of each building, and that of the set.
-    fn print(&self, figure: &SetFigure, scores: &[&Score], out: &mut RowPrinter) {
+    fn print(&self, figure: &SetFigure, scores: &[&Score], out: &mut RoomRows<'_>) {
         let row = format!("{}: {}", self.name, figure.name);
         let mut print = |scene: &str, value: f64, bar: Option<Bar>, note: &str| {
             let text = bar.map_or_else(String::new, Bar::text);

@@ -1,11 +1,10 @@
 //! Rows `spoilt`: buildings as exporters, scanners and web pipelines spoil them, beside the same buildings clean.
 
+use super::score::{Score, list};
 use crate::measure;
-use crate::rows::RowPrinter;
-use crate::score::{Score, list};
 
 use super::bars::Bar;
-use super::worlds::{Form, TriedBake, Worlds};
+use super::worlds::{Form, RoomRows, TriedBake};
 
 /// A way to spoil a building, and how far its rooms and doors may be from those of the clean one.
 pub(super) struct Spoiling {
@@ -40,16 +39,16 @@ pub(super) const SPOILINGS: [Spoiling; 6] = [
 ];
 
 /// Prints the rows of each way: what is found more than in the clean building, and the ratio of portals.
-pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
+pub(super) fn run(out: &mut RoomRows<'_>) -> anyhow::Result<()> {
     let (mut n, mut n_good) = (0, 0);
     for spoiling in &SPOILINGS {
         let name = spoiling.form.name();
-        if !worlds.chosen.has_row(&format!("spoilt: {name}")) {
+        if !out.chosen.has_row(&format!("spoilt: {name}")) {
             continue;
         }
-        for dir in worlds.buildings() {
-            let clean = worlds.building(&dir, Form::Clean);
-            let spoilt = worlds.building(&dir, spoiling.form);
+        for dir in out.buildings() {
+            let clean = out.state.building(&dir, Form::Clean);
+            let spoilt = out.state.building(&dir, spoiling.form);
             n += 1;
             n_good += usize::from(spoiling.print(&measure::name(&dir), &clean, &spoilt, out));
         }
@@ -59,6 +58,7 @@ pub(super) fn run(worlds: &mut Worlds<'_>, out: &mut RowPrinter) {
         let value = n_good as f64 / n as f64;
         out.print("spoilt", "all", Some(value), "1", Some(n == n_good), &note);
     }
+    Ok(())
 }
 
 impl Spoiling {
@@ -68,7 +68,7 @@ impl Spoiling {
         scene: &str,
         clean: &TriedBake,
         spoilt: &TriedBake,
-        out: &mut RowPrinter,
+        out: &mut RoomRows<'_>,
     ) -> bool {
         let row = format!("spoilt: {}", self.form.name());
         let whys = [clean, spoilt].map(|b| b.graph.as_ref().err());

@@ -8,14 +8,12 @@ use std::rc::Rc;
 use anyhow::Context;
 use serde_json::Value;
 
-use crate::judge::buildings;
-use crate::judge::cases::{Found, SmallCase};
-use crate::measure;
-use crate::messy::generate;
-use crate::process::{bake_command, output_of, target_dir};
-use crate::rows::Chosen;
-use crate::score::{Score, inspect, score_world};
-use crate::stranger::{merged_bake, scene_of};
+use super::cases::{Found, SmallCase};
+use super::merged::merged_bake;
+use super::score::{Score, inspect, score_world};
+use crate::measure::{self, imported};
+use crate::process::{bake_command, generate, output_of, scenes_and, target_dir};
+use crate::rows::{Chosen, RowPrinter};
 
 /// A building as it is, spoilt, or baked by another method.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,34 +48,48 @@ pub(super) struct TriedBake {
     pub(super) score: Option<Score>,
 }
 
+impl TriedBake {
+    /// Returns the path of the world, or why there is none.
+    pub(super) fn world(&self) -> Result<&Path, &str> {
+        self.graph
+            .as_ref()
+            .map(|_| &*self.world)
+            .map_err(|why| &**why)
+    }
+}
+
 /// The bakes so far.
-pub(super) struct Worlds<'a> {
-    pub(super) chosen: &'a Chosen,
+pub(crate) struct Worlds {
+    /// Segments that `verify` tries.
+    pub(super) rays: u64,
     is_kept: bool,
     folder: PathBuf,
     baked: BTreeMap<(Form, String), Rc<TriedBake>>,
     cases: BTreeMap<&'static str, Rc<Found>>,
 }
 
-impl<'a> Worlds<'a> {
+/// The rows of this benchmark.
+pub(super) type RoomRows<'a> = RowPrinter<'a, Worlds>;
+
+impl RoomRows<'_> {
+    /// Returns the chosen buildings with truth.
+    pub(super) fn buildings(&self) -> Vec<PathBuf> {
+        buildings(self.chosen)
+    }
+}
+
+impl Worlds {
     /// With `is_kept`, worlds of an earlier run are not baked again.
-    pub(super) fn new(chosen: &'a Chosen, is_kept: bool) -> anyhow::Result<Self> {
+    pub(crate) fn new(rays: u64, is_kept: bool) -> anyhow::Result<Self> {
         let folder = target_dir().join("rooms");
         std::fs::create_dir_all(&folder)?;
         Ok(Self {
-            chosen,
+            rays,
             is_kept,
             folder,
             baked: BTreeMap::new(),
             cases: BTreeMap::new(),
         })
-    }
-
-    /// Returns the chosen buildings with truth.
-    pub(super) fn buildings(&self) -> Vec<PathBuf> {
-        let mut all = buildings();
-        all.retain(|dir| self.chosen.has_scene(&measure::name(dir)));
-        all
     }
 
     /// Returns a building's bake.
@@ -92,7 +104,7 @@ impl<'a> Worlds<'a> {
                     generate(&[&[from.as_str()], how].concat(), &spoilt)?;
                     bake_command(&spoilt, world)
                 }
-                Form::Merged => merged_bake(&scene_of(dir)?, &name, "obj", world)?,
+                Form::Merged => merged_bake(&imported(dir)?, &name, "obj", world)?,
                 Form::Method(method) => {
                     let mut command = bake_command(dir, world);
                     command.args(["--method", method, "--max-time", LONGEST]);
@@ -159,6 +171,13 @@ impl<'a> Worlds<'a> {
         self.baked.insert(key, Rc::clone(&baked));
         baked
     }
+}
+
+/// Returns the folders of the chosen buildings with truth.
+pub(super) fn buildings(chosen: &Chosen) -> Vec<PathBuf> {
+    let mut all = scenes_and(&["scenes2", "scenes3"]);
+    all.retain(|dir| dir.join("truth.json").is_file() && chosen.has_scene(&measure::name(dir)));
+    all
 }
 
 /// Returns the last line of an error, which tells the cause.

@@ -8,9 +8,10 @@ use enfilade::stream::{
     Catalog, Changes, Eye, Frame, InView, LinkOptions, Piece, PieceId, Policy, Reply,
     SimulatedLink, Source, StreamOptions, Streamer,
 };
+use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, Rng, room_grid};
 
-use super::site::{FRAME, near_sets};
+use super::site::FRAME;
 use crate::rows::Figure;
 
 const WORLDS: u64 = 1000;
@@ -107,7 +108,7 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
             open: HashSet::new(),
             n_twice: 0,
         };
-        let pvs = rng.chance(0.8).then(|| near_sets(&world));
+        let pvs = rng.chance(0.8).then(|| near_sets(&world.graph));
         let mut streamer = Streamer::new(catalog, &world.graph, pvs, options.clone());
         let mut changes = Changes::default();
         let mut resident: HashSet<PieceId> = HashSet::new();
@@ -158,12 +159,9 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
         n_open += source.open.len() + source.n_twice + usize::from(!streamer.view_settled());
         n_requests += streamer.counts().n_requests;
     }
-    Ok(Figure {
-        value: (n_above + n_open) as f64,
-        most: 0.0,
-        note: format!(
-            "{n_above} frames above a limit, {n_open} requests without end, of {n_frames} frames and {n_requests} requests in \
+    let note = format!(
+        "{n_above} frames above a limit, {n_open} requests without end, of {n_frames} frames and {n_requests} requests in \
              {WORLDS} worlds; at most {most:.4} of a budget"
-        ),
-    })
+    );
+    Ok(Figure::new((n_above + n_open) as f64, 0.0, note))
 }

@@ -3,9 +3,10 @@
 use std::time::{Duration, Instant};
 
 use enfilade::stream::{Changes, LinkOptions, SimulatedLink, StreamOptions, Streamer};
+use enfilade_testkit::oracle::near_sets;
 
 use super::replay::frame_of;
-use super::site::{FRAME, Recorder, Recording, Streamed, near_sets, offices, route};
+use super::site::{FRAME, Recorder, Recording, Streamed, offices, route};
 use crate::measure::quantile;
 use crate::rows::Figure;
 
@@ -26,7 +27,7 @@ struct Timed {
 /// Walks among offices whose cells see those behind two portals, over a link of 10 MB/s.
 fn walk(scene: &str) -> anyhow::Result<Timed> {
     let world = offices(scene)?;
-    let pvs = near_sets(&world);
+    let pvs = near_sets(&world.graph);
     let site = Streamed::with_pvs(&world, pvs.clone())?;
     let walk = Recorder::new(&site).walk(&route(&site, 3, STRETCHES)?, 1.4)?;
     let link = LinkOptions {
@@ -58,18 +59,15 @@ fn walk(scene: &str) -> anyhow::Result<Timed> {
 
 fn figure(times: &mut [f64], site: &Streamed) -> Figure {
     let at = [0.5, 0.99, 1.0].map(|share| quantile(times, share));
-    Figure {
-        value: at[1],
-        most: 20.0,
-        note: format!(
-            "µs, 99 of 100 frames; half {:.2}, longest {:.1}; {} frames, {} cells, {} pieces",
-            at[0],
-            at[2],
-            times.len(),
-            site.world.graph.cells.len(),
-            site.catalog().pieces().len(),
-        ),
-    }
+    let note = format!(
+        "µs, 99 of 100 frames; half {:.2}, longest {:.1}; {} frames, {} cells, {} pieces",
+        at[0],
+        at[2],
+        times.len(),
+        site.world.graph.cells.len(),
+        site.catalog().pieces().len(),
+    );
+    Figure::new(at[1], 20.0, note)
 }
 
 pub(super) fn moving(scene: &str) -> anyhow::Result<Figure> {

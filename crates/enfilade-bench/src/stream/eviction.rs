@@ -11,7 +11,7 @@ use quick_cache::Weighter;
 use quick_cache::unsync::Cache;
 
 use super::replay::frame_of;
-use super::site::{FRAME, Recorder, Recording, Step, Streamed, offices, route};
+use super::site::{FRAME, Recorder, Recording, Step, Streamed, route};
 use crate::rows::Figure;
 
 const STRETCHES: usize = 200;
@@ -184,27 +184,15 @@ fn note(m: &Misses) -> String {
 /// Misses divided by Belady's.
 pub(super) fn belady(world: &World) -> anyhow::Result<Figure> {
     let m = misses(&Streamed::of(world)?)?;
-    Ok(Figure {
-        value: m.ours as f64 / m.belady as f64,
-        most: 1.15,
-        note: note(&m),
-    })
-}
-
-pub(super) fn belady_in(scene: &str) -> anyhow::Result<Figure> {
-    belady(&offices(scene)?)
+    Ok(Figure::new(m.ours as f64 / m.belady as f64, 1.15, note(&m)))
 }
 
 /// Misses less the fewer of those of LRU and `quick_cache`: fewer than both.
 pub(super) fn peers(world: &World) -> anyhow::Result<Figure> {
     let m = misses(&Streamed::of(world)?)?;
-    Ok(Figure {
-        value: m.ours as f64 - m.lru.min(m.quick) as f64,
-        most: -1.0,
-        note: note(&m),
-    })
-}
-
-pub(super) fn peers_in(scene: &str) -> anyhow::Result<Figure> {
-    peers(&offices(scene)?)
+    Ok(Figure::new(
+        m.ours as f64 - m.lru.min(m.quick) as f64,
+        -1.0,
+        note(&m),
+    ))
 }

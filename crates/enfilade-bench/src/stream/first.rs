@@ -14,7 +14,7 @@ use enfilade_testkit::Rng;
 use super::settled::draw_stands;
 use super::site::{FRAME, Streamed};
 use crate::rows::Figure;
-use crate::walkthrough::Rings;
+use crate::sight::walkthrough::Rings;
 
 /// Triangles of the furnished building.
 const TRIANGLES: u64 = 820_000;
@@ -77,19 +77,16 @@ pub(super) fn first_picture(world: &World) -> anyhow::Result<Figure> {
         times.sort_by(f64::total_cmp);
     }
     let [longest, longest_view] = [&rooms, &views].map(|t| t.last().copied().unwrap_or(f64::NAN));
-    Ok(Figure {
-        value: longest / whole,
-        most: 0.1,
-        note: format!(
-            "{longest:.2} s of {whole:.1} s; median of {VIEWS} rooms {:.2} s; all in view after {longest_view:.2} s, median {:.2} s; \
+    let note = format!(
+        "{longest:.2} s of {whole:.1} s; median of {VIEWS} rooms {:.2} s; all in view after {longest_view:.2} s, median {:.2} s; \
              file of {:.1} MB, packed {:.1} MB, head {:.2} MB",
-            rooms[rooms.len() / 2],
-            views[views.len() / 2],
-            file.len() as f64 / 1e6,
-            (n_head + packed.body().len()) as f64 / 1e6,
-            n_head as f64 / 1e6,
-        ),
-    })
+        rooms[rooms.len() / 2],
+        views[views.len() / 2],
+        file.len() as f64 / 1e6,
+        (n_head + packed.body().len()) as f64 / 1e6,
+        n_head as f64 / 1e6,
+    );
+    Ok(Figure::new(longest / whole, 0.1, note))
 }
 
 /// Returns the building with an object of its own in each room, and about `total` triangles.

@@ -1,4 +1,4 @@
-//! `bench stream`: worlds in pieces over a simulated link in virtual time, each figure with its bar.
+//! Worlds in pieces over a simulated link in virtual time, each figure with its bar.
 //!
 //! To add a row, add a file beside this one and a line in [`ROWS`].
 
@@ -14,7 +14,6 @@ mod size;
 
 pub(crate) use size::{TownStep, run_step};
 
-use crate::living::{baked, made};
 use crate::rows::Row;
 pub(crate) use first::furnished;
 
@@ -32,29 +31,29 @@ const TOWNS: &[&str] = &["offices-1000"];
 const LARGE: &[&str] = &["offices-10000"];
 
 pub(crate) const ROWS: &[Row] = &[
-    made("settled", TOWNS, settled::settled_in),
-    baked("settled", BUILDINGS, settled::settled),
-    made("no pops", TOWNS, pops::pops_in),
-    baked("no pops", BUILDINGS, pops::pops),
-    made("bytes: radius", TOWNS, pops::radius_in),
-    baked("bytes: radius", BUILDINGS, pops::radius),
-    made("bytes: reached", TOWNS, pops::reached_in),
-    baked("bytes: reached", BUILDINGS, pops::reached),
-    made("eviction: Belady", TOWNS, eviction::belady_in),
-    baked("eviction: Belady", BUILDINGS, eviction::belady),
-    made("eviction: peers", TOWNS, eviction::peers_in),
-    baked("eviction: peers", BUILDINGS, eviction::peers),
-    made("budget", &["random"], budget::budget),
-    made("faults", TOWNS, settled::faults_in),
-    baked("faults", BUILDINGS, settled::faults),
-    baked(
+    Row::built("settled", TOWNS, site::offices, settled::settled),
+    Row::baked("settled", BUILDINGS, settled::settled),
+    Row::built("no pops", TOWNS, site::offices, pops::pops),
+    Row::baked("no pops", BUILDINGS, pops::pops),
+    Row::built("bytes: radius", TOWNS, site::offices, pops::radius),
+    Row::baked("bytes: radius", BUILDINGS, pops::radius),
+    Row::built("bytes: reached", TOWNS, site::offices, pops::reached),
+    Row::baked("bytes: reached", BUILDINGS, pops::reached),
+    Row::built("eviction: Belady", TOWNS, site::offices, eviction::belady),
+    Row::baked("eviction: Belady", BUILDINGS, eviction::belady),
+    Row::built("eviction: peers", TOWNS, site::offices, eviction::peers),
+    Row::baked("eviction: peers", BUILDINGS, eviction::peers),
+    Row::made("budget", &["random"], budget::budget),
+    Row::built("faults", TOWNS, site::offices, settled::faults),
+    Row::baked("faults", BUILDINGS, settled::faults),
+    Row::baked(
         "first picture",
         &["institute", "clinic"],
         first::first_picture,
     ),
-    made("cost of a frame: idle", &["offices-10000"], cost::idle),
-    made("cost of a frame: moving", &["offices-10000"], cost::moving),
-    made("size: memory", LARGE, size::memory_of),
-    made("size: absent", LARGE, size::absent),
-    made("size: first picture", LARGE, size::first_picture),
+    Row::made("cost of a frame: idle", &["offices-10000"], cost::idle),
+    Row::made("cost of a frame: moving", &["offices-10000"], cost::moving),
+    Row::made("size: memory", LARGE, size::memory_of),
+    Row::made("size: absent", LARGE, size::absent),
+    Row::made("size: first picture", LARGE, size::first_picture),
 ];

@@ -12,7 +12,7 @@ use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 
 use super::replay::{Outcome, frame_of, replay};
-use super::site::{Recorder, Recording, Streamed, offices, route};
+use super::site::{Recorder, Recording, Streamed, route};
 use crate::rows::Figure;
 
 const LATENCY: Duration = Duration::from_millis(50);
@@ -75,11 +75,7 @@ fn pops_of(site: &Streamed) -> anyhow::Result<Figure> {
             known.n_frames,
         ));
     }
-    Ok(Figure {
-        value: value as f64,
-        most: 0.0,
-        note: notes.join("; "),
-    })
+    Ok(Figure::new(value as f64, 0.0, notes.join("; ")))
 }
 
 /// Returns the bytes of a walk without pops, divided by those of loading by radius: all pieces of cells within the least radius
@@ -115,17 +111,18 @@ fn radius_of(site: &Streamed) -> anyhow::Result<Figure> {
     }
     let by_radius = site.packed(loaded.into_iter().copied());
     let all = site.packed((0..cells_of.len() as u32).map(PieceId));
-    Ok(Figure {
-        value: out.n_bytes as f64 / by_radius as f64,
-        most: 0.5,
-        note: format!(
-            "{} kB, {} kB by a radius of {radius:.1} m, of {} kB; {} absent",
-            out.n_bytes / 1000,
-            by_radius / 1000,
-            all / 1000,
-            out.n_absent,
-        ),
-    })
+    let note = format!(
+        "{} kB, {} kB by a radius of {radius:.1} m, of {} kB; {} absent",
+        out.n_bytes / 1000,
+        by_radius / 1000,
+        all / 1000,
+        out.n_absent,
+    );
+    Ok(Figure::new(
+        out.n_bytes as f64 / by_radius as f64,
+        0.5,
+        note,
+    ))
 }
 
 /// Returns the bytes of a walk without pops, divided by those of the pieces of the cells that rays from places on it reach.
@@ -171,39 +168,28 @@ fn reached_of(site: &Streamed) -> anyhow::Result<Figure> {
         .copied()
         .collect();
     let true_bytes = site.packed(pieces);
-    Ok(Figure {
-        value: out.n_bytes as f64 / true_bytes as f64,
-        most: 1.3,
-        note: format!(
-            "{} kB, {} kB of {} cells of {} reached by {RAYS} rays from each of {n_places} places",
-            out.n_bytes / 1000,
-            true_bytes / 1000,
-            reached.len(),
-            world.graph.cells.len(),
-        ),
-    })
+    let note = format!(
+        "{} kB, {} kB of {} cells of {} reached by {RAYS} rays from each of {n_places} places",
+        out.n_bytes / 1000,
+        true_bytes / 1000,
+        reached.len(),
+        world.graph.cells.len(),
+    );
+    Ok(Figure::new(
+        out.n_bytes as f64 / true_bytes as f64,
+        1.3,
+        note,
+    ))
 }
 
 pub(super) fn pops(world: &World) -> anyhow::Result<Figure> {
     pops_of(&Streamed::of(world)?)
 }
 
-pub(super) fn pops_in(scene: &str) -> anyhow::Result<Figure> {
-    pops(&offices(scene)?)
-}
-
 pub(super) fn radius(world: &World) -> anyhow::Result<Figure> {
     radius_of(&Streamed::of(world)?)
 }
 
-pub(super) fn radius_in(scene: &str) -> anyhow::Result<Figure> {
-    radius(&offices(scene)?)
-}
-
 pub(super) fn reached(world: &World) -> anyhow::Result<Figure> {
     reached_of(&Streamed::of(world)?)
-}
-
-pub(super) fn reached_in(scene: &str) -> anyhow::Result<Figure> {
-    reached(&offices(scene)?)
 }

@@ -12,7 +12,7 @@ use enfilade::stream::{
 };
 use enfilade_testkit::Rng;
 
-use super::site::{FRAME, Recorder, Streamed, offices};
+use super::site::{FRAME, Recorder, Streamed};
 use crate::rows::Figure;
 
 const VIEWS: usize = 1000;
@@ -93,11 +93,8 @@ pub(super) fn settled(world: &World) -> anyhow::Result<Figure> {
         let is_absent = |p: &&PieceId| !streamer.is_resident(**p);
         n_absent += stand.visible.iter().filter(is_absent).count();
     }
-    Ok(Figure {
-        value: (n_absent + n_hung) as f64,
-        most: 0.0,
-        note: format!("of {n_visible} pieces in {VIEWS} views; {n_hung} views not settled"),
-    })
+    let note = format!("of {n_visible} pieces in {VIEWS} views; {n_hung} views not settled");
+    Ok(Figure::new((n_absent + n_hung) as f64, 0.0, note))
 }
 
 /// Returns the number of cells in view of which a piece has failed.
@@ -194,20 +191,10 @@ pub(super) fn faults(world: &World) -> anyhow::Result<Figure> {
         }
         n_different += usize::from(sets[0] != sets[1]);
     }
-    Ok(Figure {
-        value: (n_different + n_hung + n_untold) as f64,
-        most: 0.0,
-        note: format!(
-            "of {VIEWS_WITH_FAULTS} views; {n_different} settled otherwise, {n_hung} not settled, {n_untold} untold; \
+    let value = (n_different + n_hung + n_untold) as f64;
+    let note = format!(
+        "of {VIEWS_WITH_FAULTS} views; {n_different} settled otherwise, {n_hung} not settled, {n_untold} untold; \
              {n_told} failures told"
-        ),
-    })
-}
-
-pub(super) fn settled_in(scene: &str) -> anyhow::Result<Figure> {
-    settled(&offices(scene)?)
-}
-
-pub(super) fn faults_in(scene: &str) -> anyhow::Result<Figure> {
-    faults(&offices(scene)?)
+    );
+    Ok(Figure::new(value, 0.0, note))
 }

@@ -3,13 +3,15 @@
 use std::time::Duration;
 
 use anyhow::Context;
-use enfilade::cpg::{CellSet, Pvs};
+use enfilade::cpg::Pvs;
 use enfilade::geom::DVec3;
 use enfilade::runtime::{Sight, SightState, View, Viewer};
 use enfilade::stream::{Catalog, InView, PieceId, WorldPieces, images_of};
-use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
+
+use crate::measure::point;
+use crate::sight::visible;
 
 /// Length of a frame.
 pub(super) const FRAME: Duration = Duration::from_micros(16_667);
@@ -57,36 +59,13 @@ impl Streamed {
 
 /// Finds what may be seen from each cell.
 pub(super) fn visible_sets(world: &World) -> anyhow::Result<Pvs> {
-    let mut context = VisContext {
-        on_round: &mut |_, _| true,
-        walls: None,
-        checkpoint: None,
-    };
-    let found = see_world(&world.graph, &VisConfig::default(), &mut context)?;
-    Ok(found.vis.cells)
+    Ok(visible(&world.graph)?.vis.cells)
 }
 
 /// Generates offices by name, such as `offices-1000`.
 pub(super) fn offices(scene: &str) -> anyhow::Result<World> {
     let (_, n) = scene.rsplit_once('-').context("no number of rooms")?;
     Ok(room_grid(&GridParams::offices(n.parse()?, 1)))
-}
-
-/// Cells behind up to two portals, for worlds whose visible sets would take long to find.
-pub(super) fn near_sets(world: &World) -> Pvs {
-    let graph = &world.graph;
-    let row = |cell| {
-        let mut set = CellSet::new(graph.cells.len());
-        set.insert(cell);
-        for exit in graph.exits(cell) {
-            set.insert(exit.to);
-            for next in graph.exits(exit.to) {
-                set.insert(next.to);
-            }
-        }
-        set
-    };
-    Pvs::of_rows(&graph.cell_ids().map(row).collect::<Vec<_>>())
 }
 
 /// A frame of a recorded walk.
@@ -222,7 +201,6 @@ pub(super) fn route(site: &Streamed, seed: u64, n_stretches: usize) -> anyhow::R
     let graph = &site.world.graph;
     let mut been = vec![0_u32; graph.cells.len()];
     let indoors: Vec<CellId> = graph.indoor_cells().map(|c| c.0).collect();
-    let point = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
     let is_free = |a: DVec3, b: DVec3| {
         let n = (a.distance(b) / 0.05).ceil().max(1.0) as u32;
         let at = |k| a.lerp(b, f64::from(k) / f64::from(n));

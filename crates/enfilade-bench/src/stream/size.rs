@@ -6,8 +6,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
@@ -22,8 +21,9 @@ use super::first::furnished;
 use super::replay::frame_of;
 use super::settled::draw_stands;
 use super::site::{FRAME, Recorder, Streamed, offices, route, visible_sets};
+use crate::kept::Kept;
 use crate::measure::memory;
-use crate::process::target_dir;
+use crate::process::{step, target_dir};
 use crate::rows::Figure;
 
 /// Triangles of the furnished town: 2 GB.
@@ -245,23 +245,17 @@ fn walk(dir: &Path) -> anyhow::Result<Value> {
 }
 
 /// Returns the figures of the walk through a town, made once.
-fn measured(scene: &str) -> anyhow::Result<&'static Value> {
-    static FOUND: OnceLock<Value> = OnceLock::new();
-    if FOUND.get().is_none() {
+fn measured(scene: &str) -> anyhow::Result<Arc<Value>> {
+    static FOUND: Kept<Value> = Kept::new();
+    FOUND.get(scene, || {
         let dir: PathBuf = target_dir().join("town");
         std::fs::create_dir_all(&dir)?;
-        let step = |name: &str| {
-            let mut command = Command::new(std::env::current_exe()?);
-            let out = command.args(["town", name, scene]).arg(&dir).output()?;
-            let said = String::from_utf8_lossy(&out.stderr);
-            ensure!(out.status.success(), "{name} {scene}: {said}");
-            Ok(out.stdout)
-        };
-        let found = step("make").and_then(|_| step("walk"));
+        let place = dir.display().to_string();
+        let run = |name: &str| step(&["town", name, scene, &place]);
+        let found = run("make").and_then(|_| run("walk"));
         std::fs::remove_dir_all(&dir)?;
-        let _ = FOUND.set(serde_json::from_slice(&found?)?);
-    }
-    FOUND.get().context("no figures")
+        found
+    })
 }
 
 fn number(found: &Value, name: &str) -> f64 {
@@ -269,40 +263,35 @@ fn number(found: &Value, name: &str) -> f64 {
 }
 
 fn megabytes(found: &Value, name: &str) -> String {
-    format!("{:.1} MB", number(found, name) / 1e6)
+    format!("{:.1} MB", number(&found, name) / 1e6)
 }
 
 /// Returns the most memory of pieces on the walk.
 pub(super) fn memory_of(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
-    Ok(Figure {
-        value: number(found, "kept") / f64::from(1 << 20),
-        most: 256.0,
-        note: format!(
-            "MiB of pieces; {} cells, {} pieces, {} unpacked, {} packed; the process {} at most, {} after opening",
-            found["cells"],
-            found["pieces"],
-            megabytes(found, "unpacked"),
-            megabytes(found, "packed"),
-            megabytes(found, "peak"),
-            megabytes(found, "peakOfHead"),
-        ),
-    })
+    let value = number(&found, "kept") / f64::from(1 << 20);
+    let note = format!(
+        "MiB of pieces; {} cells, {} pieces, {} unpacked, {} packed; the process {} at most, {} after opening",
+        found["cells"],
+        found["pieces"],
+        megabytes(&found, "unpacked"),
+        megabytes(&found, "packed"),
+        megabytes(&found, "peak"),
+        megabytes(&found, "peakOfHead"),
+    );
+    Ok(Figure::new(value, 256.0, note))
 }
 
 /// Returns the number of frame × piece in view and absent on the walk.
 pub(super) fn absent(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
-    Ok(Figure {
-        value: number(found, "absent"),
-        most: 0.0,
-        note: format!(
-            "frame × piece; {} of {} frames, 10 MB/s, 50 ms, 1.4 m/s; {} asked for",
-            found["late"],
-            found["frames"],
-            megabytes(found, "requested"),
-        ),
-    })
+    let note = format!(
+        "frame × piece; {} of {} frames, 10 MB/s, 50 ms, 1.4 m/s; {} asked for",
+        found["late"],
+        found["frames"],
+        megabytes(&found, "requested"),
+    );
+    Ok(Figure::new(number(&found, "absent"), 0.0, note))
 }
 
 /// Returns the share of bytes after which all that is in view is complete: the worst of several places.
@@ -310,17 +299,14 @@ pub(super) fn first_picture(scene: &str) -> anyhow::Result<Figure> {
     let found = measured(scene)?;
     let first = found["first"].as_array().context("no first pictures")?;
     let bytes: Vec<f64> = first.iter().filter_map(Value::as_f64).collect();
-    let packed = number(found, "packed");
+    let packed = number(&found, "packed");
     let last = bytes.last().context("no first pictures")?;
-    Ok(Figure {
-        value: last / packed,
-        most: 0.01,
-        note: format!(
-            "all in view from the worst of {VIEWS} places after {:.1} MB of {}, the median after {:.1} MB; head {}",
-            last / 1e6,
-            megabytes(found, "packed"),
-            bytes[bytes.len() / 2] / 1e6,
-            megabytes(found, "head"),
-        ),
-    })
+    let note = format!(
+        "all in view from the worst of {VIEWS} places after {:.1} MB of {}, the median after {:.1} MB; head {}",
+        last / 1e6,
+        megabytes(&found, "packed"),
+        bytes[bytes.len() / 2] / 1e6,
+        megabytes(&found, "head"),
+    );
+    Ok(Figure::new(last / packed, 0.01, note))
 }

@@ -1,27 +1,11 @@
 //! Hand-made files and scenes, independent of the code under test.
-#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(dead_code, unused_imports, reason = "each test file uses its own part")]
 
 use enfilade_geom::DMat4;
 use enfilade_geom::scene::{Material, Mesh, Object, Primitive, Role, Scene};
 use enfilade_geom::{DVec3, Triangle};
 
-/// A GLB around a document and its binary chunk.
-pub(crate) fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
-    let mut json = json.as_bytes().to_vec();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let mut bin = bin.to_vec();
-    bin.resize(bin.len().next_multiple_of(4), 0);
-    let mut out = b"glTF\x02\0\0\0".to_vec();
-    let length = 12 + 8 + json.len() + 8 + bin.len();
-    out.extend((length as u32).to_le_bytes());
-    out.extend((json.len() as u32).to_le_bytes());
-    out.extend(b"JSON");
-    out.extend(json);
-    out.extend((bin.len() as u32).to_le_bytes());
-    out.extend(b"BIN\0");
-    out.extend(bin);
-    out
-}
+pub(crate) use enfilade_testkit::glb;
 
 pub(crate) fn f32_bytes(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()

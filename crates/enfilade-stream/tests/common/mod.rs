@@ -5,7 +5,7 @@
 use std::collections::HashSet;
 use std::time::Duration;
 
-use enfilade_cpg::{CellId, CellSet, Pvs, World};
+use enfilade_cpg::{CellId, Pvs, World};
 use enfilade_stream::{
     Catalog, Changes, Eye, Frame, InView, LinkOptions, Piece, PieceId, Reply, SimulatedLink,
     Source, StreamOptions, Streamer,
@@ -223,21 +223,4 @@ pub(crate) fn random_catalog(rng: &mut Rng, n_cells: usize) -> Catalog {
         }
     }
     Catalog::new(pieces, &rows)
-}
-
-/// Cells behind up to two portals count as visible.
-pub(crate) fn visible_sets(world: &World) -> Pvs {
-    let graph = &world.graph;
-    let row = |cell| {
-        let mut set = CellSet::new(graph.cells.len());
-        set.insert(cell);
-        for exit in graph.exits(cell) {
-            set.insert(exit.to);
-            for next in graph.exits(exit.to) {
-                set.insert(next.to);
-            }
-        }
-        set
-    };
-    Pvs::of_rows(&graph.cell_ids().map(row).collect::<Vec<_>>())
 }

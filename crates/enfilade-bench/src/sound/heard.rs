@@ -1,0 +1,258 @@
+//! Sound through portals: lengths, directions, doorways, cost.
+
+use std::time::Instant;
+
+use anyhow::Context;
+use enfilade::geom::DVec3;
+use enfilade::world::{
+    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, PartId, Place, Reverb, Space, TautString,
+    Transmission,
+};
+use enfilade::{CellId, PortalId, World};
+use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
+
+use crate::rows::Figure;
+
+fn office_grid(n: usize, seed: u64) -> World {
+    room_grid(&GridParams {
+        outdoors: false,
+        windows: 0.0,
+        furniture: 0,
+        doors: 0.7,
+        ..GridParams::offices(n, seed)
+    })
+}
+
+pub(super) struct Office {
+    pub(super) space: Space,
+    pub(super) acoustics: Acoustics,
+}
+
+impl Office {
+    pub(super) fn new(world: &World) -> anyhow::Result<Self> {
+        let space = Space::new(world.clone())?;
+        let acoustics = Acoustics::new(&space, &Transmission::default());
+        Ok(Self { space, acoustics })
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        self.space.layout(PartId::ROOT)
+    }
+
+    pub(super) fn offices(n: usize, seed: u64) -> anyhow::Result<Self> {
+        Self::new(&office_grid(n, seed))
+    }
+
+    /// Opens all that can be opened.
+    pub(super) fn open_all(&mut self) {
+        for portal in (0..self.layout().n_portals() as u32).map(PortalId) {
+            self.space.open(PartId::ROOT, portal);
+            self.space.set_leaves(PartId::ROOT, portal, 1.0);
+        }
+    }
+
+    pub(super) fn locate(&self, at: DVec3) -> Option<Place> {
+        self.space.locate(PartId::ROOT, at)
+    }
+
+    pub(super) fn place(&self, rng: &mut Rng) -> Option<(Place, DVec3)> {
+        let indoors = |c: &CellId| !self.layout().cell(*c).is_outdoor;
+        (0..10_000).find_map(|_| {
+            let cell = CellId(rng.below(self.layout().n_cells()) as u32);
+            let bounds = self.layout().cell(cell).bounds;
+            let share = DVec3::from([0; 3].map(|_| rng.range(0.05, 0.95)));
+            let at = bounds.min + (bounds.max - bounds.min) * share;
+            let place = self.locate(at)?;
+            Some((place, at)).filter(|_| indoors(&cell) && place.cell == cell)
+        })
+    }
+}
+
+/// Returns the worst length relative to the least over all sequences of at most 8 portals, and the worst angle of
+/// arrival.
+fn worst(name: &str) -> anyhow::Result<(f64, f64, usize)> {
+    let n_seeds = if name == "offices-16" { 20 } else { 5 };
+    let (mut length, mut angle, mut n): (f64, f64, usize) = (0.0, 0.0, 0);
+    let mut rng = Rng::new(4);
+    for seed in 0..n_seeds {
+        let site = Office::offices(16, seed)?;
+        for _ in 0..25 {
+            let from = site.place(&mut rng).context("no place")?;
+            let to = site.place(&mut rng).context("no place")?;
+            let mut ears = Listener::new();
+            ears.listen(&site.acoustics, &site.space, from.0, from.1);
+            let found = ears.shortest(&site.acoustics, 0, to.0, to.1);
+            let Some((found, nearest)) = found else {
+                continue;
+            };
+            let mut best = (f64::INFINITY, DVec3::ZERO);
+            let mut string = TautString::new();
+            least(
+                site.layout(),
+                (from.0.cell, from.1),
+                (to.0.cell, to.1),
+                &mut Vec::new(),
+                &mut string,
+                &mut best,
+            );
+            if best.0 < f64::INFINITY {
+                n += 1;
+                length = length.max(found / best.0);
+                angle = angle.max(nearest.angle_between(best.1).to_degrees());
+            }
+        }
+    }
+    Ok((length, angle, n))
+}
+
+/// Searches all sequences, bounded by the string through the portals so far, which tests compare with `clarabel`.
+fn least(
+    layout: &Layout,
+    (cell, from): (CellId, DVec3),
+    to: (CellId, DVec3),
+    chain: &mut Vec<PortalId>,
+    string: &mut TautString,
+    best: &mut (f64, DVec3),
+) {
+    let length = string.pull(from, to.1, chain.len(), |i| {
+        layout.opening(chain[i]).pieces()
+    });
+    if string.bound() >= best.0 {
+        return;
+    }
+    if cell == to.0 && length < best.0 {
+        *best = (length, string.departure());
+    }
+    if chain.len() == 8 {
+        return;
+    }
+    for exit in layout.exits(cell) {
+        if !chain.contains(&exit.portal) {
+            chain.push(exit.portal);
+            least(layout, (exit.to, from), to, chain, string, best);
+            chain.pop();
+        }
+    }
+}
+
+pub(super) fn length(name: &str) -> anyhow::Result<Figure> {
+    let (value, _, n) = worst(name)?;
+    let note =
+        format!("the worst of {n} pairs, by the least over all sequences of up to 8 portals");
+    Ok(Figure::new(value, 1.001, note))
+}
+
+pub(super) fn direction(name: &str) -> anyhow::Result<Figure> {
+    let (_, value, n) = worst(name)?;
+    Ok(Figure::new(
+        value,
+        1.0,
+        format!("degrees, the worst of {n} pairs"),
+    ))
+}
+
+/// Compares levels of coupled rooms with the closed-form balance of energy: worst relative error.
+pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
+    let space = Space::new(room_grid(&GridParams::two_rooms()))?;
+    let door = space.layout(PartId::ROOT).opening(PortalId(0)).area();
+    let mut rng = Rng::new(2);
+    let at = |cell: u32| Place {
+        part: PartId::ROOT,
+        cell: CellId(cell),
+    };
+    let mut fields = DiffuseFields::new();
+    let mut value: f64 = 0.0;
+    for _ in 0..1000 {
+        let room = [0; 2].map(|_| {
+            (
+                rng.range(20.0, 400.0),
+                rng.range(60.0, 400.0),
+                rng.range(0.02, 0.5),
+            )
+        });
+        let reverb = Reverb::of_rooms(&space, DecayLaw::Sabine, &room);
+        let share = rng.unit();
+        fields.solve(&reverb, &space, at(0), |_, _| share);
+        let s = door * share;
+        let [m, n] = room.map(|r| r.1 * r.2 + s);
+        let det = m * n - s * s;
+        let w = [n / det, s / det];
+        let off = [0, 1].map(|k| fields.density(at(k)) / w[k as usize]);
+        value = off.iter().fold(value, |most, x| most.max((x - 1.0).abs()));
+    }
+    let note = "1,000 pairs of rooms, levels in both, against the balance of energy in closed form";
+    Ok(Figure::new(value, 0.1, note))
+}
+
+/// Measures the time per source on a walk in steps of 2 cm, searches included. [Units: µs]
+pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
+    walk(false, 5.0)
+}
+
+/// As [`cost`], while the door next to the one that the walk leads through swings, by 1.5 % of its way a frame at most.
+pub(super) fn cost_of_door(_: &str) -> anyhow::Result<Figure> {
+    walk(true, 10.0)
+}
+
+fn walk(is_door_moving: bool, most: f64) -> anyhow::Result<Figure> {
+    let mut site = Office::new(&with_doors(office_grid(1000, 7), |_| false))?;
+    site.open_all();
+    let mut rng = Rng::new(3);
+    let sources: Vec<_> = (0..64).filter_map(|_| site.place(&mut rng)).collect();
+    let portals = (0..site.layout().n_portals() as u32).map(PortalId);
+    let middle = PortalId((site.layout().n_portals() / 2) as u32);
+    let opening = site.layout().opening(middle);
+    let (center, normal) = (opening.center(), opening.normal());
+    let far = |p: &PortalId| site.layout().opening(*p).center().distance(center);
+    let others =
+        portals.filter(|p| *p != middle && site.space.state(PartId::ROOT).leaves(*p).is_some());
+    let door = others
+        .min_by(|a, b| far(a).total_cmp(&far(b)))
+        .context("no door")?;
+    let mut ears = Listener::new();
+    let (mut kept, mut searched, mut total, mut n) = (Vec::new(), Vec::new(), 0.0, 0);
+    let (mut first, mut n_heard) = (0.0, 0);
+    for k in -100..100 {
+        let at = center + normal * (f64::from(k) + 0.5) * 0.02;
+        let Some(place) = site.locate(at) else {
+            continue;
+        };
+        if is_door_moving {
+            let share = 0.5 + 0.5 * (f64::from(k) * 0.03).sin();
+            site.space.set_leaves(PartId::ROOT, door, share as f32);
+        }
+        let before = ears.n_searches();
+        let start = Instant::now();
+        ears.listen(&site.acoustics, &site.space, place, at);
+        n_heard = 0;
+        for (id, source) in sources.iter().enumerate() {
+            let heard = ears.hear(&site.acoustics, id, source.0, source.1);
+            n_heard += usize::from(std::hint::black_box(heard).is_some());
+        }
+        let micros = start.elapsed().as_secs_f64() * 1e6 / sources.len() as f64;
+        if before == 0 {
+            first = micros;
+            continue;
+        }
+        let list = if ears.n_searches() == before {
+            &mut kept
+        } else {
+            &mut searched
+        };
+        list.push(micros);
+        total += micros;
+        n += 1;
+    }
+    let median = |list: &mut Vec<f64>| {
+        list.sort_by(f64::total_cmp);
+        list.get(list.len() / 2).copied().unwrap_or_default()
+    };
+    let note = format!(
+        "µs a source, median of frames without a search, {n_heard} of {} loud enough to be heard; {:.1} with one ({} of {n} frames), {:.1} on the mean of all, {first:.0} in the first frame",
+        sources.len(),
+        median(&mut searched),
+        searched.len(),
+        total / f64::from(n)
+    );
+    Ok(Figure::new(median(&mut kept), most, note))
+}
