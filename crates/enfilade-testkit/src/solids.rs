@@ -23,7 +23,8 @@ impl<T: Copy> Solids<T> {
     /// Adds triangles of a batch by the indices of their vertices, each mapped by `place`.
     pub fn add(
         &mut self,
-        (world, batch): (&World, u32),
+        world: &World,
+        batch: u32,
         indices: &[u32],
         place: impl Fn(DVec3) -> DVec3,
         item: T,

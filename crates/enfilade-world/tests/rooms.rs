@@ -45,7 +45,7 @@ impl Model {
                 let indices = &sight.indices(chunk.batch)[chunk.first_index as usize..];
                 let indices = &indices[..chunk.n_indices as usize];
                 let item = Item::Chunk(part, id);
-                all.add((world, chunk.batch), indices, |p| pose.point(p), item);
+                all.add(world, chunk.batch, indices, |p| pose.point(p), item);
             }
             let item = |id| Item::Detail(part, DetailId(id));
             all.add_objects(world, pose.matrix(), item);

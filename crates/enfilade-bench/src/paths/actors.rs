@@ -148,7 +148,7 @@ impl Town {
         })
     }
 
-    fn way(&self, (at, mut cell): (DVec3, CellId), place: u32, way: &mut Vec<WayPoint>) {
+    fn way(&self, at: DVec3, mut cell: CellId, place: u32, way: &mut Vec<WayPoint>) {
         match &self.ways {
             TownWays::Offices {
                 places,
@@ -211,7 +211,7 @@ impl Town {
         let mut errands = Errands::default();
         move |event, chance, plan| {
             errands.plan(chance, plan, PLACES, |to, way| {
-                self.way((event.at, event.cell), to, way);
+                self.way(event.at, event.cell, to, way);
             });
         }
     }
@@ -287,7 +287,7 @@ impl Stepped {
             let speed = chance.range(usual.speed);
             let stay = chance.range(usual.stay);
             let mut way = Vec::new();
-            town.way((self.from.1, self.cell), to, &mut way);
+            town.way(self.from.1, self.cell, to, &mut way);
             let (mut time, mut at) = self.from;
             let mut cell = self.cell;
             for point in way {

@@ -48,7 +48,7 @@ struct DockSite {
     /// The cabin's pose in the building's frame if both were at rest.
     home: Pose,
     /// Greatest shifts and turn from there. [Units: wu, rad]
-    off: ([f64; 3], f64),
+    off: Offset,
     /// Heights at which the cabin stops. [Units: wu]
     stops: Vec<f64>,
     /// Per part, all triangles with leaves open.
@@ -131,7 +131,10 @@ fn at_entrance(world: &World) -> anyhow::Result<DockSite> {
         [building, cabin],
         Beyond::Door(0, portal),
         home,
-        ([0.05, 0.0, 0.0099], 0.99_f64.to_radians()),
+        Offset {
+            by: [0.05, 0.0, 0.0099],
+            turn: 0.99_f64.to_radians(),
+        },
     )
 }
 
@@ -144,10 +147,20 @@ fn in_tower() -> anyhow::Result<DockSite> {
     let shaft = space.layout(PartId::ROOT).locate(models.cabin_lamp);
     let beyond = Beyond::Cell(shaft.context("a shaft")?);
     let parts = [PartId::ROOT, cabin];
-    let off = ([0.01, 0.1, 0.01], 0.3_f64.to_radians());
+    let off = Offset {
+        by: [0.01, 0.1, 0.01],
+        turn: 0.3_f64.to_radians(),
+    };
     let mut site = site(space, parts, beyond, Pose::IDENTITY, off)?;
     site.stops = models.stops.iter().map(|p| p.y).collect();
     Ok(site)
+}
+
+/// Distance of a cabin from its stop, and the angle by which it is turned. [Units: wu, rad]
+#[derive(Clone, Copy)]
+struct Offset {
+    by: [f64; 3],
+    turn: f64,
 }
 
 fn site(
@@ -155,7 +168,7 @@ fn site(
     [building, cabin]: [PartId; 2],
     beyond: Beyond,
     home: Pose,
-    off: ([f64; 3], f64),
+    off: Offset,
 ) -> anyhow::Result<DockSite> {
     for part in [building, cabin] {
         for portal in (0..space.layout(part).n_portals() as u32).map(PortalId) {
@@ -205,7 +218,7 @@ fn triangles(space: &Space, part: PartId) -> Vec<Triangle> {
 impl DockSite {
     /// Moves the building anywhere, and the cabin to its door; returns the cabin's pose in the building's frame.
     fn set_pose(&mut self, rng: &mut Rng) -> anyhow::Result<Pose> {
-        let (by, turn) = self.off;
+        let Offset { by, turn } = self.off;
         let stop = self.stops[rng.below(self.stops.len())];
         let mut shift = DVec3::from_array(by.map(|x| rng.range(-x, x)));
         // A shaft's floor would stand in the room of a cabin that is sunk into it: two solids in one place have no answer.
@@ -331,7 +344,8 @@ impl DockSite {
     fn walk(
         &self,
         rel: &Pose,
-        (map, acoustics): (&WalkMap, &Acoustics),
+        map: &WalkMap,
+        acoustics: &Acoustics,
         rng: &mut Rng,
         counts: &mut Counts,
     ) -> anyhow::Result<()> {
@@ -487,7 +501,7 @@ fn measure(mut site: DockSite) -> anyhow::Result<Figure> {
         let rel = site.set_pose(&mut rng)?;
         site.cast(&rel, &mut caster, &mut rng, &mut counts);
         if i % (POSES / WALKS) == 0 {
-            site.walk(&rel, (&map, &acoustics), &mut rng, &mut counts)?;
+            site.walk(&rel, &map, &acoustics, &mut rng, &mut counts)?;
         }
     }
     let told = NAMES

@@ -75,8 +75,8 @@ pub(super) fn cells(world: &World) -> anyhow::Result<Figure> {
         let (id, half) = (ids[k].context("a thing")?, half[k]);
         things.set_pose(&space, id, ROOT, pose)?;
         let listed: Vec<CellId> = things.places(&space, id).map(|p| p.cell).collect();
-        let mut least = joined(&gaps, layout.n_cells(), (half, is_ball), &pose);
-        let mut most = joined(&gaps, layout.n_cells(), (half + margin, is_ball), &pose);
+        let mut least = joined(&gaps, layout.n_cells(), half, is_ball, &pose);
+        let mut most = joined(&gaps, layout.n_cells(), half + margin, is_ball, &pose);
         let is_in = |sets: &mut Sets, c: u32| sets.find(c) == sets.find(start.0);
         let all = 0..layout.n_cells() as u32;
         let needed = all.filter(|c| is_in(&mut least, *c));
@@ -190,7 +190,8 @@ pub(super) fn lights(world: &World) -> anyhow::Result<Figure> {
 
 /// Places a part anew until the box around it is free of the host's triangles.
 fn free_pose(
-    (layout, solid): (&Space, &Solid),
+    layout: &Space,
+    solid: &Solid,
     host: PartId,
     own: &Aabb,
     turns: f64,
@@ -245,9 +246,9 @@ pub(super) fn poses(world: &World) -> anyhow::Result<Figure> {
             at: DVec3::X * 300.0 + rng.turn() * DVec3::X * 100.0,
         };
         space.set_pose(building, sail)?;
-        let there = free_pose((&space, &solids[1].1), building, &boxes[0], 3.0, &mut rng);
+        let there = free_pose(&space, &solids[1].1, building, &boxes[0], 3.0, &mut rng);
         space.set_pose(room, there.context("no room for a cabin")?)?;
-        let there = free_pose((&space, &solids[2].1), room, &boxes[1], 3.0, &mut rng);
+        let there = free_pose(&space, &solids[2].1, room, &boxes[1], 3.0, &mut rng);
         space.set_pose(inner, there.context("no room for a box")?)?;
         // In each of the three, or beside the cabin.
         let frame = [building, building, room, inner][n_poses % 4];
@@ -308,7 +309,7 @@ pub(super) fn docking(world: &World) -> anyhow::Result<Figure> {
         let own = hull(&cabin(1, size, 2));
         // A box around both, whichever window it is.
         let both = own.expanded(own.size().max_element() + 0.02);
-        let pose = free_pose((&space, &solid), ROOT, &both, 3.0, &mut rng);
+        let pose = free_pose(&space, &solid, ROOT, &both, 3.0, &mut rng);
         let mut pair = Pair::within(world.clone(), pose.context("no room for two cabins")?, size)?;
         pair.dock(&format!("room {k}"), &mut total)?;
     }

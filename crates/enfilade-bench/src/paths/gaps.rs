@@ -43,7 +43,8 @@ pub(super) fn gaps_of(world: &World) -> Vec<Gap> {
 pub(super) fn joined(
     gaps: &[Gap],
     n_cells: usize,
-    (half, is_ball): (DVec3, bool),
+    half: DVec3,
+    is_ball: bool,
     pose: &Pose,
 ) -> Sets {
     let mut sets = Sets::new(n_cells);

@@ -110,7 +110,7 @@ impl Pair {
         let mut space = Space::new(root)?;
         let a = space.add_part(cabin(1, size, 2), PartId::ROOT, first)?;
         let seam = window(&space, a);
-        Self::meeting(space, (a, PortalId(0), seam), size)
+        Self::meeting(space, a, PortalId(0), seam, size)
     }
 
     /// Places a cabin in front of an opening of a building to the outdoors, at a point of it.
@@ -124,13 +124,15 @@ impl Pair {
         let mut space = Space::new(room_grid(&GridParams::offices(4, 3)))?;
         let pose = Pose::from_translation(DVec3::X * 300.0);
         let a = space.add_part(building, PartId::ROOT, pose)?;
-        Self::meeting(space, (a, portal, (middle, outward)), size)
+        Self::meeting(space, a, portal, (middle, outward), size)
     }
 
     /// Adds a cabin whose window coincides with an opening.
     fn meeting(
         mut space: Space,
-        (a, portal, seam): (PartId, PortalId, (DVec3, DVec3)),
+        a: PartId,
+        portal: PortalId,
+        seam: (DVec3, DVec3),
         size: f32,
     ) -> anyhow::Result<Self> {
         let b = space.add_part(cabin(1, size, 2), PartId::ROOT, Pose::IDENTITY)?;

@@ -50,7 +50,8 @@ fn add<T: Copy>(
         let indices = &indices[..chunk.n_indices as usize];
         let place = |p| pose.point(p);
         all.add(
-            (world, chunk.batch),
+            world,
+            chunk.batch,
             indices,
             place,
             item(PartItem::Chunk(id)),

@@ -72,8 +72,8 @@ pub(super) fn cells(scene: &str) -> anyhow::Result<Figure> {
         let start = layout.locate(pose.at).context("an air point")?;
         // An opening within rounding may count as met or not.
         let margin = 4.0 * layout.tolerance();
-        let mut least = joined(&gaps, n_cells, (half, is_ball), &pose);
-        let mut most = joined(&gaps, n_cells, (half + margin, is_ball), &pose);
+        let mut least = joined(&gaps, n_cells, half, is_ball, &pose);
+        let mut most = joined(&gaps, n_cells, half + margin, is_ball, &pose);
         let place = Place {
             part: PartId::ROOT,
             cell: start,

@@ -73,7 +73,7 @@ pub(super) fn teleporters(world: &World) -> anyhow::Result<Figure> {
     for (i, &portal) in all.iter().enumerate() {
         for (k, cell) in world.graph[portal].cells.into_iter().enumerate() {
             let goal = all[(i * 7 + 3 + k) % all.len()];
-            let lead = lead(&world, (portal, cell), goal);
+            let lead = lead(&world, portal, cell, goal);
             add(&mut world, portal, cell, vec![Pass::new(lead)]);
         }
     }
@@ -87,7 +87,7 @@ pub(super) fn passes(world: &World) -> anyhow::Result<Figure> {
         let [first, second] = world.graph[portal].cells;
         add(&mut world, portal, first, glass());
         let goal = all[(i * 5 + 2) % all.len()];
-        let lead = lead(&world, (portal, second), goal);
+        let lead = lead(&world, portal, second, goal);
         let passes = vec![
             tinted(lead, [0.9, 0.7, 0.8, 1.0]),
             tinted(Way::Mirror, [1.0, 0.9, 0.7, 0.4]),
@@ -191,7 +191,7 @@ fn frame(world: &World, portal: PortalId, from: CellId) -> [DVec3; 3] {
 }
 
 /// Returns the way from one opening into the cell behind another: turned, and scaled so that it fits in there.
-fn lead(world: &World, (from, cell): (PortalId, CellId), goal: PortalId) -> Way {
+fn lead(world: &World, from: PortalId, cell: CellId, goal: PortalId) -> Way {
     let [before, to] = world.graph[goal].cells;
     let [a, aw, ah] = frame(world, from, cell);
     let [b, bw, bh] = frame(world, goal, before);

@@ -85,43 +85,66 @@ fn worst(name: &str) -> anyhow::Result<(f64, f64, usize)> {
             let Some((found, nearest)) = found else {
                 continue;
             };
-            let mut best = (f64::INFINITY, DVec3::ZERO);
+            let mut best = LeastWay {
+                length: f64::INFINITY,
+                departure: DVec3::ZERO,
+            };
             let mut string = TautString::new();
             least(
                 site.layout(),
-                (from.0.cell, from.1),
-                (to.0.cell, to.1),
+                from.0.cell,
+                from.1,
+                &Goal {
+                    cell: to.0.cell,
+                    at: to.1,
+                },
                 &mut Vec::new(),
                 &mut string,
                 &mut best,
             );
-            if best.0 < f64::INFINITY {
+            if best.length < f64::INFINITY {
                 n += 1;
-                length = length.max(found / best.0);
-                angle = angle.max(nearest.angle_between(best.1).to_degrees());
+                length = length.max(found / best.length);
+                angle = angle.max(nearest.angle_between(best.departure).to_degrees());
             }
         }
     }
     Ok((length, angle, n))
 }
 
+/// The end of a way.
+struct Goal {
+    cell: CellId,
+    at: DVec3,
+}
+
+/// The least length found, and the direction in which its string departs.
+struct LeastWay {
+    length: f64,
+    departure: DVec3,
+}
+
 /// Searches all sequences, bounded by the string through the portals so far, which tests compare with `clarabel`.
 fn least(
     layout: &Layout,
-    (cell, from): (CellId, DVec3),
-    to: (CellId, DVec3),
+    cell: CellId,
+    from: DVec3,
+    to: &Goal,
     chain: &mut Vec<PortalId>,
     string: &mut TautString,
-    best: &mut (f64, DVec3),
+    best: &mut LeastWay,
 ) {
-    let length = string.pull(from, to.1, chain.len(), |i| {
+    let length = string.pull(from, to.at, chain.len(), |i| {
         layout.opening(chain[i]).pieces()
     });
-    if string.bound() >= best.0 {
+    if string.bound() >= best.length {
         return;
     }
-    if cell == to.0 && length < best.0 {
-        *best = (length, string.departure());
+    if cell == to.cell && length < best.length {
+        *best = LeastWay {
+            length,
+            departure: string.departure(),
+        };
     }
     if chain.len() == 8 {
         return;
@@ -129,7 +152,7 @@ fn least(
     for exit in layout.exits(cell) {
         if !chain.contains(&exit.portal) {
             chain.push(exit.portal);
-            least(layout, (exit.to, from), to, chain, string, best);
+            least(layout, exit.to, from, to, chain, string, best);
             chain.pop();
         }
     }

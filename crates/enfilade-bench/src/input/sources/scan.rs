@@ -278,7 +278,8 @@ fn scored(name: &str, n_stations: Stations) -> anyhow::Result<Score> {
 
 /// Returns what a score lacks to 1; all of it if the scan was not baked.
 fn lacking(
-    (name, stations): (&str, Stations),
+    name: &str,
+    stations: Stations,
     most: f64,
     share: usize,
     note: impl Fn(&Score) -> String,
@@ -294,7 +295,7 @@ fn lacking(
 
 /// Share of the rooms with a station without a cell of their own.
 pub(super) fn rooms(_: &World, name: &str, stations: Stations) -> anyhow::Result<Figure> {
-    lacking((name, stations), ROOMS, 0, |score| {
+    lacking(name, stations, ROOMS, 0, |score| {
         let (n, n_cells) = (score.n_rooms, score.n_cells);
         let failed = score.failed.join("; ");
         format!("{n} rooms with a station; {n_cells} cells; {failed}")
@@ -303,7 +304,7 @@ pub(super) fn rooms(_: &World, name: &str, stations: Stations) -> anyhow::Result
 
 /// Share of the doors between rooms with stations and to the outdoors without a portal.
 pub(super) fn doors(_: &World, name: &str, stations: Stations) -> anyhow::Result<Figure> {
-    lacking((name, stations), DOORS, 1, |score| {
+    lacking(name, stations, DOORS, 1, |score| {
         format!("{} doors", score.n_doors)
     })
 }

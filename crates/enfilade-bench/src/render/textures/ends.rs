@@ -118,7 +118,8 @@ fn draw(studio: &mut Studio, camera: &Camera, culling: Culling) -> anyhow::Resul
 fn stepped(
     studio: &mut Studio,
     [before, at]: [&Camera; 2],
-    (frames, nearer): (u32, f32),
+    frames: u32,
+    nearer: f32,
 ) -> anyhow::Result<PortalTextureCounts> {
     let default = PortalTextureOptions::default();
     studio.add_portal_textures(PortalTextureOptions {
@@ -186,19 +187,19 @@ fn judge(studio: &mut Studio, cameras: [&Camera; 2], found: &mut EndsFound) -> a
     let at = cameras[1];
     let own = Culling::PortalTextures;
     // As if the transition began a step later.
-    let still = stepped(studio, cameras, (0, STEP))?;
+    let still = stepped(studio, cameras, 0, STEP)?;
     let texture = draw(studio, at, own)?;
-    let turned = stepped(studio, cameras, (0, 0.0))?;
+    let turned = stepped(studio, cameras, 0, 0.0)?;
     let geometry = draw(studio, at, own)?;
     // The first moment of one that takes forever.
-    let begun = stepped(studio, cameras, (u32::MAX, 0.0))?;
+    let begun = stepped(studio, cameras, u32::MAX, 0.0)?;
     if still.n_textured <= turned.n_textured || begun.n_textured != still.n_textured {
         return Ok(());
     }
     found.n += 1;
     let first = draw(studio, at, own)?;
     found.texture = found.texture.max(most_difference(&first, &texture));
-    let mut now = stepped(studio, cameras, (frames(), 0.0))?;
+    let mut now = stepped(studio, cameras, frames(), 0.0)?;
     let mut between = Vec::new();
     while now.n_turning > 0 && between.len() <= frames() as usize {
         between.push(draw(studio, at, own)?);

@@ -153,13 +153,13 @@ impl Measurements<'_> {
     ) -> anyhow::Result<Option<&Series>> {
         let key = (scene.to_owned(), mode);
         if !self.state.series.contains_key(&key) {
-            let (n, size) = (self.state.options.frames, self.state.options.size);
-            let frames = (size, self.state.options.ahead);
+            let options = &self.state.options;
+            let (n, size, ahead) = (options.frames, options.size, options.ahead);
             let Some((model, studio)) = self.studio(row, scene)? else {
                 return Ok(None);
             };
             let cameras = middle(&model.cameras(&studio.sight), n);
-            let series = measure(studio, (&model.world, &cameras), mode, frames)?;
+            let series = measure(studio, &model.world, &cameras, mode, size, ahead)?;
             self.state.series.insert(key.clone(), series);
         }
         Ok(self.state.series.get(&key))

@@ -141,16 +141,18 @@ pub(super) fn style() -> Style {
 /// have grown.
 pub(super) fn measure(
     studio: &mut Studio,
-    (world, cameras): (&World, &[Camera]),
+    world: &World,
+    cameras: &[Camera],
     mode: DrawMode,
-    (size, ahead): ([u32; 2], u64),
+    size: [u32; 2],
+    ahead: u64,
 ) -> anyhow::Result<Series> {
     let target = studio.target(size)?;
     let aspect = size[0] as f32 / size[1] as f32;
     let mut series = Series::default();
     mode.begin(studio)?;
     if mode == DrawMode::Warm {
-        series.ahead = make_ahead(studio, world, (size[1], ahead))?;
+        series.ahead = make_ahead(studio, world, size[1], ahead)?;
     }
     let warm = cameras.iter().take(3).map(|camera| (camera, false));
     for (camera, counts) in warm.chain(cameras.iter().map(|camera| (camera, true))) {
@@ -190,7 +192,8 @@ pub(super) fn measure(
 fn make_ahead(
     studio: &mut Studio,
     world: &World,
-    (lines, max_bytes): (u32, u64),
+    lines: u32,
+    max_bytes: u64,
 ) -> anyhow::Result<[usize; 2]> {
     let making = PortalTextureMaking {
         style: style(),
