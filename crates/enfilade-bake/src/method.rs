@@ -29,6 +29,7 @@ impl Method {
     /// Returns the stages of a bake with this method, in order. A level of brushes has no stages in voxels by
     /// [`Method::Bsp`].
     #[must_use]
+    #[doc(hidden)]
     pub fn stages(self) -> &'static [Stage] {
         use Stage::{
             Candidates, Complex, Decimation, Distance, Flood, Geometry, Partition, Rooms,

@@ -17,13 +17,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::delaunay::LEAST_BALL;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::shown;
 use enfilade::import::{ImportReport, RepairOptions};
+use enfilade::internals::bake::delaunay::LEAST_BALL;
 use enfilade::world::{Space, WalkMapKey};
 use serde::Serialize;
 

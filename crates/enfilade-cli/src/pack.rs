@@ -6,7 +6,10 @@ use std::path::PathBuf;
 use anyhow::Context;
 use enfilade::cpg::wire::decode_glb;
 use enfilade::geom::shown;
-use enfilade::stream::{HEAD, PackedPlace, PackedWorld, first_picture};
+use enfilade::internals::stream::first_picture;
+use enfilade::stream::HEAD;
+use enfilade::stream::PackedPlace;
+use enfilade::stream::PackedWorld;
 use enfilade::whole;
 use enfilade_report::WalkPage;
 

@@ -8,11 +8,21 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::{PortalId, World};
-use enfilade::geom::{Allowance, DVec3};
-use enfilade::world::{
-    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Listener, PartId,
-    Reverb, Space, Transmission, at_ears, test_sound,
-};
+use enfilade::geom::DVec3;
+use enfilade::internals::geom::Allowance;
+use enfilade::internals::world::AUDIO_BLOCK;
+use enfilade::internals::world::AudioBlock;
+use enfilade::internals::world::Auralizer;
+use enfilade::internals::world::at_ears;
+use enfilade::internals::world::test_sound;
+use enfilade::world::Acoustics;
+use enfilade::world::DecayLaw;
+use enfilade::world::DiffuseFields;
+use enfilade::world::Listener;
+use enfilade::world::PartId;
+use enfilade::world::Reverb;
+use enfilade::world::Space;
+use enfilade::world::Transmission;
 
 use self::materials::{Absorption, Absorptions, Given, given, tell};
 use crate::formats::Format;

@@ -72,6 +72,7 @@ pub enum Doubt {
 impl Cell {
     /// Returns `true` if a person fits in its box.
     #[must_use]
+    #[doc(hidden)]
     pub fn holds_person(&self) -> bool {
         /// [Units: wu]
         const PERSON: [f32; 3] = [0.6, 1.8, 0.6];

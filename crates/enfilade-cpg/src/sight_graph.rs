@@ -129,6 +129,7 @@ impl SightGraph {
     /// cells, and for its winding and each of its pieces the number of vertices and the vertices, all little-endian,
     /// counts as 32 bits and coordinates as `f64`.
     #[must_use]
+    #[doc(hidden)]
     pub fn content_hash(&self) -> u64 {
         let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
         hash.count(self.n_cells as usize);

@@ -35,6 +35,7 @@ impl Why {
 
     /// Returns `true` if a space as large as a room was given to something else, or two rooms were made one.
     #[must_use]
+    #[doc(hidden)]
     pub fn takes_room(&self) -> bool {
         matches!(
             self.reason,

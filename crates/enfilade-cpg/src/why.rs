@@ -141,6 +141,7 @@ pub struct Place {
 impl Why {
     /// Makes a decision for which nothing was weighed.
     #[must_use]
+    #[doc(hidden)]
     pub fn given(reason: Reason) -> Self {
         Self {
             reason,
@@ -151,6 +152,7 @@ impl Why {
 
     /// Makes a decision by comparing the fact of a reason with a limit.
     #[must_use]
+    #[doc(hidden)]
     pub fn compared(reason: Reason, limit: f64, facts: &[(Fact, f64)]) -> Self {
         Self {
             limit: Some(rounded(limit)),
@@ -160,6 +162,7 @@ impl Why {
 
     /// Adds facts.
     #[must_use]
+    #[doc(hidden)]
     pub fn with(mut self, facts: &[(Fact, f64)]) -> Self {
         let known = facts.iter().filter(|(_, value)| value.is_finite());
         self.facts
@@ -196,6 +199,7 @@ impl Why {
 
     /// Returns `true` if the deciding fact is on the side of its limit that the reason says.
     #[must_use]
+    #[doc(hidden)]
     pub fn holds(&self) -> bool {
         self.comparison().is_none_or(|(_, value, limit)| {
             // Both are rounded.
@@ -236,6 +240,7 @@ enum Side {
 impl Reason {
     /// Returns the fact that a decision for this reason compares with a number; `None` if it weighs nothing.
     #[must_use]
+    #[doc(hidden)]
     pub fn fact(self) -> Option<Fact> {
         match self {
             Self::Shut => Some(Fact::Closed),
@@ -399,6 +404,7 @@ impl Fact {
 
     /// Returns the quantity in words, and its unit.
     #[must_use]
+    #[doc(hidden)]
     pub fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Share => ("share of the space beside it that is open", ""),

@@ -102,6 +102,7 @@ fn nearest_words(nearest: &Option<(PortalId, f64)>) -> String {
 impl HandEditKind {
     /// Returns a word for it.
     #[must_use]
+    #[doc(hidden)]
     pub fn word(&self) -> &'static str {
         match self {
             Self::Portal(_) => "portal",
@@ -123,6 +124,7 @@ impl HandEditKind {
 
     /// Returns its middle.
     #[must_use]
+    #[doc(hidden)]
     pub fn at(&self) -> DVec3 {
         match self {
             Self::Portal(corners) | Self::Mirror(corners) => {

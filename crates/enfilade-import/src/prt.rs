@@ -194,6 +194,7 @@ impl PrtFile {
     ///
     /// When `cluster_of` lacks a cluster.
     #[must_use]
+    #[doc(hidden)]
     pub fn merged(&self, cluster_of: &[u32], n_clusters: u32) -> Self {
         let of = |c: u32| cluster_of[c as usize];
         let portals = self.portals.iter().map(|p| PrtPortal {

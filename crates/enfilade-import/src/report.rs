@@ -144,6 +144,7 @@ pub struct Note {
 impl ImportReport {
     /// Returns `true` if all input states neither a unit nor an axis that points up: arrays, and files of some formats.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_bare(&self) -> bool {
         let is_bare = |f: &FileReport| matches!(f.format, "OBJ" | "PLY" | "STL" | "arrays");
         self.files.iter().all(is_bare)

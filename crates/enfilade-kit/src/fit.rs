@@ -65,6 +65,7 @@ impl Mouth {
     /// the largest distance of a vertex of either from the other polygon, or the width of a strip along its longer side of the area
     /// within the outline that is closed in one only. [Units: wu, rad]
     #[must_use]
+    #[doc(hidden)]
     pub fn misfit(&self, other: &Self, spin: f64) -> f64 {
         let turn = DVec2::from_angle(spin);
         let its = other.outline.iter().map(|p| turn.rotate(*p));
@@ -83,6 +84,7 @@ impl Mouth {
     /// Returns the pose, in this mouth's piece, of a piece whose mouth `other` meets this one, turned by `spin` about its normal.
     /// [Units: rad]
     #[must_use]
+    #[doc(hidden)]
     pub fn meeting(&self, other: &Self, spin: f64) -> Pose {
         let half_turn = Pose {
             turn: DQuat::from_xyzw(0.0, 1.0, 0.0, 0.0) * DQuat::from_rotation_z(spin),

@@ -107,6 +107,7 @@ impl Kit {
     /// Returns the attachments in groups that fit each other within a tolerance, as pairs of piece and attachment, the largest group
     /// first. O(attachments × groups).
     #[must_use]
+    #[doc(hidden)]
     pub fn groups(&self, tolerance: f64) -> Vec<Vec<[usize; 2]>> {
         let mut groups: Vec<Vec<[usize; 2]>> = Vec::new();
         for (i, piece) in self.pieces.iter().enumerate() {

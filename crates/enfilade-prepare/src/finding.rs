@@ -25,6 +25,7 @@ pub struct Example {
 
 impl Finding {
     /// Counts an occurrence; `name` is called only for an example.
+    #[doc(hidden)]
     pub fn add(&mut self, position: DVec3, name: impl FnOnce() -> String) {
         self.n += 1;
         if self.examples.len() < MAX_EXAMPLES {

@@ -23,10 +23,10 @@ use crate::prop::{Prop, PropMesh};
 use crate::renderer::read_picture;
 use crate::scene::GpuWorld;
 use crate::shown::Shown;
-use crate::studio::{Studio, StudioPart, StudioTarget, drawn_parts, staged_worlds, world_of};
+use crate::studio::{Studio, StudioPart, drawn_parts, staged_worlds, world_of};
 
 /// A view of a space of worlds.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct SpaceShot<'a> {
     /// The worlds, their poses and their doors.
     pub space: &'a Space,
@@ -100,6 +100,7 @@ impl Studio {
 
     /// Returns the number of triangles of structure and placed objects of all worlds that are present in a space.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_triangles_in(&self, space: &Space) -> u64 {
         let parts = (1..).map(PartId).zip(&self.parts);
         let present = parts.filter(|(id, _)| space.is_present(*id));
@@ -113,6 +114,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::add_light`].
+    #[doc(hidden)]
     pub fn add_part_light(
         &mut self,
         part: PartId,
@@ -220,19 +222,6 @@ impl Studio {
             self.special_viewer = viewer;
         }
         Ok(drawn)
-    }
-
-    /// Draws a view of a space to a target.
-    ///
-    /// # Errors
-    ///
-    /// As [`Studio::draw_space`].
-    pub fn draw_space_to(
-        &mut self,
-        shot: &SpaceShot<'_>,
-        target: &StudioTarget,
-    ) -> Result<SpaceCounts, RenderError> {
-        self.draw_space(shot, &target.view, target.size)
     }
 
     /// Draws a picture of a space.

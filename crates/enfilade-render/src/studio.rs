@@ -1,5 +1,6 @@
 //! Everything needed to draw one world.
 
+use std::fmt;
 use std::sync::Arc;
 
 use enfilade_cpg::World;
@@ -38,6 +39,7 @@ pub enum Culling {
 }
 
 /// An off-screen target, for benchmarks.
+#[derive(Debug)]
 pub struct StudioTarget {
     pub(crate) view: wgpu::TextureView,
     pub(crate) size: [u32; 2],
@@ -59,6 +61,7 @@ pub struct Studio {
     /// The adapter.
     pub gpu: Gpu,
     /// The world on it.
+    #[doc(hidden)]
     pub world: GpuWorld,
     /// The world prepared for queries.
     pub sight: Sight,
@@ -67,6 +70,7 @@ pub struct Studio {
     /// The viewer that runs the queries.
     pub viewer: Viewer,
     /// Reductions for distant rooms with culling by portals. Off by default.
+    #[doc(hidden)]
     pub sparing: Sparing,
     pub(crate) renderer: Renderer,
     pub(crate) stage: RenderStage,
@@ -86,6 +90,15 @@ pub struct Studio {
     pub(crate) portal_textures: Option<Box<PortalTextures>>,
 }
 
+impl fmt::Debug for Studio {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Studio")
+            .field("gpu", &self.gpu)
+            .field("day", &self.day)
+            .finish_non_exhaustive()
+    }
+}
+
 impl Studio {
     /// Uploads a world to an adapter.
     ///
@@ -101,6 +114,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::new`].
+    #[doc(hidden)]
     pub fn with_format(
         gpu: Gpu,
         world: &World,
@@ -120,6 +134,7 @@ impl Studio {
     /// # Errors
     ///
     /// Limits beyond the adapter's buffers.
+    #[doc(hidden)]
     pub fn hollow(
         gpu: Gpu,
         world: &World,
@@ -166,6 +181,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`GpuWorld::put`].
+    #[doc(hidden)]
     pub fn put(&mut self, piece: &GpuPiece) -> Result<Put, RenderError> {
         let is_new = !self.world.has(piece.of());
         let put = self.world.put(&self.gpu, piece)?;
@@ -176,6 +192,7 @@ impl Studio {
     }
 
     /// Takes a piece of a hollow world off the adapter. Returns `true` if it was there.
+    #[doc(hidden)]
     pub fn take(&mut self, of: PieceOf) -> bool {
         let was_there = self.world.take(of);
         if was_there {
@@ -348,6 +365,7 @@ impl Studio {
 
     /// Same as [`Studio::list`], but moves the list out. [Give it back](Studio::give_list) so that nothing is
     /// allocated.
+    #[doc(hidden)]
     pub fn take_list(
         &mut self,
         view: &View,
@@ -360,6 +378,7 @@ impl Studio {
     }
 
     /// Takes the buffers of a list back.
+    #[doc(hidden)]
     pub fn give_list(&mut self, list: RenderList) {
         self.lister.give(list);
     }
@@ -428,6 +447,7 @@ impl Studio {
     /// # Errors
     ///
     /// A size beyond the adapter's limit; a device that was lost.
+    #[doc(hidden)]
     pub fn picture_of(
         &mut self,
         frame: &Frame<'_>,
@@ -489,6 +509,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::picture_of`].
+    #[doc(hidden)]
     pub fn explained(
         &mut self,
         view: &View,
@@ -513,6 +534,7 @@ impl Studio {
     }
 
     /// Lists everything.
+    #[doc(hidden)]
     pub fn everything(&mut self) -> RenderList {
         self.follow_state();
         (self.lister)

@@ -45,6 +45,7 @@ impl Start {
     /// Finds a place as [`Start::find`] does in one of these cells, on a floor at this height if there is one. Cells that do
     /// not exist are ignored.
     #[must_use]
+    #[doc(hidden)]
     pub fn among(
         world: &World,
         sight: &Sight,

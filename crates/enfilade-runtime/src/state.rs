@@ -235,11 +235,13 @@ impl SightState {
 
     /// Returns the position of each leaf, in ascending order of objects. If equal, [`SightState::moved`] is equal.
     #[must_use]
+    #[doc(hidden)]
     pub fn shares(&self) -> &[Option<f32>] {
         &self.shares
     }
 
     /// Returns the portals that let nothing through, in ascending order.
+    #[doc(hidden)]
     pub fn shut_portals(&self) -> impl Iterator<Item = PortalId> {
         let portals = (0..).zip(&self.portals);
         let shut = portals.filter(|(_, flags)| **flags & (CLOSED | SHUT) != 0);

@@ -105,7 +105,7 @@ pub enum FailureKind {
 impl FailureKind {
     /// Returns the promise that it breaks.
     #[must_use]
-    pub fn promise(self) -> &'static str {
+    pub(crate) fn promise(self) -> &'static str {
         match self {
             Self::Unlisted | Self::MissingTriangle => "complete",
             Self::Hidden | Self::OutsideVolume | Self::HiddenPart => "conservative",

@@ -134,28 +134,232 @@
 mod file;
 pub mod whole;
 
-pub use enfilade_cpg as cpg;
-pub use enfilade_geom as geom;
-pub use enfilade_runtime as runtime;
+pub use glam;
 
+/// The graph of cells and portals, its invariants, the locator, and the file.
+pub mod cpg {
+    pub use enfilade_cpg::{
+        Batch, Cell, CellId, CellPortalGraph, CellSet, CloseDecision, DetailObject, Doubt, Exit,
+        Fact, Fitting, FittingPart, GraphError, Hole, HoleReason, Locator, LocatorNode,
+        MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Place, Portal, PortalId, PortalKind,
+        Provenance, Pvs, Reason, RoomDoubt, SightGraph, SightGraphError, SightPortal, SourceRuns,
+        SpecialId, SpecialPortal, SpecialProblem, SpecialShape, Statistics, VisibleParts,
+        VisibleVolumes, Way, Why, World, cell_color,
+    };
+
+    /// Worlds as bytes of GLB files ([docs/format.md](https://github.com/enfilade-rs/enfilade/blob/main/docs/format.md)).
+    pub mod wire {
+        pub use enfilade_cpg::wire::{
+            EXTENSION, PieceContent, VERSION, WireError, decode_glb, encode_glb, is_world,
+            read_piece,
+        };
+    }
+}
+
+/// Boxes, planes, polygons, poses, and the input scene.
+pub mod geom {
+    pub use enfilade_geom::{
+        Aabb, Allowance, ConvexSolid, End, MemoryProbe, Plane, Shown, Similarity, SolidError,
+        Triangle, Winding, shown,
+    };
+    pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
+
+    /// The input scene: meshes, and objects that place them.
+    pub mod scene {
+        pub use enfilade_geom::scene::{
+            About, Entity, Filling, Fixture, FixtureKind, GivenPortal, Image, Mark, MarkKind,
+            Material, Mesh, Object, Primitive, Role, RoomName, Scene, SourceNode, Texture,
+            TriangleSource,
+        };
+    }
+}
+
+/// Visibility per frame: what a view sees, doors, following, picking and lines of sight.
+pub mod runtime {
+    pub use enfilade_runtime::{
+        Chunk, ChunkId, DetailId, Draw, DrawList, Follower, Hit, Leaf, Narrowing, NotFinite,
+        SavedDoors, SavedDoorsError, SeeCounts, SeeOptions, Seen, Sight, SightError, SightOptions,
+        SightSkeleton, SightState, Sightlines, SkeletonError, Start, Step, Stops, Target, View,
+        ViewError, Viewer, Visit,
+    };
+}
+
+/// Scene → [`World`]: finds cells and portals, and changes finished worlds.
 #[cfg(feature = "bake")]
-pub use enfilade_bake as bake;
+pub mod bake {
+    pub use enfilade_bake::complex::Leak;
+    pub use enfilade_bake::{
+        BakeConfig, BakeContext, BakeError, BakeOutput, Budget, MergeSettings, Method, Outdoors,
+        Pieces, Progress, Resolution, Silent, SmallestHole, Stage, bake,
+    };
+
+    /// Settings of the binary space partition, and leaks of its solids.
+    pub mod bsp {
+        pub use enfilade_bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
+    }
+
+    /// Settings of the Delaunay builder.
+    pub mod delaunay {
+        pub use enfilade_bake::delaunay::{Choices, DelaunayConfig, DelaunayError, Weight};
+    }
+
+    /// Portals, mirrors and links added to finished worlds.
+    pub mod edit {
+        pub use enfilade_bake::edit::{AddPortalError, Added, add_portal};
+
+        /// Mirrors, monitors and links.
+        pub mod special {
+            pub use enfilade_bake::edit::special::{
+                LinkOptions, SpecialError, Spot, link, mirror, monitor, plain, reflect, tint,
+            };
+        }
+    }
+
+    /// The widest path from a room to the outdoors.
+    pub mod leak {
+        pub use enfilade_bake::leak::{LeakTrail, NoTrail, find_leak_trail};
+    }
+
+    /// Names of cells.
+    pub mod names {
+        pub use enfilade_bake::names::rename_cells;
+    }
+
+    /// Bakes of the part of a scene that changed.
+    pub mod rebake {
+        pub use enfilade_bake::rebake::{RebakeError, Rebaked, WholeBecause, rebake};
+    }
+
+    /// Cells merged where a portal costs more than it hides.
+    pub mod simplify {
+        pub use enfilade_bake::simplify::{
+            CostModel, Metric, Simplified, SimplifySettings, UnknownMaterial, delete_portal,
+            simplify,
+        };
+    }
+}
+
+/// Editing sessions: pieces, changes by hand, undo, a journal.
 #[cfg(feature = "edit")]
-pub use enfilade_edit as edit;
+pub mod edit {
+    pub use enfilade_edit::{
+        EditError, EditGround, EditOperation, EditSession, EditedSpace, EditedWorld, HandEdit,
+        HandEditError, HandEditKind, JournalError, OwnWorlds, Resumed,
+    };
+}
+
+/// Scenes from files: glTF, OBJ, PLY, STL, IFC, maps, and sources that are not triangles.
 #[cfg(feature = "import")]
-pub use enfilade_import as import;
+pub mod import {
+    pub use enfilade_import::{
+        AirSide, ArrayMesh, BadOption, CleaningOptions, CleaningReport, Example, FileReport,
+        Finding, Glob, GlobState, HeightOptions, IfcConverter, ImportError, ImportOptions,
+        ImportReport, Imported, LeftOut, Limits, Note, PrtError, PrtFace, PrtFile, PrtFormat,
+        PrtPortal, PvsText, RepairOptions, RepairReport, RoleRules, SceneSource, ShellCounts,
+        SurfaceReport, TextureMatter, Up, UpDoubt, VolumeOptions, decode_gltf, decode_map,
+        decode_obj, decode_ply, decode_stl, decode_vox, export_glb, import, import_arrays,
+        import_sources, read_prt, read_pvs_text, write_prt, write_pvs_text,
+    };
+}
+
+/// Levels put together from baked pieces.
 #[cfg(feature = "kit")]
-pub use enfilade_kit as kit;
+pub mod kit {
+    pub use enfilade_kit::{
+        Assembly, Attachment, Choice, Chosen, DEFAULT_TOLERANCE, End, FlattenError, Instance,
+        InstanceId, Kit, KitFault, LevelParts, LevelSpace, Link, Mouth, Piece, PieceError,
+        PieceNamedTwice, PlaceError, PlaceOptions, Spot, open_air,
+    };
+
+    /// Levels made at random.
+    pub mod generate {
+        pub use enfilade_kit::generate::{dungeon, maze, office};
+    }
+}
+
+/// Pictures of a world with wgpu.
 #[cfg(feature = "render")]
-pub use enfilade_render as render;
+pub mod render {
+    pub use enfilade_render::{
+        AdapterChoice, Camera, Culling, Frame, Gpu, LampCone, LampLight, LampOptions,
+        MadePortalTextures, Mark, MarkShape, Paint, Picture, PieceOf, PortalTextureCounts,
+        PortalTextureError, PortalTextureFileError, PortalTextureMaking, PortalTextureOptions,
+        PortalTexturePaint, PortalTextureProgress, Projection, Prop, PropMesh, RenderError,
+        RenderList, SpaceCounts, SpaceShot, Studio, StudioTarget, Style, Viewpoints, good_camera,
+    };
+}
+
+/// Worlds in pieces, fetched as they come into view and kept within a budget.
 #[cfg(feature = "stream")]
-pub use enfilade_stream as stream;
+pub mod stream {
+    pub use enfilade_stream::{
+        Catalog, Cause, Changes, Eye, Failed, Fetch, FetchError, FileFetch, Frame, HEAD, InView,
+        LinkOptions, Loaded, PackError, PackedFiles, PackedHead, PackedPlace, PackedWorld, Piece,
+        PieceAt, PieceId, PinError, Policy, Reply, SimulatedLink, Source, StandIn, StreamCounts,
+        StreamOptions, Streamer, ThreadSource, WorldPieces,
+    };
+    #[cfg(feature = "http")]
+    pub use enfilade_stream::{HttpFetch, PackedHttp};
+}
+
+/// The checker of the promises of a world, which shares no code with any builder.
 #[cfg(feature = "verify")]
-pub use enfilade_verify as verify;
+pub mod verify {
+    pub use enfilade_verify::{
+        CompleteCounts, EvidenceError, EvidenceReport, Failure, FailureKind, SealedCounts,
+        VerifyOptions, VerifyReport, VisibleCounts, structural_triangles, verify_evidence,
+        verify_world,
+    };
+}
+
+/// Visibility from each cell, precomputed.
 #[cfg(feature = "vis")]
-pub use enfilade_vis as vis;
+pub mod vis {
+    pub use enfilade_vis::{
+        VisBlocks, VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, Witness,
+        WorldVis, see_all, see_parts, see_world,
+    };
+}
+
+/// Queries of a living world: things, actors, paths, sound, light, contacts, moving rooms.
 #[cfg(feature = "world")]
-pub use enfilade_world as world;
+pub mod world {
+    pub use enfilade_world::{
+        Acoustics, ActorEvent, ActorId, ActorPlace, Actors, Agent, Arrival, Assumed, AwakeCells,
+        Blocked, Body, Cast, Caster, Cause, CellShape, Chance, Contact, Corner, DecayLaw,
+        DiffuseFields, Docking, Errands, Exit, Flood, Floors, Followed, Geodesics, Heard, Hop,
+        Hops, Impact, KeptMapError, Lamp, LampError, LampId, Layout, LengthSearch, Lights,
+        Listener, Moved, NoPath, OCTAVES, Obstacle, Opening, Pairs, PartId, PassedPortal, Passing,
+        Path, PathFollower, PathPoint, PathPortal, PathSearch, Place, PlanDraft, Pose, Posted,
+        Progress, Reverb, SPEED_OF_SOUND, Sampling, SavedActor, SavedActors, SavedError, SavedPose,
+        SavedSpace, SavedThing, SavedThings, SavedTie, SeenContext, SeenVia, Shape, ShapeError,
+        SightRay, Space, SpaceError, SpaceSeen, SpaceViewer, SpecialImage, SpecialOptions,
+        StoppedSpecial, ThingError, ThingId, Things, Tie, TraceEnd, Traced, Transmission, WalkMap,
+        WalkMapKey, Walker, WayPoint, Ways,
+    };
+}
+
+/// All that our crates make public for each other: for the command and the benchmarks. Not part of the promise.
+#[doc(hidden)]
+pub mod internals {
+    #[cfg(feature = "bake")]
+    pub use enfilade_bake as bake;
+    pub use enfilade_cpg as cpg;
+    #[cfg(feature = "edit")]
+    pub use enfilade_edit as edit;
+    pub use enfilade_geom as geom;
+    #[cfg(feature = "import")]
+    pub use enfilade_import as import;
+    #[cfg(feature = "kit")]
+    pub use enfilade_kit as kit;
+    pub use enfilade_runtime as runtime;
+    #[cfg(feature = "stream")]
+    pub use enfilade_stream as stream;
+    #[cfg(feature = "vis")]
+    pub use enfilade_vis as vis;
+    #[cfg(feature = "world")]
+    pub use enfilade_world as world;
+}
 
 pub use cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Exit, Portal, PortalId, PortalKind, Pvs,

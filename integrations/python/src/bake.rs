@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use enfilade::bake::bsp::find_leak;
+use enfilade::internals::bake::bsp::find_leak;
 use enfilade::bake::{BakeConfig, BakeContext, Method, Progress, Stage, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::geom::DMat4;

@@ -1,7 +1,9 @@
 //! Implicit scenes.
 
 use anyhow::{Context, bail};
-use enfilade::import::{ImportOptions, Imported, decode_implicit};
+use enfilade::import::ImportOptions;
+use enfilade::import::Imported;
+use enfilade::internals::import::decode_implicit;
 
 use super::baked;
 use crate::rows::Figure;

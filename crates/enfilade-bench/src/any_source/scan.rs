@@ -7,9 +7,13 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade::cpg::wire::encode_glb;
+use enfilade::geom::Aabb;
+use enfilade::geom::DVec3;
+use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
-use enfilade::geom::{Aabb, Bvh, DVec3, Ray, Triangle};
 use enfilade::import::{ImportOptions, decode_ply, import};
+use enfilade::internals::geom::Bvh;
+use enfilade::internals::geom::Ray;
 use enfilade_testkit::Rng;
 use serde_json::{Value, json};
 

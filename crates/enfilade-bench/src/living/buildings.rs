@@ -6,7 +6,13 @@ use std::sync::Arc;
 
 use anyhow::{Context, ensure};
 use enfilade::cpg::Portal;
-use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Ray, Sets, Triangle};
+use enfilade::geom::Aabb;
+use enfilade::geom::DQuat;
+use enfilade::geom::DVec3;
+use enfilade::geom::Triangle;
+use enfilade::internals::geom::Bvh;
+use enfilade::internals::geom::Ray;
+use enfilade::internals::geom::Sets;
 use enfilade::runtime::View;
 use enfilade::world::{
     Lamp, LampId, Lights, PartId, Place, Pose, Shape, Space, SpaceViewer, ThingId, Things, Tie,

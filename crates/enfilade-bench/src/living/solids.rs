@@ -1,7 +1,10 @@
 //! All triangles of parts, without cells, each with what it belongs to.
 
 use enfilade::World;
-use enfilade::geom::{Aabb, Bvh, DVec3, Triangle};
+use enfilade::geom::Aabb;
+use enfilade::geom::DVec3;
+use enfilade::geom::Triangle;
+use enfilade::internals::geom::Bvh;
 use enfilade::runtime::{ChunkId, DetailId};
 use enfilade::world::{PartId, Space};
 

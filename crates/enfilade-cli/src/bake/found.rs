@@ -7,7 +7,10 @@ use std::io::Write;
 use anyhow::bail;
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::shown;
-use enfilade::import::{CleaningOptions, ImportReport, RepairOptions, cleaning_report};
+use enfilade::import::CleaningOptions;
+use enfilade::import::ImportReport;
+use enfilade::import::RepairOptions;
+use enfilade::internals::import::cleaning_report;
 
 use enfilade_report::InputDoubt;
 

@@ -88,6 +88,7 @@ pub struct RepairReport {
 impl RepairReport {
     /// Returns the counts with their names, in display order: changes first.
     #[must_use]
+    #[doc(hidden)]
     pub fn counts(&self) -> [(&'static str, u64); 12] {
         [
             ("vertices welded", self.welded_corners),

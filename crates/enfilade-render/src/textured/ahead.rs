@@ -124,6 +124,7 @@ impl Studio {
     /// # Errors
     ///
     /// If portal textures are off; a budget without room for a file; as [`Studio::picture`].
+    #[doc(hidden)]
     pub fn make_portal_textures(
         &mut self,
         world: &World,
@@ -154,6 +155,7 @@ impl Studio {
     ///
     /// If portal textures are off; a file that is damaged, of another version, for another world or light, or of textures
     /// with another side or other viewpoints.
+    #[doc(hidden)]
     pub fn load_portal_textures(&mut self, bytes: &[u8]) -> Result<usize, RenderError> {
         let own = self.portal_textures.as_mut();
         let own = own.ok_or(PortalTextureFileError::Off)?;

@@ -248,6 +248,7 @@ impl Caster {
 
     /// Returns the cost of the last query.
     #[must_use]
+    #[doc(hidden)]
     pub fn counts(&self) -> CastCounts {
         self.flood.counts()
     }

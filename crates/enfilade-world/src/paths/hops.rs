@@ -102,6 +102,7 @@ impl Hops {
     ///
     /// If there was no such part when it was made; likewise in the other queries of one.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_junctions(&self, part: PartId) -> usize {
         self.parts[part.idx()].n_junctions()
     }

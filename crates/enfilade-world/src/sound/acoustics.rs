@@ -87,7 +87,7 @@ impl Acoustics {
     ///
     /// If there is no such portal, or the part was added later.
     #[must_use]
-    pub fn open_share(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
+    pub(crate) fn open_share(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
         let state = space.state(part);
         if self.has_pane[self.index(part, portal)] || !state.is_open(portal) {
             return 0.0;

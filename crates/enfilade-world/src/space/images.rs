@@ -28,6 +28,7 @@ impl Space {
     /// # Panics
     ///
     /// If there is no such part.
+    #[doc(hidden)]
     pub fn images(&self, part: PartId, center: DVec3, radius: f64, images: &mut Vec<SpecialImage>) {
         let own = &self.parts[part.idx()];
         let at = (own.layout.n_specials() > 0).then(|| self.locate(part, center));

@@ -90,6 +90,7 @@ impl<H> Traced<H> {
 
     /// Returns the end as it seems from the start: straight ahead. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn seems_at(&self) -> DVec3 {
         self.map.point_back(self.at)
     }
@@ -213,6 +214,7 @@ impl Space {
     }
 
     /// Returns the parts whose boxes a segment, in the frame of a part, meets, and the root, which comes first.
+    #[doc(hidden)]
     pub fn parts_along(
         &self,
         frame: PartId,

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use enfilade::bake::delaunay::{Choice, Decision, OUTDOOR_CELL};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
+use enfilade::internals::bake::delaunay::Choice;
+use enfilade::internals::bake::delaunay::Decision;
+use enfilade::internals::bake::delaunay::OUTDOOR_CELL;
 use enfilade_render::Mark;
 
 use super::legend::{LegendLine, ReviewShown};
