@@ -15,7 +15,7 @@ use anyhow::{Context, bail};
 use crate::{GATE, root, run_to_end, target_dir};
 use surface::Docs;
 
-/// What the gate documents, as pages and as JSON: all of the workspace, so that the same dependencies serve both.
+/// Arguments with which the gate documents, as pages and as JSON: all of the workspace, so that the same dependencies serve both.
 pub(crate) const DOC: [&str; 3] = ["--workspace", "--all-features", "--no-deps"];
 
 /// Set for rustdoc: the program to start.
@@ -66,9 +66,14 @@ pub(crate) fn run(is_write: bool) -> anyhow::Result<()> {
             differences.join("\n")
         );
     }
-    let n_functions = lines.iter().filter(|line| line.contains(": fn(")).count();
+    let n_functions = lines.iter().filter(|line| is_function(line)).count();
     println!("{} items, {n_functions} of them functions", lines.len());
     Ok(())
+}
+
+fn is_function(line: &str) -> bool {
+    line.split_once(": ")
+        .is_some_and(|(_, text)| text.trim_start_matches("const ").starts_with("fn"))
 }
 
 fn list() -> PathBuf {
@@ -113,4 +118,27 @@ fn differences(listed: &[&str], there: &[String]) -> Vec<String> {
     out.extend(new.map(|t| (t.as_str(), '+')));
     out.sort_unstable();
     out.iter().map(|(l, sign)| format!("{sign} {l}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_only_one_side_differ() {
+        let there = ["a: fn()", "c: u8", "d: u8"].map(str::to_owned);
+        let found = differences(&["a: fn()", "b: u8", "c: u16"], &there);
+        assert_eq!(found, ["- b: u8", "- c: u16", "+ c: u8", "+ d: u8"]);
+        assert!(differences(&["a: fn()", "c: u8", "d: u8"], &there).is_empty());
+    }
+
+    #[test]
+    fn functions_are_told_from_the_rest() {
+        for line in ["a: fn(&self)", "a: const fn() -> Self", "a: fn<T>(t: T)"] {
+            assert!(is_function(line), "{line}");
+        }
+        for line in ["a: type = fn() -> u64", "b::fn: u8", "c: struct: Clone"] {
+            assert!(!is_function(line), "{line}");
+        }
+    }
 }

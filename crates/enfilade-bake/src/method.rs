@@ -6,6 +6,7 @@ use crate::Stage;
 
 /// A method that finds cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// Voxels, distances, watershed: [`crate::watershed`].
     Watershed,

@@ -281,7 +281,7 @@ fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow
             }
         }
         // Reported before the work.
-        Resolution::Voxels { .. } | Resolution::Planes => {}
+        _ => {}
     }
     for note in &baked.notes {
         write_lines(&mut Warned, note)?;

@@ -24,6 +24,7 @@ const MANY: usize = 12;
 
 /// A sign that a world is not the one that was meant.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Doubt {
     /// No cell is a room or a void: all air is open to the outdoors.
     NoRooms,

@@ -30,6 +30,7 @@ pub struct SightGraph {
 
 /// The reasons why cells and windings are not a valid [`SightGraph`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SightGraphError {
     /// A portal refers to a cell that does not exist.
     #[error("portal {portal} refers to cell {cell}, but there are only {n_cells} cells")]

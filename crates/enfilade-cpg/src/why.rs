@@ -30,6 +30,7 @@ pub struct Why {
 /// A decision and the reason for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub enum Reason {
     /// Two cells: a leaf or pane shuts the opening between them.
     Shut,
@@ -92,6 +93,7 @@ pub enum Reason {
 /// A measured quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub enum Fact {
     /// Area of an opening ÷ that of the space beside it.
     Share,

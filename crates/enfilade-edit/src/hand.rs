@@ -31,6 +31,7 @@ pub struct HandEdit {
 
 /// Kind of a [`HandEdit`], with its points in the frame of its host. [Units: wu]
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum HandEditKind {
     /// A portal across a cell, given by a convex planar polygon that may reach into walls.
     Portal(Vec<DVec3>),

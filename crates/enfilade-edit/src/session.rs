@@ -61,6 +61,7 @@ pub enum EditError {
 
 /// A world as edited.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct EditedWorld {
     /// The world.
     pub world: World,
@@ -70,6 +71,7 @@ pub struct EditedWorld {
 
 /// Account of a journal that was opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Resumed {
     /// Number of operations, undos and redos that were made again.
     pub n_entries: usize,

@@ -80,6 +80,7 @@ use std::path::{Path, PathBuf};
 
 /// A scene and the report of its import.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Imported {
     /// The scene.
     pub scene: Scene,

@@ -9,6 +9,7 @@ use std::fmt::Write;
 
 /// Variants of portal files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PrtFormat {
     /// Quake and Quake 2: a leaf is a cluster.
     Prt1,
@@ -58,6 +59,7 @@ pub struct PrtFile {
 /// The reason why a text is not a portal file or PVS, with its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}, word {word}: {}", enfilade_geom::shown(problem))]
+#[non_exhaustive]
 pub struct PrtError {
     /// Line, from 1.
     pub line: usize,

@@ -13,6 +13,7 @@ const LEANING: f64 = 1e-4;
 /// The frame's z axis points out of the piece. Its y axis points up, or north (-z) if the opening lies flat. Its origin is the middle
 /// of the sill, or of the box around an opening that lies flat.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Mouth {
     /// Maps points of its frame to those of the piece.
     pub frame: Pose,

@@ -24,6 +24,7 @@ pub struct PieceNamedTwice(pub String);
 
 /// A fault of a kit, which does not keep it from being used.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum KitFault {
     /// A piece with rooms has no attachment. Walls and other pieces without rooms need none.
     Detached {

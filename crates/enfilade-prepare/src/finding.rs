@@ -7,6 +7,7 @@ pub(crate) const MAX_EXAMPLES: usize = 5;
 
 /// A count with a few example places.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Finding {
     /// Number of occurrences.
     pub n: u64,
@@ -16,6 +17,7 @@ pub struct Finding {
 
 /// One place in the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Example {
     /// The object or element.
     pub name: String,

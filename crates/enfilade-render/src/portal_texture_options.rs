@@ -224,6 +224,7 @@ impl PortalTextureOptions {
 
 /// Textures in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PortalTextureCounts {
     /// Portals drawn as textures.
     pub n_textured: usize,

@@ -3,6 +3,7 @@
 //! Each part of a [`Space`] is drawn in its own frame, by the same camera in that frame's coordinates: a part ten kilometers
 //! away is as exact as a near one. All parts share one depth, one sun with its shadows, one sky and one exposure.
 
+use std::fmt;
 use std::sync::Arc;
 
 use enfilade_cpg::World;
@@ -50,6 +51,7 @@ pub struct SpaceShot<'a> {
 
 /// The contents of a drawn picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SpaceCounts {
     /// Drawn parts.
     pub n_parts: usize,
@@ -387,4 +389,13 @@ fn counts(lists: &[(PartId, RenderList)]) -> SpaceCounts {
         counts.n_draws += list.n_draws();
     }
     counts
+}
+
+impl fmt::Debug for Studio {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Studio")
+            .field("gpu", &self.gpu)
+            .field("day", &self.day)
+            .finish_non_exhaustive()
+    }
 }

@@ -1,6 +1,5 @@
 //! Everything needed to draw one world.
 
-use std::fmt;
 use std::sync::Arc;
 
 use enfilade_cpg::World;
@@ -88,15 +87,6 @@ pub struct Studio {
     /// For pictures of everything: finds what special portals show.
     pub(crate) special_viewer: Option<SpaceViewer>,
     pub(crate) portal_textures: Option<Box<PortalTextures>>,
-}
-
-impl fmt::Debug for Studio {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Studio")
-            .field("gpu", &self.gpu)
-            .field("day", &self.day)
-            .finish_non_exhaustive()
-    }
 }
 
 impl Studio {

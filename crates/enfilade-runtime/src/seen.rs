@@ -33,6 +33,7 @@ pub struct Visit {
 
 /// Statistics of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SeeCounts {
     /// Portals whose outline was clipped.
     pub clips: u32,

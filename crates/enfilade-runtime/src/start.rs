@@ -23,6 +23,7 @@ const ROOMS: usize = 8;
 
 /// An eye to begin a walk with, and the direction in which the way is free farthest.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Start {
     /// The eye, 1.6 m above the floor. [Units: wu]
     pub eye: [f32; 3],

@@ -53,6 +53,7 @@ pub struct SavedDoors {
 #[error(
     "these are the doors of another world: {saved} moving leaves, where this one has {own}, or portals or cells that it has not"
 )]
+#[non_exhaustive]
 pub struct SavedDoorsError {
     /// Leaves in the saved state.
     pub saved: usize,

@@ -65,6 +65,7 @@ impl Default for VisConfig {
 
 /// The reasons why nothing was computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VisError {
     /// The graph is broken.
     #[error(transparent)]

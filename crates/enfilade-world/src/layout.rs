@@ -30,6 +30,7 @@ pub struct Layout {
 
 /// Extent of a cell.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct CellShape {
     /// Bounding box. For outdoors, the scene's padded box. [Units: wu]
     pub bounds: Aabb,

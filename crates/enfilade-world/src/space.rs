@@ -9,7 +9,6 @@
 //!
 //! Coordinates are relative to a part; poses are in `f64`, so that a part ten kilometers away is as exact as a near one.
 
-use std::fmt;
 use std::sync::{Arc, OnceLock};
 
 use enfilade_cpg::{CellId, PortalId, World};
@@ -195,15 +194,6 @@ pub struct Space {
     pub(crate) docking: Docking,
     changes: Changes,
     buffers: Buffers,
-}
-
-impl fmt::Debug for Space {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Space")
-            .field("n_parts", &self.parts.len())
-            .field("n_cells", &self.n_cells)
-            .finish_non_exhaustive()
-    }
 }
 
 #[derive(Default)]
@@ -480,20 +470,6 @@ impl Space {
     #[must_use]
     pub fn n_parts(&self) -> usize {
         self.parts.len()
-    }
-
-    /// Returns the number of cells of all parts.
-    #[must_use]
-    #[doc(hidden)]
-    pub fn n_cells(&self) -> usize {
-        self.n_cells
-    }
-
-    /// Returns the number of a cell among those of all parts; those of the root come first.
-    #[must_use]
-    #[doc(hidden)]
-    pub fn cell_number(&self, place: Place) -> u32 {
-        self.parts[place.part.idx()].first_cell + place.cell.0
     }
 
     /// Returns the world of a part.

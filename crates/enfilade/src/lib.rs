@@ -123,8 +123,31 @@
 //! # Conventions, everywhere
 //!
 //! Right-handed, +Y up, meters; front faces are counter-clockwise; ranges are half-open; builders
-//! compute in `f64`, files hold `f32`; ids are indices into lists. Points and directions in run-time queries and their
-//! answers are `[f32; 3]`, as in the file.
+//! compute in `f64`, files hold `f32`; ids are indices into lists.
+//!
+//! Points and directions are of one of two types:
+//!
+//! | modules | type | why |
+//! | --- | --- | --- |
+//! | this one, [`cpg`], [`runtime`], `stream`; lamps of `world` | `[f32; 3]` | as in the file, and without a library of vectors |
+//! | [`geom`], `import`, `bake`, `vis`, `world`, `kit`, `edit`; the [`Locator`](cpg::Locator) | [`DVec3`](geom::DVec3) | they compute in `f64` |
+//! | `render` | `glam::Vec3`, and `DVec3` in spaces | as shaders do |
+//!
+//! [`glam`] is re-exported, so that nobody needs to find its version: `DVec3::from(p.map(f64::from))` and
+//! `p.as_vec3().to_array()` convert.
+//!
+//! # What is promised
+//!
+//! The items that this crate names, and nothing else, are the API; `api.txt` beside its sources lists them all. While the
+//! version is 0.x, a minor version may break them, and a patch version does not. The crates behind it (`enfilade-bake` and so
+//! on) may change with any version, and so may what is hidden from these pages.
+//!
+//! - **Settings** are made with `..Default::default()`, as in `BakeConfig { min_opening: 0.7, ..BakeConfig::default() }`: a
+//!   patch version may add a field.
+//! - **Results, errors and reasons** are `#[non_exhaustive]` where they may grow: match them with `..` and `_`.
+//! - **Parts of worlds and scenes** ([`World`], [`Cell`], [`Portal`], [`Scene`](geom::scene::Scene)) are made by users, too. A
+//!   new field is a new minor version.
+//! - All types are `Debug`, `Send` and `Sync`, unless they say why not.
 //!
 //! # Limits
 //!
@@ -136,209 +159,27 @@ pub mod whole;
 
 pub use glam;
 
-/// The graph of cells and portals, its invariants, the locator, and the file.
-pub mod cpg {
-    pub use enfilade_cpg::{
-        Batch, Cell, CellId, CellPortalGraph, CellSet, CloseDecision, DetailObject, Doubt, Exit,
-        Fact, Fitting, FittingPart, GraphError, Hole, HoleReason, Locator, LocatorNode,
-        MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Place, Portal, PortalId, PortalKind,
-        Provenance, Pvs, Reason, RoomDoubt, SightGraph, SightGraphError, SightPortal, SourceRuns,
-        SpecialId, SpecialPortal, SpecialProblem, SpecialShape, Statistics, VisibleParts,
-        VisibleVolumes, Way, Why, World, cell_color,
-    };
-
-    /// Worlds as bytes of GLB files ([docs/format.md](https://github.com/enfilade-rs/enfilade/blob/main/docs/format.md)).
-    pub mod wire {
-        pub use enfilade_cpg::wire::{
-            EXTENSION, PieceContent, VERSION, WireError, decode_glb, encode_glb, is_world,
-            read_piece,
-        };
-    }
-}
-
-/// Boxes, planes, polygons, poses, and the input scene.
-pub mod geom {
-    pub use enfilade_geom::{
-        Aabb, Allowance, ConvexSolid, End, MemoryProbe, Plane, Shown, Similarity, SolidError,
-        Triangle, Winding, shown,
-    };
-    pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
-
-    /// The input scene: meshes, and objects that place them.
-    pub mod scene {
-        pub use enfilade_geom::scene::{
-            About, Entity, Filling, Fixture, FixtureKind, GivenPortal, Image, Mark, MarkKind,
-            Material, Mesh, Object, Primitive, Role, RoomName, Scene, SourceNode, Texture,
-            TriangleSource,
-        };
-    }
-}
-
-/// Visibility per frame: what a view sees, doors, following, picking and lines of sight.
-pub mod runtime {
-    pub use enfilade_runtime::{
-        Chunk, ChunkId, DetailId, Draw, DrawList, Follower, Hit, Leaf, Narrowing, NotFinite,
-        SavedDoors, SavedDoorsError, SeeCounts, SeeOptions, Seen, Sight, SightError, SightOptions,
-        SightSkeleton, SightState, Sightlines, SkeletonError, Start, Step, Stops, Target, View,
-        ViewError, Viewer, Visit,
-    };
-}
-
-/// Scene → [`World`]: finds cells and portals, and changes finished worlds.
 #[cfg(feature = "bake")]
-pub mod bake {
-    pub use enfilade_bake::complex::Leak;
-    pub use enfilade_bake::{
-        BakeConfig, BakeContext, BakeError, BakeOutput, Budget, MergeSettings, Method, Outdoors,
-        Pieces, Progress, Resolution, Silent, SmallestHole, Stage, bake,
-    };
-
-    /// Settings of the binary space partition, and leaks of its solids.
-    pub mod bsp {
-        pub use enfilade_bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
-    }
-
-    /// Settings of the Delaunay builder.
-    pub mod delaunay {
-        pub use enfilade_bake::delaunay::{Choices, DelaunayConfig, DelaunayError, Weight};
-    }
-
-    /// Portals, mirrors and links added to finished worlds.
-    pub mod edit {
-        pub use enfilade_bake::edit::{AddPortalError, Added, add_portal};
-
-        /// Mirrors, monitors and links.
-        pub mod special {
-            pub use enfilade_bake::edit::special::{
-                LinkOptions, SpecialError, Spot, link, mirror, monitor, plain, reflect, tint,
-            };
-        }
-    }
-
-    /// The widest path from a room to the outdoors.
-    pub mod leak {
-        pub use enfilade_bake::leak::{LeakTrail, NoTrail, find_leak_trail};
-    }
-
-    /// Names of cells.
-    pub mod names {
-        pub use enfilade_bake::names::rename_cells;
-    }
-
-    /// Bakes of the part of a scene that changed.
-    pub mod rebake {
-        pub use enfilade_bake::rebake::{RebakeError, Rebaked, WholeBecause, rebake};
-    }
-
-    /// Cells merged where a portal costs more than it hides.
-    pub mod simplify {
-        pub use enfilade_bake::simplify::{
-            CostModel, Metric, Simplified, SimplifySettings, UnknownMaterial, delete_portal,
-            simplify,
-        };
-    }
-}
-
-/// Editing sessions: pieces, changes by hand, undo, a journal.
+pub mod bake;
+pub mod cpg;
 #[cfg(feature = "edit")]
-pub mod edit {
-    pub use enfilade_edit::{
-        EditError, EditGround, EditOperation, EditSession, EditedSpace, EditedWorld, HandEdit,
-        HandEditError, HandEditKind, JournalError, OwnWorlds, Resumed,
-    };
-}
-
-/// Scenes from files: glTF, OBJ, PLY, STL, IFC, maps, and sources that are not triangles.
+pub mod edit;
+pub mod geom;
 #[cfg(feature = "import")]
-pub mod import {
-    pub use enfilade_import::{
-        AirSide, ArrayMesh, BadOption, CleaningOptions, CleaningReport, Example, FileReport,
-        Finding, Glob, GlobState, HeightOptions, IfcConverter, ImportError, ImportOptions,
-        ImportReport, Imported, LeftOut, Limits, Note, PrtError, PrtFace, PrtFile, PrtFormat,
-        PrtPortal, PvsText, RepairOptions, RepairReport, RoleRules, SceneSource, ShellCounts,
-        SurfaceReport, TextureMatter, Up, UpDoubt, VolumeOptions, decode_gltf, decode_map,
-        decode_obj, decode_ply, decode_stl, decode_vox, export_glb, import, import_arrays,
-        import_sources, read_prt, read_pvs_text, write_prt, write_pvs_text,
-    };
-}
-
-/// Levels put together from baked pieces.
+pub mod import;
 #[cfg(feature = "kit")]
-pub mod kit {
-    pub use enfilade_kit::{
-        Assembly, Attachment, Choice, Chosen, DEFAULT_TOLERANCE, End, FlattenError, Instance,
-        InstanceId, Kit, KitFault, LevelParts, LevelSpace, Link, Mouth, Piece, PieceError,
-        PieceNamedTwice, PlaceError, PlaceOptions, Spot, open_air,
-    };
-
-    /// Levels made at random.
-    pub mod generate {
-        pub use enfilade_kit::generate::{dungeon, maze, office};
-    }
-}
-
-/// Pictures of a world with wgpu.
+pub mod kit;
 #[cfg(feature = "render")]
-pub mod render {
-    pub use enfilade_render::{
-        AdapterChoice, Camera, Culling, Frame, Gpu, LampCone, LampLight, LampOptions,
-        MadePortalTextures, Mark, MarkShape, Paint, Picture, PieceOf, PortalTextureCounts,
-        PortalTextureError, PortalTextureFileError, PortalTextureMaking, PortalTextureOptions,
-        PortalTexturePaint, PortalTextureProgress, Projection, Prop, PropMesh, RenderError,
-        RenderList, SpaceCounts, SpaceShot, Studio, StudioTarget, Style, Viewpoints, good_camera,
-    };
-}
-
-/// Worlds in pieces, fetched as they come into view and kept within a budget.
+pub mod render;
+pub mod runtime;
 #[cfg(feature = "stream")]
-pub mod stream {
-    pub use enfilade_stream::{
-        Catalog, Cause, Changes, Eye, Failed, Fetch, FetchError, FileFetch, Frame, HEAD, InView,
-        LinkOptions, Loaded, PackError, PackedFiles, PackedHead, PackedPlace, PackedWorld, Piece,
-        PieceAt, PieceId, PinError, Policy, Reply, SimulatedLink, Source, StandIn, StreamCounts,
-        StreamOptions, Streamer, ThreadSource, WorldPieces,
-    };
-    #[cfg(feature = "http")]
-    pub use enfilade_stream::{HttpFetch, PackedHttp};
-}
-
-/// The checker of the promises of a world, which shares no code with any builder.
+pub mod stream;
 #[cfg(feature = "verify")]
-pub mod verify {
-    pub use enfilade_verify::{
-        CompleteCounts, EvidenceError, EvidenceReport, Failure, FailureKind, SealedCounts,
-        VerifyOptions, VerifyReport, VisibleCounts, structural_triangles, verify_evidence,
-        verify_world,
-    };
-}
-
-/// Visibility from each cell, precomputed.
+pub mod verify;
 #[cfg(feature = "vis")]
-pub mod vis {
-    pub use enfilade_vis::{
-        VisBlocks, VisCheckpoint, VisConfig, VisContext, VisError, VisMode, VisOutput, Witness,
-        WorldVis, see_all, see_parts, see_world,
-    };
-}
-
-/// Queries of a living world: things, actors, paths, sound, light, contacts, moving rooms.
+pub mod vis;
 #[cfg(feature = "world")]
-pub mod world {
-    pub use enfilade_world::{
-        Acoustics, ActorEvent, ActorId, ActorPlace, Actors, Agent, Arrival, Assumed, AwakeCells,
-        Blocked, Body, Cast, Caster, Cause, CellShape, Chance, Contact, Corner, DecayLaw,
-        DiffuseFields, Docking, Errands, Exit, Flood, Floors, Followed, Geodesics, Heard, Hop,
-        Hops, Impact, KeptMapError, Lamp, LampError, LampId, Layout, LengthSearch, Lights,
-        Listener, Moved, NoPath, OCTAVES, Obstacle, Opening, Pairs, PartId, PassedPortal, Passing,
-        Path, PathFollower, PathPoint, PathPortal, PathSearch, Place, PlanDraft, Pose, Posted,
-        Progress, Reverb, SPEED_OF_SOUND, Sampling, SavedActor, SavedActors, SavedError, SavedPose,
-        SavedSpace, SavedThing, SavedThings, SavedTie, SeenContext, SeenVia, Shape, ShapeError,
-        SightRay, Space, SpaceError, SpaceSeen, SpaceViewer, SpecialImage, SpecialOptions,
-        StoppedSpecial, ThingError, ThingId, Things, Tie, TraceEnd, Traced, Transmission, WalkMap,
-        WalkMapKey, Walker, WayPoint, Ways,
-    };
-}
-
+pub mod world;
 /// All that our crates make public for each other: for the command and the benchmarks. Not part of the promise.
 #[doc(hidden)]
 pub mod internals {

@@ -40,16 +40,10 @@ impl Writer<'_> {
     }
 
     fn input(&self, input: &Value) -> String {
-        let (name, ty) = (text(&input[0]), &input[1]);
-        let is_self = |ty: &Value| ty["generic"] == "Self";
-        let borrowed = &ty["borrowed_ref"];
-        match name {
-            "self" if is_self(ty) => "self".to_owned(),
-            "self" if is_self(&borrowed["type"]) && borrowed["is_mutable"] == true => {
-                "&mut self".to_owned()
-            }
-            "self" if is_self(&borrowed["type"]) => "&self".to_owned(),
-            _ => format!("{name}: {}", self.ty(ty)),
+        let (name, ty) = (text(&input[0]), self.ty(&input[1]));
+        match ty.strip_suffix("Self") {
+            Some(sign) if name == "self" => format!("{sign}self"),
+            _ => format!("{name}: {ty}"),
         }
     }
 

@@ -191,11 +191,9 @@ impl<'a> Walk<'a> {
                         .borrow_mut()
                         .insert(format!("{path} has no Debug"));
                 }
-                let text = format!(
-                    "{kind}{}{growing}: {}",
-                    writer.generics(&it["generics"]),
-                    traits.join(" + ")
-                );
+                let generics = writer.generics(&it["generics"]);
+                let text = format!("{kind}{generics}{growing}: {}", traits.join(" + "));
+                let text = text.trim_end_matches(": ").to_owned();
                 (text, self.members(key, it))
             }
             "variant" => (format!("variant{growing}"), members_of(&it["kind"])),
@@ -258,4 +256,45 @@ fn members_of(kind: &Value) -> Vec<&Value> {
     let fields = ["/plain/fields", "/struct/fields", "/tuple"];
     let found = fields.iter().filter_map(|at| kind.pointer(at));
     found.flat_map(each).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn ty(name: &str, id: u64) -> Value {
+        json!({"resolved_path": {"path": name, "id": id}})
+    }
+
+    #[test]
+    fn names_are_those_of_the_facade_and_what_has_none_is_a_fault() {
+        let used = |name: &str, id: u64| json!({"inner": {"use": {"source": format!("inner::{name}"), "name": name, "id": id}}});
+        let path = |name: &str, kind: &str, of: u64| json!({"crate_id": of, "path": ["inner", name], "kind": kind});
+        let sig = json!({"inputs": [["t", {"borrowed_ref": {"type": ty("crate::T", 3)}}]], "output": ty("U", 5)});
+        let unit =
+            |name: &str| json!({"name": name, "inner": {"struct": {"kind": "unit", "impls": []}}});
+        let crates = [
+            (
+                "facade",
+                json!({"root": 0, "index": {
+                    "0": {"inner": {"module": {"items": [1, 2, 3]}}}, "1": used("T", 10), "2": used("f", 11), "3": used("T", 10),
+                }, "paths": {"10": path("T", "struct", 1), "11": path("f", "function", 1)}}),
+            ),
+            (
+                "inner",
+                json!({"root": 0, "index": {
+                    "3": unit("T"), "4": {"name": "f", "inner": {"function": {"sig": sig}}}, "5": unit("U"),
+                }, "paths": {
+                    "3": path("T", "struct", 0), "4": path("f", "function", 0), "5": path("U", "struct", 0),
+                }}),
+            ),
+        ];
+        let crates = crates.map(|(name, json)| (name.to_owned(), json));
+        let (lines, faults) = Docs::new(crates.into()).surface("facade").unwrap();
+        assert_eq!(lines, ["T: struct", "T: use T", "f: fn(t: &T) -> U"]);
+        let unnamed = "U is reached by f, but has no name in the façade";
+        assert_eq!(faults, ["T has no Debug", unnamed]);
+    }
 }

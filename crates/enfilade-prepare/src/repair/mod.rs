@@ -54,6 +54,7 @@ impl Default for RepairOptions {
 
 /// Changes of a repair.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RepairReport {
     /// Distinct vertices joined with another.
     pub welded_corners: u64,

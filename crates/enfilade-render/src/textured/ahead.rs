@@ -46,6 +46,7 @@ impl Default for PortalTextureMaking {
 
 /// Progress of textures that are made ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PortalTextureProgress {
     /// Doorways are looked for.
     Looking {
@@ -67,6 +68,7 @@ pub enum PortalTextureProgress {
 
 /// Textures that were made ahead.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MadePortalTextures {
     /// The file, for [`Studio::load_portal_textures`].
     pub bytes: Vec<u8>,

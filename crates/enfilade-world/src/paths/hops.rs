@@ -50,6 +50,7 @@ struct HopLink {
 
 /// A step from a cell to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Hop {
     /// The part whose portal it is.
     pub part: PartId,

@@ -141,6 +141,7 @@ pub(super) fn rise((before, leaf_before): (f64, f64), (open, leaf): (f64, f64)) 
 
 /// A source as heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Heard {
     /// Length of the shortest path. [Units: wu]
     pub length: f64,

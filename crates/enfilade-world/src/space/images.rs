@@ -7,6 +7,7 @@ use super::{PartId, Place, Space};
 
 /// The image of a thing beyond a special portal that it stands in.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SpecialImage {
     /// The special portal.
     pub special: SpecialId,

@@ -49,6 +49,7 @@ impl SightRay {
 
 /// The end of a ray, and its way there.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Traced<H> {
     /// The reason why it ends.
     pub end: TraceEnd<H>,
@@ -68,6 +69,7 @@ pub struct Traced<H> {
 
 /// The reason why a ray ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum TraceEnd<H> {
     /// It meets a surface.
     Surface(H),
