@@ -90,22 +90,23 @@ pub use enfilade_cpg::{
     Why, World, cell_color,
 };
 
-/// Worlds as bytes of GLB files ([docs/format.md](https://github.com/enfilade-rs/enfilade/blob/main/docs/format.md)).
-///
-/// [`encode_glb`] and [`decode_glb`] are inverse; damaged bytes are a [`WireError`], never a world:
-///
-/// ```
-/// use enfilade::cpg::wire::{decode_glb, encode_glb, is_world};
-/// # let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::two_rooms());
-///
-/// let mut bytes = encode_glb(&world)?;
-/// assert!(is_world(&bytes));
-/// assert_eq!(encode_glb(&decode_glb(&bytes)?)?, bytes);
-/// bytes.truncate(bytes.len() / 2);
-/// assert!(decode_glb(&bytes).is_err());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub mod wire {
+    //! Worlds as bytes of GLB files ([docs/format.md](https://github.com/enfilade-rs/enfilade/blob/main/docs/format.md)).
+    //!
+    //! [`encode_glb`] and [`decode_glb`] are inverse; damaged bytes are a [`WireError`], never a world:
+    //!
+    //! ```
+    //! use enfilade::cpg::wire::{decode_glb, encode_glb, is_world};
+    //! # let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::two_rooms());
+    //!
+    //! let mut bytes = encode_glb(&world)?;
+    //! assert!(is_world(&bytes));
+    //! assert_eq!(encode_glb(&decode_glb(&bytes)?)?, bytes);
+    //! bytes.truncate(bytes.len() / 2);
+    //! assert!(decode_glb(&bytes).is_err());
+    //! # Ok::<(), Box<dyn std::error::Error>>(())
+    //! ```
+
     pub use enfilade_cpg::wire::{
         EXTENSION, PieceContent, VERSION, WireError, decode_glb, encode_glb, is_world, read_piece,
     };

@@ -69,36 +69,37 @@ pub use enfilade_geom::{
 };
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
 
-/// The input scene: meshes, and objects that place them.
-///
-/// A [`Scene`] made in code: an [`Object`] places a [`Mesh`], and its [`Role`] tells walls from furniture:
-///
-/// ```
-/// use enfilade::geom::scene::{Mesh, Object, Primitive, Role, Scene};
-/// use enfilade::geom::{DMat4, DVec3};
-///
-/// let floor = Primitive {
-///     positions: vec![[0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [4.0, 0.0, 5.0], [4.0, 0.0, 0.0]],
-///     indices: vec![0, 1, 2, 0, 2, 3],
-///     ..Primitive::default()
-/// };
-/// let scene = Scene {
-///     meshes: vec![Mesh { primitives: vec![floor], ..Mesh::default() }],
-///     objects: vec![Object {
-///         name: "floor".to_owned(),
-///         mesh: 0,
-///         transform: DMat4::from_translation(DVec3::X),
-///         role: Role::Structural,
-///         reason: "made here".to_owned(),
-///         node: None,
-///         filling: None,
-///     }],
-///     ..Scene::default()
-/// };
-/// assert_eq!(scene.triangle_sources(Role::Structural).count(), 2);
-/// assert_eq!(scene.object_aabb(0).max, DVec3::new(5.0, 0.0, 5.0));
-/// ```
 pub mod scene {
+    //! The input scene: meshes, and objects that place them.
+    //!
+    //! A [`Scene`] made in code: an [`Object`] places a [`Mesh`], and its [`Role`] tells walls from furniture:
+    //!
+    //! ```
+    //! use enfilade::geom::scene::{Mesh, Object, Primitive, Role, Scene};
+    //! use enfilade::geom::{DMat4, DVec3};
+    //!
+    //! let floor = Primitive {
+    //!     positions: vec![[0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [4.0, 0.0, 5.0], [4.0, 0.0, 0.0]],
+    //!     indices: vec![0, 1, 2, 0, 2, 3],
+    //!     ..Primitive::default()
+    //! };
+    //! let scene = Scene {
+    //!     meshes: vec![Mesh { primitives: vec![floor], ..Mesh::default() }],
+    //!     objects: vec![Object {
+    //!         name: "floor".to_owned(),
+    //!         mesh: 0,
+    //!         transform: DMat4::from_translation(DVec3::X),
+    //!         role: Role::Structural,
+    //!         reason: "made here".to_owned(),
+    //!         node: None,
+    //!         filling: None,
+    //!     }],
+    //!     ..Scene::default()
+    //! };
+    //! assert_eq!(scene.triangle_sources(Role::Structural).count(), 2);
+    //! assert_eq!(scene.object_aabb(0).max, DVec3::new(5.0, 0.0, 5.0));
+    //! ```
+
     pub use enfilade_geom::scene::{
         About, Entity, Filling, Fixture, FixtureKind, GivenPortal, Image, Mark, MarkKind, Material,
         Mesh, Object, Primitive, Role, RoomName, Scene, SourceNode, Texture, TriangleSource,

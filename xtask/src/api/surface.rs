@@ -124,8 +124,8 @@ impl<'a> Walk<'a> {
         while !level.is_empty() {
             let mut below = Vec::new();
             for (module, path) in level {
-                let items = &self.docs.item(module).pointer("/inner/module/items");
-                for id in items.into_iter().flat_map(|it| each(it)) {
+                let items = self.docs.item(module).pointer("/inner/module/items");
+                for id in items.into_iter().flat_map(each) {
                     let (mut key, mut path) =
                         ((module.0, id.as_u64().unwrap_or_default()), path.clone());
                     let mut item = self.docs.item(key);

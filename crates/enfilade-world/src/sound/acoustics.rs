@@ -99,7 +99,7 @@ impl Acoustics {
     ///
     /// # Panics
     ///
-    /// As [`Acoustics::open_share`].
+    /// If there is no such portal, or the part was added later.
     #[must_use]
     pub fn transmitted(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
         let open = self.open_share(space, part, portal);
