@@ -12,8 +12,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use enfilade::bake::{BakeContext, Method, Silent};
-use enfilade::internals::bake::delaunay::Review;
-use enfilade::internals::bake::delaunay::Session;
+use enfilade::internals::bake::delaunay::{Review, Session};
 
 use self::walk::Walk;
 use crate::bake::{begin, settings};

@@ -11,8 +11,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::internals::geom::Allowance;
-use enfilade::internals::geom::PROGRAM;
+use enfilade::internals::geom::{Allowance, PROGRAM};
 
 use crate::output::WRITING;
 use crate::screen::Warned;

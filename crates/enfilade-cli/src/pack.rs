@@ -7,9 +7,7 @@ use anyhow::Context;
 use enfilade::cpg::wire::decode_glb;
 use enfilade::geom::shown;
 use enfilade::internals::stream::first_picture;
-use enfilade::stream::HEAD;
-use enfilade::stream::PackedPlace;
-use enfilade::stream::PackedWorld;
+use enfilade::stream::{HEAD, PackedPlace, PackedWorld};
 use enfilade::whole;
 use enfilade_report::WalkPage;
 

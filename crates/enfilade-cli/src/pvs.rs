@@ -12,14 +12,9 @@ use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
 use enfilade::internals::vis::see_parts_through;
 use enfilade::stream::PackedPlace;
-use enfilade::vis::VisCheckpoint;
-use enfilade::vis::VisConfig;
-use enfilade::vis::VisContext;
-use enfilade::vis::VisMode;
-use enfilade::vis::VisOutput;
-use enfilade::vis::WorldVis;
-use enfilade::vis::see_all;
-use enfilade::vis::see_world;
+use enfilade::vis::{
+    VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, WorldVis, see_all, see_world,
+};
 
 use enfilade_verify::structural_triangles;
 

@@ -4,15 +4,12 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::Context;
-use enfilade::bake::BakeContext;
-use enfilade::bake::BakeOutput;
-use enfilade::bake::Silent;
 use enfilade::bake::delaunay::Choices;
+use enfilade::bake::{BakeContext, BakeOutput, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 use enfilade::internals::bake::bake_session;
-use enfilade::internals::bake::delaunay::JOINED;
-use enfilade::internals::bake::delaunay::Review;
+use enfilade::internals::bake::delaunay::{JOINED, Review};
 
 use crate::bake::Summary;
 use crate::bake::delaunay::choices_text;

@@ -4,9 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::simplify::CostModel;
-use enfilade::bake::simplify::Metric;
-use enfilade::bake::simplify::SimplifySettings;
+use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings};
 use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};

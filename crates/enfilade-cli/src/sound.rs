@@ -10,19 +10,10 @@ use anyhow::{Context, bail};
 use enfilade::cpg::{PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::internals::geom::Allowance;
-use enfilade::internals::world::AUDIO_BLOCK;
-use enfilade::internals::world::AudioBlock;
-use enfilade::internals::world::Auralizer;
-use enfilade::internals::world::at_ears;
-use enfilade::internals::world::test_sound;
-use enfilade::world::Acoustics;
-use enfilade::world::DecayLaw;
-use enfilade::world::DiffuseFields;
-use enfilade::world::Listener;
-use enfilade::world::PartId;
-use enfilade::world::Reverb;
-use enfilade::world::Space;
-use enfilade::world::Transmission;
+use enfilade::internals::world::{AUDIO_BLOCK, AudioBlock, Auralizer, at_ears, test_sound};
+use enfilade::world::{
+    Acoustics, DecayLaw, DiffuseFields, Listener, PartId, Reverb, Space, Transmission,
+};
 
 use self::materials::{Absorption, Absorptions, Given, given, tell};
 use crate::formats::Format;

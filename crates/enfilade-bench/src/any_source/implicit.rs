@@ -1,8 +1,7 @@
 //! Implicit scenes.
 
 use anyhow::{Context, bail};
-use enfilade::import::ImportOptions;
-use enfilade::import::Imported;
+use enfilade::import::{ImportOptions, Imported};
 use enfilade::internals::import::decode_implicit;
 
 use super::baked;

@@ -5,9 +5,7 @@ use std::fmt::Write as _;
 use anyhow::bail;
 use enfilade::cpg::World;
 use enfilade::geom::DMat4;
-use enfilade::import::ArrayMesh;
-use enfilade::import::ImportOptions;
-use enfilade::import::import_arrays;
+use enfilade::import::{ArrayMesh, ImportOptions, import_arrays};
 use enfilade::internals::import::decode_patches;
 
 use super::{baked, twins};

@@ -7,13 +7,10 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade::cpg::wire::encode_glb;
-use enfilade::geom::Aabb;
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
 use enfilade::geom::scene::Role;
+use enfilade::geom::{Aabb, DVec3, Triangle};
 use enfilade::import::{ImportOptions, decode_ply, import};
-use enfilade::internals::geom::Bvh;
-use enfilade::internals::geom::Ray;
+use enfilade::internals::geom::{Bvh, Ray};
 use enfilade_testkit::Rng;
 use serde_json::{Value, json};
 

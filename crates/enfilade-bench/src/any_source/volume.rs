@@ -4,16 +4,10 @@ use std::collections::BTreeMap;
 
 use anyhow::Context;
 use enfilade::cpg::{CellId, World};
-use enfilade::geom::Aabb;
-use enfilade::geom::DVec3;
 use enfilade::geom::scene::Role;
-use enfilade::import::AirSide;
-use enfilade::import::ImportOptions;
-use enfilade::import::VolumeOptions;
-use enfilade::import::import;
-use enfilade::internals::geom::Bvh;
-use enfilade::internals::geom::Ray;
-use enfilade::internals::geom::closest_point_on_segment;
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::import::{AirSide, ImportOptions, VolumeOptions, import};
+use enfilade::internals::geom::{Bvh, Ray, closest_point_on_segment};
 use enfilade::internals::import::decode_volume;
 use enfilade_testkit::Rng;
 

@@ -8,11 +8,7 @@ use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use enfilade::cpg::wire::encode_glb;
-use enfilade::edit::EditGround;
-use enfilade::edit::EditOperation;
-use enfilade::edit::EditSession;
-use enfilade::edit::HandEditKind;
-use enfilade::edit::Resumed;
+use enfilade::edit::{EditGround, EditOperation, EditSession, HandEditKind, Resumed};
 use enfilade::geom::DVec3;
 use enfilade::internals::edit::journal_of;
 use enfilade::internals::edit::random::random_operation;

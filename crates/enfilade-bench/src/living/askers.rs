@@ -5,11 +5,8 @@ use std::f64::consts::PI;
 
 use anyhow::{Context, ensure};
 use enfilade::bake::{BakeConfig, BakeContext, bake};
-use enfilade::geom::DQuat;
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
-use enfilade::internals::geom::Bvh;
-use enfilade::internals::geom::Ray;
+use enfilade::geom::{DQuat, DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Ray};
 use enfilade::world::{
     Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Place, Pose,
     Space, Transmission, WalkMap, Walker,

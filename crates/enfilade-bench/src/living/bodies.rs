@@ -11,11 +11,7 @@ use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::Aabb;
-use enfilade::geom::DMat4;
-use enfilade::geom::DQuat;
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
+use enfilade::geom::{Aabb, DMat4, DQuat, DVec3, Triangle};
 use enfilade::internals::geom::closest_point_on_triangle;
 use enfilade::internals::geom::ray::segment_to_triangle_distance;
 use enfilade::runtime::DetailId;

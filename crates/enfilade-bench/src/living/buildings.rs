@@ -6,13 +6,8 @@ use std::sync::Arc;
 
 use anyhow::{Context, ensure};
 use enfilade::cpg::Portal;
-use enfilade::geom::Aabb;
-use enfilade::geom::DQuat;
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
-use enfilade::internals::geom::Bvh;
-use enfilade::internals::geom::Ray;
-use enfilade::internals::geom::Sets;
+use enfilade::geom::{Aabb, DQuat, DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Ray, Sets};
 use enfilade::runtime::View;
 use enfilade::world::{
     Lamp, LampId, Lights, PartId, Place, Pose, Shape, Space, SpaceViewer, ThingId, Things, Tie,

@@ -3,11 +3,8 @@
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::DQuat;
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
-use enfilade::internals::geom::Bvh;
-use enfilade::internals::geom::Ray;
+use enfilade::geom::{DQuat, DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Ray};
 use enfilade::runtime::{ChunkId, DetailId, Sightlines, View};
 use enfilade::world::{
     Lamp, LampId, Lights, PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie,

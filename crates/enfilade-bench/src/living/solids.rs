@@ -1,9 +1,7 @@
 //! All triangles of parts, without cells, each with what it belongs to.
 
 use enfilade::World;
-use enfilade::geom::Aabb;
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
+use enfilade::geom::{Aabb, DVec3, Triangle};
 use enfilade::internals::geom::Bvh;
 use enfilade::runtime::{ChunkId, DetailId};
 use enfilade::world::{PartId, Space};

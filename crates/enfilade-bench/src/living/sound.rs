@@ -5,16 +5,10 @@ use std::time::Instant;
 use anyhow::Context;
 use enfilade::geom::DVec3;
 use enfilade::internals::world::TautString;
-use enfilade::world::Acoustics;
-use enfilade::world::DecayLaw;
-use enfilade::world::DiffuseFields;
-use enfilade::world::Layout;
-use enfilade::world::Listener;
-use enfilade::world::PartId;
-use enfilade::world::Place;
-use enfilade::world::Reverb;
-use enfilade::world::Space;
-use enfilade::world::Transmission;
+use enfilade::world::{
+    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, PartId, Place, Reverb, Space,
+    Transmission,
+};
 use enfilade::{CellId, PortalId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
 

@@ -5,8 +5,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
-use enfilade::geom::Aabb;
-use enfilade::geom::DVec3;
+use enfilade::geom::{Aabb, DVec3};
 use enfilade::internals::geom::Sets;
 use enfilade::runtime::{Sight, SightOptions, SightState, View, Viewer};
 use enfilade::world::{

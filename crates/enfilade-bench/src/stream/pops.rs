@@ -4,16 +4,10 @@ use std::collections::HashSet;
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::DVec3;
-use enfilade::geom::Triangle;
-use enfilade::internals::geom::Bvh;
-use enfilade::internals::geom::Ray;
-use enfilade::internals::stream::deadlines;
-use enfilade::internals::stream::due_times;
-use enfilade::internals::stream::least_bandwidth;
-use enfilade::stream::LinkOptions;
-use enfilade::stream::PieceId;
-use enfilade::stream::StreamOptions;
+use enfilade::geom::{DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Ray};
+use enfilade::internals::stream::{deadlines, due_times, least_bandwidth};
+use enfilade::stream::{LinkOptions, PieceId, StreamOptions};
 use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 

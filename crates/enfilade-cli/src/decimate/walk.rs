@@ -3,8 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use enfilade::internals::bake::delaunay::Choice;
-use enfilade::internals::bake::delaunay::Decision;
+use enfilade::internals::bake::delaunay::{Choice, Decision};
 
 use crate::bake::print_summary;
 use crate::formats::Format;
@@ -174,8 +173,7 @@ mod tests {
     use crate::output::Outputs;
     use enfilade::bake::delaunay::Choices;
     use enfilade::bake::{BakeConfig, BakeContext, Method, Silent};
-    use enfilade::internals::bake::delaunay::Review;
-    use enfilade::internals::bake::delaunay::Session;
+    use enfilade::internals::bake::delaunay::{Review, Session};
     use enfilade_testkit::{Variant, gjorup_rooms};
 
     /// The replies of the walk to some lines.

@@ -6,9 +6,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use clap::Parser;
 use enfilade::bake::BakeContext;
-use enfilade::internals::bake::bake_pieces;
-use enfilade::internals::bake::is_piece;
-use enfilade::internals::bake::piece_keys;
+use enfilade::internals::bake::{bake_pieces, is_piece, piece_keys};
 
 use super::shards::{JobFinish, JobRun, Shards};
 use crate::bake::{self, Bake, Readied};

@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use enfilade::cpg::wire::is_world;
-use enfilade::internals::vis::VisPlan;
-use enfilade::internals::vis::plain_sight;
-use enfilade::vis::VisConfig;
-use enfilade::vis::VisContext;
+use enfilade::internals::vis::{VisPlan, plain_sight};
+use enfilade::vis::{VisConfig, VisContext};
 
 use super::shards::{JobFinish, JobRun, Shards};
 use crate::pieces::PieceFolder;

@@ -83,8 +83,7 @@ mod tests {
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
     use enfilade::geom::Aabb;
     use enfilade::geom::scene::{Mesh, Primitive};
-    use enfilade::internals::bake::edit::special::Spot;
-    use enfilade::internals::bake::edit::special::link;
+    use enfilade::internals::bake::edit::special::{Spot, link};
     use enfilade_testkit::{GridParams, room_grid};
 
     /// Rooms in a row, and a person in the middle of the first.

@@ -6,9 +6,7 @@ use std::time::{Duration, Instant};
 
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
-use enfilade::internals::bake::delaunay::Choice;
-use enfilade::internals::bake::delaunay::Decision;
-use enfilade::internals::bake::delaunay::OUTDOOR_CELL;
+use enfilade::internals::bake::delaunay::{Choice, Decision, OUTDOOR_CELL};
 use enfilade_render::Mark;
 
 use super::legend::{LegendLine, ReviewShown};

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use enfilade::geom::{Aabb, DVec3};
-use enfilade::internals::bake::delaunay::RemainingPortal;
-use enfilade::internals::bake::delaunay::Session;
+use enfilade::internals::bake::delaunay::{RemainingPortal, Session};
 use enfilade_render::{Mark, MarkShape};
 
 use super::scale::{PortalClass, WeightScale};
