@@ -8,7 +8,7 @@ use anyhow::{bail, ensure};
 
 use crate::steps::Steps;
 use crate::{
-    GATE, add_scene_files, apt, cargo, dependencies, engines, features, installed, name_of,
+    GATE, add_scene_files, api, apt, cargo, dependencies, engines, features, installed, name_of,
     node_path, output_of, root, run_to_end, scenes, suites, target_dir, tidy, tools_dir, world_of,
 };
 
@@ -62,10 +62,11 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("tests", suites::run)?;
     steps.step("docs", || {
         run_to_end(
-            GATE.cargo("doc", &["--workspace", "--no-deps"])
+            GATE.cargo("doc", &api::DOC)
                 .env("RUSTDOCFLAGS", "-D warnings"),
         )
     })?;
+    steps.step("api", || api::run(false))?;
     steps.step("build", || {
         run_to_end(&mut GATE.cargo("build", &["--workspace"]))
     })?;

@@ -1,7 +1,8 @@
-//! The project's chores: `cargo xtask test | tidy | score | bench`.
+//! The project's chores: `cargo xtask test | tidy | api | score | bench`.
 //!
 //! `test` decides whether a change may land; `score` and `bench` start `enfilade-bench`, which prints tables.
 
+mod api;
 mod apt;
 mod check;
 mod dependencies;
@@ -27,6 +28,7 @@ use anyhow::{Context, bail};
 const USAGE: &str = "\
 usage: cargo xtask test [--engines]
        cargo xtask tidy
+       cargo xtask api [--write]
        cargo xtask score [OPTION...] [SCENE_DIR...]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench NAME [--json] [OPTION...]
@@ -36,6 +38,7 @@ usage: cargo xtask test [--engines]
           engines, of which Bevy is compiled only; with --engines, the integrations only, and all of Bevy's tests
   tidy    the checks of these that need no build: dependencies between crates, lengths, wording, links,
           licenses and versions of dependencies, features that tests name
+  api     compares the façade with crates/enfilade/api.txt, the list of all that users may build on; --write writes it
   score   rooms and doors found, compared with those that architects modeled; --help tells the options
   bench   a table of docs/benchmarks/: `cargo xtask bench --help` lists them, `bench NAME --help` their options;
           without NAME, growth of time and memory with the size of an office tower
@@ -44,6 +47,9 @@ Real scenes (folders with a scene.glb) are searched in $ENFILADE_SCENES, then in
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(code) = api::as_rustdoc(&args) {
+        return code;
+    }
     let Some(task) = Task::parse(&args) else {
         eprintln!("{USAGE}");
         return ExitCode::from(2);
@@ -53,6 +59,7 @@ fn main() -> ExitCode {
         Task::Tidy => tidy::run()
             .and_then(|()| dependencies::run())
             .and_then(|()| features::run()),
+        Task::Api { is_write } => api::run(is_write),
         Task::BenchEngines(args) => engines::bench(&args),
         Task::Bench(args) => return bench(&args),
     };
@@ -70,6 +77,9 @@ fn main() -> ExitCode {
 enum Task {
     Test(check::Checks),
     Tidy,
+    Api {
+        is_write: bool,
+    },
     /// Arguments after `bench engines`.
     BenchEngines(Vec<String>),
     /// Arguments of `enfilade-bench`.
@@ -86,6 +96,8 @@ impl Task {
                 Some(Self::Test(check::Checks::Engines))
             }
             ("tidy", None) => Some(Self::Tidy),
+            ("api", None) => Some(Self::Api { is_write: false }),
+            ("api", Some("--write")) if rest.len() == 1 => Some(Self::Api { is_write: true }),
             ("score", _) => Some(Self::Bench(args.to_vec())),
             ("bench", None | Some("--write" | "--peers")) => {
                 Some(Self::Bench([&["growth".to_owned()], rest].concat()))
@@ -294,6 +306,9 @@ mod tests {
         assert_eq!(parse("test --engines abi"), None);
         let engines = Task::BenchEngines(vec!["--json".to_owned()]);
         assert_eq!(parse("bench engines --json"), Some(engines));
+        assert_eq!(parse("api"), Some(Task::Api { is_write: false }));
+        assert_eq!(parse("api --write"), Some(Task::Api { is_write: true }));
+        assert_eq!(parse("api --json"), None);
         assert_eq!(parse("test --json"), None);
         assert_eq!(parse("nothing"), None);
     }

@@ -50,6 +50,7 @@ const POINT_BYTES_A_TRIANGLE: u64 = 100_000;
 impl Budget {
     /// Returns the allowance of a bake of so many triangles. Memory is watched if there is a probe.
     #[must_use]
+    #[doc(hidden)]
     pub fn allowance(&self, n_triangles: usize, probe: Option<MemoryProbe>) -> Allowance {
         let work = match (self.work, self.time) {
             (Some(work), _) => work,

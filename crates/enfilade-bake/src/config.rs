@@ -145,6 +145,7 @@ impl SmallestHole {
 
     /// Returns the width of the widest gap. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn gap(self) -> f64 {
         match self {
             Self::Auto => Self::LEAST,
@@ -154,6 +155,7 @@ impl SmallestHole {
 
     /// Returns `true` if gaps are closed.
     #[must_use]
+    #[doc(hidden)]
     pub fn has_seals(self) -> bool {
         !matches!(self, Self::Open(_))
     }

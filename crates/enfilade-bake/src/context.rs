@@ -1,5 +1,6 @@
 //! The context of a bake: progress, stage times and cancellation.
 
+use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -28,6 +29,7 @@ pub trait Progress: Sync {
 }
 
 /// Ignores all progress.
+#[derive(Clone, Copy, Debug)]
 pub struct Silent;
 
 impl Progress for Silent {
@@ -53,6 +55,14 @@ pub struct BakeContext<'a> {
     budget: Budget,
     n_triangles: usize,
     pieces: Option<&'a dyn Pieces>,
+}
+
+impl fmt::Debug for BakeContext<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BakeContext")
+            .field("budget", &self.budget)
+            .finish_non_exhaustive()
+    }
 }
 
 /// Ignores progress, and cannot be canceled.

@@ -23,6 +23,7 @@ use crate::{BakeConfig, BakeContext, BakeError, Stage};
 
 /// The widest path to the outdoors from air that should be a room.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LeakTrail {
     /// Vertices of the path, from the middle of the room to the edge of the air around the scene. It touches no
     /// structure, door leaf or pane. [Units: wu]

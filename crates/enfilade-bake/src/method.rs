@@ -6,6 +6,7 @@ use crate::Stage;
 
 /// A method that finds cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// Voxels, distances, watershed: [`crate::watershed`].
     Watershed,
@@ -29,6 +30,7 @@ impl Method {
     /// Returns the stages of a bake with this method, in order. A level of brushes has no stages in voxels by
     /// [`Method::Bsp`].
     #[must_use]
+    #[doc(hidden)]
     pub fn stages(self) -> &'static [Stage] {
         use Stage::{
             Candidates, Complex, Decimation, Distance, Flood, Geometry, Partition, Rooms,

@@ -9,6 +9,7 @@ use crate::{Method, Stage};
 
 /// The world and a report on how it was made.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct BakeOutput {
     /// Cells, portals, geometry.
     pub world: World,
@@ -36,6 +37,7 @@ impl BakeOutput {
 
 /// Resolution of a builder.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Resolution {
     /// The watershed: cubes.
     Voxels {

@@ -17,13 +17,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::delaunay::LEAST_BALL;
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::shown;
 use enfilade::import::{ImportReport, RepairOptions};
+use enfilade::internals::bake::delaunay::LEAST_BALL;
 use enfilade::world::{Space, WalkMapKey};
 use serde::Serialize;
 
@@ -265,23 +265,20 @@ const LEAKS_SHOWN: usize = 10;
 
 fn report_bake(baked: &BakeOutput, config: &BakeConfig, verbose: bool) -> anyhow::Result<()> {
     let mut err = Told;
-    match baked.resolution {
-        Resolution::Balls { radius } => {
+    // The others are reported before the work.
+    if let Resolution::Balls { radius } = baked.resolution {
+        writeln!(
+            err,
+            "the points on surfaces resolve all air at least {radius:.3} m in radius"
+        )?;
+        let wanted = config.min_opening * LEAST_BALL;
+        if radius > wanted {
             writeln!(
-                err,
-                "the points on surfaces resolve all air at least {radius:.3} m in radius"
+                Warned,
+                "coarser than the {wanted:.3} m requested: the scene would need more points than fit in memory; \
+                 narrower openings are found, but may get wrong weights"
             )?;
-            let wanted = config.min_opening * LEAST_BALL;
-            if radius > wanted {
-                writeln!(
-                    Warned,
-                    "coarser than the {wanted:.3} m requested: the scene would need more points than fit in memory; \
-                     narrower openings are found, but may get wrong weights"
-                )?;
-            }
         }
-        // Reported before the work.
-        Resolution::Voxels { .. } | Resolution::Planes => {}
     }
     for note in &baked.notes {
         write_lines(&mut Warned, note)?;

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use enfilade::bake::delaunay::{Review, Session};
 use enfilade::bake::{BakeContext, Method, Silent};
+use enfilade::internals::bake::delaunay::{Review, Session};
 
 use self::walk::Walk;
 use crate::bake::{begin, settings};

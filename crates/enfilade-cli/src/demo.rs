@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use enfilade::bake::BakeConfig;
-use enfilade::bake::edit::special::{self, LinkOptions, Spot};
+use enfilade::bake::edit::special;
+use enfilade::bake::edit::special::LinkOptions;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{MonitorCamera, PortalId, World};
 use enfilade::geom::{DVec3, shown};
 use enfilade::import::{ImportOptions, decode_gltf, export_glb};
+use enfilade::internals::bake::edit::special::Spot;
 use enfilade_demo::{Generated, furnished_house, impossible_house, lift_tower};
 use enfilade_report::{PlanOptions, Verdict, plan_svg};
 

@@ -11,8 +11,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use doors::FittingReport;
-use enfilade::bake::simplify::{CostModel, portal_scores};
-use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, Seals, World};
+use enfilade::bake::simplify::CostModel;
+use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, World};
+use enfilade::internals::bake::simplify::portal_scores;
+use enfilade::internals::cpg::Seals;
 pub(crate) use objects::cell_of;
 use serde::Serialize;
 use specials::SpecialReport;

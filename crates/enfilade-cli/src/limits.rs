@@ -11,7 +11,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use enfilade::geom::{Allowance, PROGRAM};
+use enfilade::internals::geom::{Allowance, PROGRAM};
 
 use crate::output::WRITING;
 use crate::screen::Warned;

@@ -68,8 +68,9 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use enfilade::geom::{is_hidden, shown};
-use enfilade::import::is_panic_caught;
+use enfilade::geom::shown;
+use enfilade::internals::geom::is_hidden;
+use enfilade::internals::import::is_panic_caught;
 use screen::{Warned, be_quiet, is_broken_pipe};
 
 /// Finds the rooms and doorways of a 3D scene and computes what is visible from where.

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use anyhow::Context;
 use enfilade::cpg::wire::decode_glb;
 use enfilade::geom::shown;
-use enfilade::stream::{HEAD, PackedPlace, PackedWorld, first_picture};
+use enfilade::internals::stream::first_picture;
+use enfilade::stream::{HEAD, PackedPlace, PackedWorld};
 use enfilade::whole;
 use enfilade_report::WalkPage;
 

@@ -147,6 +147,7 @@ fn show(bar: &StageBar, now: PortalTextureProgress, max_bytes: u64) {
             let share = shares[0].max(shares[1]).min(1.0);
             bar.set((share * STEPS as f64) as u64);
         }
+        _ => {}
     }
 }
 

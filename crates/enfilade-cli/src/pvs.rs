@@ -10,9 +10,9 @@ use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::cpg::{self, CellId, SightGraph, World};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{PrtFile, PvsText, read_prt, write_pvs_text};
+use enfilade::internals::vis::see_parts_through;
 use enfilade::vis::{
-    VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, WorldVis, see_all, see_parts_through,
-    see_world,
+    VisCheckpoint, VisConfig, VisContext, VisMode, VisOutput, WorldVis, see_all, see_world,
 };
 
 use enfilade_verify::structural_triangles;

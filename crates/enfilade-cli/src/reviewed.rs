@@ -4,10 +4,12 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::Context;
-use enfilade::bake::delaunay::{Choices, JOINED, Review};
-use enfilade::bake::{BakeContext, BakeOutput, Silent, bake_session};
+use enfilade::bake::delaunay::Choices;
+use enfilade::bake::{BakeContext, BakeOutput, Silent};
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
+use enfilade::internals::bake::bake_session;
+use enfilade::internals::bake::delaunay::{JOINED, Review};
 
 use crate::bake::Summary;
 use crate::bake::delaunay::choices_text;

@@ -10,7 +10,8 @@ use std::io::{self, BufWriter, IsTerminal as _, StdoutLock, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
-use enfilade::geom::{is_hidden, shown};
+use enfilade::geom::shown;
+use enfilade::internals::geom::is_hidden;
 
 /// `true` if `--quiet` was given; set once, before any command runs.
 static IS_QUIET: AtomicBool = AtomicBool::new(false);

@@ -4,11 +4,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::bake::bound::keep_bounds;
-use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings, simplify_graph};
+use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings};
 use enfilade::cpg::World;
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::import::{PrtFile, read_prt, write_prt};
+use enfilade::internals::bake::bound::keep_bounds;
+use enfilade::internals::bake::simplify::simplify_graph;
 use serde::Serialize;
 
 use crate::formats::Format;

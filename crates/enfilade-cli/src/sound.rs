@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use enfilade::cpg::{PortalId, World};
-use enfilade::geom::{Allowance, DVec3};
+use enfilade::geom::DVec3;
+use enfilade::internals::geom::Allowance;
+use enfilade::internals::world::{AUDIO_BLOCK, AudioBlock, Auralizer, at_ears, test_sound};
 use enfilade::world::{
-    AUDIO_BLOCK, Acoustics, AudioBlock, Auralizer, DecayLaw, DiffuseFields, Listener, PartId,
-    Reverb, Space, Transmission, at_ears, test_sound,
+    Acoustics, DecayLaw, DiffuseFields, Listener, PartId, Reverb, Space, Transmission,
 };
 
 use self::materials::{Absorption, Absorptions, Given, given, tell};

@@ -383,9 +383,11 @@ fn a_broken_map_is_refused_with_its_place() {
 
 /// Checks the separators among brushes, or among triangles if there are none.
 fn check_separators(name: &str, scene: &enfilade::geom::scene::Scene) {
-    use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
+    use enfilade::bake::bsp::{Guide, Heuristic};
     use enfilade::geom::scene::{Role, TriangleSource};
-    use enfilade::geom::{Aabb, BoxTree, Bvh, ConvexSolid, DVec3, Sets, Triangle, Winding};
+    use enfilade::geom::{Aabb, ConvexSolid, DVec3, Triangle, Winding};
+    use enfilade::internals::bake::bsp::{Bsp, BspInput};
+    use enfilade::internals::geom::{BoxTree, Bvh, Sets};
     let entities = scene.entities.iter().filter(|e| e.object.is_none());
     let inside: Vec<DVec3> = entities.filter_map(|e| e.position).collect();
     let (sources, triangles): (Vec<TriangleSource>, Vec<Triangle>) = scene

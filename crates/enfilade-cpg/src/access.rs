@@ -8,6 +8,7 @@ use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, World};
 
 /// A portal seen from one of its cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Exit<'a> {
     /// The portal's id.
     pub id: PortalId,

@@ -81,7 +81,7 @@ impl CellSet {
     }
 
     /// Adds every cell of the graph.
-    pub fn insert_all(&mut self) {
+    pub(crate) fn insert_all(&mut self) {
         self.words.fill(u64::MAX);
         let tail = self.n_cells % 64;
         if tail != 0
@@ -97,6 +97,7 @@ impl CellSet {
     }
 
     /// Adds the cells of another set of the same graph.
+    #[doc(hidden)]
     pub fn union_with(&mut self, other: &Self) {
         for (a, b) in self.words.iter_mut().zip(&other.words) {
             *a |= b;
@@ -105,6 +106,7 @@ impl CellSet {
 
     /// Returns `true` if each cell is also in the other set.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_subset(&self, other: &Self) -> bool {
         self.words
             .iter()
@@ -128,7 +130,7 @@ impl CellSet {
 
     /// Returns runs of consecutive ids, end excluded, ascending.
     #[must_use]
-    pub fn ranges(&self) -> Vec<(u32, u32)> {
+    pub(crate) fn ranges(&self) -> Vec<(u32, u32)> {
         let mut ranges: Vec<(u32, u32)> = Vec::new();
         for CellId(c) in self.iter() {
             match ranges.last_mut() {

@@ -24,6 +24,7 @@ const MANY: usize = 12;
 
 /// A sign that a world is not the one that was meant.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Doubt {
     /// No cell is a room or a void: all air is open to the outdoors.
     NoRooms,
@@ -72,6 +73,7 @@ pub enum Doubt {
 impl Cell {
     /// Returns `true` if a person fits in its box.
     #[must_use]
+    #[doc(hidden)]
     pub fn holds_person(&self) -> bool {
         /// [Units: wu]
         const PERSON: [f32; 3] = [0.6, 1.8, 0.6];

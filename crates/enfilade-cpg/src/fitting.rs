@@ -57,6 +57,7 @@ pub enum MotionKind {
 impl Motion {
     /// Returns the share of the way from shut (0) to open (1) that is the pose of the model.
     #[must_use]
+    #[doc(hidden)]
     pub fn share_of_model(&self) -> f32 {
         let way = self.open - self.shut;
         if way == 0.0 || self.shut == 0.0 {

@@ -15,6 +15,7 @@ const REGULAR: f32 = 0.6;
 
 /// The reason why an opening may be a hole of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum HoleReason {
     /// It lies in a floor, ceiling or roof, and no pane closes it.
     Overhead,
@@ -36,6 +37,7 @@ impl std::fmt::Display for HoleReason {
 
 /// An opening to outdoors that may be a hole of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Hole {
     /// The opening.
     pub portal: PortalId,

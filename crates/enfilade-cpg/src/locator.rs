@@ -72,6 +72,7 @@ impl Locator {
     /// within 0.1 mm of a plane are on both sides of it: errs to "touches".
     ///
     /// `corners` are its vertices in order, any number of them. Vertices that are not finite touch nothing.
+    #[doc(hidden)]
     pub fn cells_touching(&self, corners: &[DVec3], cells: &mut Vec<CellId>) {
         if corners.is_empty() || corners.iter().any(|p| !p.is_finite()) {
             return;
@@ -120,6 +121,7 @@ impl Locator {
 
     /// Divides a convex polygon into its parts by cell, and passes on each; `None` is solid matter. What lies in a plane of
     /// the tree goes to its positive side, as points do. O(parts × depth).
+    #[doc(hidden)]
     pub fn for_parts(&self, polygon: Winding, mut use_part: impl FnMut(Option<CellId>, Winding)) {
         let mut rest = Some(polygon);
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -162,6 +164,7 @@ impl Locator {
     /// Returns the share of the segment from `from` to `to` that lies in one cell, from its start on: 0 if its start does not,
     /// 1 if all of it does. O(leaves on the way × depth).
     #[must_use]
+    #[doc(hidden)]
     pub fn share_in(&self, cell: CellId, from: DVec3, to: DVec3) -> f64 {
         let mut reached = 0.0;
         let mut stack = vec![(self.root, 0.0, 1.0)];
@@ -202,6 +205,7 @@ impl Locator {
 
     /// Does [`Locator::cells_near`] with a buffer kept between queries, so that nothing is allocated once it has
     /// grown. The buffer's contents do not matter.
+    #[doc(hidden)]
     pub fn cells_near_with(
         &self,
         points: &[DVec3],
@@ -249,6 +253,7 @@ impl Locator {
     /// Returns the cell of `p`, as [`Locator::locate`], and a distance from `p` within which it is surely the same:
     /// that to the nearest plane on the way down the tree. 0 outside the box. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn locate_with_room(&self, p: DVec3) -> (Option<CellId>, f64) {
         if !p.is_finite() || !self.bounds.contains(p) {
             return (self.locate(p), 0.0);
@@ -282,6 +287,7 @@ impl Locator {
     /// Returns the smallest part of the tree that answers for all points of a convex hull, so that many points close to one
     /// another share the walk from the root. O(points × depth).
     #[must_use]
+    #[doc(hidden)]
     pub fn around(&self, hull: &[DVec3]) -> Around<'_> {
         let is_inside = |p: &DVec3| p.is_finite() && self.bounds.contains(*p);
         if !hull.iter().all(is_inside) {

@@ -50,6 +50,7 @@ impl World {
     /// Returns the cells that see any of the sources for which `is_one` is `true` without passing a portal,
     /// ascending. O(batches + runs + details).
     #[must_use]
+    #[doc(hidden)]
     pub fn cells_of_sources(&self, is_one: impl Fn(u32) -> bool) -> Vec<CellId> {
         let holds = |b: &&Batch| b.sources.runs().iter().any(|r| is_one(r[0]));
         let batches = self.batches.iter().filter(holds);

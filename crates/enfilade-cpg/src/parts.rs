@@ -57,6 +57,7 @@ pub struct VisibleParts {
 impl VisibleParts {
     /// Makes the table from rows of parts, each ascending without duplicates. Takes no more memory than the resulting
     /// runs.
+    #[doc(hidden)]
     pub fn of_ascending<R: IntoIterator<Item = u32>>(rows: impl IntoIterator<Item = R>) -> Self {
         let mut out = Self::default();
         for row in rows {
@@ -75,6 +76,7 @@ impl VisibleParts {
     /// Makes the table from rows of runs as [`VisibleParts::runs_of`] has them; `ends` holds the end of each row in `runs`.
     /// `None` if a run is empty or touches the one before it in its row, or a part is not below `n_parts`.
     #[must_use]
+    #[doc(hidden)]
     pub fn of_runs(ends: Vec<u32>, runs: Vec<[u32; 2]>, n_parts: u32) -> Option<Self> {
         let (n_pairs, out) = (ends.len(), Self { ends, runs });
         out.problem(n_pairs, n_parts).is_none().then_some(out)
@@ -141,6 +143,7 @@ impl VisibleVolumes {
 
     /// Makes the table from the volumes of pairs in order, each a list of pieces, each a list of planes.
     #[must_use]
+    #[doc(hidden)]
     pub fn of_pairs(pairs: impl IntoIterator<Item = Vec<Vec<[f64; 4]>>>) -> Self {
         let mut out = Self::default();
         for pair in pairs {

@@ -37,6 +37,7 @@ impl Pvs {
 
     /// Makes the set of a graph in which cell `c` may see the cells of `rows[c]`, ascending without duplicates. Takes
     /// no more memory than the resulting runs.
+    #[doc(hidden)]
     pub fn of_ascending<R: IntoIterator<Item = u32>>(rows: impl IntoIterator<Item = R>) -> Self {
         let mut pvs = Self::default();
         for row in rows {
@@ -93,6 +94,7 @@ impl Pvs {
     /// Returns the cells that may be seen from a cell as runs of consecutive ids, end excluded; ascending, with gaps
     /// between runs. Empty for a cell that its graph does not have.
     #[must_use]
+    #[doc(hidden)]
     pub fn runs_from(&self, cell: CellId) -> &[[u32; 2]] {
         self.row(cell)
     }

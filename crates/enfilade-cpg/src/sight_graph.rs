@@ -30,6 +30,7 @@ pub struct SightGraph {
 
 /// The reasons why cells and windings are not a valid [`SightGraph`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SightGraphError {
     /// A portal refers to a cell that does not exist.
     #[error("portal {portal} refers to cell {cell}, but there are only {n_cells} cells")]
@@ -129,6 +130,7 @@ impl SightGraph {
     /// cells, and for its winding and each of its pieces the number of vertices and the vertices, all little-endian,
     /// counts as 32 bits and coordinates as `f64`.
     #[must_use]
+    #[doc(hidden)]
     pub fn content_hash(&self) -> u64 {
         let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
         hash.count(self.n_cells as usize);

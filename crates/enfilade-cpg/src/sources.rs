@@ -12,6 +12,7 @@ pub struct SourceRuns {
 impl SourceRuns {
     /// Takes runs as they are, e.g. from a file; [`World::validate`](crate::World::validate) checks them.
     #[must_use]
+    #[doc(hidden)]
     pub fn from_runs(runs: Vec<[u32; 2]>) -> Self {
         Self { runs }
     }
@@ -24,6 +25,7 @@ impl SourceRuns {
 
     /// Returns `true` if no triangle has a source.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.runs.is_empty()
     }
@@ -38,6 +40,7 @@ impl SourceRuns {
     }
 
     /// Appends the runs of further triangles.
+    #[doc(hidden)]
     pub fn extend(&mut self, other: &Self) {
         for &[source, n] in &other.runs {
             self.push(source, n);
@@ -46,6 +49,7 @@ impl SourceRuns {
 
     /// Returns these runs if they cover all of `n_triangles`, and no runs otherwise.
     #[must_use]
+    #[doc(hidden)]
     pub fn of_all(self, n_triangles: usize) -> Self {
         let n: u64 = self.runs.iter().map(|r| u64::from(r[1])).sum();
         if n == n_triangles as u64 {

@@ -12,6 +12,7 @@ impl CellPortalGraph {
 
     /// Returns the special portal that is a doorway's side in a cell. O(special portals).
     #[must_use]
+    #[doc(hidden)]
     pub fn special_side(&self, portal: PortalId, cell: CellId) -> Option<SpecialId> {
         let is_it = |s: &SpecialPortal| s.cell == cell && s.portal() == Some(portal);
         let at = self.specials.iter().position(is_it)?;
@@ -24,6 +25,7 @@ impl CellPortalGraph {
     ///
     /// If there is no such special portal, or it refers to a portal that does not exist.
     #[must_use]
+    #[doc(hidden)]
     pub fn special_opening(&self, special: SpecialId) -> (DVec3, Vec<Winding>) {
         let side = &self.specials[special.idx()];
         let point = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
@@ -52,6 +54,7 @@ impl CellPortalGraph {
     ///
     /// As [`CellPortalGraph::special_opening`], and if there is no such pass.
     #[must_use]
+    #[doc(hidden)]
     pub fn map_of_pass(&self, special: SpecialId, pass: usize) -> Option<Similarity> {
         match &self.specials[special.idx()].passes[pass].way {
             Way::Through => Some(Similarity::IDENTITY),

@@ -8,6 +8,7 @@ const SAFE: f32 = 0.2;
 
 /// The rooms of a world that may be others.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct RoomDoubt {
     /// Share of the rooms that are expected to be wrong, by the margins of all decisions. [Limit: 0 to 1]
     pub share: f32,
@@ -35,6 +36,7 @@ impl Why {
 
     /// Returns `true` if a space as large as a room was given to something else, or two rooms were made one.
     #[must_use]
+    #[doc(hidden)]
     pub fn takes_room(&self) -> bool {
         matches!(
             self.reason,

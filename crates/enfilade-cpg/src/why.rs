@@ -30,6 +30,7 @@ pub struct Why {
 /// A decision and the reason for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub enum Reason {
     /// Two cells: a leaf or pane shuts the opening between them.
     Shut,
@@ -92,6 +93,7 @@ pub enum Reason {
 /// A measured quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
+#[non_exhaustive]
 pub enum Fact {
     /// Area of an opening ÷ that of the space beside it.
     Share,
@@ -141,6 +143,7 @@ pub struct Place {
 impl Why {
     /// Makes a decision for which nothing was weighed.
     #[must_use]
+    #[doc(hidden)]
     pub fn given(reason: Reason) -> Self {
         Self {
             reason,
@@ -151,6 +154,7 @@ impl Why {
 
     /// Makes a decision by comparing the fact of a reason with a limit.
     #[must_use]
+    #[doc(hidden)]
     pub fn compared(reason: Reason, limit: f64, facts: &[(Fact, f64)]) -> Self {
         Self {
             limit: Some(rounded(limit)),
@@ -160,6 +164,7 @@ impl Why {
 
     /// Adds facts.
     #[must_use]
+    #[doc(hidden)]
     pub fn with(mut self, facts: &[(Fact, f64)]) -> Self {
         let known = facts.iter().filter(|(_, value)| value.is_finite());
         self.facts
@@ -196,6 +201,7 @@ impl Why {
 
     /// Returns `true` if the deciding fact is on the side of its limit that the reason says.
     #[must_use]
+    #[doc(hidden)]
     pub fn holds(&self) -> bool {
         self.comparison().is_none_or(|(_, value, limit)| {
             // Both are rounded.
@@ -236,6 +242,7 @@ enum Side {
 impl Reason {
     /// Returns the fact that a decision for this reason compares with a number; `None` if it weighs nothing.
     #[must_use]
+    #[doc(hidden)]
     pub fn fact(self) -> Option<Fact> {
         match self {
             Self::Shut => Some(Fact::Closed),
@@ -399,6 +406,7 @@ impl Fact {
 
     /// Returns the quantity in words, and its unit.
     #[must_use]
+    #[doc(hidden)]
     pub fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Share => ("share of the space beside it that is open", ""),

@@ -31,6 +31,7 @@ pub struct HandEdit {
 
 /// Kind of a [`HandEdit`], with its points in the frame of its host. [Units: wu]
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum HandEditKind {
     /// A portal across a cell, given by a convex planar polygon that may reach into walls.
     Portal(Vec<DVec3>),
@@ -102,6 +103,7 @@ fn nearest_words(nearest: &Option<(PortalId, f64)>) -> String {
 impl HandEditKind {
     /// Returns a word for it.
     #[must_use]
+    #[doc(hidden)]
     pub fn word(&self) -> &'static str {
         match self {
             Self::Portal(_) => "portal",
@@ -123,6 +125,7 @@ impl HandEditKind {
 
     /// Returns its middle.
     #[must_use]
+    #[doc(hidden)]
     pub fn at(&self) -> DVec3 {
         match self {
             Self::Portal(corners) | Self::Mirror(corners) => {

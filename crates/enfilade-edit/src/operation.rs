@@ -8,6 +8,7 @@ use crate::hand::{HandEdit, HandEditKind};
 
 /// A change of a session's world.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum EditOperation {
     /// Places a piece.
     Put {

@@ -61,6 +61,7 @@ pub enum EditError {
 
 /// A world as edited.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct EditedWorld {
     /// The world.
     pub world: World,
@@ -70,6 +71,7 @@ pub struct EditedWorld {
 
 /// Account of a journal that was opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Resumed {
     /// Number of operations, undos and redos that were made again.
     pub n_entries: usize,
@@ -193,6 +195,7 @@ impl EditSession {
 
     /// Returns `true` if pieces can be placed.
     #[must_use]
+    #[doc(hidden)]
     pub fn takes_pieces(&self) -> bool {
         self.base.is_none()
     }
@@ -380,6 +383,7 @@ impl EditSession {
 
     /// Returns the changes by hand that cannot be made now, by their number, each with the reason: as [`EditSession::world`], without
     /// making the whole.
+    #[doc(hidden)]
     pub fn resting(&mut self) -> Vec<(usize, HandEditError)> {
         self.own_worlds();
         let mut resting = Vec::new();
@@ -424,6 +428,7 @@ impl EditSession {
 
     /// Returns a change by hand, given in the frame of the world, as one that moves with the instance there.
     #[must_use]
+    #[doc(hidden)]
     pub fn hosted(&self, kind: &HandEditKind) -> HandEdit {
         let host = self.level.instance_at(kind.at());
         let pose = host.and_then(|id| self.level.standing(id).ok().map(|i| i.pose));
@@ -439,6 +444,7 @@ impl EditSession {
     /// # Errors
     ///
     /// If the instance that it moves with does not stand.
+    #[doc(hidden)]
     pub fn placed(&self, edit: &HandEdit) -> Result<HandEditKind, HandEditError> {
         let Some(id) = edit.host else {
             return Ok(edit.kind.clone());

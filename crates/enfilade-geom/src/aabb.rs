@@ -50,6 +50,7 @@ impl Aabb {
 
     /// Returns the common part of both; may be empty.
     #[must_use]
+    #[doc(hidden)]
     pub fn intersection(self, other: Self) -> Self {
         Self {
             min: self.min.max(other.min),
@@ -59,6 +60,7 @@ impl Aabb {
 
     /// Returns the box grown by `margin` on every side.
     #[must_use]
+    #[doc(hidden)]
     pub fn expanded(self, margin: f64) -> Self {
         Self {
             min: self.min - margin,
@@ -85,6 +87,7 @@ impl Aabb {
 
     /// Returns the eight vertices: bit `k` of an index is set if axis `k` is at its maximum.
     #[must_use]
+    #[doc(hidden)]
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|i| {
             let pick = |k: usize| [self.min[k], self.max[k]][i >> k & 1];
@@ -94,6 +97,7 @@ impl Aabb {
 
     /// Returns the six faces, in the order of [`Self::FACES`].
     #[must_use]
+    #[doc(hidden)]
     pub fn faces(&self) -> [[DVec3; 4]; 6] {
         let corners = self.corners();
         Self::FACES.map(|face| face.map(|c| corners[c]))
@@ -101,6 +105,7 @@ impl Aabb {
 
     /// Returns two triangles per face, counter-clockwise from outside.
     #[must_use]
+    #[doc(hidden)]
     pub fn triangles(&self) -> Vec<Triangle> {
         let halves = |[a, b, c, d]: [DVec3; 4]| [[a, b, c], [a, c, d]];
         self.faces().into_iter().flat_map(halves).collect()
@@ -120,6 +125,7 @@ impl Aabb {
 
     /// Returns `true` if the closed boxes intersect.
     #[must_use]
+    #[doc(hidden)]
     pub fn overlaps(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
@@ -132,6 +138,7 @@ impl Aabb {
 
     /// Returns the squared distance from `p` to the box; 0 inside.
     #[must_use]
+    #[doc(hidden)]
     pub fn distance_squared(&self, p: DVec3) -> f64 {
         (self.min - p)
             .max(p - self.max)
@@ -141,6 +148,7 @@ impl Aabb {
 
     /// Returns the surface area; 0 if empty.
     #[must_use]
+    #[doc(hidden)]
     pub fn surface_area(&self) -> f64 {
         let s = self.size().max(DVec3::ZERO);
         2.0 * (s.x * s.y + s.y * s.z + s.z * s.x)

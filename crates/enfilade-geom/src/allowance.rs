@@ -85,17 +85,20 @@ impl Allowance {
 
     /// Returns `true` if it ends at some time, however much work is left.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_timed(&self) -> bool {
         self.until.is_some()
     }
 
     /// Returns `true` if it has a limit on memory.
     #[must_use]
+    #[doc(hidden)]
     pub fn holds_memory(&self) -> bool {
         self.memory.is_some()
     }
 
     /// Adds work: the task turned out larger, by an amount that is bounded elsewhere.
+    #[doc(hidden)]
     pub fn grant(&self, work: u64) {
         let most = self.most().saturating_add(work);
         self.most.store(most, Ordering::Relaxed);
@@ -108,6 +111,7 @@ impl Allowance {
     /// Spends work; returns `false` once it is over. A few nanoseconds, and now and then a look at clock and
     /// memory.
     #[inline]
+    #[doc(hidden)]
     pub fn spend(&self, work: u64) -> bool {
         // Counts only work that is done.
         if self.spent() > self.most() || self.seen.load(Ordering::Relaxed) != 0 {
@@ -122,6 +126,7 @@ impl Allowance {
     }
 
     /// Returns a filter for a loop's items: spends `work` on each, and rejects all once the allowance is over.
+    #[doc(hidden)]
     pub fn each<T: ?Sized>(&self, work: u64) -> impl Fn(&T) -> bool + Copy + '_ {
         move |_| self.spend(work)
     }
@@ -157,12 +162,14 @@ impl Allowance {
 
     /// Returns `true` if it is over; looks at clock and memory.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_over(&self) -> bool {
         self.end().is_some()
     }
 
     /// Returns the work spent.
     #[must_use]
+    #[doc(hidden)]
     pub fn spent(&self) -> u64 {
         self.spent.load(Ordering::Relaxed)
     }

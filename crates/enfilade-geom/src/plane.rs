@@ -23,6 +23,7 @@ impl Plane {
 
     /// Returns the plane of a triangle, facing its counter-clockwise side; `None` if the triangle has no area.
     #[must_use]
+    #[doc(hidden)]
     pub fn of_triangle(t: &Triangle) -> Option<Self> {
         let n = triangle_area_normal(t).try_normalize()?;
         // The centroid keeps the rounding of the offset small for distant vertices.
@@ -46,12 +47,14 @@ impl Plane {
 
     /// Projects `p` onto the plane along its normal.
     #[must_use]
+    #[doc(hidden)]
     pub fn project(&self, p: DVec3) -> DVec3 {
         p - self.normal * self.signed_distance(p)
     }
 
     /// Returns two unit vectors that span the plane, with `u × v = normal`.
     #[must_use]
+    #[doc(hidden)]
     pub fn basis(&self) -> (DVec3, DVec3) {
         let n = self.normal;
         // Cross with the axis least aligned to the normal, so that the product is far from zero.

@@ -80,6 +80,7 @@ impl Similarity {
 
     /// Returns `true` if all numbers are finite, the rotation has unit length, and the scale is not 0.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_valid(&self) -> bool {
         self.at.is_finite()
             && (self.turn.length_squared() - 1.0).abs() < 1e-6
@@ -139,12 +140,14 @@ impl Similarity {
     /// Maps a direction; keeps its length.
     #[inline]
     #[must_use]
+    #[doc(hidden)]
     pub fn direction(&self, v: DVec3) -> DVec3 {
         self.turn * (v * self.scale.signum())
     }
 
     /// Returns the linear part: rotation and scale.
     #[must_use]
+    #[doc(hidden)]
     pub fn linear(&self) -> DMat3 {
         DMat3::from_quat(self.turn) * self.scale
     }
@@ -157,6 +160,7 @@ impl Similarity {
 
     /// Returns `true` if no point within `reach` of the origin moves farther than `margin` between both maps. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn is_near(&self, other: &Self, reach: f64, margin: f64) -> bool {
         let [a, b] = [self.linear(), other.linear()];
         let columns = [

@@ -123,6 +123,7 @@ impl ConvexSolid {
 
     /// Returns the volume. [Units: wu³]
     #[must_use]
+    #[doc(hidden)]
     pub fn volume(&self) -> f64 {
         let Some(&o) = self.faces.first().and_then(|f| f.points.first()) else {
             return 0.0;
@@ -135,6 +136,7 @@ impl ConvexSolid {
 
     /// Returns `true` if `p` is more than `eps` inside.
     #[must_use]
+    #[doc(hidden)]
     pub fn contains(&self, p: DVec3, eps: f64) -> bool {
         self.planes
             .iter()
@@ -143,6 +145,7 @@ impl ConvexSolid {
 
     /// Returns the solid scaled by `scale` (above 0), then rotated by `rotation`, then moved by `offset`.
     #[must_use]
+    #[doc(hidden)]
     pub fn placed(&self, scale: f64, rotation: &DMat3, offset: DVec3) -> Self {
         let moved = |p: &DVec3| *rotation * *p * scale + offset;
         Self {
@@ -171,6 +174,7 @@ impl ConvexSolid {
     ///
     /// A part in a face that faces the other way counts as inside; a part in a face that faces the same way
     /// counts as inside if `takes_shared`.
+    #[doc(hidden)]
     pub fn cut_from(
         &self,
         polygon: Winding,

@@ -29,6 +29,7 @@ pub fn world_tolerance(extent: f64) -> f64 {
 impl Aabb {
     /// Returns its largest absolute coordinate; 0 if empty. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn extent(&self) -> f64 {
         if self.is_empty() {
             return 0.0;

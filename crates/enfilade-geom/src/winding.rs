@@ -19,6 +19,7 @@ impl Winding {
 
     /// Makes a square of half-width `reach` around the point of `plane` nearest to `center`.
     #[must_use]
+    #[doc(hidden)]
     pub fn square(plane: &Plane, center: DVec3, reach: f64) -> Self {
         let (u, v) = plane.basis();
         let c = plane.project(center);
@@ -32,6 +33,7 @@ impl Winding {
 
     /// Returns the section of `plane` with a box; `None` if they have no area in common.
     #[must_use]
+    #[doc(hidden)]
     pub fn section_of_box(plane: &Plane, bounds: &Aabb) -> Option<Self> {
         let center = bounds.center();
         let mut w = Self::square(plane, center, bounds.size().length() + 1.0);
@@ -76,18 +78,21 @@ impl Winding {
 
     /// Returns the mean of the vertices.
     #[must_use]
+    #[doc(hidden)]
     pub fn mean(&self) -> DVec3 {
         self.points.iter().sum::<DVec3>() / self.points.len().max(1) as f64
     }
 
     /// Returns the polygon seen from the other side.
     #[must_use]
+    #[doc(hidden)]
     pub fn flipped(&self) -> Self {
         Self::new(self.points.iter().rev().copied().collect())
     }
 
     /// Returns the smallest box around it.
     #[must_use]
+    #[doc(hidden)]
     pub fn aabb(&self) -> Aabb {
         Aabb::of_points(&self.points)
     }
@@ -96,6 +101,7 @@ impl Winding {
     ///
     /// `None` if only an edge or a vertex is left.
     #[must_use]
+    #[doc(hidden)]
     pub fn clipped(&self, plane: &Plane, eps: f64) -> Option<Self> {
         self.split(plane, eps).0
     }
@@ -105,6 +111,7 @@ impl Winding {
     /// Vertices within `eps` of the plane belong to both parts unmoved; a polygon in the plane belongs to
     /// neither.
     #[must_use]
+    #[doc(hidden)]
     pub fn split(&self, plane: &Plane, eps: f64) -> (Option<Self>, Option<Self>) {
         let whole = || Some(self.clone());
         let part = |points: Poly| Some(Self::new(points.into_vec()));
@@ -118,6 +125,7 @@ impl Winding {
 
     /// Returns `true` if `p`, a point of the polygon's plane, lies in it or within `eps` of it.
     #[must_use]
+    #[doc(hidden)]
     pub fn contains_in_plane(&self, p: DVec3, eps: f64) -> bool {
         let normal = self.area_normal().normalize_or_zero();
         let n = self.points.len();
@@ -133,6 +141,7 @@ impl Winding {
 
     /// Returns the convex hull of points of `plane`, counter-clockwise. Drops collinear points.
     #[must_use]
+    #[doc(hidden)]
     pub fn hull_in_plane(plane: &Plane, points: &[DVec3]) -> Self {
         let (u, v) = plane.basis();
         let mut at: Vec<(f64, f64, DVec3)> =

@@ -73,11 +73,13 @@ use enfilade_geom::scene::Scene;
 pub use enfilade_source::AirSide;
 pub use enfilade_source::HeightOptions;
 use enfilade_source::{FreeformScene, HeightMap, ImplicitScene, Volume};
+use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A scene and the report of its import.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Imported {
     /// The scene.
     pub scene: Scene,
@@ -117,6 +119,15 @@ pub struct SceneSource<'a> {
     pub stream: Option<Box<dyn Read + 'a>>,
     /// All its objects are detail.
     pub is_detail: bool,
+}
+
+impl fmt::Debug for SceneSource<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SceneSource")
+            .field("path", &self.path)
+            .field("is_detail", &self.is_detail)
+            .finish_non_exhaustive()
+    }
 }
 
 impl SceneSource<'_> {

@@ -32,6 +32,7 @@ impl Up {
 
     /// Returns the option of the command, as typed.
     #[must_use]
+    #[doc(hidden)]
     pub fn option(self) -> &'static str {
         match self {
             Self::Y => "--up y",
@@ -180,6 +181,7 @@ impl Default for Limits {
 impl Limits {
     /// Returns limits small enough for fuzzing: never more than a few megabytes of memory.
     #[must_use]
+    #[doc(hidden)]
     pub fn tiny() -> Self {
         Self {
             max_file_bytes: 1 << 20,

@@ -9,6 +9,7 @@ use std::fmt::Write;
 
 /// Variants of portal files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PrtFormat {
     /// Quake and Quake 2: a leaf is a cluster.
     Prt1,
@@ -58,6 +59,7 @@ pub struct PrtFile {
 /// The reason why a text is not a portal file or PVS, with its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}, word {word}: {}", enfilade_geom::shown(problem))]
+#[non_exhaustive]
 pub struct PrtError {
     /// Line, from 1.
     pub line: usize,
@@ -194,6 +196,7 @@ impl PrtFile {
     ///
     /// When `cluster_of` lacks a cluster.
     #[must_use]
+    #[doc(hidden)]
     pub fn merged(&self, cluster_of: &[u32], n_clusters: u32) -> Self {
         let of = |c: u32| cluster_of[c as usize];
         let portals = self.portals.iter().map(|p| PrtPortal {

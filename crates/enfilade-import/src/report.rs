@@ -13,6 +13,7 @@ const MAX_NOTES: usize = 500;
 
 /// Observations and changes of an import.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct ImportReport {
     /// One entry per file, in the order given.
     pub files: Vec<FileReport>,
@@ -53,6 +54,7 @@ pub struct ImportReport {
 
 /// Evidence that another axis points up than the one that was taken to.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct UpDoubt {
     /// The reason and the remedy.
     pub text: String,
@@ -66,6 +68,7 @@ pub struct UpDoubt {
 
 /// One input file.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
@@ -81,6 +84,7 @@ pub struct FileReport {
 
 /// A surface made of a source that is not triangles. All promises hold for the surface.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SurfaceReport {
     /// Distance between the points at which the source was evaluated; details thinner than this may be lost. Patches have none, and lose
     /// none. [Units: wu]
@@ -97,6 +101,7 @@ pub struct SurfaceReport {
 
 /// Objects left out for one reason.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct LeftOut {
     /// The reason.
     pub reason: String,
@@ -130,6 +135,7 @@ impl fmt::Display for LeftOut {
 
 /// One observation.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Note {
     /// The file.
     pub path: PathBuf,
@@ -144,6 +150,7 @@ pub struct Note {
 impl ImportReport {
     /// Returns `true` if all input states neither a unit nor an axis that points up: arrays, and files of some formats.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_bare(&self) -> bool {
         let is_bare = |f: &FileReport| matches!(f.format, "OBJ" | "PLY" | "STL" | "arrays");
         self.files.iter().all(is_bare)

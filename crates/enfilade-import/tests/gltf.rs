@@ -482,7 +482,7 @@ fn textures_of_several_files_keep_their_materials() {
         make("three", "a.png"),
     ];
     let detail = [make("four", "secret.txt")];
-    let Imported { scene, report } =
+    let Imported { scene, report, .. } =
         import(&paths, &detail, &ImportOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(

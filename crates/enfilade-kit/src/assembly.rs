@@ -363,7 +363,7 @@ impl Assembly {
     /// # Panics
     ///
     /// If there never was such an instance, as [`Assembly::piece`].
-    pub fn open_ends_of(&self, instance: InstanceId) -> impl Iterator<Item = End> {
+    pub(crate) fn open_ends_of(&self, instance: InstanceId) -> impl Iterator<Item = End> {
         let links = self.state.instances.get(instance).links.iter().enumerate();
         let open = links.filter(|(_, link)| **link == Link::Open);
         open.map(move |(attachment, _)| End {
@@ -374,6 +374,7 @@ impl Assembly {
 
     /// Returns the instance that has a point in a room of it, or else in a wall.
     #[must_use]
+    #[doc(hidden)]
     pub fn instance_at(&self, p: DVec3) -> Option<InstanceId> {
         let cell_in = |id: &InstanceId| {
             let own = self.state.instances.get(*id).pose.point_back(p);
@@ -401,6 +402,7 @@ impl Assembly {
     ///
     /// If there never was such an instance, as [`Assembly::piece`].
     #[must_use]
+    #[doc(hidden)]
     pub fn end_name(&self, end: End) -> String {
         self.state.instances.end_name(end)
     }

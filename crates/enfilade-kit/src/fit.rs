@@ -13,6 +13,7 @@ const LEANING: f64 = 1e-4;
 /// The frame's z axis points out of the piece. Its y axis points up, or north (-z) if the opening lies flat. Its origin is the middle
 /// of the sill, or of the box around an opening that lies flat.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Mouth {
     /// Maps points of its frame to those of the piece.
     pub frame: Pose,
@@ -65,6 +66,7 @@ impl Mouth {
     /// the largest distance of a vertex of either from the other polygon, or the width of a strip along its longer side of the area
     /// within the outline that is closed in one only. [Units: wu, rad]
     #[must_use]
+    #[doc(hidden)]
     pub fn misfit(&self, other: &Self, spin: f64) -> f64 {
         let turn = DVec2::from_angle(spin);
         let its = other.outline.iter().map(|p| turn.rotate(*p));
@@ -83,6 +85,7 @@ impl Mouth {
     /// Returns the pose, in this mouth's piece, of a piece whose mouth `other` meets this one, turned by `spin` about its normal.
     /// [Units: rad]
     #[must_use]
+    #[doc(hidden)]
     pub fn meeting(&self, other: &Self, spin: f64) -> Pose {
         let half_turn = Pose {
             turn: DQuat::from_xyzw(0.0, 1.0, 0.0, 0.0) * DQuat::from_rotation_z(spin),

@@ -24,6 +24,7 @@ pub struct PieceNamedTwice(pub String);
 
 /// A fault of a kit, which does not keep it from being used.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum KitFault {
     /// A piece with rooms has no attachment. Walls and other pieces without rooms need none.
     Detached {
@@ -107,6 +108,7 @@ impl Kit {
     /// Returns the attachments in groups that fit each other within a tolerance, as pairs of piece and attachment, the largest group
     /// first. O(attachments × groups).
     #[must_use]
+    #[doc(hidden)]
     pub fn groups(&self, tolerance: f64) -> Vec<Vec<[usize; 2]>> {
         let mut groups: Vec<Vec<[usize; 2]>> = Vec::new();
         for (i, piece) in self.pieces.iter().enumerate() {

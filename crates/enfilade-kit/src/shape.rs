@@ -8,6 +8,7 @@ use crate::fit::Mouth;
 
 /// An opening of a piece to its outdoors that may be attached to that of another piece.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Attachment {
     /// Name, unique in the piece.
     pub name: String,

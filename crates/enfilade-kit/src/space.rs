@@ -11,6 +11,7 @@ use crate::assembly::Assembly;
 use crate::instance::{InstanceId, Link};
 
 /// A level as a space: each instance is a part in an empty world that is all outdoors.
+#[derive(Debug)]
 pub struct LevelSpace {
     /// The parts; each docks where its attachments are joined.
     pub space: Space,

@@ -40,6 +40,7 @@ impl Default for CleaningOptions {
 
 /// Defects of a scene's surface: counts with a few places each, in world space.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct CleaningReport {
     /// Triangles examined.
     pub n_triangles: u64,
@@ -87,6 +88,7 @@ pub struct CleaningReport {
 ///
 /// Where triangles disagree in orientation, the majority decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ShellCounts {
     /// Closed, front faces outwards: solid matter inside.
     pub solids: u64,

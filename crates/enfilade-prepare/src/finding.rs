@@ -7,6 +7,7 @@ pub(crate) const MAX_EXAMPLES: usize = 5;
 
 /// A count with a few example places.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Finding {
     /// Number of occurrences.
     pub n: u64,
@@ -16,6 +17,7 @@ pub struct Finding {
 
 /// One place in the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Example {
     /// The object or element.
     pub name: String,
@@ -25,6 +27,7 @@ pub struct Example {
 
 impl Finding {
     /// Counts an occurrence; `name` is called only for an example.
+    #[doc(hidden)]
     pub fn add(&mut self, position: DVec3, name: impl FnOnce() -> String) {
         self.n += 1;
         if self.examples.len() < MAX_EXAMPLES {

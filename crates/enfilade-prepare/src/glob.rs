@@ -90,6 +90,7 @@ impl Glob {
 
     /// Returns the state before the first letter.
     #[must_use]
+    #[doc(hidden)]
     pub fn start(&self) -> GlobState {
         let mut bits = vec![0; self.any.len()];
         bits[0] = 1;
@@ -97,6 +98,7 @@ impl Glob {
     }
 
     /// Reads the next part of a text.
+    #[doc(hidden)]
     pub fn read(&self, state: &mut GlobState, text: &str) {
         for c in folded(text) {
             let places = self.places.get(&c).unwrap_or(&self.any);

@@ -176,6 +176,7 @@ pub fn drops_subtree(name: &str) -> Option<String> {
 
 impl RoleRules {
     /// Returns `true` if a material of this name lets light through, whatever its settings.
+    #[doc(hidden)]
     pub fn is_clear_material(&self, name: &str) -> bool {
         !self.is_manual
             && words(name)
@@ -184,6 +185,7 @@ impl RoleRules {
     }
 
     /// Returns the role that the caller's rules give an object of this name, before the format's own.
+    #[doc(hidden)]
     pub fn forced(&self, name: &str) -> Option<(Role, String)> {
         let fits = |globs: &[String]| globs.iter().find(|g| is_match(g, name)).cloned();
         let structural =
@@ -193,6 +195,7 @@ impl RoleRules {
     }
 
     /// Returns the object's role; the first rule that matches decides.
+    #[doc(hidden)]
     pub fn decide(&self, facts: &RoleFacts<'_>) -> RoleVerdict {
         let structural = |reason: String| RoleVerdict::Keep(Role::Structural, reason);
         let detail = |reason: String| RoleVerdict::Keep(Role::Detail, reason);

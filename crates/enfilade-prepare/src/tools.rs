@@ -40,6 +40,7 @@ impl TextureMatter {
     ///
     /// # Errors
     /// The known names, if it is none of them.
+    #[doc(hidden)]
     pub fn of_name(name: &str) -> Result<Self, String> {
         let found = MATTERS.iter().find(|(known, _)| *known == name);
         found.map(|(_, matter)| *matter).ok_or_else(|| {
@@ -50,6 +51,7 @@ impl TextureMatter {
 
     /// Returns `true` for what bounds nothing and is not drawn.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_nothing(self) -> bool {
         matches!(self, Self::Air | Self::Undrawn | Self::Portal | Self::Hint)
     }

@@ -317,6 +317,7 @@ fn shells_are_solids_rooms_or_open() {
             solids,
             rooms,
             open,
+            ..
         } = of(primitive).shells;
         [solids, rooms, open]
     };

@@ -30,6 +30,7 @@ impl Camera {
 
     /// Returns the distance along the view direction of a depth in an [`IdPicture`](crate::IdPicture). [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn distance_of(depth: f32) -> f32 {
         Self::NEAR / depth
     }
@@ -70,6 +71,7 @@ impl Camera {
 
     /// Returns right, up and forward: orthogonal unit vectors.
     #[must_use]
+    #[doc(hidden)]
     pub fn axes(&self) -> [Vec3; 3] {
         let forward = Vec3::from(self.toward).normalize_or(Vec3::NEG_Z);
         // Same as `View::perspective`, so that pictures and queries mean the same view.
@@ -84,6 +86,7 @@ impl Camera {
 
     /// Returns the four edges of the view pyramid, counter-clockwise from the lower left of the picture.
     #[must_use]
+    #[doc(hidden)]
     pub fn corners(&self, aspect: f32) -> [Vec3; 4] {
         let [right, up, forward] = self.axes();
         let tan = (self.fov_y * 0.5).tan();
@@ -209,6 +212,7 @@ impl Projection {
 
     /// Returns the same projection for points of another frame. `motion` maps that frame to this one.
     #[must_use]
+    #[doc(hidden)]
     pub fn in_frame(&self, motion: &Pose) -> Self {
         if *motion == Pose::IDENTITY {
             return *self;
@@ -232,6 +236,7 @@ impl Projection {
 
     /// Returns the position of a point in the picture, 0 to 1 from the upper left; `None` behind the eye.
     #[must_use]
+    #[doc(hidden)]
     pub fn place(&self, p: [f32; 3]) -> Option<[f32; 2]> {
         let q = self.clip_from_relative * (Vec3::from(p) - self.origin).extend(1.0);
         (q.w > 1e-6).then(|| [0.5 + 0.5 * q.x / q.w, 0.5 - 0.5 * q.y / q.w])

@@ -12,6 +12,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::picture`].
+    #[doc(hidden)]
     pub fn ids(
         &mut self,
         camera: &Camera,
@@ -32,6 +33,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::picture`].
+    #[doc(hidden)]
     pub fn ids_compared(
         &mut self,
         camera: &Camera,

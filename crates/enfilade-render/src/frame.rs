@@ -45,7 +45,7 @@ impl Default for Style {
 }
 
 /// One frame.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// The projection to the screen.
     pub projection: Projection,

@@ -217,6 +217,7 @@ impl Gpu {
 
     /// Returns the adapters of an instance with their backends, e.g. `llvmpipe (vulkan)`.
     #[must_use]
+    #[doc(hidden)]
     pub fn names(instance: &wgpu::Instance) -> Vec<String> {
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
         adapters.iter().map(|a| named(&a.get_info())).collect()
@@ -329,6 +330,7 @@ impl Gpu {
     /// # Errors
     ///
     /// The device was lost.
+    #[doc(hidden)]
     pub fn wait(&self) -> Result<(), RenderError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
@@ -346,6 +348,7 @@ impl Gpu {
 
     /// Returns a mark after all work submitted so far, for [`Gpu::wait_for`].
     #[must_use]
+    #[doc(hidden)]
     pub fn mark(&self) -> Submitted {
         Submitted(self.queue.submit([]))
     }
@@ -355,6 +358,7 @@ impl Gpu {
     /// # Errors
     ///
     /// The device was lost.
+    #[doc(hidden)]
     pub fn wait_for(&self, mark: Submitted) -> Result<(), RenderError> {
         let submission_index = Some(mark.0);
         let wait = wgpu::PollType::Wait {

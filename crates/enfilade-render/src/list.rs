@@ -118,18 +118,21 @@ impl RenderList {
 
     /// Returns the number of draws.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_draws(&self) -> usize {
         self.opaque.len() + self.transparent.len()
     }
 
     /// Returns the portals drawn as a polygon each instead of the cells behind them.
     #[must_use]
+    #[doc(hidden)]
     pub fn stand_ins(&self) -> &[(PortalId, CellId)] {
         &self.stand_ins
     }
 
     /// Returns the portals drawn as textures of what lies behind them.
     #[must_use]
+    #[doc(hidden)]
     pub fn doorways(&self) -> &[(PortalId, CellId)] {
         &self.doorways
     }
@@ -169,6 +172,7 @@ impl RenderList {
     }
 
     /// Appends the draws of another list.
+    #[doc(hidden)]
     pub fn append(&mut self, other: &Self) {
         let base = self.instances.len() as u32;
         self.instances.extend_from_slice(&other.instances);

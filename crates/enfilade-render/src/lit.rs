@@ -49,6 +49,7 @@ impl Studio {
     /// # Errors
     ///
     /// More maps than the adapter can hold.
+    #[doc(hidden)]
     pub fn set_lamp_options(&mut self, options: LampOptions) -> Result<(), RenderError> {
         self.lamps.options = options;
         self.reserve_lamps()

@@ -38,6 +38,7 @@ impl Picture {
     /// # Errors
     ///
     /// Bytes that are not a PNG.
+    #[doc(hidden)]
     pub fn from_png(bytes: &[u8]) -> Result<Self, RenderError> {
         let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
             .map_err(|why| RenderError::Encode(why.to_string()))?
@@ -52,6 +53,7 @@ impl Picture {
 
     /// Returns the picture at half the width and height; each pixel is the mean of four in linear light.
     #[must_use]
+    #[doc(hidden)]
     pub fn halved(&self) -> Self {
         let to_light: Vec<f32> = (0..256).map(|c| (c as f32 / 255.0).powf(2.2)).collect();
         let (width, height) = (self.width / 2, self.height / 2);
@@ -88,6 +90,7 @@ impl Picture {
     }
 
     /// Draws another picture over this one with its upper left pixel at `(x, y)`; parts outside are clipped.
+    #[doc(hidden)]
     pub fn put(&mut self, other: &Self, x: u32, y: u32) {
         let columns = other.width.min(self.width.saturating_sub(x)) as usize;
         for row in 0..other.height.min(self.height.saturating_sub(y)) {

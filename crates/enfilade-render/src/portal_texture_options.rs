@@ -51,7 +51,7 @@ impl Viewpoints {
 
     /// Returns `true` if textures are warped by their depths.
     #[must_use]
-    pub fn are_warped(&self) -> bool {
+    pub(crate) fn are_warped(&self) -> bool {
         matches!(self, Self::Warped { .. })
     }
 }
@@ -133,6 +133,7 @@ pub enum PortalTextureError {
 impl PortalTextureOptions {
     /// Returns the bytes of one texture: color, and depth of 32 bits.
     #[must_use]
+    #[doc(hidden)]
     pub fn bytes_each(&self) -> u64 {
         u64::from(self.side) * u64::from(self.side) * 8
     }
@@ -223,6 +224,7 @@ impl PortalTextureOptions {
 
 /// Textures in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PortalTextureCounts {
     /// Portals drawn as textures.
     pub n_textured: usize,

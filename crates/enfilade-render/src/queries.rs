@@ -57,6 +57,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::picture`].
+    #[doc(hidden)]
     pub fn list_by_queries(
         &mut self,
         world: &World,

@@ -17,6 +17,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::new`]; the old world stays then.
+    #[doc(hidden)]
     pub fn replace_world(&mut self, world: &World) -> Result<(), RenderError> {
         let sight = Sight::build(world)?;
         let on_gpu = GpuWorld::load(&self.gpu, world, &sight)?;

@@ -72,6 +72,7 @@ impl Picture {
 
     /// Draws the scale of [`Paint::Overdraw`](crate::Paint::Overdraw) at the lower left: a color for each number
     /// of draws of a pixel, up to 16 and more. Pictures less than 160 pixels wide have no room for it.
+    #[doc(hidden)]
     pub fn add_overdraw_scale(&mut self) {
         // As legible in a large picture as in a small one.
         let dot = (self.width / 480).max(1);

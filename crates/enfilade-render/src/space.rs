@@ -3,6 +3,7 @@
 //! Each part of a [`Space`] is drawn in its own frame, by the same camera in that frame's coordinates: a part ten kilometers
 //! away is as exact as a near one. All parts share one depth, one sun with its shadows, one sky and one exposure.
 
+use std::fmt;
 use std::sync::Arc;
 
 use enfilade_cpg::World;
@@ -23,10 +24,10 @@ use crate::prop::{Prop, PropMesh};
 use crate::renderer::read_picture;
 use crate::scene::GpuWorld;
 use crate::shown::Shown;
-use crate::studio::{Studio, StudioPart, StudioTarget, drawn_parts, staged_worlds, world_of};
+use crate::studio::{Studio, StudioPart, drawn_parts, staged_worlds, world_of};
 
 /// A view of a space of worlds.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct SpaceShot<'a> {
     /// The worlds, their poses and their doors.
     pub space: &'a Space,
@@ -50,6 +51,7 @@ pub struct SpaceShot<'a> {
 
 /// The contents of a drawn picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SpaceCounts {
     /// Drawn parts.
     pub n_parts: usize,
@@ -100,6 +102,7 @@ impl Studio {
 
     /// Returns the number of triangles of structure and placed objects of all worlds that are present in a space.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_triangles_in(&self, space: &Space) -> u64 {
         let parts = (1..).map(PartId).zip(&self.parts);
         let present = parts.filter(|(id, _)| space.is_present(*id));
@@ -113,6 +116,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::add_light`].
+    #[doc(hidden)]
     pub fn add_part_light(
         &mut self,
         part: PartId,
@@ -220,19 +224,6 @@ impl Studio {
             self.special_viewer = viewer;
         }
         Ok(drawn)
-    }
-
-    /// Draws a view of a space to a target.
-    ///
-    /// # Errors
-    ///
-    /// As [`Studio::draw_space`].
-    pub fn draw_space_to(
-        &mut self,
-        shot: &SpaceShot<'_>,
-        target: &StudioTarget,
-    ) -> Result<SpaceCounts, RenderError> {
-        self.draw_space(shot, &target.view, target.size)
     }
 
     /// Draws a picture of a space.
@@ -399,4 +390,13 @@ fn counts(lists: &[(PartId, RenderList)]) -> SpaceCounts {
         counts.n_draws += list.n_draws();
     }
     counts
+}
+
+impl fmt::Debug for Studio {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Studio")
+            .field("gpu", &self.gpu)
+            .field("day", &self.day)
+            .finish_non_exhaustive()
+    }
 }

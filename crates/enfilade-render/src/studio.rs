@@ -38,6 +38,7 @@ pub enum Culling {
 }
 
 /// An off-screen target, for benchmarks.
+#[derive(Debug)]
 pub struct StudioTarget {
     pub(crate) view: wgpu::TextureView,
     pub(crate) size: [u32; 2],
@@ -59,6 +60,7 @@ pub struct Studio {
     /// The adapter.
     pub gpu: Gpu,
     /// The world on it.
+    #[doc(hidden)]
     pub world: GpuWorld,
     /// The world prepared for queries.
     pub sight: Sight,
@@ -67,6 +69,7 @@ pub struct Studio {
     /// The viewer that runs the queries.
     pub viewer: Viewer,
     /// Reductions for distant rooms with culling by portals. Off by default.
+    #[doc(hidden)]
     pub sparing: Sparing,
     pub(crate) renderer: Renderer,
     pub(crate) stage: RenderStage,
@@ -101,6 +104,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::new`].
+    #[doc(hidden)]
     pub fn with_format(
         gpu: Gpu,
         world: &World,
@@ -120,6 +124,7 @@ impl Studio {
     /// # Errors
     ///
     /// Limits beyond the adapter's buffers.
+    #[doc(hidden)]
     pub fn hollow(
         gpu: Gpu,
         world: &World,
@@ -166,6 +171,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`GpuWorld::put`].
+    #[doc(hidden)]
     pub fn put(&mut self, piece: &GpuPiece) -> Result<Put, RenderError> {
         let is_new = !self.world.has(piece.of());
         let put = self.world.put(&self.gpu, piece)?;
@@ -176,6 +182,7 @@ impl Studio {
     }
 
     /// Takes a piece of a hollow world off the adapter. Returns `true` if it was there.
+    #[doc(hidden)]
     pub fn take(&mut self, of: PieceOf) -> bool {
         let was_there = self.world.take(of);
         if was_there {
@@ -348,6 +355,7 @@ impl Studio {
 
     /// Same as [`Studio::list`], but moves the list out. [Give it back](Studio::give_list) so that nothing is
     /// allocated.
+    #[doc(hidden)]
     pub fn take_list(
         &mut self,
         view: &View,
@@ -360,6 +368,7 @@ impl Studio {
     }
 
     /// Takes the buffers of a list back.
+    #[doc(hidden)]
     pub fn give_list(&mut self, list: RenderList) {
         self.lister.give(list);
     }
@@ -428,6 +437,7 @@ impl Studio {
     /// # Errors
     ///
     /// A size beyond the adapter's limit; a device that was lost.
+    #[doc(hidden)]
     pub fn picture_of(
         &mut self,
         frame: &Frame<'_>,
@@ -489,6 +499,7 @@ impl Studio {
     /// # Errors
     ///
     /// As [`Studio::picture_of`].
+    #[doc(hidden)]
     pub fn explained(
         &mut self,
         view: &View,
@@ -513,6 +524,7 @@ impl Studio {
     }
 
     /// Lists everything.
+    #[doc(hidden)]
     pub fn everything(&mut self) -> RenderList {
         self.follow_state();
         (self.lister)

@@ -51,6 +51,7 @@ impl Studio {
     }
 
     /// Ends portal textures, and frees their memory.
+    #[doc(hidden)]
     pub fn remove_portal_textures(&mut self) {
         self.portal_textures = None;
     }
@@ -62,6 +63,7 @@ impl Studio {
     }
 
     /// Changes the coloring of pixels from portal textures.
+    #[doc(hidden)]
     pub fn paint_portal_textures(&mut self, paint: PortalTexturePaint) {
         if let Some(own) = &mut self.portal_textures {
             own.options.paint = paint;
@@ -69,6 +71,7 @@ impl Studio {
     }
 
     /// Drops all portal textures, so that they are made anew.
+    #[doc(hidden)]
     pub fn clear_portal_textures(&mut self) {
         if let Some(own) = &mut self.portal_textures {
             own.clear();
@@ -184,6 +187,7 @@ impl Studio {
     }
 
     /// Returns the cells that the textures of the last plan show, with repetitions: what moves in them is drawn over the textures.
+    #[doc(hidden)]
     pub fn cells_in_portal_textures(&self) -> impl Iterator<Item = CellId> {
         let own = self.portal_textures.iter();
         let shown = own.flat_map(|own| own.shown.keys().map(move |id| (own, *id)));

@@ -131,6 +131,7 @@ fn textures_made_ahead_show_the_same_and_are_not_drawn_again() {
                     assert!(done < all);
                     drawn += 1;
                 }
+                _ => unreachable!("looked, then drawn"),
             }
             ControlFlow::Continue(())
         })

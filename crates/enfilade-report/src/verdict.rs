@@ -383,6 +383,8 @@ fn reason(doubt: &Doubt) -> Reason {
             format!("{n} of {} without a doorway", count(of, "room")),
             &["--detail-name 'PATTERN'"],
         ),
+        // A later version may have more.
+        _ => ("it has a doubt that this version has no words for".into(), &[]),
     };
     Reason {
         text,

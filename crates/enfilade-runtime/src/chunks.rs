@@ -7,6 +7,7 @@ use crate::point::point;
 
 /// A group of triangles of one batch, culled and drawn as a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Chunk {
     /// Index into `World::batches`.
     pub batch: u32,

@@ -14,6 +14,7 @@ const STRIPS: u32 = 4;
 
 /// A leaf of a door: an object and its motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Leaf {
     /// The object.
     pub detail: DetailId,

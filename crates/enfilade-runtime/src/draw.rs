@@ -13,6 +13,7 @@ use crate::sight::Sight;
 /// With a vertex buffer of `draw.batch(&world).primitive.positions` and an index buffer of
 /// [`Sight::indices`] per batch, it is one indexed draw of `n_indices` from `first_index` on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Draw {
     /// Index into `World::batches`.
     pub batch: u32,

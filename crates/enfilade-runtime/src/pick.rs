@@ -58,6 +58,7 @@ impl Target {
 
 /// The end of a picked segment, and the target there.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Hit {
     /// Parameter along the segment, 0 to 1.
     pub t: f64,

@@ -1,5 +1,7 @@
 //! The answer to a view: visible things in lists, near to far.
 
+use std::fmt;
+
 use enfilade_cpg::{CellId, PortalId, SpecialId};
 
 /// Index into [`Sight::chunks`](crate::Sight::chunks).
@@ -31,6 +33,7 @@ pub struct Visit {
 
 /// Statistics of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SeeCounts {
     /// Portals whose outline was clipped.
     pub clips: u32,
@@ -63,6 +66,15 @@ pub(crate) struct Lists {
 #[derive(Clone, Copy)]
 pub struct Seen<'a> {
     pub(crate) lists: &'a Lists,
+}
+
+impl fmt::Debug for Seen<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Seen")
+            .field("cells", &self.cells())
+            .field("portals", &self.portals())
+            .finish_non_exhaustive()
+    }
 }
 
 impl<'a> Seen<'a> {

@@ -178,12 +178,14 @@ impl Sight {
 
     /// Returns the number of special portals.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_specials(&self) -> usize {
         self.n_specials
     }
 
     /// Returns the number of structural batches.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_batches(&self) -> usize {
         self.indices.len()
     }
@@ -202,6 +204,7 @@ impl Sight {
 
     /// Returns the chunks of a batch as a range of [`Sight::chunks`]; empty for a batch that does not exist. O(log n).
     #[must_use]
+    #[doc(hidden)]
     pub fn chunks_of(&self, batch: u32) -> std::ops::Range<u32> {
         let chunks = &self.drawn.chunks;
         let first = chunks.partition_point(|c| c.batch < batch);
@@ -211,6 +214,7 @@ impl Sight {
 
     /// Returns the area of a batch's triangles; 0 for a batch that does not exist. [Units: wu²]
     #[must_use]
+    #[doc(hidden)]
     pub fn batch_area(&self, batch: u32) -> f32 {
         self.drawn.areas.get(batch as usize).copied().unwrap_or(0.0)
     }
@@ -218,6 +222,7 @@ impl Sight {
     /// Returns minimum and maximum of a detail object in the model's pose; `None` without vertices, or if it does not exist.
     /// [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn detail_box(&self, detail: DetailId) -> Option<[DVec3; 2]> {
         let bounds = self.drawn.details.get(detail.0 as usize)?.bounds;
         (!bounds.is_empty()).then_some([bounds.min, bounds.max])
@@ -229,6 +234,7 @@ impl Sight {
     /// # Errors
     ///
     /// If `primitive` is not the batch's.
+    #[doc(hidden)]
     pub fn chunk_order(&self, batch: u32, primitive: &Primitive) -> Result<Vec<u32>, SightError> {
         let own = self.chunks_of(batch);
         let own = &self.drawn.chunks[own.start as usize..own.end as usize];
@@ -254,6 +260,7 @@ impl Sight {
 
     /// Returns the number of triangles of a detail object; 0 for one that does not exist.
     #[must_use]
+    #[doc(hidden)]
     pub fn detail_triangles(&self, detail: u32) -> u32 {
         let details = &self.drawn.details;
         details.get(detail as usize).map_or(0, |d| d.n_triangles)
@@ -291,6 +298,7 @@ impl Sight {
     /// Returns the distance of the middle of a portal's shut leaves from its plane, along its normal: a panel at that distance
     /// that fills the opening is hidden by them. 0 without leaves. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn depth_of_leaves(&self, portal: PortalId) -> f32 {
         self.doors.depth(portal)
     }
@@ -303,6 +311,7 @@ impl Sight {
 
     /// Returns the largest error of a stored outline; all answers allow for it. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }

@@ -164,6 +164,7 @@ impl Sightlines {
     /// Uses one tree over the whole world, which measured faster than following the segment from cell to
     /// cell (`docs/benchmarks/sight.md`).
     #[must_use]
+    #[doc(hidden)]
     pub fn first_hit(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
         self.hit_of_whole(point(a), point(b))
             .map(|hit| self.named(hit.0, hit.1, hit.2, None))
@@ -171,6 +172,7 @@ impl Sightlines {
 
     /// As [`Sightlines::first_hit`], by following the segment from cell to cell; also reports the cell where it ends.
     #[must_use]
+    #[doc(hidden)]
     pub fn first_hit_by_cells(&self, a: [f32; 3], b: [f32; 3]) -> Option<SightHit> {
         let (a, b) = (point(a), point(b));
         match self.walk(a, b) {

@@ -23,6 +23,7 @@ const ROOMS: usize = 8;
 
 /// An eye to begin a walk with, and the direction in which the way is free farthest.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Start {
     /// The eye, 1.6 m above the floor. [Units: wu]
     pub eye: [f32; 3],
@@ -45,6 +46,7 @@ impl Start {
     /// Finds a place as [`Start::find`] does in one of these cells, on a floor at this height if there is one. Cells that do
     /// not exist are ignored.
     #[must_use]
+    #[doc(hidden)]
     pub fn among(
         world: &World,
         sight: &Sight,

@@ -53,6 +53,7 @@ pub struct SavedDoors {
 #[error(
     "these are the doors of another world: {saved} moving leaves, where this one has {own}, or portals or cells that it has not"
 )]
+#[non_exhaustive]
 pub struct SavedDoorsError {
     /// Leaves in the saved state.
     pub saved: usize,
@@ -235,11 +236,13 @@ impl SightState {
 
     /// Returns the position of each leaf, in ascending order of objects. If equal, [`SightState::moved`] is equal.
     #[must_use]
+    #[doc(hidden)]
     pub fn shares(&self) -> &[Option<f32>] {
         &self.shares
     }
 
     /// Returns the portals that let nothing through, in ascending order.
+    #[doc(hidden)]
     pub fn shut_portals(&self) -> impl Iterator<Item = PortalId> {
         let portals = (0..).zip(&self.portals);
         let shut = portals.filter(|(_, flags)| **flags & (CLOSED | SHUT) != 0);

@@ -227,6 +227,7 @@ impl View {
 
     /// Returns the position of the eye, which a view in another frame has in `f64`. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn exact_eye(&self) -> DVec3 {
         self.eye
     }
@@ -234,6 +235,7 @@ impl View {
     /// Returns the view in another frame: `map` maps that frame to this one. Seen by a reflection, left and right are exchanged
     /// in the frame, not on the screen.
     #[must_use]
+    #[doc(hidden)]
     pub fn in_frame(&self, map: &Similarity) -> Self {
         let mut view = self.clone();
         view.eye = map.point_back(self.eye);
@@ -252,6 +254,7 @@ impl View {
     ///
     /// Infinite if the sphere reaches behind the eye, and for views all around, which are not pictures.
     #[must_use]
+    #[doc(hidden)]
     pub fn pixels_per_meter(&self, center: [f32; 3], radius: f32, size: [u32; 2]) -> f32 {
         let center = DVec3::from_array(center.map(f64::from));
         let rows = self.faces[0].map.transpose();
@@ -270,6 +273,7 @@ impl View {
 
     /// Returns the number of faces: 1, or 6 if it looks all around.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_faces(&self) -> usize {
         self.n_faces
     }

@@ -101,6 +101,7 @@ impl PackedFiles {
     /// # Errors
     ///
     /// As [`PackedFiles::open`].
+    #[doc(hidden)]
     pub fn read_all(path: &Path) -> Result<PackedWorld, PackError> {
         let (head, files) = Self::open(path)?;
         let mut file = File::open(&files.pieces).map_err(|e| at(&files.pieces, &e))?;

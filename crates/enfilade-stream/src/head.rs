@@ -204,6 +204,7 @@ impl PackedHead {
     /// # Errors
     ///
     /// A world that breaks invariants.
+    #[doc(hidden)]
     pub fn encode(&self) -> Result<Vec<u8>, PackError> {
         let body = self.encode_body()?;
         let packed = compressed(&body, HEAD_RATIO)?;

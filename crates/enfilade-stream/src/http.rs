@@ -70,6 +70,7 @@ impl PackedHttp {
     /// # Errors
     ///
     /// As [`PackedHttp::open`].
+    #[doc(hidden)]
     pub fn read_all(url: &str) -> Result<PackedWorld, PackError> {
         let (head, place) = Self::open(url)?;
         let mut parts: Vec<(PieceAt, u64)> = (head.places.iter().copied())
@@ -114,6 +115,7 @@ impl PackedHttp {
 
     /// Returns what fetches ranges of its pieces, over one connection that is kept.
     #[must_use]
+    #[doc(hidden)]
     pub fn fetch(&self) -> HttpFetch {
         HttpFetch {
             place: self.clone(),

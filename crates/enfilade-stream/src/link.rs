@@ -81,12 +81,14 @@ impl SimulatedLink {
 
     /// Gives the pieces their bytes, in the order of the catalog.
     #[must_use]
+    #[doc(hidden)]
     pub fn with_contents(mut self, contents: Vec<Vec<u8>>) -> Self {
         self.contents = contents;
         self
     }
 
     /// Cuts the link, or mends it. What is on its way over a cut link fails, as do requests, after the latency.
+    #[doc(hidden)]
     pub fn set_down(&mut self, is_down: bool) {
         self.is_down = is_down;
         if is_down {

@@ -51,6 +51,7 @@ impl PackedWorld {
     /// # Errors
     ///
     /// The first difference.
+    #[doc(hidden)]
     pub fn check(&self, file: &[u8]) -> Result<(), PackError> {
         let differs = |what: &str| Err(damaged(format!("{what} is not that of its pieces")));
         let Divided {
@@ -116,6 +117,7 @@ impl PackedWorld {
 
     /// Returns the packed bytes of a piece; `None` if there is none, or the bytes end before.
     #[must_use]
+    #[doc(hidden)]
     pub fn packed(&self, piece: PieceId) -> Option<&[u8]> {
         let at = self.head.places.get(piece.idx())?;
         let size = self.head.catalog.pieces()[piece.idx()].n_packed;
@@ -135,6 +137,7 @@ impl PackedHead {
     /// # Errors
     ///
     /// The problem, in words.
+    #[doc(hidden)]
     pub fn expand(&self, piece: PieceId, packed: &[u8]) -> Result<Vec<u8>, String> {
         let places = self.places.get(piece.idx());
         let at = places.ok_or_else(|| "there is no such piece".to_owned())?;

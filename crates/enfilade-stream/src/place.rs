@@ -21,6 +21,7 @@ pub enum PackedPlace {
 impl PackedPlace {
     /// Returns `true` for addresses: what begins with `http://` or `https://`, in capitals or not.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_url(place: impl AsRef<Path>) -> bool {
         let place = place.as_ref().to_string_lossy();
         let begins = |scheme: &str| {

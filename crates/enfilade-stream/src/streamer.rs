@@ -50,6 +50,7 @@ const MANY_FAILURES: u32 = 3;
 
 /// A cell cannot be pinned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PinError {
     /// The catalog does not have it.
     #[error("{cell} is not in the catalog, which has {n_cells} cells")]
@@ -75,6 +76,7 @@ pub enum PinError {
 
 /// Numbers for people: bars on a screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct StreamCounts {
     /// Memory of all pieces in memory, on their way or not handed over. [Units: bytes]
     pub n_kept: u64,

@@ -1,6 +1,7 @@
 //! Sources that fetch on threads of their own.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -61,6 +62,12 @@ impl Shared {
 /// own.
 pub struct ThreadSource {
     shared: Arc<Shared>,
+}
+
+impl fmt::Debug for ThreadSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ThreadSource").finish_non_exhaustive()
+    }
 }
 
 impl ThreadSource {

@@ -27,6 +27,8 @@ enum About {
     Inside,
     /// A place without a cell.
     Matter,
+    /// A reason of a later version: a finding wherever it stands.
+    Unknown,
 }
 
 impl About {
@@ -51,6 +53,7 @@ impl About {
             Reason::Land => Self::Land,
             Reason::Wide | Reason::Unframed | Reason::Merged | Reason::Sheltered => Self::Inside,
             Reason::Solid | Reason::Crevice => Self::Matter,
+            _ => Self::Unknown,
         }
     }
 
@@ -64,6 +67,7 @@ impl About {
             Self::Land => "land",
             Self::Inside => "places within a cell",
             Self::Matter => "matter",
+            Self::Unknown => "nothing known",
         }
     }
 }

@@ -26,6 +26,7 @@ const FAR: f64 = 0.25;
 
 /// Outcomes of the segments for *sealed*. All but `crossings` and `drawn` add up to `drawn`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct SealedCounts {
     /// Segments drawn.
     pub drawn: u64,
@@ -48,6 +49,7 @@ pub struct SealedCounts {
 
 /// Outcomes of the rays for *complete*. All but `drawn` add up to `drawn`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct CompleteCounts {
     /// Rays drawn.
     pub drawn: u64,
@@ -65,6 +67,7 @@ pub struct CompleteCounts {
 
 /// Outcomes of the lines for *conservative*, if a world stores visible volumes and parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct VisibleCounts {
     /// Lines aimed at hidden things.
     pub drawn: u64,
@@ -77,6 +80,7 @@ pub struct VisibleCounts {
 /// A kind of broken promise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum FailureKind {
     /// *Sealed*: the cell changed on the path where there is no portal.
     MissedPortal,
@@ -105,7 +109,7 @@ pub enum FailureKind {
 impl FailureKind {
     /// Returns the promise that it breaks.
     #[must_use]
-    pub fn promise(self) -> &'static str {
+    pub(crate) fn promise(self) -> &'static str {
         match self {
             Self::Unlisted | Self::MissingTriangle => "complete",
             Self::Hidden | Self::OutsideVolume | Self::HiddenPart => "conservative",
@@ -132,6 +136,7 @@ impl FailureKind {
 
 /// All failures of the same kind, cells and portal, with the surest example.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Failure {
     /// Kind of broken promise.
     pub kind: FailureKind,
@@ -267,6 +272,7 @@ impl Tally {
 
 /// The outcome of [`verify_world`](crate::verify_world).
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct VerifyReport {
     /// Cells of the world.
     pub cells: usize,

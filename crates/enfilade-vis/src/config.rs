@@ -1,5 +1,6 @@
 //! Settings, context and errors of [`see_all`](crate::see_all).
 
+use std::fmt;
 use std::time::Duration;
 
 use enfilade_cpg::SightGraphError;
@@ -64,6 +65,7 @@ impl Default for VisConfig {
 
 /// The reasons why nothing was computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VisError {
     /// The graph is broken.
     #[error(transparent)]
@@ -116,6 +118,15 @@ pub struct VisContext<'a> {
     pub checkpoint: Option<VisCheckpoint<'a>>,
 }
 
+impl fmt::Debug for VisContext<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("VisContext")
+            .field("n_walls", &self.walls.map(<[_]>::len))
+            .field("checkpoint", &self.checkpoint)
+            .finish_non_exhaustive()
+    }
+}
+
 /// Finished blocks of a search, kept in a folder or elsewhere; see [`VisPlan`](crate::VisPlan).
 pub trait VisBlocks {
     /// Returns the bytes that were put under a key, if they are there.
@@ -136,4 +147,13 @@ pub struct VisCheckpoint<'a> {
     pub every: Duration,
     /// Receives the state whenever a save is due, and when [`VisContext::on_round`] stops the search.
     pub save: &'a mut (dyn FnMut(Vec<u8>) + Send),
+}
+
+impl fmt::Debug for VisCheckpoint<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("VisCheckpoint")
+            .field("salt", &self.salt)
+            .field("every", &self.every)
+            .finish_non_exhaustive()
+    }
 }

@@ -5,6 +5,7 @@ use enfilade_geom::DVec3;
 
 /// A line that proves that cells see each other.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Witness {
     /// A point in one of the openings it crosses. [Units: wu]
     pub origin: DVec3,
@@ -16,6 +17,7 @@ pub struct Witness {
 
 /// Precomputed visibility of a graph.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct VisOutput {
     /// For each cell, the cells that might be seen from it, itself included. Symmetric, unless special portals show
     /// more ([`see_world`](crate::see_world)).

@@ -30,6 +30,7 @@ use crate::unfold::{Goal, Node, Unfolded};
 
 /// Precomputed visibility of a world's graph, special portals included.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct WorldVis {
     /// The answer. Not symmetric if the graph has special portals. Witnesses are lines that pass none, and all pairs
     /// that are seen through one count as undecided if walls are given.

@@ -1,5 +1,7 @@
 //! Shared cell and portal layout of all queries.
 
+use std::fmt;
+
 use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, SpecialId, Way, World};
 use enfilade_geom::{Aabb, DVec3, Plane, Similarity, Winding, world_tolerance};
 
@@ -28,6 +30,7 @@ pub struct Layout {
 
 /// Extent of a cell.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct CellShape {
     /// Bounding box. For outdoors, the scene's padded box. [Units: wu]
     pub bounds: Aabb,
@@ -76,6 +79,15 @@ pub(crate) struct SpecialSide {
 pub struct Opening<'a> {
     layout: &'a Layout,
     shape: &'a OpeningShape,
+}
+
+impl fmt::Debug for Opening<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Opening")
+            .field("cells", &self.cells())
+            .field("kind", &self.kind())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Layout {
@@ -274,7 +286,7 @@ impl Layout {
     ///
     /// If there is no such cell.
     #[must_use]
-    pub fn distance_to_exits(&self, cell: CellId, p: DVec3) -> f64 {
+    pub(crate) fn distance_to_exits(&self, cell: CellId, p: DVec3) -> f64 {
         let first = &self.first_exit[cell.idx()..];
         let bounds = &self.exit_bounds[first[0] as usize..first[1] as usize];
         let squares = bounds.iter().map(|b| b.distance_squared(p));
@@ -296,12 +308,13 @@ impl Layout {
 
     /// Returns the number of special portals.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_specials(&self) -> usize {
         self.specials.len()
     }
 
     /// Returns the special portals that a cell sees, ascending. O(log).
-    pub fn specials_of(&self, cell: CellId) -> impl ExactSizeIterator<Item = SpecialId> {
+    pub(crate) fn specials_of(&self, cell: CellId) -> impl ExactSizeIterator<Item = SpecialId> {
         let all = &self.specials_by_cell;
         let first = all.partition_point(|s| s.0 < cell);
         let end = all.partition_point(|s| s.0 <= cell);
@@ -315,6 +328,7 @@ impl Layout {
     ///
     /// If there is no such special portal; likewise in all queries of one.
     #[must_use]
+    #[doc(hidden)]
     pub fn special_opening(&self, special: SpecialId) -> Opening<'_> {
         Opening {
             layout: self,
@@ -324,7 +338,7 @@ impl Layout {
 
     /// Returns the doorway of which a special portal is a side.
     #[must_use]
-    pub fn portal_of_special(&self, special: SpecialId) -> Option<PortalId> {
+    pub(crate) fn portal_of_special(&self, special: SpecialId) -> Option<PortalId> {
         self.specials[special.idx()].portal
     }
 
@@ -334,6 +348,7 @@ impl Layout {
     ///
     /// If there is no such pass.
     #[must_use]
+    #[doc(hidden)]
     pub fn map_of_pass(&self, special: SpecialId, pass: usize) -> Option<&Similarity> {
         self.specials[special.idx()].maps[pass].as_ref()
     }
@@ -341,7 +356,7 @@ impl Layout {
     /// Returns where those who pass a special portal come out: the cell, and the map from here to there. `None` if nobody
     /// passes it.
     #[must_use]
-    pub fn passage(&self, special: SpecialId) -> Option<(CellId, &Similarity)> {
+    pub(crate) fn passage(&self, special: SpecialId) -> Option<(CellId, &Similarity)> {
         let side = &self.specials[special.idx()];
         let (to, pass) = side.leads_to?;
         Some((to, side.maps[pass].as_ref()?))
@@ -350,6 +365,7 @@ impl Layout {
     /// Returns the rectangle around a special portal, upright as far as its plane allows, as seen from its cell: its lower left
     /// vertex, and its edges to the right and up. A monitor's picture fills it. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn special_rectangle(&self, special: SpecialId) -> [DVec3; 3] {
         let opening = self.special_opening(special);
         let normal = opening.normal();
@@ -379,12 +395,14 @@ impl Layout {
 
     /// As [`Layout::locate`]; also returns a distance from the point within which the cell is certainly the same. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn locate_with_room(&self, p: DVec3) -> (Option<CellId>, f64) {
         self.locator.locate_with_room(p)
     }
 
     /// Adds to `cells` those that the hull of `points`, grown by `margin`, may touch; `cells` stays ascending and without
     /// repeats. `stack` is a buffer to keep between calls. As [`Locator::cells_near`]. [Units: wu]
+    #[doc(hidden)]
     pub fn cells_near(
         &self,
         points: &[DVec3],
@@ -404,6 +422,7 @@ impl Layout {
 
     /// Returns the largest deviation of stored from true geometry by rounding. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
@@ -430,6 +449,7 @@ impl<'a> Opening<'a> {
 
     /// Returns the signed distance of a point from its plane, above 0 on the side of the second cell. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn height_of(&self, p: DVec3) -> f64 {
         self.shape.normal.dot(p - self.shape.center)
     }
@@ -442,6 +462,7 @@ impl<'a> Opening<'a> {
 
     /// Returns the radius of the bounding sphere about the center. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn radius(&self) -> f64 {
         self.shape.radius
     }
@@ -460,6 +481,7 @@ impl<'a> Opening<'a> {
 
     /// Returns `true` if a point of its plane is in one of its pieces, or within `margin` of the line of each edge. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn is_over(&self, p: DVec3, margin: f64) -> bool {
         let normal = self.normal();
         self.pieces().any(|piece| {
@@ -471,6 +493,7 @@ impl<'a> Opening<'a> {
     }
 
     /// Returns its convex pieces, each counter-clockwise seen from the second cell. [Units: wu]
+    #[doc(hidden)]
     pub fn pieces(&self) -> impl ExactSizeIterator<Item = &'a [DVec3]> + Clone + use<'a> {
         let (layout, [first, end]) = (self.layout, self.shape.pieces);
         (first as usize..end as usize).map(move |i| {

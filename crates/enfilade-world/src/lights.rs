@@ -6,6 +6,8 @@
 //!
 //! The lit cells are computed on the first query after a change, O(cells lit), and kept.
 
+use std::fmt;
+
 use enfilade_cpg::PortalId;
 use enfilade_geom::DVec3;
 use enfilade_runtime::{SeeOptions, View};
@@ -66,6 +68,14 @@ pub struct Lights {
     seen: Vec<LampId>,
     /// Number of the last change of the space that it knows.
     known: u64,
+}
+
+impl fmt::Debug for Lights {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Lights")
+            .field("n_lamps", &self.lamps.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Lights {
@@ -166,6 +176,7 @@ impl Lights {
     }
 
     /// Returns the places that a lamp lights, each at least once and none missing; none for a lamp that does not exist.
+    #[doc(hidden)]
     pub fn lit_by(&mut self, space: &Space, id: LampId) -> impl Iterator<Item = Place> + use<'_> {
         self.update(space);
         let lit = self.lamps.get(id.0 as usize);

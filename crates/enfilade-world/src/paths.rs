@@ -62,6 +62,7 @@ mod ways;
 
 /// A path found. Reuse it, so that a search need not allocate.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Path {
     /// Points where it bends, in plan or in height: on the floor, from the start to the end. Where it goes from part to part, a
     /// point in each.
@@ -85,6 +86,7 @@ pub struct PathPoint {
 
 /// A portal of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PathPortal {
     /// The part whose portal it is.
     pub part: PartId,

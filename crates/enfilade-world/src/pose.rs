@@ -92,6 +92,7 @@ impl Pose {
 
     /// Returns the rotation as a matrix.
     #[must_use]
+    #[doc(hidden)]
     pub fn matrix3(&self) -> DMat3 {
         DMat3::from_quat(self.turn)
     }
@@ -105,6 +106,7 @@ impl Pose {
     /// Returns the pose at a fraction `t` of the way to `end`: the origin moves in a straight line, while the frame rotates
     /// uniformly by the lesser angle. [Limit: `t` from 0 to 1]
     #[must_use]
+    #[doc(hidden)]
     pub fn toward(&self, end: &Self, t: f64) -> Self {
         Self {
             turn: self.turn.slerp(end.turn, t),
@@ -114,6 +116,7 @@ impl Pose {
 
     /// Returns `true` if all its numbers are finite and its rotation has unit length.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_rigid(&self) -> bool {
         self.at.is_finite() && (self.turn.length_squared() - 1.0).abs() < 1e-6
     }

@@ -78,24 +78,28 @@ impl Shape {
 
     /// Returns the points.
     #[must_use]
+    #[doc(hidden)]
     pub fn points(&self) -> &[DVec3] {
         &self.points
     }
 
     /// Returns the growth of their hull. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
     /// Returns its greatest distance from its origin. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn reach(&self) -> f64 {
         let far = self.points.iter().map(|p| p.length());
         far.fold(0.0, f64::max) + self.radius
     }
 
     /// Writes the positions of its points in `pose` into `into`.
+    #[doc(hidden)]
     pub fn place(&self, pose: &Pose, into: &mut Vec<DVec3>) {
         into.clear();
         into.extend(self.points.iter().map(|p| pose.point(*p)));

@@ -472,18 +472,6 @@ impl Space {
         self.parts.len()
     }
 
-    /// Returns the number of cells of all parts.
-    #[must_use]
-    pub fn n_cells(&self) -> usize {
-        self.n_cells
-    }
-
-    /// Returns the number of a cell among those of all parts; those of the root come first.
-    #[must_use]
-    pub fn cell_number(&self, place: Place) -> u32 {
-        self.parts[place.part.idx()].first_cell + place.cell.0
-    }
-
     /// Returns the world of a part.
     #[must_use]
     pub fn world(&self, part: PartId) -> &Arc<World> {
@@ -514,7 +502,7 @@ impl Space {
 
     /// Returns what lines of sight can hit in a part. The first query of one of its copies prepares it.
     #[must_use]
-    pub fn sightlines(&self, part: PartId) -> &Sightlines {
+    pub(crate) fn sightlines(&self, part: PartId) -> &Sightlines {
         let part = &self.parts[part.idx()];
         (part.lines).get_or_init(|| Sightlines::build(&part.world))
     }
@@ -533,12 +521,14 @@ impl Space {
 
     /// Returns the pose of a part in its host's frame.
     #[must_use]
+    #[doc(hidden)]
     pub fn local_pose(&self, part: PartId) -> &Pose {
         &self.parts[part.idx()].local
     }
 
     /// Returns the part in which it stands; the root for the root.
     #[must_use]
+    #[doc(hidden)]
     pub fn host(&self, part: PartId) -> PartId {
         self.parts[part.idx()].host
     }
@@ -554,12 +544,14 @@ impl Space {
 
     /// Returns the parts that stand in a cell, ascending.
     #[must_use]
+    #[doc(hidden)]
     pub fn guests(&self, place: Place) -> &[PartId] {
         &self.parts[place.part.idx()].guests[place.cell.idx()]
     }
 
     /// Returns the doors of other parts that a part's door currently meets, within the tolerance of [`Docking`].
     #[must_use]
+    #[doc(hidden)]
     pub fn meets(&self, part: PartId, portal: PortalId) -> &[(PartId, PortalId)] {
         let doors = &self.parts[part.idx()].doors;
         let door = doors.iter().find(|d| d.portal == portal);

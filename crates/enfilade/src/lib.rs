@@ -124,8 +124,31 @@
 //! # Conventions, everywhere
 //!
 //! Right-handed, +Y up, meters; front faces are counter-clockwise; ranges are half-open; builders
-//! compute in `f64`, files hold `f32`; ids are indices into lists. Points and directions in run-time queries and their
-//! answers are `[f32; 3]`, as in the file.
+//! compute in `f64`, files hold `f32`; ids are indices into lists.
+//!
+//! Points and directions are of one of two types:
+//!
+//! | modules | type | why |
+//! | --- | --- | --- |
+//! | this one, [`cpg`], [`runtime`], `stream`; lamps of `world` | `[f32; 3]` | as in the file, and without a library of vectors |
+//! | [`geom`], `import`, `bake`, `vis`, `world`, `kit`, `edit`; the [`Locator`](cpg::Locator) | [`DVec3`](geom::DVec3) | they compute in `f64` |
+//! | `render` | `glam::Vec3`, and `DVec3` in spaces | as shaders do |
+//!
+//! [`glam`] is re-exported, so that nobody needs to find its version: `DVec3::from(p.map(f64::from))` and
+//! `p.as_vec3().to_array()` convert.
+//!
+//! # What is promised
+//!
+//! The items that this crate names, and nothing else, are the API; `api.txt` beside its sources lists them all. While the
+//! version is 0.x, a minor version may break them, and a patch version does not. The crates behind it (`enfilade-bake` and so
+//! on) may change with any version, and so may what is hidden from these pages.
+//!
+//! - **Settings** are made with `..Default::default()`, as in `BakeConfig { min_opening: 0.7, ..BakeConfig::default() }`: a
+//!   patch version may add a field.
+//! - **Results, errors and reasons** are `#[non_exhaustive]` where they may grow: match them with `..` and `_`.
+//! - **Parts of worlds and scenes** ([`World`], [`Cell`], [`Portal`], [`Scene`](geom::scene::Scene)) are made by users, too. A
+//!   new field is a new minor version.
+//! - All types are `Debug`, `Send` and `Sync`, unless they say why not.
 //!
 //! # Limits
 //!
@@ -135,28 +158,50 @@
 mod file;
 pub mod whole;
 
-pub use enfilade_cpg as cpg;
-pub use enfilade_geom as geom;
-pub use enfilade_runtime as runtime;
+pub use glam;
 
 #[cfg(feature = "bake")]
-pub use enfilade_bake as bake;
+pub mod bake;
+pub mod cpg;
 #[cfg(feature = "edit")]
-pub use enfilade_edit as edit;
+pub mod edit;
+pub mod geom;
 #[cfg(feature = "import")]
-pub use enfilade_import as import;
+pub mod import;
 #[cfg(feature = "kit")]
-pub use enfilade_kit as kit;
+pub mod kit;
 #[cfg(feature = "render")]
-pub use enfilade_render as render;
+pub mod render;
+pub mod runtime;
 #[cfg(feature = "stream")]
-pub use enfilade_stream as stream;
+pub mod stream;
 #[cfg(feature = "verify")]
-pub use enfilade_verify as verify;
+pub mod verify;
 #[cfg(feature = "vis")]
-pub use enfilade_vis as vis;
+pub mod vis;
 #[cfg(feature = "world")]
-pub use enfilade_world as world;
+pub mod world;
+/// All that our crates make public for each other: for the command and the benchmarks. Not part of the promise.
+#[doc(hidden)]
+pub mod internals {
+    #[cfg(feature = "bake")]
+    pub use enfilade_bake as bake;
+    pub use enfilade_cpg as cpg;
+    #[cfg(feature = "edit")]
+    pub use enfilade_edit as edit;
+    pub use enfilade_geom as geom;
+    #[cfg(feature = "import")]
+    pub use enfilade_import as import;
+    #[cfg(feature = "kit")]
+    pub use enfilade_kit as kit;
+    pub use enfilade_runtime as runtime;
+    #[cfg(feature = "stream")]
+    pub use enfilade_stream as stream;
+    #[cfg(feature = "vis")]
+    pub use enfilade_vis as vis;
+    #[cfg(feature = "world")]
+    pub use enfilade_world as world;
+}
 
 pub use cpg::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Exit, Portal, PortalId, PortalKind, Pvs,

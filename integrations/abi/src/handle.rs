@@ -347,7 +347,7 @@ impl EnfWorld {
     /// Never.
     pub fn start(&mut self) -> Result<Option<EnfStart>, Failure> {
         let start = Start::find(&self.world, &self.sight, &self.state);
-        Ok(start.map(|Start { eye, yaw }| EnfStart { eye, yaw }))
+        Ok(start.map(|Start { eye, yaw, .. }| EnfStart { eye, yaw }))
     }
 
     /// Follows a step from cell to cell.

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use enfilade::bake::bsp::find_leak;
 use enfilade::bake::{BakeConfig, BakeContext, Method, Progress, Stage, bake};
 use enfilade::cpg::wire::{decode_glb, encode_glb};
 use enfilade::geom::DMat4;
@@ -11,6 +10,7 @@ use enfilade::geom::scene::Scene;
 use enfilade::import::{
     ArrayMesh, IfcConverter, ImportOptions, ImportReport, Imported, import, import_arrays,
 };
+use enfilade::internals::bake::bsp::find_leak;
 use enfilade_report::{InputDoubt, Verdict, is_empty, why_empty};
 use enfilade_settings::{Resolved, Settings, parse_toml};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};

@@ -36,6 +36,7 @@ const BEND: f64 = 1e-3;
 
 /// A world with one more portal.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Added {
     /// The world.
     pub world: World,

@@ -10,6 +10,7 @@ use crate::{BakeError, Stage};
 
 /// A world after a change of its scene.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Rebaked {
     /// The world.
     pub world: World,

@@ -41,6 +41,7 @@ impl Default for CostModel {
     shown(name),
     shown(known)
 )]
+#[non_exhaustive]
 pub struct UnknownMaterial {
     /// Its name.
     pub name: String,

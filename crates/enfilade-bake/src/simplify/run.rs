@@ -10,6 +10,7 @@ use super::{apply, metric, views};
 
 /// A simplified world and its costs.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Simplified {
     /// The world.
     pub world: World,

@@ -43,7 +43,7 @@ pub struct SimplifySettings {
 impl SimplifySettings {
     /// Returns every setting by name, as text, for the provenance of the file.
     #[must_use]
-    pub fn to_settings(&self) -> BTreeMap<String, String> {
+    pub(crate) fn to_settings(&self) -> BTreeMap<String, String> {
         let number = |v: Option<f64>| v.map_or_else(|| "none".to_owned(), |v| v.to_string());
         let mut out: BTreeMap<String, String> = [
             ("simplify.min_cost", self.min_cost.to_string()),

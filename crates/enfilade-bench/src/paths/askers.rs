@@ -4,7 +4,8 @@
 use std::f64::consts::PI;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::{Bvh, DQuat, DVec3, Ray, Triangle};
+use enfilade::geom::{DQuat, DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Ray};
 use enfilade::world::{
     Acoustics, Agent, Body, Cast, Caster, Heard, Listener, PartId, Path, PathSearch, Place, Pose,
     Space, Transmission, WalkMap, Walker,

@@ -11,8 +11,9 @@ use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::ray::segment_to_triangle_distance;
-use enfilade::geom::{Aabb, DMat4, DQuat, DVec3, Triangle, closest_point_on_triangle};
+use enfilade::geom::{Aabb, DMat4, DQuat, DVec3, Triangle};
+use enfilade::internals::geom::closest_point_on_triangle;
+use enfilade::internals::geom::ray::segment_to_triangle_distance;
 use enfilade::runtime::DetailId;
 use enfilade::world::{Body, Cast, Caster, Impact, Layout, PartId, Place, Space};
 use enfilade::{CellId, World};

@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::{Aabb, Bvh, DQuat, DVec3, Sets, Triangle};
+use enfilade::geom::{Aabb, DQuat, DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Sets};
 use enfilade::runtime::View;
 use enfilade::world::{PartId, Place, Pose, Shape, Space, SpaceViewer, ThingId, Things, Tie};
 use enfilade::{CellId, PortalId, World};

@@ -2,7 +2,8 @@
 
 use enfilade::World;
 use enfilade::cpg::Portal;
-use enfilade::geom::{Aabb, DVec3, Sets, Triangle};
+use enfilade::geom::{Aabb, DVec3, Triangle};
+use enfilade::internals::geom::Sets;
 use enfilade::world::Pose;
 use enfilade_testkit::oracle::{ball_meets, box_meets};
 

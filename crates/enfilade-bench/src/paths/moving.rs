@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use anyhow::ensure;
-use enfilade::geom::{DQuat, DVec3, Ray};
+use enfilade::geom::{DQuat, DVec3};
+use enfilade::internals::geom::Ray;
 use enfilade::runtime::{Sightlines, View};
 use enfilade::world::{PartId, Passing, Pose, Shape, Space, SpaceViewer, Things, Tie};
 use enfilade::{PortalId, World};

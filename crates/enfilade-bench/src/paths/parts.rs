@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::{Aabb, DVec3, Ray};
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::internals::geom::Ray;
 use enfilade::runtime::View;
 use enfilade::world::{PartId, Pose, Shape, Space, SpaceViewer, Things, Tie};
 use enfilade::{PortalId, World};

@@ -3,7 +3,8 @@
 use std::collections::HashSet;
 
 use enfilade::World;
-use enfilade::geom::{Aabb, Bvh, DVec3, Ray};
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::internals::geom::{Bvh, Ray};
 use enfilade::runtime::{ChunkId, DetailId};
 use enfilade::world::{PartId, Pose, Space, SpaceSeen};
 use enfilade_testkit::Solids;

@@ -4,7 +4,8 @@
 use std::time::Instant;
 
 use anyhow::Context;
-use enfilade::geom::{Aabb, DVec3, Sets};
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::internals::geom::Sets;
 use enfilade::runtime::{Sight, SightOptions, SightState, View, Viewer};
 use enfilade::world::{Flood, PartId, Place, Pose, Posted, Shape, Space, SpaceViewer, Things, Tie};
 use enfilade::{CellId, World};

@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
-use enfilade::bake::bsp::{Bsp, BspInput, Guide, Heuristic};
-use enfilade::bake::simplify::{
-    CostModel, Metric, SimplifySettings, expected_cost, expected_cost_after, least_expected_cost,
-    simplify,
-};
+use enfilade::bake::bsp::{Guide, Heuristic};
+use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings, simplify};
 use enfilade::bake::{BakeConfig, BakeContext, Method, Silent, bake};
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::import::{ImportOptions, import};
+use enfilade::internals::bake::bsp::{Bsp, BspInput};
+use enfilade::internals::bake::simplify::{
+    expected_cost, expected_cost_after, least_expected_cost,
+};
 use enfilade_cli::world::read_world;
 use enfilade_testkit::clinic;
 

@@ -5,7 +5,8 @@
 
 use anyhow::ensure;
 use enfilade::cpg::{Pass, PortalId, PortalKind, SpecialId, SpecialPortal, SpecialShape, Way};
-use enfilade::geom::{DQuat, DVec3, Similarity, world_tolerance};
+use enfilade::geom::{DQuat, DVec3, Similarity};
+use enfilade::internals::geom::world_tolerance;
 use enfilade::runtime::View;
 use enfilade::world::{Body, Cast, Caster, PartId, Place, Space, SpaceViewer};
 use enfilade::{CellId, World};

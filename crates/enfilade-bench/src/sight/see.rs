@@ -245,13 +245,14 @@ pub(crate) fn bench_los(
             .map(|(a, b)| lines.first_hit(*a, *b))
             .collect();
         let whole_ns = start.elapsed().as_secs_f64() * 1e9 / pairs.max(1) as f64;
-        let same = |a: &Option<enfilade::runtime::SightHit>,
-                    b: &Option<enfilade::runtime::SightHit>| match (a, b) {
-            (Some(a), Some(b)) => {
-                (a.t, a.batch, a.triangle, a.front) == (b.t, b.batch, b.triangle, b.front)
-            }
-            (a, b) => a.is_none() && b.is_none(),
-        };
+        let same =
+            |a: &Option<enfilade::internals::runtime::SightHit>,
+             b: &Option<enfilade::internals::runtime::SightHit>| match (a, b) {
+                (Some(a), Some(b)) => {
+                    (a.t, a.batch, a.triangle, a.front) == (b.t, b.batch, b.triangle, b.front)
+                }
+                (a, b) => a.is_none() && b.is_none(),
+            };
         let differ = by_cells
             .iter()
             .zip(&whole)

@@ -5,11 +5,12 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use enfilade::bake::{BakeConfig, BakeContext, Pieces, bake, bake_pieces, piece_keys};
+use enfilade::bake::{BakeConfig, BakeContext, Pieces, bake};
 use enfilade::cpg::World;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::Scene;
+use enfilade::internals::bake::{bake_pieces, piece_keys};
 
 use super::bakes::on_land;
 use crate::rows::Figure;

@@ -1,9 +1,8 @@
 //! Decay times of rooms against ray tracing.
 
 use anyhow::Context;
-use enfilade::CellId;
-use enfilade::PortalId;
 use enfilade::world::{DecayLaw, DiffuseFields, PartId, Place, Reverb, Space};
+use enfilade::{CellId, PortalId};
 use enfilade_testkit::{GridParams, room_grid};
 
 use crate::rows::Figure;

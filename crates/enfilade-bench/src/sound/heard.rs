@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use anyhow::Context;
 use enfilade::geom::DVec3;
+use enfilade::internals::world::TautString;
 use enfilade::world::{
-    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, PartId, Place, Reverb, Space, TautString,
+    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, PartId, Place, Reverb, Space,
     Transmission,
 };
 use enfilade::{CellId, PortalId, World};

@@ -1,7 +1,8 @@
 //! Areas of the walls of rooms, against the rooms of the model's author.
 
 use anyhow::Context;
-use enfilade::geom::{DVec3, triangle_area_normal};
+use enfilade::geom::DVec3;
+use enfilade::internals::geom::triangle_area_normal;
 use enfilade::world::{DecayLaw, PartId, Place, Reverb, Space};
 use enfilade::{CellId, World};
 use serde_json::Value;

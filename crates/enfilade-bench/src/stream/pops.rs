@@ -4,10 +4,10 @@ use std::collections::HashSet;
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
-use enfilade::geom::{Bvh, DVec3, Ray, Triangle};
-use enfilade::stream::{
-    LinkOptions, PieceId, StreamOptions, deadlines, due_times, least_bandwidth,
-};
+use enfilade::geom::{DVec3, Triangle};
+use enfilade::internals::geom::{Bvh, Ray};
+use enfilade::internals::stream::{deadlines, due_times, least_bandwidth};
+use enfilade::stream::{LinkOptions, PieceId, StreamOptions};
 use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 

@@ -5,8 +5,9 @@ use std::time::Duration;
 use anyhow::Context;
 use enfilade::cpg::Pvs;
 use enfilade::geom::DVec3;
+use enfilade::internals::stream::images_of;
 use enfilade::runtime::{Sight, SightState, View, Viewer};
-use enfilade::stream::{Catalog, InView, PieceId, WorldPieces, images_of};
+use enfilade::stream::{Catalog, InView, PieceId, WorldPieces};
 use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
 

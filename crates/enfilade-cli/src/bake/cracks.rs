@@ -3,8 +3,8 @@
 use std::io::{self, Write};
 
 use enfilade::bake::BakeOutput;
-use enfilade::bake::complex::CRACK_WIDTH;
 use enfilade::cpg::PortalKind;
+use enfilade::internals::bake::complex::CRACK_WIDTH;
 
 /// Least fraction of the cracks that the proposed width closes.
 const MOST: f64 = 0.9;

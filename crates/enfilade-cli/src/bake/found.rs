@@ -7,7 +7,8 @@ use std::io::Write;
 use anyhow::bail;
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::shown;
-use enfilade::import::{CleaningOptions, ImportReport, RepairOptions, cleaning_report};
+use enfilade::import::{CleaningOptions, ImportReport, RepairOptions};
+use enfilade::internals::import::cleaning_report;
 
 use enfilade_report::InputDoubt;
 

@@ -2,8 +2,7 @@
 
 use std::io::{self, Write};
 
-use enfilade::bake::BakeOutput;
-use enfilade::bake::complex::Leak;
+use enfilade::bake::{BakeOutput, Leak};
 use enfilade::cpg::Portal;
 use enfilade::geom::{Aabb, DVec3};
 

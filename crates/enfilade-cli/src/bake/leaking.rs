@@ -5,8 +5,8 @@ use std::io::Write as _;
 
 use anyhow::bail;
 use enfilade::bake::BakeConfig;
-use enfilade::bake::bsp::find_leak;
 use enfilade::geom::scene::{Role, Scene};
+use enfilade::internals::bake::bsp::find_leak;
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
 

@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use enfilade::bake::{Method, Outdoors};
-use enfilade::geom::{Allowance, DVec3};
+use enfilade::geom::DVec3;
 use enfilade::import::{AirSide, HeightOptions, IfcConverter, ImportOptions, VolumeOptions};
+use enfilade::internals::geom::Allowance;
 use enfilade_settings::{
     Given, Settings, UpAxis, parse_hole, parse_length, parse_point, parse_toml, parse_unit,
     parse_weld,

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use enfilade::bake::delaunay::{Choice, Decision};
+use enfilade::internals::bake::delaunay::{Choice, Decision};
 
 use crate::bake::print_summary;
 use crate::formats::Format;
@@ -171,8 +171,9 @@ fn decided(decision: Decision, out: &mut impl Write) -> io::Result<()> {
 mod tests {
     use super::*;
     use crate::output::Outputs;
-    use enfilade::bake::delaunay::{Choices, Review, Session};
+    use enfilade::bake::delaunay::Choices;
     use enfilade::bake::{BakeConfig, BakeContext, Method, Silent};
+    use enfilade::internals::bake::delaunay::{Review, Session};
     use enfilade_testkit::{Variant, gjorup_rooms};
 
     /// The replies of the walk to some lines.

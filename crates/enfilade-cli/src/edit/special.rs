@@ -1,9 +1,11 @@
 //! Mirrors, monitors, tinted panes and links, as arguments of `edit`.
 
 use anyhow::{Context, bail};
-use enfilade::bake::edit::special::{self, LinkOptions, Spot};
+use enfilade::bake::edit::special;
+use enfilade::bake::edit::special::LinkOptions;
 use enfilade::cpg::{CellPortalGraph, MonitorCamera, PortalId, SpecialId, World};
 use enfilade::geom::{DMat4, Similarity, shown};
+use enfilade::internals::bake::edit::special::Spot;
 
 use super::{Polygon, parse_polygon};
 use crate::inspect::cell_of;

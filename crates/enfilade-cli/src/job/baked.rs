@@ -5,7 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use enfilade::bake::{BakeContext, bake_pieces, is_piece, piece_keys};
+use enfilade::bake::BakeContext;
+use enfilade::internals::bake::{bake_pieces, is_piece, piece_keys};
 
 use super::shards::{JobFinish, JobRun, Shards};
 use crate::bake::{self, Bake, Readied};

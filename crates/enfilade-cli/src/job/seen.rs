@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use enfilade::cpg::wire::is_world;
-use enfilade::vis::{VisConfig, VisContext, VisPlan, plain_sight};
+use enfilade::internals::vis::{VisPlan, plain_sight};
+use enfilade::vis::{VisConfig, VisContext};
 
 use super::shards::{JobFinish, JobRun, Shards};
 use crate::pieces::PieceFolder;

@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::PortalId;
-use enfilade::World;
 use enfilade::bake::{BakeConfig, BakeContext, bake};
 use enfilade::cpg::wire::{WireError, decode_glb};
 use enfilade::geom::DVec3;
 use enfilade::geom::scene::Scene;
 use enfilade::import::ImportOptions;
 use enfilade::kit::{Choice, Chosen, DEFAULT_TOLERANCE, Kit, Piece, Spot};
+use enfilade::{PortalId, World};
 use enfilade_settings::parse_toml;
 use serde::Deserialize;
 

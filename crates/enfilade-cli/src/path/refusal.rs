@@ -184,6 +184,8 @@ impl Wanted<'_> {
                     At(to.into())
                 )
             }
+            // A later version may have more.
+            _ => format!("the way ends at {}", At(blocked.at.into())),
         };
         // Only other maps tell whether objects, a low ceiling or a narrow place are in the way.
         let walks = self.walks;

@@ -69,13 +69,11 @@ pub(super) fn settle(
     studio.clear_portal_textures();
     let mut sum = PortalTextureCounts::default();
     for _ in 0..MOST_PLANS {
-        let now = plan(studio)?;
-        sum = PortalTextureCounts {
-            n_made: sum.n_made + now.n_made,
-            n_loaded: sum.n_loaded + now.n_loaded,
-            n_made_triangles: sum.n_made_triangles + now.n_made_triangles,
-            ..now
-        };
+        let (before, now) = (sum, plan(studio)?);
+        sum = now;
+        sum.n_made += before.n_made;
+        sum.n_loaded += before.n_loaded;
+        sum.n_made_triangles += before.n_made_triangles;
         if now.n_made + now.n_loaded + now.n_turning == 0 {
             break;
         }

@@ -62,8 +62,9 @@ impl Pointed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade::bake::edit::special::{Spot, mirror};
+    use enfilade::bake::edit::special::Spot;
     use enfilade::cpg::PortalId;
+    use enfilade::internals::bake::edit::special::mirror;
     use enfilade_render::portal_looked_at;
     use enfilade_testkit::{GridParams, room_grid};
 

@@ -78,11 +78,12 @@ impl Walker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade::bake::edit::special::{LinkOptions, Spot, link};
+    use enfilade::bake::edit::special::LinkOptions;
     use enfilade::cpg::{DetailObject, PortalId, World};
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
     use enfilade::geom::Aabb;
     use enfilade::geom::scene::{Mesh, Primitive};
+    use enfilade::internals::bake::edit::special::{Spot, link};
     use enfilade_testkit::{GridParams, room_grid};
 
     /// Rooms in a row, and a person in the middle of the first.

@@ -54,6 +54,7 @@ impl Default for RepairOptions {
 
 /// Changes of a repair.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RepairReport {
     /// Distinct vertices joined with another.
     pub welded_corners: u64,
@@ -88,6 +89,7 @@ pub struct RepairReport {
 impl RepairReport {
     /// Returns the counts with their names, in display order: changes first.
     #[must_use]
+    #[doc(hidden)]
     pub fn counts(&self) -> [(&'static str, u64); 12] {
         [
             ("vertices welded", self.welded_corners),

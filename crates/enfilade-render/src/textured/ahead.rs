@@ -46,6 +46,7 @@ impl Default for PortalTextureMaking {
 
 /// Progress of textures that are made ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PortalTextureProgress {
     /// Doorways are looked for.
     Looking {
@@ -67,6 +68,7 @@ pub enum PortalTextureProgress {
 
 /// Textures that were made ahead.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MadePortalTextures {
     /// The file, for [`Studio::load_portal_textures`].
     pub bytes: Vec<u8>,
@@ -124,6 +126,7 @@ impl Studio {
     /// # Errors
     ///
     /// If portal textures are off; a budget without room for a file; as [`Studio::picture`].
+    #[doc(hidden)]
     pub fn make_portal_textures(
         &mut self,
         world: &World,
@@ -154,6 +157,7 @@ impl Studio {
     ///
     /// If portal textures are off; a file that is damaged, of another version, for another world or light, or of textures
     /// with another side or other viewpoints.
+    #[doc(hidden)]
     pub fn load_portal_textures(&mut self, bytes: &[u8]) -> Result<usize, RenderError> {
         let own = self.portal_textures.as_mut();
         let own = own.ok_or(PortalTextureFileError::Off)?;

@@ -38,6 +38,7 @@ pub struct StepQuestion<'a> {
 /// Terminates: a window within earlier ones adds nothing, and a cell is entered at most 16 times per face.
 impl Viewer {
     /// Begins a query.
+    #[doc(hidden)]
     pub fn begin_steps(&mut self) {
         self.begin();
         self.stepping.crossings.clear();
@@ -45,6 +46,7 @@ impl Viewer {
     }
 
     /// Begins one face of the query.
+    #[doc(hidden)]
     pub fn begin_face(&mut self, question: &StepQuestion) {
         self.stepping.border = question.border.map(|c| c.0);
         self.stepping.gate = question.gate;
@@ -55,6 +57,7 @@ impl Viewer {
     }
 
     /// Adds the eye, in a cell or in none.
+    #[doc(hidden)]
     pub fn add_eye(&mut self, question: &StepQuestion, cell: Option<CellId>) {
         self.stepping.is_on = true;
         let precomputed = std::mem::replace(&mut self.options.precomputed, false);
@@ -68,6 +71,7 @@ impl Viewer {
     /// # Panics
     ///
     /// If there is no such cell.
+    #[doc(hidden)]
     pub fn add_window(&mut self, question: &StepQuestion, cell: CellId, window: &Window) {
         let Window {
             region,
@@ -80,6 +84,7 @@ impl Viewer {
     }
 
     /// Continues the traversal from everything added so far.
+    #[doc(hidden)]
     pub fn advance(&mut self, question: &StepQuestion) {
         self.stepping.is_on = true;
         self.traversal(question).run();
@@ -87,17 +92,20 @@ impl Viewer {
     }
 
     /// Appends to `into` the visits of watched cells and of the border since the last call.
+    #[doc(hidden)]
     pub fn take_crossings(&mut self, into: &mut Vec<Crossing>) {
         into.append(&mut self.stepping.crossings);
     }
 
     /// Appends to `into` the views of special portals since the last call, in no order.
+    #[doc(hidden)]
     pub fn take_specials(&mut self, into: &mut Vec<SpecialView>) {
         into.append(&mut self.stepping.specials);
     }
 
     /// Returns everything seen so far.
     #[must_use]
+    #[doc(hidden)]
     pub fn answer(&self) -> Seen<'_> {
         Seen { lists: &self.out }
     }

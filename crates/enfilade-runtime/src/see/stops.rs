@@ -79,6 +79,7 @@ impl Stops {
 
     /// Returns `true` if there are none.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.beyond == f32::INFINITY && self.chosen.is_empty()
     }

@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::fmt;
 
 use glam::DVec3;
 
@@ -94,6 +95,14 @@ pub struct Viewer {
     pub(super) shadows: Shadows,
     pub(super) out: Lists,
     pub(super) stepping: Stepping,
+}
+
+impl fmt::Debug for Viewer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Viewer")
+            .field("options", &self.options)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Viewer {

@@ -116,6 +116,7 @@ impl SightSkeleton {
 
     /// Returns the options that the sight was built with; chunks follow from them.
     #[must_use]
+    #[doc(hidden)]
     pub fn options(&self) -> &SightOptions {
         &self.options
     }

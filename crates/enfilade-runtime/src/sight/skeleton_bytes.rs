@@ -45,6 +45,7 @@ fn damaged(what: &'static str) -> SkeletonError {
 impl SightSkeleton {
     /// Returns it as bytes for [`SightSkeleton::decode`]; equal skeletons give equal bytes.
     #[must_use]
+    #[doc(hidden)]
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Writer(MARK.to_vec());
         out.words([VERSION]);
@@ -109,6 +110,7 @@ impl SightSkeleton {
     /// # Errors
     ///
     /// If the bytes are of another format or version, or damaged.
+    #[doc(hidden)]
     pub fn decode(bytes: &[u8]) -> Result<Self, SkeletonError> {
         let rest = bytes
             .strip_prefix(&MARK)

@@ -39,6 +39,7 @@ pub struct Frame<'a> {
 
 /// Output of a frame. Reuse it, so that a frame need not allocate.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Changes {
     /// Pieces to free. The memory of those in `added` counts on it.
     pub removed: Vec<PieceId>,
@@ -52,6 +53,7 @@ pub struct Changes {
 
 /// A piece that arrived.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Loaded {
     /// The piece.
     pub piece: PieceId,
@@ -61,6 +63,7 @@ pub struct Loaded {
 
 /// A request that failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Failed {
     /// The piece.
     pub piece: PieceId,
@@ -72,6 +75,7 @@ pub struct Failed {
 
 /// A cell in view that is not complete: draw its mean color, or the last picture of the portal.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StandIn {
     /// The cell.
     pub cell: CellId,
@@ -83,6 +87,7 @@ pub struct StandIn {
 
 /// The reason why a cell in view is not complete: the last of these that holds for one of its pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
 pub enum Cause {
     /// It covers less of the screen than [`StreamOptions::min_share`](crate::StreamOptions::min_share).
     Small,

@@ -22,6 +22,7 @@ use shape::Openings;
 
 /// The result of evidence, after every claim in it was checked.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct EvidenceReport {
     /// For each cell, the cells not proved hidden from it, itself included.
     pub cells: Vec<CellSet>,

@@ -28,6 +28,7 @@ impl Chance {
     }
 
     /// Returns 64 random bits.
+    #[doc(hidden)]
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(STEP);
         mixed(self.state)

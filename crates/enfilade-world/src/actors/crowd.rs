@@ -28,6 +28,7 @@ pub struct ActorId(pub u32);
 
 /// Reason why an actor needs a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Cause {
     /// It was just added.
     Came,
@@ -39,6 +40,7 @@ pub enum Cause {
 
 /// The moment at which an actor gets a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ActorEvent {
     /// The actor.
     pub actor: ActorId,
@@ -56,6 +58,7 @@ pub struct ActorEvent {
 
 /// Position of an actor.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ActorPlace {
     /// Position. [Units: wu]
     pub at: DVec3,

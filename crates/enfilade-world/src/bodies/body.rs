@@ -38,6 +38,7 @@ impl Body {
 
     /// Returns its bounding box with its center at `center`. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn bounds(&self, center: DVec3) -> Aabb {
         let half = BodyCore::of(self).reach();
         Aabb::new(center - half, center + half)

@@ -32,6 +32,7 @@ pub struct Cast<'a> {
 
 /// First impact of a moving body, in the frame of its cast.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Impact {
     /// Time, as a fraction of the motion, 0 to 1.
     pub t: f64,
@@ -49,6 +50,7 @@ pub struct Impact {
 
 /// Contact of a resting body, in the frame of the query.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Contact {
     /// Unit vector of the shortest way out.
     pub normal: DVec3,
@@ -250,6 +252,7 @@ impl Caster {
 
     /// Returns the cost of the last query.
     #[must_use]
+    #[doc(hidden)]
     pub fn counts(&self) -> CastCounts {
         self.flood.counts()
     }

@@ -74,6 +74,7 @@ impl Walker {
 
     /// Returns its size and abilities.
     #[must_use]
+    #[doc(hidden)]
     pub fn agent(&self) -> &Agent {
         &self.agent
     }
@@ -86,6 +87,7 @@ impl Walker {
 
     /// Returns the last obstacle that was in its way in the last step, if any, and its part.
     #[must_use]
+    #[doc(hidden)]
     pub fn obstacle(&self) -> Option<(PartId, Target)> {
         self.obstacle
     }

@@ -20,6 +20,7 @@ use crate::space::{PartId, Space};
 
 /// How far a walker gets who finds no path, and the obstacle there.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Blocked {
     /// The place before the obstacle, on the floor. [Units: wu]
     pub at: DVec3,
@@ -35,6 +36,7 @@ pub struct Blocked {
 
 /// The obstacle of a [`Blocked`] walker.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Obstacle {
     /// A portal that may not be passed, such as a closed door.
     Closed(PortalId),

@@ -15,6 +15,7 @@ use crate::layout::Layout;
 
 /// A convex edge, and a point of it just off the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Corner {
     /// Point at which paths may bend. [Units: wu]
     pub at: DVec3,

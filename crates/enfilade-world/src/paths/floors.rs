@@ -259,6 +259,7 @@ impl Floors {
 
     /// Returns the number of floors: squares, some above one another.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_floors(&self) -> usize {
         self.floors.len()
     }
@@ -271,6 +272,7 @@ impl Floors {
 
     /// Returns the width of a square. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn side(&self) -> f64 {
         self.squares.side
     }

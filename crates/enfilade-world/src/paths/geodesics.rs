@@ -124,6 +124,7 @@ impl Geodesics {
     ///
     /// If there is no such cell.
     #[must_use]
+    #[doc(hidden)]
     pub fn is_concave(&self, cell: CellId) -> bool {
         self.cells[cell.idx()].is_some()
     }
@@ -196,6 +197,7 @@ impl Geodesics {
 
     /// Returns the distance by which points are moved off walls and portals. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn off(&self) -> f64 {
         self.off
     }

@@ -50,6 +50,7 @@ struct HopLink {
 
 /// A step from a cell to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Hop {
     /// The part whose portal it is.
     pub part: PartId,
@@ -102,6 +103,7 @@ impl Hops {
     ///
     /// If there was no such part when it was made; likewise in the other queries of one.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_junctions(&self, part: PartId) -> usize {
         self.parts[part.idx()].n_junctions()
     }

@@ -43,6 +43,7 @@ pub struct WalkMapKey {
 impl WalkMapKey {
     /// Returns the 64-bit FNV-1a hash of a file. Tells files apart, but does not withstand forgery.
     #[must_use]
+    #[doc(hidden)]
     pub fn hash(bytes: &[u8]) -> u64 {
         bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

@@ -31,6 +31,7 @@ const PROGRESS: f64 = 0.05;
 
 /// State of a walk along a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Progress {
     /// It is on its way.
     Walking,

@@ -45,6 +45,7 @@ impl Arrival {
 
 /// A portal passed by a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PassedPortal {
     /// The portal, and the cell entered through it.
     pub exit: Exit,

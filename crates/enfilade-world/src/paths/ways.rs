@@ -69,7 +69,10 @@ impl Ways {
 
     /// Makes it with the caller's points: `choose` adds those of a portal. A portal without any is never passed.
     #[must_use]
-    pub fn with_points(layout: &Layout, mut choose: impl FnMut(PortalId, &mut Vec<DVec3>)) -> Self {
+    pub(crate) fn with_points(
+        layout: &Layout,
+        mut choose: impl FnMut(PortalId, &mut Vec<DVec3>),
+    ) -> Self {
         let (mut first_point, mut points, mut portal) = (vec![0], Vec::new(), Vec::new());
         let mut cells = Vec::new();
         for id in (0..layout.n_portals() as u32).map(PortalId) {
@@ -110,7 +113,7 @@ impl Ways {
     /// # Panics
     ///
     /// If the number of lengths is not that of pairs of points.
-    pub fn set_lengths(&mut self, cell: CellId, lengths: Vec<f64>) {
+    pub(crate) fn set_lengths(&mut self, cell: CellId, lengths: Vec<f64>) {
         let n = self.n_points[cell.idx()] as usize;
         assert_eq!(lengths.len(), n * n, "a length for each pair of points");
         self.bent[cell.idx()] = Bent {
@@ -136,6 +139,7 @@ impl Ways {
     }
 
     /// Returns the points of a cell's portals, in the order of its exits, each with its portal. [Units: wu]
+    #[doc(hidden)]
     pub fn points_of(&self, cell: CellId) -> impl Iterator<Item = (PortalId, DVec3)> + Clone {
         self.exits_of(cell).iter().flat_map(|exit| {
             let points = self.range(exit.portal);
@@ -145,6 +149,7 @@ impl Ways {
 
     /// Returns the points of a portal. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn points(&self, portal: PortalId) -> &[DVec3] {
         let range = self.range(portal);
         &self.points[range.start as usize..range.end as usize]
@@ -173,6 +178,7 @@ impl Ways {
     ///
     /// If the cell has no such points.
     #[must_use]
+    #[doc(hidden)]
     pub fn length(&self, cell: CellId, from: usize, to: usize) -> f64 {
         let n = self.n_points[cell.idx()] as usize;
         let point = |k: usize| self.points_of(cell).nth(k).expect("a point of the cell").1;

@@ -87,7 +87,7 @@ impl Acoustics {
     ///
     /// If there is no such portal, or the part was added later.
     #[must_use]
-    pub fn open_share(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
+    pub(crate) fn open_share(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
         let state = space.state(part);
         if self.has_pane[self.index(part, portal)] || !state.is_open(portal) {
             return 0.0;
@@ -99,7 +99,7 @@ impl Acoustics {
     ///
     /// # Panics
     ///
-    /// As [`Acoustics::open_share`].
+    /// If there is no such portal, or the part was added later.
     #[must_use]
     pub fn transmitted(&self, space: &Space, part: PartId, portal: PortalId) -> f64 {
         let open = self.open_share(space, part, portal);
@@ -141,6 +141,7 @@ pub(super) fn rise((before, leaf_before): (f64, f64), (open, leaf): (f64, f64)) 
 
 /// A source as heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Heard {
     /// Length of the shortest path. [Units: wu]
     pub length: f64,

@@ -5,6 +5,8 @@
 //! Chaigne, "Digital delay networks for designing artificial reverberators", 1991). O(samples). A delay changes by at
 //! most a tenth of real time, so that a switch to another shortest path bends the pitch instead of clicking.
 
+use std::fmt;
+
 use crate::sound::reverb::SPEED_OF_SOUND;
 
 /// Samples for which one answer of the listener is used.
@@ -40,6 +42,15 @@ pub struct Auralizer<'s> {
     /// Samples so far.
     now: u64,
     out: Vec<[f32; 2]>,
+}
+
+impl fmt::Debug for Auralizer<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Auralizer")
+            .field("rate", &self.rate)
+            .field("now", &self.now)
+            .finish_non_exhaustive()
+    }
 }
 
 impl<'s> Auralizer<'s> {

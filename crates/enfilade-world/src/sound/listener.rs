@@ -314,6 +314,7 @@ impl Listener {
 
     /// Returns the number of searches of sequences, for cost statistics.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_searches(&self) -> u64 {
         self.n_searches
     }

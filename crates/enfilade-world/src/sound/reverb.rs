@@ -137,6 +137,7 @@ impl Reverb {
     ///
     /// If there is not one per cell.
     #[must_use]
+    #[doc(hidden)]
     pub fn of_rooms(space: &Space, law: DecayLaw, rooms: &[(f64, f64, f64)]) -> Self {
         assert_eq!(rooms.len(), space.n_cells(), "one for each cell");
         let mut reverb = Self {
@@ -161,6 +162,7 @@ impl Reverb {
     ///
     /// If there is no such place.
     #[must_use]
+    #[doc(hidden)]
     pub fn area(&self, place: Place) -> f64 {
         self.rooms[self.index(place)].area
     }
@@ -170,6 +172,7 @@ impl Reverb {
     }
 
     /// Returns the area of walls indoors of each part and material, `None` for those without one. [Units: wu²]
+    #[doc(hidden)]
     pub fn surfaces(&self) -> impl Iterator<Item = (PartId, Option<u32>, f64)> {
         self.surfaces
             .iter()
@@ -181,8 +184,8 @@ impl Reverb {
     /// # Panics
     ///
     /// If there is no such place.
-    #[must_use]
-    pub fn absorbing_area(&self, place: Place) -> [f64; N_BANDS] {
+    #[cfg(test)]
+    pub(crate) fn absorbing_area(&self, place: Place) -> [f64; N_BANDS] {
         self.absorbing(&self.rooms[self.index(place)])
     }
 
@@ -205,6 +208,7 @@ impl Reverb {
 
     /// Returns the number of cells.
     #[must_use]
+    #[doc(hidden)]
     pub fn n_cells(&self) -> usize {
         self.rooms.len()
     }
@@ -508,6 +512,7 @@ impl DiffuseFields {
     ///
     /// If there is no such place, or nothing was solved.
     #[must_use]
+    #[doc(hidden)]
     pub fn density(&self, place: Place) -> f64 {
         self.steady[self.index(place)].iter().sum::<f64>() / N_BANDS as f64
     }

@@ -57,6 +57,7 @@ pub(super) struct PartView {
 
 /// The special portal in which a context is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SeenVia {
     /// Index of the context that sees it.
     pub parent: usize,
@@ -70,6 +71,7 @@ pub struct SeenVia {
 
 /// A special portal that was not looked into.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StoppedSpecial {
     /// The special portal, and the context that sees it.
     pub via: SeenVia,

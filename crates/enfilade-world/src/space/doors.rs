@@ -102,6 +102,7 @@ impl Space {
     /// # Panics
     ///
     /// If the state is not of the part's world.
+    #[doc(hidden)]
     pub fn set_state(&mut self, part: PartId, state: SightState) {
         let known = &mut self.parts[part.idx()].state;
         assert_eq!(

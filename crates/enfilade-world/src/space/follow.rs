@@ -15,6 +15,7 @@ const MAX_PASSED: u32 = 64;
 
 /// A step through special portals.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Followed {
     /// The part in whose frame the end is: that of the last special portal passed, otherwise that of the step.
     pub frame: PartId,

@@ -7,6 +7,7 @@ use super::{PartId, Place, Space};
 
 /// The image of a thing beyond a special portal that it stands in.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SpecialImage {
     /// The special portal.
     pub special: SpecialId,
@@ -28,6 +29,7 @@ impl Space {
     /// # Panics
     ///
     /// If there is no such part.
+    #[doc(hidden)]
     pub fn images(&self, part: PartId, center: DVec3, radius: f64, images: &mut Vec<SpecialImage>) {
         let own = &self.parts[part.idx()];
         let at = (own.layout.n_specials() > 0).then(|| self.locate(part, center));

@@ -1,5 +1,7 @@
 //! The place of a point, in parts that move.
 
+use std::fmt;
+
 use enfilade_geom::{Aabb, DVec3};
 
 use super::{PartId, Place, Space};
@@ -8,6 +10,20 @@ use super::{PartId, Place, Space};
 const FEW: usize = 8;
 
 impl Space {
+    /// Returns the number of cells of all parts.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn n_cells(&self) -> usize {
+        self.n_cells
+    }
+
+    /// Returns the number of a cell among those of all parts; those of the root come first.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn cell_number(&self, place: Place) -> u32 {
+        self.parts[place.part.idx()].first_cell + place.cell.0
+    }
+
     /// Returns the place of a point of a part's frame: a cell of the innermost part that contains it; `None` in solid matter of
     /// all. O(depth of the locators), for each part at the point. A point in the walls of a part counts as in that part's
     /// surroundings.
@@ -51,5 +67,14 @@ impl Space {
             first.map(|f| f.1)
         };
         found.or(cell.map(|cell| Place { part: id, cell }))
+    }
+}
+
+impl fmt::Debug for Space {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Space")
+            .field("n_parts", &self.parts.len())
+            .field("n_cells", &self.n_cells)
+            .finish_non_exhaustive()
     }
 }

@@ -14,6 +14,7 @@
 //! through the special portal that it came by.
 
 use std::collections::BinaryHeap;
+use std::fmt;
 
 use enfilade_cpg::{MonitorCamera, Way};
 use enfilade_geom::Similarity;
@@ -65,6 +66,15 @@ pub struct SpaceViewer {
     /// Total area of the rectangles around what is drawn apart. [Units: screens]
     apart: f64,
     buffers: ViewBuffers,
+}
+
+impl fmt::Debug for SpaceViewer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SpaceViewer")
+            .field("options", &self.options)
+            .field("specials", &self.specials)
+            .finish_non_exhaustive()
+    }
 }
 
 /// A context to look into. Ordered by its share of the screen, then by age.

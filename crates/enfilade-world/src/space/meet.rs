@@ -40,6 +40,7 @@ impl Docking {
 impl Space {
     /// Returns the tolerance within which doors of parts meet.
     #[must_use]
+    #[doc(hidden)]
     pub fn docking(&self) -> Docking {
         self.docking
     }

@@ -1,5 +1,7 @@
 //! Answers to views.
 
+use std::fmt;
+
 use enfilade_cpg::SpecialId;
 use enfilade_geom::{DVec3, Similarity};
 use enfilade_runtime::{Seen, View};
@@ -15,10 +17,27 @@ pub struct SpaceSeen<'a> {
     pub(super) is_capped: bool,
 }
 
+impl fmt::Debug for SpaceSeen<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SpaceSeen")
+            .field("n_contexts", &self.contexts.len())
+            .field("is_capped", &self.is_capped)
+            .finish_non_exhaustive()
+    }
+}
+
 /// The view of one eye: the direct one, or that in one special portal.
 #[derive(Clone, Copy)]
 pub struct SeenContext<'a> {
     context: &'a Context,
+}
+
+impl fmt::Debug for SeenContext<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SeenContext")
+            .field("via", &self.via())
+            .finish_non_exhaustive()
+    }
 }
 
 impl<'a> SpaceSeen<'a> {
@@ -101,6 +120,7 @@ impl<'a> SeenContext<'a> {
     /// Returns `true` if no line of sight meets a special portal in the cells that it sees: what is
     /// [in view](Seen::specials) errs to more.
     #[must_use]
+    #[doc(hidden)]
     pub fn never_meets(&self, space: &Space, part: PartId, special: SpecialId) -> bool {
         self.context.never_meets(space, part, special)
     }

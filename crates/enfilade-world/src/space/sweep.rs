@@ -21,6 +21,7 @@ const HALVINGS: u32 = 40;
 
 /// Passage of a door over a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Passing {
     /// Time, as a fraction of the motion.
     pub at: f64,

@@ -49,6 +49,7 @@ impl SightRay {
 
 /// The end of a ray, and its way there.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Traced<H> {
     /// The reason why it ends.
     pub end: TraceEnd<H>,
@@ -68,6 +69,7 @@ pub struct Traced<H> {
 
 /// The reason why a ray ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum TraceEnd<H> {
     /// It meets a surface.
     Surface(H),
@@ -90,6 +92,7 @@ impl<H> Traced<H> {
 
     /// Returns the end as it seems from the start: straight ahead. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn seems_at(&self) -> DVec3 {
         self.map.point_back(self.at)
     }
@@ -213,6 +216,7 @@ impl Space {
     }
 
     /// Returns the parts whose boxes a segment, in the frame of a part, meets, and the root, which comes first.
+    #[doc(hidden)]
     pub fn parts_along(
         &self,
         frame: PartId,

@@ -32,7 +32,7 @@ struct Posed {
 }
 
 /// A shape at a pose.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Posted<'a> {
     /// The shape.
     pub shape: &'a Shape,
@@ -118,6 +118,7 @@ impl Flood {
     /// Returns the distance by which the shape of the last flood may move without meeting another opening: a lower bound, and 0
     /// where parts stand in a cell that it reached. [Units: wu]
     #[must_use]
+    #[doc(hidden)]
     pub fn clearance(&self) -> f64 {
         self.clearance
     }

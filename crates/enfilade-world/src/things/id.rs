@@ -41,6 +41,7 @@ pub enum ThingError {
 
 /// Movement of a thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Moved {
     /// Place of its origin before; `None` in solid matter.
     pub from: Option<Place>,

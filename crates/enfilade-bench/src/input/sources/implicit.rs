@@ -1,7 +1,8 @@
 //! Implicit scenes.
 
 use anyhow::{Context, bail};
-use enfilade::import::{ImportOptions, Imported, decode_implicit};
+use enfilade::import::{ImportOptions, Imported};
+use enfilade::internals::import::decode_implicit;
 
 use crate::rows::{Figure, baked};
 

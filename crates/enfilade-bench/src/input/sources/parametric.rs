@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use anyhow::bail;
 use enfilade::cpg::World;
 use enfilade::geom::DMat4;
-use enfilade::import::{ArrayMesh, ImportOptions, decode_patches, import_arrays};
+use enfilade::import::{ArrayMesh, ImportOptions, import_arrays};
+use enfilade::internals::import::decode_patches;
 
 use super::twins;
 use crate::rows::{Figure, baked};

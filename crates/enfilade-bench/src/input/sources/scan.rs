@@ -8,8 +8,9 @@ use anyhow::Context;
 use enfilade::cpg::World;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Role;
-use enfilade::geom::{Aabb, Bvh, DVec3, Ray, Triangle};
+use enfilade::geom::{Aabb, DVec3, Triangle};
 use enfilade::import::{ImportOptions, decode_ply, import};
+use enfilade::internals::geom::{Bvh, Ray};
 use enfilade_testkit::Rng;
 use serde_json::{Value, json};
 

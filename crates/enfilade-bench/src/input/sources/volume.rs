@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use anyhow::Context;
 use enfilade::cpg::{CellId, World};
 use enfilade::geom::scene::Role;
-use enfilade::geom::{Aabb, Bvh, DVec3, Ray, closest_point_on_segment};
-use enfilade::import::{AirSide, ImportOptions, VolumeOptions, decode_volume};
+use enfilade::geom::{Aabb, DVec3};
+use enfilade::import::{AirSide, ImportOptions, VolumeOptions};
+use enfilade::internals::geom::{Bvh, Ray, closest_point_on_segment};
+use enfilade::internals::import::decode_volume;
 use enfilade_testkit::Rng;
 
 use crate::measure::imported;

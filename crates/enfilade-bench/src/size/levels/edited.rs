@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use anyhow::ensure;
 use enfilade::View;
-use enfilade::edit::random::random_operation;
 use enfilade::edit::{EditGround, EditOperation, EditSession, EditedSpace};
 use enfilade::geom::DVec3;
+use enfilade::internals::edit::random::random_operation;
 use enfilade::kit::{Assembly, InstanceId};
 use enfilade::world::{PartId, Pose, Space, SpaceViewer};
 use enfilade_cli::adapter;

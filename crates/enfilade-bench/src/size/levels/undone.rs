@@ -8,9 +8,10 @@ use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use enfilade::cpg::wire::encode_glb;
-use enfilade::edit::random::random_operation;
-use enfilade::edit::{EditGround, EditOperation, EditSession, HandEditKind, Resumed, journal_of};
+use enfilade::edit::{EditGround, EditOperation, EditSession, HandEditKind, Resumed};
 use enfilade::geom::DVec3;
+use enfilade::internals::edit::journal_of;
+use enfilade::internals::edit::random::random_operation;
 use enfilade::kit::{DEFAULT_TOLERANCE, InstanceId, Kit};
 use enfilade::world::Pose;
 use enfilade_testkit::{Rng, dungeon_kit, office_kit};

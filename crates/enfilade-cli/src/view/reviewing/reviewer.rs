@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use enfilade::bake::delaunay::{Choice, Decision, OUTDOOR_CELL};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
+use enfilade::internals::bake::delaunay::{Choice, Decision, OUTDOOR_CELL};
 use enfilade_render::Mark;
 
 use super::legend::{LegendLine, ReviewShown};

@@ -4,7 +4,7 @@
 //! told apart by those who do not tell red from green. Decisions have colors of their own.
 
 use enfilade::bake::BakeConfig;
-use enfilade::bake::delaunay::{Choice, RemainingPortal, default_stop};
+use enfilade::internals::bake::delaunay::{Choice, RemainingPortal, default_stop};
 
 /// Upper ends of the classes of weights, the last of which has none. [Units: the weight of the stop]
 const ENDS: [f64; 6] = [0.75, 0.9, 1.0, 1.25, 2.0, 4.0];

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use enfilade::bake::delaunay::{RemainingPortal, Session};
 use enfilade::geom::{Aabb, DVec3};
+use enfilade::internals::bake::delaunay::{RemainingPortal, Session};
 use enfilade_render::{Mark, MarkShape};
 
 use super::scale::{PortalClass, WeightScale};
@@ -231,8 +231,8 @@ fn add_border(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade::bake::delaunay::Review;
     use enfilade::bake::{BakeConfig, BakeContext, Method, Silent};
+    use enfilade::internals::bake::delaunay::Review;
     use enfilade_testkit::{Variant, gjorup_rooms};
 
     // Covers T5.
