@@ -66,9 +66,7 @@ fn add<T: Copy>(
 pub(super) fn model(space: &Space, n_parts: usize) -> (Bvh, Vec<(PartId, PartItem)>) {
     let mut all = Solids::default();
     for part in (0..n_parts as u32).map(PartId) {
-        add(&mut all, space, part, &space.pose(part), |item| {
-            (part, item)
-        });
+        add(&mut all, space, part, space.pose(part), |item| (part, item));
     }
     all.built()
 }

@@ -263,7 +263,7 @@ fn number(found: &Value, name: &str) -> f64 {
 }
 
 fn megabytes(found: &Value, name: &str) -> String {
-    format!("{:.1} MB", number(&found, name) / 1e6)
+    format!("{:.1} MB", number(found, name) / 1e6)
 }
 
 /// Returns the most memory of pieces on the walk.
