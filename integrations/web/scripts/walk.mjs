@@ -12,7 +12,6 @@ const { outputFiles } = await build({
   minify: true,
   write: false,
   target: 'es2022',
-  external: ['node:fs/promises'],
   legalComments: 'none',
 });
 mkdirSync(at('dist/walk'), { recursive: true });

@@ -60,15 +60,15 @@ export class Runtime {
     const from = source ?? new URL('./enfilade.wasm', import.meta.url);
     if (typeof from !== 'string' && !(from instanceof URL)) return Runtime.start(from);
     const address = String(from);
-    const known = Runtime.shared.get(address) ?? Runtime.start(address);
+    const known = Runtime.shared.get(address) ?? moduleAt(address).then((module) => Runtime.start(module));
     Runtime.shared.set(address, known);
     // An address that failed is tried again by the next who asks.
     known.catch(() => Runtime.shared.delete(address));
     return known;
   }
 
-  private static async start(source: WasmSource): Promise<Runtime> {
-    const module = source instanceof WebAssembly.Module ? source : await WebAssembly.compile(await bytesOf(source));
+  private static async start(source: BufferSource | WebAssembly.Module): Promise<Runtime> {
+    const module = source instanceof WebAssembly.Module ? source : await WebAssembly.compile(source);
     const instance = await WebAssembly.instantiate(module, {});
     const exports = instance.exports as unknown as Exports;
     const found = exports.enf_abi_version();
@@ -134,11 +134,28 @@ export async function bytesOf(source: BufferSource | URL | string): Promise<Uint
     return new Uint8Array(source.buffer as ArrayBuffer, source.byteOffset, source.byteLength);
   }
   const address = String(source);
-  if (address.startsWith('file:')) {
-    const fs = await import(/* webpackIgnore: true */ 'node:fs/promises');
-    return new Uint8Array(await fs.readFile(new URL(address)));
-  }
-  const answer = await fetch(source as string | URL);
+  // Not imported: browsers have no such module, and bundlers would look for it.
+  const fs = address.startsWith('file:') ? globalThis.process?.getBuiltinModule?.('fs') : undefined;
+  if (fs) return new Uint8Array(await fs.promises.readFile(new URL(address)));
+  const answer = await fetch(address).catch((why: Error) => {
+    throw new Error(`${address}: ${why.message}`);
+  });
   if (!answer.ok) throw new Error(`${address}: ${answer.status} ${answer.statusText}`);
   return new Uint8Array(await answer.arrayBuffer());
+}
+
+/** Compiles the module that lies at an address; says what to do if there is none. */
+async function moduleAt(address: string): Promise<WebAssembly.Module> {
+  try {
+    const bytes = await bytesOf(address);
+    // Servers answer with a page for what they do not have. Types do not matter: some know none for modules.
+    const head = new TextDecoder().decode(bytes.subarray(0, 16));
+    if (!head.startsWith('\0asm')) throw new Error(`${address}: no WebAssembly, it begins with ${JSON.stringify(head)}`);
+    return await WebAssembly.compile(bytes);
+  } catch (why) {
+    throw new Error(
+      `enfilade.wasm did not load (${(why as Error).message}). Copy it there from the package's folder dist, ` +
+        `or give its address or its bytes as \`wasm\` (README, "Bundlers")`,
+    );
+  }
 }

@@ -31,7 +31,6 @@ export async function bundle(name, contents) {
     bundle: true,
     format: 'esm',
     outfile: at(`dist/test/${name}.js`),
-    external: ['node:fs/promises'],
     logLevel: 'error',
   });
   writeFileSync(at(`dist/test/${name}.html`), `<!doctype html><meta charset="utf-8"><script type="module" src="${name}.js"></script>`);

@@ -4,7 +4,13 @@ import { existsSync, readFileSync, statSync } from 'node:fs';
 import { gzipSync } from 'node:zlib';
 import { extname, join, normalize } from 'node:path';
 
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm', '.glb': 'model/gltf-binary' };
+const TYPES = {
+  '.html': 'text/html',
+  '.js': 'text/javascript',
+  '.mjs': 'text/javascript',
+  '.wasm': 'application/wasm',
+  '.glb': 'model/gltf-binary',
+};
 
 /** Serves `folders` (by first name of the path); `pace` is in bytes a second, `latency` in milliseconds; with or without ranges. */
 export async function serve(folders, { pace = Infinity, latency = 0, ranges = true } = {}) {
