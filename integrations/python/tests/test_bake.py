@@ -177,7 +177,7 @@ def test_wrong_arrays_are_refused_with_the_row():
             enfilade.bake(*args)
         for word in words:
             assert re.search(word, str(error.value)), (word, str(error.value))
-    for wrong in ["house.glb", 3, None, [1, 2, 3], {"wall": 3}]:
+    for wrong in [3, None, [1, 2, 3], {"wall": 3}]:
         with pytest.raises(TypeError, match="expected a mesh"):
             enfilade.bake(wrong)
 
@@ -280,6 +280,7 @@ def test_files_are_baked_as_by_the_command(command, tmp_path):
     baked = enfilade.bake_file(tmp_path / "house.glb")
     assert bytes(baked) == (tmp_path / "world.glb").read_bytes()
     assert bytes(enfilade.bake_file([str(tmp_path / "house.glb")], threads=1)) == bytes(baked)
+    assert bytes(enfilade.bake(tmp_path / "house.glb")) == bytes(baked)
     # Arrays have no materials, but the same rooms.
     of_arrays = enfilade.bake(enfilade.demo_house())
     volumes = [np.sort(w.cells.volumes[1:]) for w in (of_arrays, baked)]

@@ -1,7 +1,10 @@
 """The code of README and tutorial runs."""
 
+import json
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -24,6 +27,33 @@ def test_the_code_of_a_page_runs(page, tmp_path, monkeypatch, capsys):
     if page == "README.md":
         promised = re.search(r"# (<Cells.*)$", text, re.MULTILINE)[1].strip()
         assert said.splitlines()[0] == promised
+
+
+def test_the_notebook_runs(tmp_path, monkeypatch, capsys):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads((FOLDER / "ROOMS.ipynb").read_text(encoding="utf-8"))["cells"]
+    blocks = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert sum(block.count("\n") + 1 for block in blocks) <= 20
+    names = {"__name__": "notebook"}
+    for block in blocks:
+        exec(compile(block, "ROOMS.ipynb", "exec"), names)
+    assert "trust: good" in capsys.readouterr().out
+    assert len(names["axes"]) == len(names["world"].storeys)
+
+
+def test_programs_that_use_it_are_checked_strictly(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import enfilade\n\n"
+        "def largest(path: str) -> enfilade.Room:\n"
+        "    world = enfilade.bake(path)\n"
+        "    return max(world.rooms, key=lambda room: room.floor_area)\n"
+    )
+    run = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), str(program), str(FOLDER / "python/enfilade")]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
 
 
 def test_the_package_is_typed_and_documented():

@@ -66,6 +66,48 @@ def test_rooms_have_the_facts_that_the_command_prints(world, command, tmp_path):
         assert room.height == pytest.approx(cell["height"], abs=1e-3) and 2 < room.height < 4
 
 
+def test_rooms_have_outlines_as_large_as_their_floors(world):
+    polygons = world.polygons()
+    assert set(polygons) == {room.id for room in world.rooms}
+    attic = world.storeys[-1].name
+    for room in world.rooms:
+        # Recesses of doors and windows are on the plan and no floor area; its lines are as exact as its sampling grid.
+        area = polygons[room.id].area
+        assert area < 1.08 * room.floor_area, room.name
+        # The cut is 1.2 m above the floor, where a roof leaves less.
+        assert attic in room.storeys or area > 0.92 * room.floor_area, room.name
+        assert room.kind == "room" and room.volume == world.cells[room.id].volume
+        low, high = world.cells[room.id].bounds[:, [0, 2]]
+        least_x, least_z, most_x, most_z = polygons[room.id].bounds
+        assert (low - 0.1 < (least_x, least_z)).all() and (high + 0.1 > (most_x, most_z)).all()
+
+
+def test_windows_to_the_outdoors_count_for_daylight(world):
+    areas = {room.id: 0.0 for room in world.rooms}
+    for portal in world.portals:
+        kinds = [world.cells[cell].kind for cell in portal.cells]
+        if portal.kind == "window" and sorted(kinds) == ["outdoors", "room"]:
+            areas[portal.cells[kinds.index("room")]] += portal.area
+    assert sum(areas.values()) > 5
+    for room in world.rooms:
+        assert room.window_area == pytest.approx(areas[room.id], rel=1e-5)
+
+
+def test_tables_have_rooms_portals_and_visibility(world):
+    rooms = world.to_dataframe()
+    assert list(rooms.index) == [room.id for room in world.rooms]
+    assert rooms.floor_area.sum() == pytest.approx(sum(room.floor_area for room in world.rooms))
+    portals = world.to_dataframe("portals")
+    assert len(portals) == len(world.portals)
+    first = portals.loc[0]
+    assert (first.kind, first.cell) == (world.portals[0].kind, world.cells[world.portals[0].cells[0]].name)
+    assert [first.x, first.y, first.z] == pytest.approx(list(world.portals[0].center))
+    seen = world.to_dataframe("visibility")
+    assert (seen.to_numpy() == world.pvs().matrix()).all() and list(seen.columns) == world.cells.names
+    with pytest.raises(ValueError, match="expected 'rooms'"):
+        world.to_dataframe("doors")
+
+
 def test_points_are_located(world):
     middle = [2, 1, 2]
     cell = world.locate(middle)
@@ -153,7 +195,7 @@ def test_graphs_have_a_node_for_each_cell_and_an_edge_for_each_portal(world):
     assert graph.nodes[0]["name"] == world.cells[0].name
 
 
-@pytest.mark.parametrize("package, call", [("networkx", "to_networkx"), ("matplotlib.pyplot", "plot")])
+@pytest.mark.parametrize("package, call", [("networkx", "to_networkx"), ("matplotlib.pyplot", "plot"), ("pandas", "to_dataframe"), ("shapely", "polygons")])
 def test_a_package_that_is_missing_is_named_with_its_remedy(world, monkeypatch, package, call):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ImportError, match=f"pip install {package.split('.')[0]}"):
@@ -179,6 +221,9 @@ def test_plans_show_all_rooms(world):
         assert left <= low[0] <= right and top <= low[1] <= bottom, "z points down"
         shown.update(storey.cells)
         pyplot.close(figure)
+    axes = world.plot()
+    assert [ax.get_title() for ax in axes] == [f"storey {storey.name}" for storey in world.storeys]
+    pyplot.close("all")
     assert shown >= {c.id for c in world.cells if c.kind == "room"}
     with pytest.raises(ValueError, match="the storeys are"):
         world.plan_svg("cellar")

@@ -4,7 +4,7 @@
 is where, what is seen from where, and how to walk there:
 
 >>> import enfilade
->>> world = enfilade.bake(vertices, faces)          # or a trimesh mesh or scene; bake_file("house.glb")
+>>> world = enfilade.bake(vertices, faces)          # or a trimesh mesh or scene; bake("house.glb")
 >>> world.locate([[1.0, 1.6, 2.0]])                 # cells of points, -1 in walls
 >>> world.see(eye=(1, 1.6, 2), look=(4, 1.6, 2)).cells
 >>> world.save("world.glb")                         # opens in any viewer of glTF

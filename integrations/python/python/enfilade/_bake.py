@@ -6,14 +6,14 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Callable, List, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Optional, Tuple, Union
 
 import numpy as np
 
 from . import _arrays, _native
 from ._world import World
 
-Settings = Union[Mapping, str, "os.PathLike[str]"]
+Settings = Union["Mapping[str, Any]", str, "os.PathLike[str]"]
 Progress = Callable[[str, int, int], object]
 
 
@@ -60,8 +60,9 @@ def bake(
     allow_empty: bool = False,
     progress: Optional[Progress] = None,
 ) -> World:
-    """Finds the rooms and doorways of meshes.
+    """Finds the rooms and doorways of meshes, or of a file.
 
+    ``bake("house.glb")`` is ``bake_file``, which has options for files; ``detail`` then names files, too.
     ``bake(vertices, faces)`` takes arrays: (n, 3) floats, and (m, 3) integers that number vertices from 0.
     ``bake(mesh)`` takes what has ``vertices`` and ``faces`` or ``triangles``, as meshes of trimesh and open3d do; a ``trimesh.Scene``; a mapping of
     names to meshes; or a list of meshes. Names tell doors, windows and furniture from walls, and are kept; meshes
@@ -87,13 +88,6 @@ def bake(
     ``BakeError`` if no room is found or a limit is reached. Doubts are warnings, ``BakeWarning``. Options in their texts
     are the arguments above. An interrupt ends the bake within about a second.
     """
-    meshes: List[tuple] = []
-    if faces is not None:
-        meshes.append(_placed("", "", vertices, faces, None, False))
-    else:
-        _add(meshes, vertices, False, "vertices")
-    if detail is not None:
-        _add(meshes, detail, True, "detail")
     options = _options(
         settings,
         method,
@@ -111,6 +105,15 @@ def bake(
         detail_names=detail_names,
         structural_names=structural_names,
     )
+    if faces is None and _is_path(vertices):
+        return _told(_native.bake_files, _paths(vertices), _paths(detail or ()), options, progress)
+    meshes: List[Tuple[Any, ...]] = []
+    if faces is not None:
+        meshes.append(_placed("", "", vertices, faces, None, False))
+    else:
+        _add(meshes, vertices, False, "vertices")
+    if detail is not None:
+        _add(meshes, detail, True, "detail")
     return _told(_native.bake_arrays, meshes, options, progress)
 
 
@@ -168,7 +171,7 @@ def bake_file(
     return _told(_native.bake_files, _paths(files), _paths(detail), options, progress)
 
 
-def _told(function: Callable, *args: Any) -> World:
+def _told(function: Callable[..., Any], *args: Any) -> World:
     """Calls a native function, and says its warnings and errors with the names of arguments."""
     try:
         world, said = function(*args)
@@ -224,7 +227,7 @@ def _options(
     allow_leak: bool,
     allow_outside: bool,
     **arguments: Any,
-) -> dict:
+) -> Dict[str, Any]:
     toml = text = None
     if isinstance(settings, Mapping):
         text = json.dumps(dict(settings), default=_plain)
@@ -256,13 +259,19 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"settings hold numbers, texts and lists, not {type(value).__name__}")
 
 
+def _is_path(given: Any) -> bool:
+    """True for a path, and for several that make one scene."""
+    paths = given if isinstance(given, (list, tuple)) and given else [given]
+    return all(isinstance(path, (str, os.PathLike)) for path in paths)
+
+
 def _paths(files: Any) -> List[str]:
     if isinstance(files, (str, os.PathLike)):
         files = [files]
     return [os.fspath(path) for path in files]
 
 
-def _placed(name: str, shape: str, vertices: Any, faces: Any, transform: Any, detail: bool) -> tuple:
+def _placed(name: str, shape: str, vertices: Any, faces: Any, transform: Any, detail: bool) -> Tuple[Any, ...]:
     label = name or shape
     of = f"mesh {label!r}: " if label else ""
     rows = None
@@ -275,7 +284,7 @@ def _placed(name: str, shape: str, vertices: Any, faces: Any, transform: Any, de
     return ([name, shape], array, _arrays.faces(f"{of}faces", faces), rows, detail)
 
 
-def _add(meshes: List[tuple], given: Any, detail: bool, argument: str) -> None:
+def _add(meshes: List[Tuple[Any, ...]], given: Any, detail: bool, argument: str) -> None:
     """Adds a mesh, a scene, or several."""
     if hasattr(given, "geometry") and hasattr(given, "graph"):
         _add_scene(meshes, given, detail)
@@ -313,7 +322,7 @@ def _pair(mesh: Any, name: str) -> Tuple[Any, Any]:
     raise TypeError(f"{name}: expected a mesh, or a pair of vertices and faces, not {type(mesh).__name__}")
 
 
-def _add_scene(meshes: List[tuple], scene: Any, detail: bool) -> None:
+def _add_scene(meshes: List[Tuple[Any, ...]], scene: Any, detail: bool) -> None:
     """Adds the meshes of a ``trimesh.Scene``, each where its nodes place it."""
     n_left = 0
     for node in scene.graph.nodes_geometry:

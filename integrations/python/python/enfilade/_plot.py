@@ -1,6 +1,6 @@
 """Floor plans with matplotlib."""
 
-from typing import Any, Optional
+from typing import Any, List, Optional
 
 import numpy as np
 
@@ -40,6 +40,22 @@ def draw(native: _native.World, ax: Any, storey: Optional[str], height: float, l
     ax.set_xlabel("x (m)")
     ax.set_ylabel("z (m)")
     return ax
+
+
+def draw_all(native: _native.World, storeys: List[str], height: float, labels: bool) -> List[Any]:
+    """Draws all storeys side by side, in a new figure as wide as their names need; returns the axes."""
+    pyplot = _lazily("matplotlib.pyplot")
+    n = max(len(storeys), 1)
+    columns = min(n, 3)
+    rows = -(-n // columns)
+    figure, axes = pyplot.subplots(rows, columns, figsize=(9 * columns, 7 * rows), squeeze=False, layout="constrained")
+    axes = list(axes.flat)
+    for ax, name in zip(axes, storeys):
+        draw(native, ax, name, height, labels)
+        ax.set_title(f"storey {name}")
+    for ax in axes[len(storeys) :]:
+        ax.set_axis_off()
+    return axes[: len(storeys)]
 
 
 def _path(path: Any, lines: Any, is_closed: bool) -> Any:

@@ -1,9 +1,8 @@
 """Worlds, and the answers to questions about them."""
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Tuple, Union, overload
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union, overload
 
 import numpy as np
 
@@ -53,6 +52,15 @@ class Room:
     """The clear height over most of the floor, in meters."""
     doors: int
     windows: int
+    volume: float
+    """In cubic meters."""
+    window_area: float
+    """Of its windows to the outdoors, in square meters: the openings in the walls, with their frames."""
+
+    @property
+    def kind(self) -> str:
+        """``"room"``, as its cell's kind."""
+        return "room"
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +119,7 @@ class Portal:
         return f"<Portal {self.id}, {self.kind}, {self.cells[0]}–{self.cells[1]}, {width:.2f} × {height:.2f} m>"
 
 
-class Cells(Sequence):
+class Cells(Sequence[Cell]):
     """The cells of a world: a sequence, and their attributes as columns.
 
     ``cells[3]`` and ``cells["kitchen"]`` are cells; ``cells.volumes`` is an array.
@@ -165,7 +173,7 @@ class Cells(Sequence):
         return "<Cells: " + ", ".join(f"{n} {kind}" for kind, n in counts.items() if n > 0) + ">"
 
 
-class Portals(Sequence):
+class Portals(Sequence[Portal]):
     """The portals of a world: a sequence, and their attributes as columns."""
 
     cells: np.ndarray
@@ -325,7 +333,7 @@ class World:
     def __bytes__(self) -> bytes:
         return self._native.to_bytes()
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> Tuple[Any, ...]:
         return World.from_bytes, (bytes(self),)
 
     @property
@@ -344,10 +352,73 @@ class World:
 
     @property
     def rooms(self) -> List[Room]:
-        """Floor area, height, storeys, doors and windows of each room, by the ids of their cells."""
-        names = self.cells.names
-        rows = self._native.rooms()
-        return [Room(id, names[id], tuple(on), area, height, *n) for id, on, area, height, n in rows]
+        """Floor area, height, volume, storeys, doors and windows of each room, by the ids of their cells."""
+        cells, portals = self.cells, self.portals
+        glass = np.zeros(len(cells))
+        is_out = np.array([kind == "outdoors" for kind in cells.kinds] + [False])
+        is_window = np.array([kind == "window" for kind in portals.kinds], dtype=bool)
+        for one, other in ((0, 1), (1, 0)):
+            counts = is_window & is_out[portals.cells[:, other]]
+            np.add.at(glass, portals.cells[counts, one], portals.areas[counts])
+        return [
+            Room(id, cells.names[id], tuple(on), area, height, *n, float(cells.volumes[id]), float(glass[id]))
+            for id, on, area, height, n in self._native.rooms()
+        ]
+
+    def outlines(self, *, height: float = 1.2) -> Dict[int, List[np.ndarray]]:
+        """Returns the outlines of rooms on the plans, by the ids of their cells.
+
+        Each is a list of closed lines, (n, 2) float64 of x and z, which do not repeat their first point; a point inside an odd
+        number of them is in the room, so that holes are lines, too. A room on several storeys has the lines of all its plans.
+
+        height: that of the cut above each floor, in meters.
+        """
+        out: Dict[int, List[np.ndarray]] = {}
+        for storey in self.storeys:
+            for kind, _, _, lines, _, cell in self._native.plan_shapes(storey.name, height)[0]:
+                if kind == "cell" and cell is not None:
+                    out.setdefault(cell, []).extend(lines)
+        return out
+
+    def polygons(self, *, height: float = 1.2) -> Dict[int, Any]:
+        """Returns the ``outlines`` of rooms as geometries of shapely, by the ids of their cells."""
+        shapely = _lazily("shapely")
+        out = {}
+        for cell, lines in self.outlines(height=height).items():
+            whole = shapely.Polygon()
+            for line in lines:
+                if len(line) > 2:
+                    whole = whole.symmetric_difference(shapely.Polygon(line).buffer(0))
+            out[cell] = whole
+        return out
+
+    def to_dataframe(self, of: str = "rooms") -> Any:
+        """Returns a ``pandas.DataFrame`` of ``"rooms"``, ``"portals"`` or ``"visibility"``.
+
+        Rooms and portals have a row each, by their ids; visibility has a row and a column for each cell, by their names, true where
+        something of the column's cell may be seen from the row's.
+        """
+        pandas = _lazily("pandas")
+        if of == "rooms":
+            columns = (
+                "name storeys floor_area height volume doors windows window_area".split()
+            )
+            rows = [[getattr(room, column) for column in columns] for room in self.rooms]
+            frame = pandas.DataFrame(rows, columns=columns)
+            frame["storeys"] = frame["storeys"].map(", ".join)
+            frame.index = pandas.Index([room.id for room in self.rooms], name="id")
+            return frame
+        if of == "portals":
+            portals, names = self.portals, self.cells.names
+            ends = [[names[cell] for cell in portals.cells[:, end]] for end in (0, 1)]
+            table: Dict[str, Any] = {"kind": portals.kinds, "cell": ends[0], "other": ends[1], "area": portals.areas}
+            table["width"], table["height"] = portals.sizes.T
+            table["x"], table["y"], table["z"] = portals.centers.T
+            return pandas.DataFrame(table).rename_axis("id")
+        if of == "visibility":
+            names = self.cells.names
+            return pandas.DataFrame(self.pvs().matrix(), index=names, columns=names)
+        raise ValueError(f"of is {of!r}: expected 'rooms', 'portals' or 'visibility'")
 
     @property
     def places(self) -> List[Place]:
@@ -486,13 +557,18 @@ class World:
     def plot(
         self, ax: Any = None, *, storey: Optional[str] = None, height: float = 1.2, labels: bool = True
     ) -> Any:
-        """Draws the plan of a storey, the lowest if not given, with matplotlib; returns the axes.
+        """Draws the plan of a storey with matplotlib, and returns the axes.
+
+        Without ``ax`` and ``storey``, a new figure shows all storeys side by side, the lowest first, and the axes are a list. On
+        given axes, the lowest storey is drawn if none is named.
 
         Coordinates are those of the world: x to the right, z down. So ``ax.scatter(points[:, 0], points[:, 2])`` marks
         points on the plan.
         """
-        from ._plot import draw
+        from ._plot import draw, draw_all
 
+        if ax is None and storey is None:
+            return draw_all(self._native, [s.name for s in self.storeys], height, labels)
         return draw(self._native, ax, storey, height, labels)
 
     def __repr__(self) -> str:

@@ -15,8 +15,11 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any, List, Optional, Sequence, Union
 
 from ._native import EnfiladeError
+
+File = Union[str, "os.PathLike[str]"]
 
 __all__ = ["JobError", "finish", "missing", "plan", "run"]
 
@@ -25,7 +28,16 @@ class JobError(EnfiladeError):
     """A step of a job failed; the message is the command's."""
 
 
-def plan(source, folder, *, mode=None, far=None, max_memory=None, options=(), command="enfilade"):
+def plan(
+    source: File,
+    folder: File,
+    *,
+    mode: Optional[str] = None,
+    far: Optional[float] = None,
+    max_memory: Union[None, int, str] = None,
+    options: Sequence[str] = (),
+    command: str = "enfilade",
+) -> List[str]:
     """Divide the work for a file into shards; return their keys.
 
     A scene is baked, a shard for each building apart from others; ``options`` are those of ``enfilade bake``. Of a world, or a
@@ -34,7 +46,7 @@ def plan(source, folder, *, mode=None, far=None, max_memory=None, options=(), co
     shard, in bytes or as the command takes it ("8G"). Less makes more shards of visibility; a graph of up to 10,000 portals
     is a single one unless this is less than its tables. The same plan again leaves the folder as it is.
     """
-    given = []
+    given: List[str] = []
     for name, value in [("--mode", mode), ("--far", far), ("--max-memory", max_memory)]:
         if value is not None:
             given += [name, str(value)]
@@ -44,13 +56,13 @@ def plan(source, folder, *, mode=None, far=None, max_memory=None, options=(), co
     return _shards(folder)
 
 
-def missing(folder):
+def missing(folder: File) -> List[str]:
     """Return the keys of the shards that are not there yet."""
     done = {path.stem for path in Path(folder, "shards").glob("*.block")}
     return [key for key in _shards(folder) if key not in done]
 
 
-def run(folder, pool, *, threads=1, retries=3, command="enfilade"):
+def run(folder: File, pool: Any, *, threads: int = 1, retries: int = 3, command: str = "enfilade") -> None:
     """Compute the missing shards, and wait until all are there; run it again to resume.
 
     ``pool`` is a ``dask.distributed.Client``, the module ``ray`` after ``ray.init()``, or an executor of
@@ -71,7 +83,7 @@ def run(folder, pool, *, threads=1, retries=3, command="enfilade"):
             future.result()
 
 
-def finish(folder, output, *, into=None, command="enfilade"):
+def finish(folder: File, output: File, *, into: Optional[File] = None, command: str = "enfilade") -> None:
     """Put all shards together: write what ``enfilade bake`` or ``enfilade pvs`` writes on one machine.
 
     ``into`` is a file for the world with visibility in it.
@@ -80,20 +92,21 @@ def finish(folder, output, *, into=None, command="enfilade"):
     _call(command, "finish", os.fspath(folder), "-o", os.fspath(output), *options)
 
 
-def _shards(folder):
+def _shards(folder: File) -> List[str]:
     manifest = Path(folder, "manifest.json")
     try:
-        return json.loads(manifest.read_text(encoding="utf-8"))["shards"]
+        shards: List[str] = json.loads(manifest.read_text(encoding="utf-8"))["shards"]
+        return shards
     except FileNotFoundError:
         raise JobError(f"{manifest} is not there: make the job first, with jobs.plan") from None
 
 
-def _shard(command, folder, key, threads):
+def _shard(command: str, folder: str, key: str, threads: int) -> str:
     _call(command, "run", folder, key, "--threads", str(threads))
     return key
 
 
-def _call(command, step, *arguments):
+def _call(command: str, step: str, *arguments: str) -> None:
     program = shutil.which(command)
     if program is None:
         raise JobError(f"no program {command!r}: install enfilade's command on this machine, or pass command=PATH")
