@@ -32,7 +32,7 @@
 //! let kit = Arc::new(Kit::new(vec![Piece::new("chamber", chamber, &Choice::Doorways)?])?);
 //! let journal = std::env::temp_dir().join(format!("enfilade-journal-{}", std::process::id()));
 //! # let _ = std::fs::remove_file(&journal);
-//! let open = || EditSession::open(&journal, kit.clone(), (EditGround::Open, "level 1"), DEFAULT_TOLERANCE);
+//! let open = || EditSession::open(&journal, kit.clone(), EditGround::Open, "level 1", DEFAULT_TOLERANCE);
 //! let (mut session, _) = open()?;
 //! session.apply(EditOperation::put("chamber", None, Pose::IDENTITY))?;
 //! drop(session);

@@ -88,7 +88,7 @@
 //! assert!(path.length > 1.0 && path.portals.len() == 1);
 //! let no_door = search.find(&map, &space, ends, |_, _| false, &mut path);
 //! assert_eq!(no_door, Err(NoPath::NoWay));
-//! let near = search.cells_within(&map, &space, ends[0], 100.0, |_, _| true)?;
+//! let near = search.cells_within(&map, &space, ends[0].0, ends[0].1, 100.0, |_, _| true)?;
 //! assert_eq!(near.len(), 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
