@@ -103,11 +103,38 @@ fn lines() -> anyhow::Result<Vec<String>> {
             crates.insert(name.into_owned(), json);
         }
     }
-    let (lines, faults) = Docs::new(crates).surface("enfilade")?;
+    let (lines, mut faults) = Docs::new(crates).surface("enfilade")?;
+    faults.extend(double_names(&lines));
     if !faults.is_empty() {
         bail!("{}", faults.join("\n"));
     }
     Ok(lines)
+}
+
+/// Returns a fault for each name that two types of the façade have: a reader of code would take one for the other.
+fn double_names(lines: &[String]) -> Vec<String> {
+    let kinds = ["enum", "struct", "trait", "type", "union"];
+    let mut places: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for line in lines {
+        let Some((path, text)) = line.split_once(": ") else {
+            continue;
+        };
+        let kind = text.split(|c: char| !c.is_alphanumeric()).next();
+        // An associated type is told by its owner, as a field is.
+        let is_own = |path: &str| {
+            let owners = path.rsplit_once("::").map_or("", |(owners, _)| owners);
+            let mut owners = owners.split("::");
+            owners.all(|owner| !owner.starts_with(char::is_uppercase))
+        };
+        if kind.is_some_and(|kind| kinds.contains(&kind)) && is_own(path) {
+            let name = path.rsplit("::").next().unwrap_or(path);
+            places.entry(name).or_default().push(path);
+        }
+    }
+    let double = places.values().filter(|at| at.len() > 1);
+    double
+        .map(|at| format!("types of one name: {}", at.join(", ")))
+        .collect()
 }
 
 /// Returns the lines of only one of two sorted lists.
@@ -130,6 +157,18 @@ mod tests {
         let found = differences(&["a: fn()", "b: u8", "c: u16"], &there);
         assert_eq!(found, ["- b: u8", "- c: u16", "+ c: u8", "+ d: u8"]);
         assert!(differences(&["a: fn()", "c: u8", "d: u8"], &there).is_empty());
+    }
+
+    #[test]
+    fn two_types_of_one_name_are_a_fault() {
+        let lines = [
+            "cpg::Place: struct: Clone",
+            "world::Place: enum",
+            "a::B::Place: type = u8",
+            "a::B::c: struct",
+        ];
+        let found = double_names(&lines.map(str::to_owned));
+        assert_eq!(found, ["types of one name: cpg::Place, world::Place"]);
     }
 
     #[test]

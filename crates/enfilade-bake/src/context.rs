@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use enfilade_geom::{Allowance, End, MemoryProbe};
+use enfilade_geom::{Allowance, AllowanceEnd, MemoryProbe};
 
 use crate::{BakeError, Budget, Method, Pieces, Resolution, Stage};
 
@@ -136,16 +136,16 @@ impl<'a> BakeContext<'a> {
         let running = self.stages().running;
         let stage = running.map_or(Stage::Structure, |(stage, ..)| stage);
         Err(match end {
-            End::Time => BakeError::TimeIsUp {
+            AllowanceEnd::Time => BakeError::TimeIsUp {
                 stage,
                 time: self.budget.time.unwrap_or_default(),
             },
-            End::Memory => BakeError::TooMuchMemory {
+            AllowanceEnd::Memory => BakeError::TooMuchMemory {
                 stage,
                 memory: self.budget.memory.unwrap_or_default(),
             },
-            End::Cancelled => BakeError::Cancelled,
-            End::Work => BakeError::TooMuchWork {
+            AllowanceEnd::Cancelled => BakeError::Cancelled,
+            AllowanceEnd::Work => BakeError::TooMuchWork {
                 stage,
                 n_triangles: self.n_triangles,
                 spent: self.allowance.spent(),

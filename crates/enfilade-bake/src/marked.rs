@@ -11,7 +11,7 @@ use enfilade_cpg::{SpecialId, World};
 use enfilade_geom::scene::{Mark, MarkKind, Scene, TriangleSource};
 use enfilade_geom::{Aabb, DVec3, Plane, Triangle, Winding, shown, triangle_area_normal};
 
-use crate::edit::special::{self, LinkOptions, Spot};
+use crate::edit::special::{self, LinkOptions, SpecialSpot};
 
 /// Greatest distance of a vertex from the plane of its panel, and width of dents that are filled. [Units: wu]
 const FLAT: f64 = 0.005;
@@ -114,7 +114,7 @@ fn link(world: &mut World, name: &str, ends: &[&Panel<'_>], problems: &mut Probl
 }
 
 /// Returns the place of an outline. One that faces a wall close by hangs on it and is seen from behind.
-fn spot(world: &World, outline: &[DVec3]) -> Spot {
+fn spot(world: &World, outline: &[DVec3]) -> SpecialSpot {
     let polygon = Winding::new(outline.to_vec());
     let (at, normal) = (
         polygon.centroid(),
@@ -128,7 +128,7 @@ fn spot(world: &World, outline: &[DVec3]) -> Spot {
     if is_walled(normal) && !is_walled(-normal) {
         corners.reverse();
     }
-    Spot::Wall(corners)
+    SpecialSpot::Wall(corners)
 }
 
 impl Panel<'_> {

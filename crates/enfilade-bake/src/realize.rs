@@ -1,7 +1,7 @@
 //! From a proposal to a world: an exact cut of space into convex leaves, cells by votes, portals where cells are open
 //! to each other, and geometry assigned to the cells that see it. The same for all builders.
 
-use enfilade_cpg::{Place, Provenance, Reason, Statistics, Why, World};
+use enfilade_cpg::{DecidedPlace, Provenance, Reason, Statistics, Why, World};
 use enfilade_geom::scene::Role;
 use enfilade_geom::{Allowance, Triangle};
 
@@ -86,8 +86,8 @@ pub(crate) fn realize(
 }
 
 /// Returns the close decisions of a proposal, as a world has them.
-pub(crate) fn places_of(proposal: &Proposal) -> Vec<Place> {
-    let place = |place: &FoundPlace| Place {
+pub(crate) fn places_of(proposal: &Proposal) -> Vec<DecidedPlace> {
+    let place = |place: &FoundPlace| DecidedPlace {
         at: place.at.as_vec3().to_array(),
         why: place.why.clone(),
     };

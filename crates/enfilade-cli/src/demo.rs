@@ -10,7 +10,7 @@ use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{MonitorCamera, PortalId, World};
 use enfilade::geom::{DVec3, shown};
 use enfilade::import::{ImportOptions, decode_gltf, export_glb};
-use enfilade::internals::bake::edit::special::Spot;
+use enfilade::internals::bake::edit::special::SpecialSpot;
 use enfilade_demo::{Generated, furnished_house, impossible_house, lift_tower};
 use enfilade_report::{PlanOptions, Verdict, plan_svg};
 
@@ -183,7 +183,7 @@ fn tower() -> anyhow::Result<Made> {
 fn impossible() -> anyhow::Result<Made> {
     let made = impossible_house();
     let (model, mut world, _) = baked(&made.house)?;
-    let on_wall = |polygon: &Vec<DVec3>| Spot::Wall(polygon.clone());
+    let on_wall = |polygon: &Vec<DVec3>| SpecialSpot::Wall(polygon.clone());
     for polygon in &made.mirrors {
         special::mirror(&mut world, &on_wall(polygon))?;
     }
@@ -205,7 +205,7 @@ fn impossible() -> anyhow::Result<Made> {
     special::monitor(&mut world, &on_wall(screen), camera)?;
     for (portal, cell) in sides_near(&world, made.window) {
         let cell = Some(cell);
-        special::reflect(&mut world, &Spot::Doorway { portal, cell }, 0.25)?;
+        special::reflect(&mut world, &SpecialSpot::Doorway { portal, cell }, 0.25)?;
     }
     let bytes = encode_glb(&world).context("the world breaks an invariant (a bug)")?;
     let plan = plan_svg(&world, &PlanOptions::default()).into_bytes();

@@ -7,8 +7,8 @@ use enfilade::cpg::{CellId, World};
 use enfilade::geom::shown;
 use enfilade_demo::Rng;
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, LostPixel, Mark, MarkShape, Oracle, Picture, PixelContent,
-    Studio, Style,
+    AdapterChoice, Camera, Culling, LostPixel, MarkShape, Oracle, Picture, PictureMark,
+    PixelContent, Studio, Style,
 };
 use serde::Serialize;
 
@@ -305,12 +305,12 @@ fn picture_of_loss(
         dark_corners: false,
         ..Style::default()
     };
-    let marks: Vec<Mark> = lost
+    let marks: Vec<PictureMark> = lost
         .iter()
         .take(200)
         .map(|l| {
             let at = |i: usize, d: f32| (l.at[i] as f32 + 0.5 + d) / size[i] as f32 * 2.0 - 1.0;
-            Mark {
+            PictureMark {
                 shape: MarkShape::Rectangle([at(0, -4.0), -at(1, 4.0), at(0, 4.0), -at(1, -4.0)]),
                 color: [1.0, 0.0, 0.2, 1.0],
                 width: 1.5,

@@ -9,7 +9,8 @@ use enfilade::geom::DVec3;
 use enfilade::runtime::Seen;
 use enfilade::world::{PartId, Pose};
 use enfilade_render::{
-    Camera, Culling, Mark, MarkShape, Paint, Picture, PortalTextureCounts, Sparing, Studio, Style,
+    Camera, Culling, MarkShape, Paint, Picture, PictureMark, PortalTextureCounts, Sparing, Studio,
+    Style,
 };
 use serde_json::json;
 
@@ -341,7 +342,7 @@ pub(crate) fn portal_marks(
     world: &World,
     camera: &Camera,
     size: [u32; 2],
-) -> anyhow::Result<Vec<Mark>> {
+) -> anyhow::Result<Vec<PictureMark>> {
     let view = camera.view(size[0] as f32 / size[1] as f32)?;
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let mut marks = Vec::new();
@@ -351,7 +352,7 @@ pub(crate) fn portal_marks(
 
 /// Adds the marks of a world that stands at a pose in the frame of the camera.
 pub(crate) fn add_portal_marks(
-    marks: &mut Vec<Mark>,
+    marks: &mut Vec<PictureMark>,
     world: &World,
     pose: &Pose,
     seen: &Seen<'_>,
@@ -371,7 +372,7 @@ pub(crate) fn add_portal_marks(
         let outline: Vec<[f32; 3]> = outline.iter().map(|p| p.as_vec3().to_array()).collect();
         let (least, most) = (size[1] as f32 / 540.0, size[1] as f32 / 110.0);
         let width = (0.02 * focal / nearest.max(0.1)).clamp(least, most);
-        let mark = |shape, color, width, on_top| Mark {
+        let mark = |shape, color, width, on_top| PictureMark {
             shape,
             color,
             width,
@@ -385,7 +386,7 @@ pub(crate) fn add_portal_marks(
     }
     let visits = seen.visits().iter();
     for v in visits.filter(|v| v.via.is_some() && v.face == 0) {
-        marks.push(Mark {
+        marks.push(PictureMark {
             shape: MarkShape::Rectangle(v.rectangle),
             color: [0.05, 0.55, 0.9, 0.8],
             width: size[1] as f32 / 480.0,

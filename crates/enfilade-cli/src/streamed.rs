@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use enfilade::runtime::{Sight, SightState};
 use enfilade::stream::{
-    Catalog, Changes, Eye, FetchError, Frame, InView, PackedPlace, PieceId, Policy, StreamOptions,
-    Streamer, ThreadSource,
+    Catalog, Changes, Eye, FetchError, InView, PackedPlace, PieceId, Policy, StreamFrame,
+    StreamOptions, Streamer, ThreadSource,
 };
 use enfilade_render::{Gpu, PieceOf, Put, RenderError, Studio};
 
@@ -242,7 +242,7 @@ impl Streamed {
     pub fn frame(&mut self, studio: &mut Studio, eye: Eye, slice: Duration) {
         // Otherwise what has come would pile up.
         if self.backlog <= self.max_backlog {
-            let frame = Frame {
+            let frame = StreamFrame {
                 now: self.start.elapsed(),
                 eye,
                 in_view: &self.in_view,

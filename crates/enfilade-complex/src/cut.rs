@@ -53,7 +53,7 @@ pub(super) fn move_borders(graph: &LeafGraph<'_>, cells: &mut LeafCells, tally: 
     if leaks.is_empty() {
         return;
     }
-    let adjacency = Adjacency::of(graph, &cells.cell_of_leaf, &leaks);
+    let adjacency = Adjacency::of_leaking_cells(graph, &cells.cell_of_leaf, &leaks);
     let n_leaves = graph.volumes.len();
     let node_of: Vec<AtomicU32> = (0..n_leaves).map(|_| AtomicU32::new(NO_NODE)).collect();
     let votes = LeafVotes::of(tally, n_leaves);
@@ -277,7 +277,7 @@ struct Adjacency {
 }
 
 impl Adjacency {
-    fn of(
+    fn of_leaking_cells(
         graph: &LeafGraph<'_>,
         cell_of_leaf: &[u32],
         leaks: &BTreeMap<[u32; 2], (f64, Vec<u32>)>,

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
 use crate::{
-    CellId, Fitting, Locator, PartNumbers, Place, PortalId, Pvs, SourceRuns, SpecialPortal, Why,
+    CellId, DecidedPlace, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns, SpecialPortal,
+    Why,
 };
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
@@ -102,7 +103,7 @@ pub struct CellPortalGraph {
     pub locator: Locator,
     /// Decisions of the bake about places that are neither a cell nor a portal: openings within a cell that nearly parted it,
     /// and spaces that are not cells.
-    pub places: Vec<Place>,
+    pub places: Vec<DecidedPlace>,
     /// Origin of the graph.
     pub provenance: Provenance,
     /// Counts from the bake.

@@ -49,4 +49,4 @@ pub use sources::SourceRuns;
 pub use special::{MonitorCamera, Pass, SpecialId, SpecialPortal, SpecialShape, Way};
 pub use trust::{CloseDecision, RoomDoubt};
 pub use validate::{GraphError, MAX_REPORTED, SpecialProblem};
-pub use why::{Fact, Place, Reason, Why};
+pub use why::{DecidedPlace, Fact, Reason, Why};

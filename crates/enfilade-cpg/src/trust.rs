@@ -93,7 +93,7 @@ impl CellPortalGraph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Fact, Place, Portal, PortalKind};
+    use crate::{DecidedPlace, Fact, Portal, PortalKind};
 
     fn narrow(share: f64) -> Why {
         Why::compared(Reason::Narrow, 0.7, &[(Fact::Share, share)])
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn a_room_that_was_lost_counts_with_those_that_are_there() {
         let mut graph = row(&[0.3]);
-        graph.places.push(Place {
+        graph.places.push(DecidedPlace {
             at: [0.0; 3],
             why: Why::compared(Reason::Wide, 0.7, &[(Fact::Share, 0.7)]),
         });

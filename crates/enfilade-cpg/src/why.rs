@@ -133,7 +133,7 @@ pub enum Fact {
 
 /// A place, neither a cell nor a portal, and a decision about it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct DecidedPlace {
     /// A point of it. [Units: wu]
     pub at: [f32; 3],
     /// The decision.

@@ -1,6 +1,6 @@
 //! Changes by hand: portals, doors, mirrors, lamps and crates in a finished world.
 
-use enfilade_bake::edit::special::{SpecialError, Spot, mirror};
+use enfilade_bake::edit::special::{SpecialError, SpecialSpot, mirror};
 use enfilade_bake::edit::{AddPortalError, add_portal};
 use enfilade_bake::simplify::delete_portal;
 use enfilade_cpg::{CellId, CellPortalGraph, DetailObject, PortalId, PortalKind, World};
@@ -192,7 +192,8 @@ impl HandEditKind {
                 };
             }
             Self::Mirror(corners) => {
-                mirror(world, &Spot::Wall(corners.clone())).map_err(HandEditError::Mirror)?;
+                mirror(world, &SpecialSpot::Wall(corners.clone()))
+                    .map_err(HandEditError::Mirror)?;
             }
             Self::Lamp(at) => {
                 in_air(world, *at, "lamp")?;

@@ -34,7 +34,7 @@ pub struct Allowance {
 
 /// The reason why an allowance is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum AllowanceEnd {
     /// The allowed work is done.
     Work,
     /// The time is up.
@@ -148,15 +148,15 @@ impl Allowance {
 
     /// Returns the reason why it is over, if it is; looks at clock and memory. An end other than by work stays.
     #[must_use]
-    pub fn end(&self) -> Option<End> {
+    pub fn end(&self) -> Option<AllowanceEnd> {
         if self.seen.load(Ordering::Relaxed) == 0 {
             self.look(true);
         }
         match self.seen.load(Ordering::Relaxed) {
-            LATE => Some(End::Time),
-            FULL => Some(End::Memory),
-            CANCELLED => Some(End::Cancelled),
-            _ => (self.spent() > self.most()).then_some(End::Work),
+            LATE => Some(AllowanceEnd::Time),
+            FULL => Some(AllowanceEnd::Memory),
+            CANCELLED => Some(AllowanceEnd::Cancelled),
+            _ => (self.spent() > self.most()).then_some(AllowanceEnd::Work),
         }
     }
 
@@ -256,12 +256,12 @@ mod tests {
         let some = Allowance::new(10, None);
         assert!(some.spend(10) && !some.is_over());
         assert!(!some.spend(1));
-        assert_eq!(some.end(), Some(End::Work));
+        assert_eq!(some.end(), Some(AllowanceEnd::Work));
         some.grant(2);
         assert!(!some.is_over() && some.spend(1) && !some.spend(1));
         let late = Allowance::new(u64::MAX, Some(Instant::now()));
         assert!(!late.spend(LOOK));
-        assert_eq!(late.end(), Some(End::Time));
+        assert_eq!(late.end(), Some(AllowanceEnd::Time));
         let early = Allowance::new(u64::MAX, Some(Instant::now() + Duration::from_secs(1000)));
         assert!(early.spend(10 * LOOK) && !early.is_over());
         assert!(Allowance::default().spend(u64::MAX / 2));
@@ -274,7 +274,7 @@ mod tests {
         let full = of(999);
         assert!(full.spend(LOOK), "not yet looked");
         assert!(!full.spend(LOOK_AT_MEMORY));
-        assert_eq!(full.end(), Some(End::Memory));
+        assert_eq!(full.end(), Some(AllowanceEnd::Memory));
         let unknown = Allowance::default().holding(0, || None);
         assert!(unknown.spend(LOOK_AT_MEMORY) && !unknown.is_over());
     }
@@ -288,7 +288,7 @@ mod tests {
         assert!(some.spend(1), "not yet looked");
         assert!(!some.spend(LOOK));
         cancel.store(false, Ordering::Relaxed);
-        assert_eq!(some.end(), Some(End::Cancelled), "it stays");
+        assert_eq!(some.end(), Some(AllowanceEnd::Cancelled), "it stays");
     }
 
     #[test]

@@ -26,7 +26,7 @@ mod tolerance;
 mod winding;
 
 pub use aabb::Aabb;
-pub use allowance::{Allowance, End, MemoryProbe, PROGRAM, Purse, Tab};
+pub use allowance::{Allowance, AllowanceEnd, MemoryProbe, PROGRAM, Purse, Tab};
 pub use attitude::{Attitude, faces, is_rather_level, lies_along};
 pub use bvh::{Bvh, NearSeries, Nearest};
 pub use flight::{MOST_FLIGHT_PLAN, are_treads, is_flight};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use enfilade_geom::{End, shown};
+use enfilade_geom::{AllowanceEnd, shown};
 
 /// The reason why an import stopped. The text names the problem, the place and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -87,7 +87,7 @@ pub enum ImportError {
         /// Element that was being read.
         place: String,
         /// Reason for the end.
-        end: End,
+        end: AllowanceEnd,
     },
     /// No triangle was found in any file.
     #[error("no triangles in {}; {}", shown(paths), shown(advice))]
@@ -121,18 +121,18 @@ pub enum ImportError {
 }
 
 /// Returns the reason for an end, and the remedy.
-fn words_of(end: End) -> &'static str {
+fn words_of(end: AllowanceEnd) -> &'static str {
     match end {
-        End::Work => {
+        AllowanceEnd::Work => {
             "reading takes more work than allowed; allow more, or give less or coarser input"
         }
-        End::Time => {
+        AllowanceEnd::Time => {
             "the time was up before it was read (--max-time); allow more, or give less or coarser input"
         }
-        End::Memory => {
+        AllowanceEnd::Memory => {
             "reading takes more memory than allowed (--max-memory); allow more, or give less or coarser input"
         }
-        End::Cancelled => "cancelled",
+        AllowanceEnd::Cancelled => "cancelled",
     }
 }
 

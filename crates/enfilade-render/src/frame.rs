@@ -2,7 +2,7 @@
 
 use crate::camera::Projection;
 use crate::list::RenderList;
-use crate::marks::Mark;
+use crate::marks::PictureMark;
 
 /// The coloring of surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,5 +54,5 @@ pub struct Frame<'a> {
     /// The style.
     pub style: Style,
     /// Lines and polygons drawn over it.
-    pub marks: &'a [Mark],
+    pub marks: &'a [PictureMark],
 }

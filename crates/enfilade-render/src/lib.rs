@@ -113,7 +113,7 @@ pub use gpu::{AdapterChoice, Gpu, RenderError};
 pub use ids::{Difference, IdPicture, LostPixel, PixelContent};
 pub use lamps::{LampCone, LampLight, LampOptions, lamp_lights};
 pub use list::{DrawReason, Lister, RenderList, Shot, Sparing};
-pub use marks::{Mark, MarkShape};
+pub use marks::{MarkShape, PictureMark};
 pub use oracle::Oracle;
 pub use picture::Picture;
 pub use piece_of::PieceOf;

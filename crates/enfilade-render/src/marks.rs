@@ -20,7 +20,7 @@ pub enum MarkShape {
 
 /// A line or polygon over a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mark {
+pub struct PictureMark {
     /// The shape.
     pub shape: MarkShape,
     /// Linear color with opacity.
@@ -39,7 +39,7 @@ const NEARER: f32 = 1.002;
 
 /// Returns the triangles of marks, three vertices each: those that surfaces hide, and those on top.
 pub(crate) fn corners(
-    marks: &[Mark],
+    marks: &[PictureMark],
     projection: &Projection,
     size: [u32; 2],
 ) -> [Vec<MarkCorner>; 2] {
@@ -82,7 +82,7 @@ fn nearer(q: Vec4) -> [f32; 4] {
 }
 
 /// Adds a line as two triangles that face the camera.
-fn add_line(out: &mut Vec<MarkCorner>, mark: &Mark, [a, b]: [Vec4; 2], size: [u32; 2]) {
+fn add_line(out: &mut Vec<MarkCorner>, mark: &PictureMark, [a, b]: [Vec4; 2], size: [u32; 2]) {
     const LEAST: f32 = 1e-3;
     let cut = |p: Vec4, q: Vec4| {
         if p.w >= LEAST {

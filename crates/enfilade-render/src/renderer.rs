@@ -13,7 +13,7 @@ use crate::gpu::{Gpu, RenderError};
 use crate::lamps::LampMaps;
 use crate::light::Light;
 use crate::list::Run;
-use crate::marks::Mark;
+use crate::marks::PictureMark;
 use crate::picture::Picture;
 use crate::pipelines::{Layouts, Pipelines};
 use crate::props::{PropDraw, PropMeshes};
@@ -349,7 +349,7 @@ impl Renderer {
     ) -> [Range<u32>; 2] {
         let mut hidden = Vec::new();
         for part in parts.iter().filter(|p| !p.list.stand_ins.is_empty()) {
-            let stand_ins: Vec<Mark> = (part.list.stand_ins.iter())
+            let stand_ins: Vec<PictureMark> = (part.list.stand_ins.iter())
                 .map(|&(portal, cell)| part.world.stand_in(portal, cell))
                 .collect();
             let projection = shown.projection_in(part.stage);

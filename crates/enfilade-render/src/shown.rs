@@ -7,7 +7,7 @@ use crate::copies::PropCopy;
 use crate::frame::Style;
 use crate::lamps::ActiveLamp;
 use crate::list::RenderList;
-use crate::marks::Mark;
+use crate::marks::PictureMark;
 use crate::portal_textures::DoorwayDraw;
 use crate::scene::GpuWorld;
 use crate::stage::{RenderStage, StageView};
@@ -46,7 +46,7 @@ pub(crate) struct Shown<'a> {
     /// Motion from that frame to that of the first world.
     pub(crate) pose: Pose,
     pub(crate) style: Style,
-    pub(crate) marks: &'a [Mark],
+    pub(crate) marks: &'a [PictureMark],
     pub(crate) props: &'a [PropCopy],
     pub(crate) lamps: &'a [ActiveLamp],
     pub(crate) exposure: f32,

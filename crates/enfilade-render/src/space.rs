@@ -18,7 +18,7 @@ use crate::gpu::RenderError;
 use crate::lamps::ActiveLamp;
 use crate::light::Light;
 use crate::list::{RenderList, Shot, Sparing};
-use crate::marks::Mark;
+use crate::marks::PictureMark;
 use crate::picture::Picture;
 use crate::prop::{Prop, PropMesh};
 use crate::renderer::read_picture;
@@ -41,7 +41,7 @@ pub struct SpaceShot<'a> {
     /// The style.
     pub style: Style,
     /// Lines and polygons drawn over the picture.
-    pub marks: &'a [Mark],
+    pub marks: &'a [PictureMark],
     /// Things; of parts that are not seen they are left out.
     pub props: &'a [Prop],
     /// Indices of the lamps that shine, for example those [that matter](enfilade_world::Lights::that_matter); `None` for

@@ -13,7 +13,7 @@ use crate::gpu::{Gpu, RenderError};
 use crate::lamps::{ActiveLamp, LampState};
 use crate::light::{Light, sun_of};
 use crate::list::{Lister, RenderList, Shot, Sparing};
-use crate::marks::Mark;
+use crate::marks::PictureMark;
 use crate::picture::Picture;
 use crate::piece_of::PieceOf;
 use crate::portal_textures::PortalTextures;
@@ -412,7 +412,7 @@ impl Studio {
         camera: &Camera,
         culling: Culling,
         style: Style,
-        marks: &[Mark],
+        marks: &[PictureMark],
         size: [u32; 2],
     ) -> Result<Picture, RenderError> {
         let aspect = size[0] as f32 / size[1] as f32;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use enfilade_cpg::{CellPortalGraph, Doubt, Place, Reason as Decision, World};
+use enfilade_cpg::{CellPortalGraph, DecidedPlace, Doubt, Reason as Decision, World};
 use serde::Serialize;
 
 /// A foot. [Units: wu]
@@ -288,7 +288,7 @@ fn found(world: &World) -> String {
 
 /// Returns the reason for less trust if spaces as large as rooms are not rooms of their own.
 fn taken(graph: &CellPortalGraph) -> Option<Reason> {
-    let taken: Vec<&Place> = (graph.places.iter())
+    let taken: Vec<&DecidedPlace> = (graph.places.iter())
         .filter(|place| place.why.takes_room())
         .collect();
     let mut text = match taken.len() {
@@ -398,7 +398,7 @@ mod tests {
 
     #[test]
     fn a_space_that_is_no_room_of_its_own_is_named_with_its_place() {
-        let place = |reason| Place {
+        let place = |reason| DecidedPlace {
             at: [1.0, 2.0, 3.5],
             why: enfilade_cpg::Why::given(reason),
         };

@@ -84,12 +84,12 @@ pub fn least_bandwidth(due: &[Due], catalog: &Catalog, latency: Duration) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LinkOptions, Piece, SimulatedLink, Source};
+    use crate::{PieceSizes, SimulatedLink, SimulatedLinkOptions, Source};
     use enfilade_cpg::CellSet;
     use enfilade_testkit::Rng;
 
     fn catalog(sizes: &[u64]) -> Catalog {
-        let pieces = sizes.iter().map(|&n| Piece {
+        let pieces = sizes.iter().map(|&n| PieceSizes {
             n_packed: n,
             n_resident: n,
         });
@@ -138,10 +138,10 @@ mod tests {
             let least = least_bandwidth(&due, &catalog, latency);
             // One after the other in the order of their deadlines, which no order betters; asked for ahead, so that there is
             // one latency in all.
-            let options = LinkOptions {
+            let options = SimulatedLinkOptions {
                 latency: Duration::ZERO,
                 bandwidth: least * 1.001,
-                ..LinkOptions::default()
+                ..SimulatedLinkOptions::default()
             };
             let mut link = SimulatedLink::new(&catalog, options);
             let (mut replies, mut now, mut was_late) = (Vec::new(), latency, false);

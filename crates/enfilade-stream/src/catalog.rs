@@ -17,7 +17,7 @@ impl PieceId {
 
 /// Sizes of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Piece {
+pub struct PieceSizes {
     /// Size in transit. [Units: bytes]
     pub n_packed: u64,
     /// Size in memory once unpacked. [Units: bytes]
@@ -28,7 +28,7 @@ pub struct Piece {
 /// other cells, its objects' meshes, and their pictures.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Catalog {
-    pieces: Vec<Piece>,
+    pieces: Vec<PieceSizes>,
     /// For each cell, the end of its pieces in `needed`.
     ends: Vec<u32>,
     /// Ascending in each cell, without duplicates.
@@ -39,7 +39,7 @@ impl Catalog {
     /// Makes the catalog of a world in which cell `c` needs the pieces of `rows[c]`. Numbers that `pieces` does not have are
     /// dropped.
     #[must_use]
-    pub fn new(pieces: Vec<Piece>, rows: &[Vec<PieceId>]) -> Self {
+    pub fn new(pieces: Vec<PieceSizes>, rows: &[Vec<PieceId>]) -> Self {
         let (mut ends, mut needed) = (Vec::with_capacity(rows.len()), Vec::new());
         for row in rows {
             let mut row: Vec<PieceId> = row
@@ -61,7 +61,7 @@ impl Catalog {
 
     /// Returns all pieces.
     #[must_use]
-    pub fn pieces(&self) -> &[Piece] {
+    pub fn pieces(&self) -> &[PieceSizes] {
         &self.pieces
     }
 

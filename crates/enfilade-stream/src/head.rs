@@ -5,7 +5,7 @@ use enfilade_cpg::{CellId, World};
 use enfilade_runtime::{Sight, SightError, SightSkeleton};
 use serde::{Deserialize, Serialize};
 
-use crate::{Catalog, Piece, PieceId, WorldPieces, images_of};
+use crate::{Catalog, PieceId, PieceSizes, WorldPieces, images_of};
 
 /// First bytes of a head.
 const MAGIC: [u8; 8] = *b"enfpack\0";
@@ -289,10 +289,13 @@ impl PackedHead {
             batch.primitive.material = *material;
         }
         listed.check(&world)?;
-        let pieces = listed.pieces.iter().map(|[_, n_packed, n_resident]| Piece {
-            n_packed: *n_packed,
-            n_resident: *n_resident,
-        });
+        let pieces = listed
+            .pieces
+            .iter()
+            .map(|[_, n_packed, n_resident]| PieceSizes {
+                n_packed: *n_packed,
+                n_resident: *n_resident,
+            });
         let rows: Vec<Vec<PieceId>> = (listed.cells.iter())
             .map(|row| row.iter().copied().map(PieceId).collect())
             .collect();

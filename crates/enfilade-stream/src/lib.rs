@@ -21,19 +21,19 @@ mod streamer;
 mod threads;
 
 pub use bound::{Due, deadlines, due_times, least_bandwidth};
-pub use catalog::{Catalog, Piece, PieceId};
+pub use catalog::{Catalog, PieceId, PieceSizes};
 pub use files::{FileFetch, HEAD, PackedFiles};
 pub use first_picture::first_picture;
 pub use head::{PackError, PackedHead, PieceAt};
 #[cfg(feature = "http")]
 pub use http::{HttpFetch, PackedHttp};
-pub use link::{LinkOptions, SimulatedLink};
+pub use link::{SimulatedLink, SimulatedLinkOptions};
 pub use of_world::{WorldPieces, images_of};
 pub use pack::PackedWorld;
 pub use place::PackedPlace;
 pub use source::{FetchError, Reply, Source};
 pub use streamer::{
-    Cause, Changes, Eye, Failed, Frame, InView, Loaded, PinError, Policy, StandIn, StreamCounts,
-    StreamOptions, Streamer,
+    Changes, Eye, Failed, InView, Loaded, PinError, Policy, StandIn, StandInCause, StreamCounts,
+    StreamFrame, StreamOptions, Streamer,
 };
 pub use threads::{Fetch, ThreadSource};

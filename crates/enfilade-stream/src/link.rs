@@ -6,7 +6,7 @@ use crate::{Catalog, FetchError, PieceId, Reply, Source};
 
 /// Settings of a [`SimulatedLink`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct LinkOptions {
+pub struct SimulatedLinkOptions {
     /// Time from a request to its first byte.
     pub latency: Duration,
     /// Bytes a second, shared equally by all transfers that have begun. [Limit: above 0]
@@ -20,7 +20,7 @@ pub struct LinkOptions {
     pub seed: u64,
 }
 
-impl Default for LinkOptions {
+impl Default for SimulatedLinkOptions {
     fn default() -> Self {
         Self {
             latency: Duration::from_millis(50),
@@ -36,7 +36,7 @@ impl Default for LinkOptions {
 /// calls give equal replies.
 #[derive(Debug)]
 pub struct SimulatedLink {
-    options: LinkOptions,
+    options: SimulatedLinkOptions,
     /// Size of each piece in transit. [Units: bytes]
     sizes: Vec<u64>,
     /// Bytes of each piece; empty vectors if not given.
@@ -65,7 +65,7 @@ struct Transfer {
 impl SimulatedLink {
     /// Makes a link to the pieces of a catalog. Their contents are empty unless [given](Self::with_contents).
     #[must_use]
-    pub fn new(catalog: &Catalog, options: LinkOptions) -> Self {
+    pub fn new(catalog: &Catalog, options: SimulatedLinkOptions) -> Self {
         Self {
             sizes: catalog.pieces().iter().map(|p| p.n_packed).collect(),
             contents: Vec::new(),

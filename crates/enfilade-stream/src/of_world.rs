@@ -6,7 +6,7 @@ use enfilade_cpg::{CellId, World};
 use enfilade_geom::scene::Primitive;
 use serde_json::Value;
 
-use crate::{Catalog, Piece, PieceId};
+use crate::{Catalog, PieceId, PieceSizes};
 
 /// The pieces into which a world falls apart: one per set of cells that see the same triangles, one per mesh of objects, one
 /// per picture.
@@ -57,7 +57,7 @@ impl WorldPieces {
             .map(|image| {
                 let piece = pieces.push(&[]);
                 let size = image.bytes.len() as u64;
-                pieces.pieces[piece.idx()] = Piece {
+                pieces.pieces[piece.idx()] = PieceSizes {
                     n_packed: size,
                     n_resident: size,
                 };
@@ -128,7 +128,7 @@ pub fn images_of(world: &World, material: u32) -> Vec<u32> {
 
 /// Pieces so far, and the pieces that each cell needs.
 struct Pieces {
-    pieces: Vec<Piece>,
+    pieces: Vec<PieceSizes>,
     rows: Vec<Vec<PieceId>>,
 }
 
@@ -142,7 +142,7 @@ impl Pieces {
 
     fn push(&mut self, cells: &[CellId]) -> PieceId {
         let piece = PieceId(self.pieces.len() as u32);
-        self.pieces.push(Piece {
+        self.pieces.push(PieceSizes {
             n_packed: 0,
             n_resident: 0,
         });

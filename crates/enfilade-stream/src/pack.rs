@@ -7,7 +7,7 @@ use enfilade_runtime::{Sight, SightSkeleton, SightState, Start};
 use crate::head::{
     PackError, PackedHead, PieceAt, compressed_piece, damaged, expanded_piece, hash_of,
 };
-use crate::{Catalog, Piece, PieceId, WorldPieces, images_of};
+use crate::{Catalog, PieceId, PieceSizes, WorldPieces, images_of};
 
 /// A packed world in memory.
 #[derive(Clone, Debug)]
@@ -213,7 +213,7 @@ impl Divided {
         let rows: Vec<Vec<PieceId>> = (world.graph.cell_ids())
             .map(|cell| needs.catalog.pieces_of(cell).to_vec())
             .collect();
-        let sizes = pieces.iter().map(|piece| Piece {
+        let sizes = pieces.iter().map(|piece| PieceSizes {
             n_packed: 0,
             n_resident: piece.len() as u64,
         });
@@ -232,10 +232,14 @@ impl Divided {
 
 /// Returns a catalog with these sizes in transit.
 fn packed_as(catalog: &Catalog, n_packed: impl Fn(usize) -> u64) -> Catalog {
-    let pieces = catalog.pieces().iter().enumerate().map(|(i, piece)| Piece {
-        n_packed: n_packed(i),
-        ..*piece
-    });
+    let pieces = catalog
+        .pieces()
+        .iter()
+        .enumerate()
+        .map(|(i, piece)| PieceSizes {
+            n_packed: n_packed(i),
+            ..*piece
+        });
     let rows: Vec<Vec<PieceId>> = (0..catalog.n_cells() as u32)
         .map(|cell| catalog.pieces_of(CellId(cell)).to_vec())
         .collect();

@@ -38,7 +38,7 @@ use state::State;
 use sweep::Sweep;
 use wanted::Wanted;
 
-pub use frame::{Cause, Changes, Eye, Failed, Frame, InView, Loaded, StandIn};
+pub use frame::{Changes, Eye, Failed, InView, Loaded, StandIn, StandInCause, StreamFrame};
 pub use options::{Policy, StreamOptions};
 
 /// Work of a frame for searching and sweeping, in units of about a nanosecond.
@@ -185,7 +185,7 @@ impl Streamer {
     pub fn update<S: Source + ?Sized>(
         &mut self,
         source: &mut S,
-        frame: &Frame<'_>,
+        frame: &StreamFrame<'_>,
         changes: &mut Changes,
     ) {
         changes.clear();

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Program, piece_a_cell};
-use enfilade_stream::{Frame, LinkOptions, StreamOptions};
+use enfilade_stream::{SimulatedLinkOptions, StreamFrame, StreamOptions};
 use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, room_grid};
 
@@ -18,7 +18,7 @@ fn idle_frames_allocate_nothing() {
             ..StreamOptions::default()
         };
         let pvs = Some(near_sets(&world.graph));
-        let link = LinkOptions::default();
+        let link = SimulatedLinkOptions::default();
         let mut program = Program::new(&world, &catalog, pvs, options, link);
         let view: Vec<(u32, f32)> = (0..60).map(|c| (c, 0.01)).collect();
         program.look(&world, 3, &view);
@@ -27,7 +27,7 @@ fn idle_frames_allocate_nothing() {
         assert!(program.source.on_their_way.is_empty());
         let count = allocation_counter::measure(|| {
             for _ in 0..100 {
-                let frame = Frame {
+                let frame = StreamFrame {
                     now: program.now,
                     eye: program.eye,
                     in_view: &program.view,

@@ -7,7 +7,7 @@
 mod measure;
 mod spaces;
 
-use enfilade_cpg::{Cell, CellPortalGraph, Fact, Place, Portal, Reason, Why};
+use enfilade_cpg::{Cell, CellPortalGraph, DecidedPlace, Fact, Portal, Reason, Why};
 use enfilade_geom::Triangle;
 
 use crate::kinds::is_by_rule;
@@ -156,7 +156,7 @@ fn label_problem(cell: &Cell) -> Option<String> {
 }
 
 /// Returns the problem of a place that is not a cell, but lies in one. Where an opening was, the middle of what was cut may be in a wall.
-fn matter_problem(subject: &Subject, place: &Place) -> Option<String> {
+fn matter_problem(subject: &Subject, place: &DecidedPlace) -> Option<String> {
     let cell = subject.locator.locate(to_dvec(place.at))?;
     let (name, what) = (place.why.reason.name(), subject.cell_name(cell));
     let is_matter = About::of(place.why.reason) == About::Matter;

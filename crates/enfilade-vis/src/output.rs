@@ -30,8 +30,8 @@ pub struct VisOutput {
     pub n_lines: u64,
     /// `true` if the search ended by itself; otherwise the answer is larger than necessary.
     pub is_complete: bool,
-    /// Number of pairs left by sides of planes alone, or by the floods of several blocks: an upper bound for
-    /// comparison.
+    /// Number of pairs of cells of which a test by planes alone (or, in several blocks, their floods) cannot tell that they do not
+    /// see each other: an upper bound for comparison.
     pub n_base: u64,
     /// Number of chains searched.
     pub n_steps: u64,

@@ -14,7 +14,7 @@ pub struct Layout {
     pub(crate) cells: Vec<CellShape>,
     /// Per cell its first exit, and the number of all.
     pub(crate) first_exit: Vec<u32>,
-    pub(crate) exits: Vec<Exit>,
+    pub(crate) exits: Vec<LayoutExit>,
     /// Per exit, the box around its opening; contiguous, for distance bounds to all of them.
     pub(crate) exit_bounds: Vec<Aabb>,
     pub(crate) openings: Vec<OpeningShape>,
@@ -44,7 +44,7 @@ pub struct CellShape {
 
 /// A portal as left from one of its cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exit {
+pub struct LayoutExit {
     /// The portal.
     pub portal: PortalId,
     /// The cell behind it.
@@ -118,7 +118,7 @@ impl Layout {
                 side.is_none_or(|s| graph.specials[s.idx()].is_through())
             };
             let ways = graph.exits(cell).filter(|e| is_way(e.id));
-            exits.extend(ways.map(|e| Exit {
+            exits.extend(ways.map(|e| LayoutExit {
                 portal: e.id,
                 to: e.to,
             }));
@@ -149,7 +149,7 @@ impl Layout {
             layout.add_special(id, world);
         }
         layout.specials_by_cell.sort_unstable();
-        let bounds = |e: &Exit| layout.openings[e.portal.idx()].bounds;
+        let bounds = |e: &LayoutExit| layout.openings[e.portal.idx()].bounds;
         layout.exit_bounds = layout.exits.iter().map(bounds).collect();
         layout
     }
@@ -274,7 +274,7 @@ impl Layout {
     ///
     /// If there is no such cell.
     #[must_use]
-    pub fn exits(&self, cell: CellId) -> &[Exit] {
+    pub fn exits(&self, cell: CellId) -> &[LayoutExit] {
         let first = &self.first_exit[cell.idx()..];
         &self.exits[first[0] as usize..first[1] as usize]
     }

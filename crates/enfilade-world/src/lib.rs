@@ -26,12 +26,12 @@ pub use actors::{
     WayPoint,
 };
 pub use bodies::{Agent, Body, Cast, CastCounts, Caster, Contact, Impact, Pairs, Walker};
-pub use layout::{CellShape, Exit, Layout, Opening};
+pub use layout::{CellShape, Layout, LayoutExit, Opening};
 pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{
     Arrival, Blocked, Corner, Floors, Geodesics, Hop, Hops, KeptMapError, LengthSearch, NoPath,
-    Obstacle, PassedPortal, Path, PathFollower, PathPoint, PathPortal, PathSearch, Progress,
-    Sampling, WalkMap, WalkMapKey, Ways,
+    Obstacle, PassedPortal, Path, PathFollower, PathPoint, PathPortal, PathSearch, Sampling,
+    WalkMap, WalkMapKey, WalkProgress, Ways,
 };
 pub use pose::Pose;
 pub use saved::{

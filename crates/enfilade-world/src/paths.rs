@@ -16,7 +16,7 @@
 
 use enfilade_geom::DVec3;
 
-use crate::layout::Exit;
+use crate::layout::LayoutExit;
 use crate::space::PartId;
 
 pub use blocked::{Blocked, Obstacle};
@@ -27,7 +27,7 @@ pub use geodesics::Geodesics;
 pub(crate) use geodesics::{Seen, into_cell};
 pub use hops::{Hop, Hops};
 pub use kept::{KeptMapError, WalkMapKey};
-pub use path_follower::{PathFollower, Progress};
+pub use path_follower::{PathFollower, WalkProgress};
 pub use path_search::PathSearch;
 pub use sampling::Sampling;
 pub use search::{Arrival, LengthSearch, PassedPortal};
@@ -91,7 +91,7 @@ pub struct PathPortal {
     /// The part whose portal it is.
     pub part: PartId,
     /// The portal, and the cell entered.
-    pub exit: Exit,
+    pub exit: LayoutExit,
     /// Where the path passes it, on the floor, in the part's frame. [Units: wu]
     pub at: DVec3,
 }

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use enfilade::cpg::Portal;
 use enfilade::stream::{
-    Changes, Eye, Frame, InView, LinkOptions, SimulatedLink, StreamOptions, Streamer, WorldPieces,
+    Changes, Eye, InView, SimulatedLink, SimulatedLinkOptions, StreamFrame, StreamOptions,
+    Streamer, WorldPieces,
 };
 use enfilade::vis::{VisConfig, VisContext, see_world};
 use enfilade::{Sight, SightState, View, Viewer};
@@ -27,9 +28,9 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     };
     let visible = see_world(&world.graph, &VisConfig::default(), &mut context)?;
     let catalog = WorldPieces::of_world(&world, &|_| Vec::new()).catalog;
-    let link = LinkOptions {
+    let link = SimulatedLinkOptions {
         bandwidth: 2e3,
-        ..LinkOptions::default()
+        ..SimulatedLinkOptions::default()
     };
     let mut source = SimulatedLink::new(&catalog, link);
     let pvs = Some(visible.vis.cells);
@@ -53,7 +54,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
             let in_view: Vec<InView> = cells.map(|&cell| InView { cell, share: 0.1 }).collect();
             now += Duration::from_micros(16_667);
             source.advance(now);
-            let frame = Frame {
+            let frame = StreamFrame {
                 now,
                 eye: Eye {
                     cell: sight.locate(position),

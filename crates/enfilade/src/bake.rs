@@ -84,15 +84,15 @@ pub mod edit {
     pub mod special {
         //! Mirrors, monitors and links.
         //!
-        //! A [`Spot`] becomes a [`mirror`], and [`plain`] takes it away:
+        //! A [`SpecialSpot`] becomes a [`mirror`], and [`plain`] takes it away:
         //!
         //! ```
         //! use enfilade::{CellId, PortalId};
-        //! use enfilade::bake::edit::special::{Spot, mirror, plain};
+        //! use enfilade::bake::edit::special::{SpecialSpot, mirror, plain};
         //! use enfilade::cpg::Way;
         //! # let mut world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::two_rooms());
         //!
-        //! let spot = Spot::Doorway { portal: PortalId(0), cell: Some(CellId(0)) };
+        //! let spot = SpecialSpot::Doorway { portal: PortalId(0), cell: Some(CellId(0)) };
         //! let id = mirror(&mut world, &spot)?;
         //! assert!(world.graph.specials[id.idx()].passes.iter().any(|pass| pass.way == Way::Mirror));
         //! plain(&mut world, id)?;
@@ -101,7 +101,7 @@ pub mod edit {
         //! ```
 
         pub use enfilade_bake::edit::special::{
-            LinkOptions, SpecialError, Spot, link, mirror, monitor, plain, reflect, tint,
+            LinkOptions, SpecialError, SpecialSpot, link, mirror, monitor, plain, reflect, tint,
         };
     }
 }

@@ -50,22 +50,22 @@
 //! # Ok::<(), SolidError>(())
 //! ```
 //!
-//! An [`Allowance`] bounds the work of a call; its [`End`] is the reason why it is used up:
+//! An [`Allowance`] bounds the work of a call; its [`AllowanceEnd`] is the reason why it is used up:
 //!
 //! ```
 //! use std::sync::Arc;
 //! use std::sync::atomic::AtomicBool;
 //!
-//! use enfilade::geom::{Allowance, End};
+//! use enfilade::geom::{Allowance, AllowanceEnd};
 //!
 //! let cancel = Arc::new(AtomicBool::new(true));
 //! let allowance = Allowance::new(u64::MAX, None).unless(Some(cancel));
-//! assert_eq!(allowance.end(), Some(End::Cancelled));
+//! assert_eq!(allowance.end(), Some(AllowanceEnd::Cancelled));
 //! ```
 
 pub use enfilade_geom::{
-    Aabb, Allowance, ConvexSolid, End, MemoryProbe, Plane, Shown, Similarity, SolidError, Triangle,
-    Winding, shown,
+    Aabb, Allowance, AllowanceEnd, ConvexSolid, MemoryProbe, Plane, Shown, Similarity, SolidError,
+    Triangle, Winding, shown,
 };
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
 

@@ -16,17 +16,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! A [`Streamer`] decides what a [`Source`] fetches for a [`Frame`], and tells the [`Changes`]:
+//! A [`Streamer`] decides what a [`Source`] fetches for a [`StreamFrame`], and tells the [`Changes`]:
 //!
 //! ```
 //! use std::time::Duration;
 //!
-//! use enfilade::stream::{Changes, Eye, Frame, InView, LinkOptions, SimulatedLink, StreamOptions, Streamer, WorldPieces};
+//! use enfilade::stream::{
+//!     Changes, Eye, InView, SimulatedLink, SimulatedLinkOptions, StreamFrame, StreamOptions, Streamer, WorldPieces,
+//! };
 //! use enfilade::CellId;
 //! # let world = enfilade_testkit::room_grid(&enfilade_testkit::GridParams::two_rooms());
 //!
 //! let catalog = WorldPieces::of_world(&world, &|_| Vec::new()).catalog;
-//! let mut source = SimulatedLink::new(&catalog, LinkOptions::default());
+//! let mut source = SimulatedLink::new(&catalog, SimulatedLinkOptions::default());
 //! let mut streamer = Streamer::new(catalog, &world.graph, None, StreamOptions::default());
 //! let mut changes = Changes::default();
 //! let in_view = [InView { cell: CellId(0), share: 1.0 }];
@@ -34,7 +36,7 @@
 //!     let now = Duration::from_secs(second);
 //!     source.advance(now);
 //!     let eye = Eye { cell: Some(CellId(0)), ..Eye::default() };
-//!     streamer.update(&mut source, &Frame { now, eye, in_view: &in_view }, &mut changes);
+//!     streamer.update(&mut source, &StreamFrame { now, eye, in_view: &in_view }, &mut changes);
 //! }
 //! assert!(streamer.is_complete(CellId(0)) && streamer.view_settled());
 //! assert!(streamer.counts().n_loaded > 0);
@@ -76,10 +78,10 @@
 //! ```
 
 pub use enfilade_stream::{
-    Catalog, Cause, Changes, Eye, Failed, Fetch, FetchError, FileFetch, Frame, HEAD, InView,
-    LinkOptions, Loaded, PackError, PackedFiles, PackedHead, PackedPlace, PackedWorld, Piece,
-    PieceAt, PieceId, PinError, Policy, Reply, SimulatedLink, Source, StandIn, StreamCounts,
-    StreamOptions, Streamer, ThreadSource, WorldPieces,
+    Catalog, Changes, Eye, Failed, Fetch, FetchError, FileFetch, HEAD, InView, Loaded, PackError,
+    PackedFiles, PackedHead, PackedPlace, PackedWorld, PieceAt, PieceId, PieceSizes, PinError,
+    Policy, Reply, SimulatedLink, SimulatedLinkOptions, Source, StandIn, StandInCause,
+    StreamCounts, StreamFrame, StreamOptions, Streamer, ThreadSource, WorldPieces,
 };
 #[cfg(feature = "http")]
 pub use enfilade_stream::{HttpFetch, PackedHttp};

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, block_on, poll_once};
 use enfilade::CellId;
 use enfilade::stream::{
-    Catalog, Changes, Eye, Frame, InView, PackedHead, Piece, PieceId, StreamCounts, StreamOptions,
+    Catalog, Changes, Eye, StreamFrame, InView, PackedHead, PieceId, PieceSizes, StreamCounts, StreamOptions,
     Streamer, ThreadSource,
 };
 
@@ -224,7 +224,7 @@ impl PortalStream {
 
     /// Runs a frame: takes away what has to go, and puts into the scene what is ready.
     fn run(&mut self, at: At, site: &mut Site) {
-        let frame = Frame {
+        let frame = StreamFrame {
             now: site.time.elapsed(),
             eye: self.eye,
             in_view: &self.in_view,
@@ -412,14 +412,14 @@ fn drawn_sizes(head: &PackedHead) -> Catalog {
     let shared = n_vertices as f64 * VERTEX + n_indices as f64 * INDEX;
     let drawn = shared.max(n_indices as f64 * FLAT_VERTEX);
     let growth = (drawn / unpacked.max(1) as f64).max(1.0);
-    let sized = |(i, piece): (usize, &Piece)| {
+    let sized = |(i, piece): (usize, &PieceSizes)| {
         let n = piece.n_resident;
         let drawn = if i < first_picture {
             (n as f64 * growth).ceil() as u64
         } else {
             n.saturating_mul(EXPANSION).min(LARGEST_PICTURE)
         };
-        Piece {
+        PieceSizes {
             n_resident: n.max(drawn),
             ..*piece
         }

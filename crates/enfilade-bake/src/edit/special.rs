@@ -19,7 +19,7 @@ const BEFORE: [f64; 3] = [0.01, 0.05, 0.25];
 
 /// The place of a special portal.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Spot {
+pub enum SpecialSpot {
     /// A doorway, as seen from one of its cells.
     Doorway {
         /// The doorway.
@@ -131,7 +131,7 @@ fn in_words(cell: Option<CellId>) -> String {
 /// # Errors
 ///
 /// If the place is none, is special already, or both sides of a doorway would be mirrors.
-pub fn mirror(world: &mut World, spot: &Spot) -> Result<SpecialId, SpecialError> {
+pub fn mirror(world: &mut World, spot: &SpecialSpot) -> Result<SpecialId, SpecialError> {
     let (cell, shape) = shape_at(&world.graph, spot)?;
     if let SpecialShape::Portal(portal) = shape {
         let other = world.graph[portal].beyond(cell);
@@ -154,7 +154,7 @@ pub fn mirror(world: &mut World, spot: &Spot) -> Result<SpecialId, SpecialError>
 /// If the place is none or special already, or the camera is none.
 pub fn monitor(
     world: &mut World,
-    spot: &Spot,
+    spot: &SpecialSpot,
     camera: MonitorCamera,
 ) -> Result<SpecialId, SpecialError> {
     let (cell, shape) = shape_at(&world.graph, spot)?;
@@ -171,8 +171,8 @@ pub fn monitor(
 /// [`CellPortalGraph::validate`], or the map leads elsewhere.
 pub fn link(
     world: &mut World,
-    from: &Spot,
-    into: &Spot,
+    from: &SpecialSpot,
+    into: &SpecialSpot,
     options: &LinkOptions,
 ) -> Result<(SpecialId, Option<SpecialId>), SpecialError> {
     let one = shape_at(&world.graph, from)?;
@@ -252,7 +252,7 @@ pub fn link(
 /// If the place is none, or the color is.
 pub fn tint(
     world: &mut World,
-    spot: &Spot,
+    spot: &SpecialSpot,
     color: [f32; 3],
     share: f32,
 ) -> Result<SpecialId, SpecialError> {
@@ -270,7 +270,11 @@ pub fn tint(
 /// # Errors
 ///
 /// If the place is none or only a mirror, or the share is none.
-pub fn reflect(world: &mut World, spot: &Spot, share: f32) -> Result<SpecialId, SpecialError> {
+pub fn reflect(
+    world: &mut World,
+    spot: &SpecialSpot,
+    share: f32,
+) -> Result<SpecialId, SpecialError> {
     change(world, spot, |special| {
         let mut mirrors = special.passes.iter().skip(1);
         match mirrors.position(|p| p.way == Way::Mirror) {
@@ -304,7 +308,7 @@ pub fn plain(world: &mut World, special: SpecialId) -> Result<(), SpecialError> 
 /// Changes what a doorway's side shows; a plain one shows the cell behind it. `Err` if it is nothing but a mirror.
 fn change(
     world: &mut World,
-    spot: &Spot,
+    spot: &SpecialSpot,
     change: impl Fn(&mut SpecialPortal) -> Result<(), ()>,
 ) -> Result<SpecialId, SpecialError> {
     let (cell, shape) = shape_at(&world.graph, spot)?;
@@ -488,9 +492,12 @@ fn middle(pieces: &[Winding]) -> DVec3 {
 }
 
 /// Finds the cell and polygon of a place.
-fn shape_at(graph: &CellPortalGraph, spot: &Spot) -> Result<(CellId, SpecialShape), SpecialError> {
+fn shape_at(
+    graph: &CellPortalGraph,
+    spot: &SpecialSpot,
+) -> Result<(CellId, SpecialShape), SpecialError> {
     match spot {
-        Spot::Doorway { portal, cell } => {
+        SpecialSpot::Doorway { portal, cell } => {
             let portal = *portal;
             let n = graph.portals.len();
             let found = graph.portals.get(portal.idx());
@@ -518,7 +525,7 @@ fn shape_at(graph: &CellPortalGraph, spot: &Spot) -> Result<(CellId, SpecialShap
             };
             Ok((cell, SpecialShape::Portal(portal)))
         }
-        Spot::Wall(corners) => {
+        SpecialSpot::Wall(corners) => {
             let (plane, polygon) = checked(corners).map_err(SpecialError::Polygon)?;
             let at = polygon.centroid();
             for before in BEFORE {

@@ -3,7 +3,7 @@
 //! The part is a box that cuts rooms. Where it does, its faces are candidate portals for the complex, so that what is beyond joins
 //! nothing; and air at its border that was outdoors is outdoors.
 
-use enfilade_cpg::{Locator, Place, Portal, Reason, Why, World};
+use enfilade_cpg::{DecidedPlace, Locator, Portal, Reason, Why, World};
 use enfilade_geom::{Aabb, DVec3, Triangle, Winding};
 
 use super::block::Block;
@@ -29,7 +29,7 @@ pub(super) struct BakedPart {
     pub(super) is_void: Vec<bool>,
     pub(super) whys: Vec<Vec<Why>>,
     /// Close decisions about places in the part that are not cells.
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<DecidedPlace>,
     /// Cells that are matter, or not in the part.
     pub(super) is_beyond: Vec<bool>,
     pub(super) portals: Vec<Portal>,

@@ -226,8 +226,8 @@ impl Joint<'_> {
     }
 
     /// Returns the close decisions: those of the part in the block, the old ones beyond it.
-    fn places(&self) -> Vec<enfilade_cpg::Place> {
-        let is_in = |place: &&enfilade_cpg::Place| {
+    fn places(&self) -> Vec<enfilade_cpg::DecidedPlace> {
+        let is_in = |place: &&enfilade_cpg::DecidedPlace| {
             let p = DVec3::from_array(place.at.map(f64::from));
             self.block.contains([&p], 0.0)
         };

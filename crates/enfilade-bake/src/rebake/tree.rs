@@ -159,7 +159,7 @@ pub(super) struct LocatorSplice<'a> {
 }
 
 impl<'a> LocatorSplice<'a> {
-    /// Copies what is around the box.
+    /// Copies the nodes of the old tree outside the box, and leaves a hole for those inside.
     pub(super) fn around(old: &PlaneTree<'_>, block: &'a Block, n_cells: usize) -> Self {
         let bounds = old.locator.bounds;
         let mut splice = Self {

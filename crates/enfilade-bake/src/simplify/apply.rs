@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{
-    Batch, Cell, CellId, CellPortalGraph, Fact, Locator, Place, Portal, PortalId, Reason,
+    Batch, Cell, CellId, CellPortalGraph, DecidedPlace, Fact, Locator, Portal, PortalId, Reason,
     SourceRuns, Why, World,
 };
 use enfilade_geom::scene::Primitive;
@@ -154,7 +154,7 @@ fn why_of_both(cell: &Cell, from: &Cell) -> Vec<Why> {
 
 /// Returns the decisions by which rooms are parts of others: one for each room but the largest of its cell, at the widest of its
 /// portals that are gone. `cell_of` has the new cell of each.
-fn merged_rooms(old: &CellPortalGraph, cell_of: &[CellId]) -> Vec<Place> {
+fn merged_rooms(old: &CellPortalGraph, cell_of: &[CellId]) -> Vec<DecidedPlace> {
     let to = |c: CellId| cell_of[c.idx()];
     let is_room = |c: &CellId| old[*c].is_room() && old[*c].holds_person();
     let mut largest: BTreeMap<CellId, CellId> = BTreeMap::new();
@@ -173,7 +173,7 @@ fn merged_rooms(old: &CellPortalGraph, cell_of: &[CellId]) -> Vec<Place> {
         let portal = gone.max_by(|a, b| a.area.total_cmp(&b.area))?;
         let facts = [(Fact::Area, portal.area), (Fact::Volume, old[c].volume)];
         let facts = facts.map(|(fact, value)| (fact, f64::from(value)));
-        Some(Place {
+        Some(DecidedPlace {
             at: portal.center(),
             why: Why::given(Reason::Merged).with(&facts),
         })

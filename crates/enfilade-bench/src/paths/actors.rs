@@ -11,8 +11,8 @@ use anyhow::{Context, ensure};
 use enfilade::cpg::{CellSet, Pvs};
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    ActorEvent, ActorId, ActorPlace, Actors, Agent, AwakeCells, Chance, Errands, Exit, Layout,
-    PartId, Path, PathSearch, PlanDraft, Space, WalkMap, WayPoint,
+    ActorEvent, ActorId, ActorPlace, Actors, Agent, AwakeCells, Chance, Errands, Layout,
+    LayoutExit, PartId, Path, PathSearch, PlanDraft, Space, WalkMap, WayPoint,
 };
 use enfilade::{CellId, World};
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -69,7 +69,7 @@ impl Town {
         let (mut hops, mut first) = (Vec::new(), Vec::new());
         for c in (0..n_cells as u32).map(CellId) {
             first.push(hops.len() as u32);
-            let point = |e: &Exit| (layout.opening(e.portal).center(), e.to);
+            let point = |e: &LayoutExit| (layout.opening(e.portal).center(), e.to);
             hops.extend(layout.exits(c).iter().map(point));
         }
         let next = places.iter().map(|&place| {

@@ -7,8 +7,8 @@ use anyhow::Context;
 use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::geom::DVec3;
 use enfilade::world::{
-    Agent, Exit, Hops, Layout, LengthSearch, PartId, Path, PathSearch, Place, Sampling, Space,
-    WalkMap, Ways,
+    Agent, Hops, Layout, LayoutExit, LengthSearch, PartId, Path, PathSearch, Place, Sampling,
+    Space, WalkMap, Ways,
 };
 use enfilade_testkit::oracle::least_lengths;
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -42,7 +42,7 @@ fn hops(name: &str) -> anyhow::Result<(Space, Vec<f64>, Hops)> {
 }
 
 /// Returns lengths from a cell to all others, in whole tenths of a millimeter.
-fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(Exit) -> Option<u64>) -> Vec<u64> {
+fn dijkstra(layout: &Layout, from: CellId, step: impl Fn(LayoutExit) -> Option<u64>) -> Vec<u64> {
     let lengths = least_lengths(layout.n_cells(), from.0, |cell| {
         let exits = layout.exits(CellId(cell)).iter();
         exits.filter_map(|&e| Some((e.to.0, step(e)?)))
@@ -64,15 +64,16 @@ pub(super) fn distances(name: &str) -> anyhow::Result<Figure> {
             is_open[p.idx()] ^= true;
             hops.set_open(ROOT, p, is_open[p.idx()]);
         }
-        let step =
-            |e: Exit| is_open[e.portal.idx()].then(|| (steps[e.portal.idx()] * 1e4).round() as u64);
+        let step = |e: LayoutExit| {
+            is_open[e.portal.idx()].then(|| (steps[e.portal.idx()] * 1e4).round() as u64)
+        };
         for from in (0..layout.n_cells() as u32).map(CellId) {
             let expected = dijkstra(layout, from, step);
             for to in (0..layout.n_cells() as u32).map(CellId) {
                 n_pairs += 1;
                 let least = expected[to.idx()];
                 let next = hops.next(&space, place(to), place(from));
-                let next = next.map(|hop| Exit {
+                let next = next.map(|hop| LayoutExit {
                     portal: hop.portal,
                     to: hop.to.cell,
                 });

@@ -9,7 +9,7 @@ use enfilade::geom::DVec3;
 use enfilade::runtime::{SightState, Target};
 use enfilade::world::{
     Agent, Body, Cast, Caster, Layout, NoPath, PartId, Path, PathFollower, PathSearch, Place,
-    Progress, Space, WalkMap, Walker,
+    Space, WalkMap, WalkProgress, Walker,
 };
 use enfilade_testkit::Rng;
 
@@ -31,7 +31,7 @@ const SHORTEST: f64 = 2.0;
 /// A walk of a path.
 pub(super) struct Walk {
     pub(super) path: Path,
-    pub(super) progress: Progress,
+    pub(super) progress: WalkProgress,
     /// Where it ended.
     pub(super) at: DVec3,
     /// Length of the path passed. [Units: wu]
@@ -85,16 +85,16 @@ pub(super) fn walks(world: &World) -> anyhow::Result<Walks> {
         let mut follower = PathFollower::new(&space, path.clone(), SPEED);
         // A walker that follows its path takes no longer, whatever it slides along.
         let most = (10.0 + 2.0 * path.length / SPEED) / SECONDS;
-        let mut progress = Progress::Walking;
+        let mut progress = WalkProgress::Walking;
         for _ in 0..most as usize {
             progress = follower.step(&mut walker, &mut space, SECONDS);
-            if progress != Progress::Walking {
+            if progress != WalkProgress::Walking {
                 break;
             }
         }
         let at = walker.feet();
         let mut touched = Vec::new();
-        if progress != Progress::Arrived {
+        if progress != WalkProgress::Arrived {
             touched = places.touched_at(&space, at);
         }
         all.walks.push(Walk {
@@ -207,7 +207,7 @@ pub(super) fn walk(world: &World) -> anyhow::Result<Figure> {
     let all = walks(world)?;
     let n = all.walks.len();
     ensure!(n >= PATHS / 2, "only {n} paths in {} pairs", PATHS * TRIES);
-    let is_lost = |walk: &&Walk| walk.progress != Progress::Arrived;
+    let is_lost = |walk: &&Walk| walk.progress != WalkProgress::Arrived;
     let lost: Vec<String> = (all.walks.iter().filter(is_lost))
         .map(|w| {
             let [passed, length] = [w.passed, w.path.length_in_plan];

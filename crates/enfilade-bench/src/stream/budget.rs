@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use enfilade::CellId;
 use enfilade::stream::{
-    Catalog, Changes, Eye, Frame, InView, LinkOptions, Piece, PieceId, Policy, Reply,
-    SimulatedLink, Source, StreamOptions, Streamer,
+    Catalog, Changes, Eye, InView, PieceId, PieceSizes, Policy, Reply, SimulatedLink,
+    SimulatedLinkOptions, Source, StreamFrame, StreamOptions, Streamer,
 };
 use enfilade_testkit::oracle::near_sets;
 use enfilade_testkit::{GridParams, Rng, room_grid};
@@ -51,7 +51,7 @@ fn draw_catalog(rng: &mut Rng, n_cells: usize) -> Catalog {
             rows[rng.below(n_cells)].push(PieceId(p));
         }
         let size = 1 + rng.below(100_000) as u64;
-        Piece {
+        PieceSizes {
             n_packed: size / 3 + 1,
             n_resident: size,
         }
@@ -96,7 +96,7 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
             max_in_flight: 1 + rng.below(12),
             ..StreamOptions::default()
         };
-        let link = LinkOptions {
+        let link = SimulatedLinkOptions {
             latency: Duration::from_millis(rng.below(300) as u64),
             bandwidth: rng.range(1e5, 5e6),
             error_rate: rng.range(0.0, 0.3),
@@ -128,7 +128,7 @@ pub(super) fn budget(_: &str) -> anyhow::Result<Figure> {
             }
             let now = FRAME * (i as u32 + 1);
             source.link.advance(now);
-            let frame = Frame {
+            let frame = StreamFrame {
                 now,
                 eye,
                 in_view: &in_view,

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use enfilade::stream::{Changes, LinkOptions, SimulatedLink, StreamOptions, Streamer};
+use enfilade::stream::{Changes, SimulatedLink, SimulatedLinkOptions, StreamOptions, Streamer};
 use enfilade_testkit::oracle::near_sets;
 
 use super::replay::frame_of;
@@ -30,9 +30,9 @@ fn walk(scene: &str) -> anyhow::Result<Timed> {
     let pvs = near_sets(&world.graph);
     let site = Streamed::with_pvs(&world, pvs.clone())?;
     let walk = Recorder::new(&site).walk(&route(&site, 3, STRETCHES)?, 1.4)?;
-    let link = LinkOptions {
+    let link = SimulatedLinkOptions {
         bandwidth: 1e7,
-        ..LinkOptions::default()
+        ..SimulatedLinkOptions::default()
     };
     let mut link = SimulatedLink::new(site.catalog(), link);
     let catalog = site.catalog().clone();

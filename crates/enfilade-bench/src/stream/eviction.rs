@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use anyhow::ensure;
 use enfilade::World;
 use enfilade::stream::{
-    Changes, LinkOptions, PieceId, Policy, SimulatedLink, StreamOptions, Streamer,
+    Changes, PieceId, Policy, SimulatedLink, SimulatedLinkOptions, StreamOptions, Streamer,
 };
 use quick_cache::Weighter;
 use quick_cache::unsync::Cache;
@@ -65,10 +65,10 @@ fn ours(site: &Streamed, walk: &Recording, capacity: u64) -> u64 {
         max_bytes_a_frame: u64::MAX,
         ..StreamOptions::default()
     };
-    let link = LinkOptions {
+    let link = SimulatedLinkOptions {
         latency: std::time::Duration::ZERO,
         bandwidth: 1e18,
-        ..LinkOptions::default()
+        ..SimulatedLinkOptions::default()
     };
     let mut link = SimulatedLink::new(site.catalog(), link);
     let catalog = site.catalog().clone();

@@ -7,7 +7,7 @@ use anyhow::ensure;
 use enfilade::World;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::stream::{
-    Changes, Frame, LinkOptions, PackedWorld, SimulatedLink, StreamOptions, Streamer,
+    Changes, PackedWorld, SimulatedLink, SimulatedLinkOptions, StreamFrame, StreamOptions, Streamer,
 };
 use enfilade_testkit::Rng;
 
@@ -33,13 +33,13 @@ pub(super) fn first_picture(world: &World) -> anyhow::Result<Figure> {
     let n_head = packed.head.encode()?.len();
     let catalog = &packed.head.catalog;
     let of_file = |n: usize| {
-        let link = LinkOptions::default();
+        let link = SimulatedLinkOptions::default();
         link.latency.as_secs_f64() + n as f64 / link.bandwidth
     };
     let whole = of_file(file.len());
     let (mut rooms, mut views) = (Vec::new(), Vec::new());
     for stand in draw_stands(&site, VIEWS)? {
-        let mut link = SimulatedLink::new(catalog, LinkOptions::default());
+        let mut link = SimulatedLink::new(catalog, SimulatedLinkOptions::default());
         let pvs = Some(site.pvs.clone());
         let options = StreamOptions::default();
         let mut streamer = Streamer::new(catalog.clone(), &world.graph, pvs, options);
@@ -51,7 +51,7 @@ pub(super) fn first_picture(world: &World) -> anyhow::Result<Figure> {
         let (mut now, mut is_settled, mut of_room) = (Duration::ZERO, false, None);
         for _ in 0..MOST_FRAMES {
             link.advance(now);
-            let frame = Frame {
+            let frame = StreamFrame {
                 now,
                 eye: stand.eye,
                 in_view: &stand.in_view,

@@ -7,7 +7,7 @@ use anyhow::{Context, ensure};
 use enfilade::geom::{DVec3, Triangle};
 use enfilade::internals::geom::{Bvh, Ray};
 use enfilade::internals::stream::{deadlines, due_times, least_bandwidth};
-use enfilade::stream::{LinkOptions, PieceId, StreamOptions};
+use enfilade::stream::{PieceId, SimulatedLinkOptions, StreamOptions};
 use enfilade::{CellId, World};
 use enfilade_testkit::Rng;
 
@@ -45,10 +45,10 @@ fn options() -> StreamOptions {
 }
 
 fn replay_at(site: &Streamed, walk: &Recording, bandwidth: f64) -> Outcome {
-    let link = LinkOptions {
+    let link = SimulatedLinkOptions {
         latency: LATENCY,
         bandwidth,
-        ..LinkOptions::default()
+        ..SimulatedLinkOptions::default()
     };
     replay(site, walk, options(), link)
 }

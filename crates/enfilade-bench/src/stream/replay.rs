@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use enfilade::stream::{
-    Changes, Eye, Frame, LinkOptions, PieceId, SimulatedLink, StreamOptions, Streamer,
+    Changes, Eye, PieceId, SimulatedLink, SimulatedLinkOptions, StreamFrame, StreamOptions,
+    Streamer,
 };
 
 use super::site::{FRAME, Recording, Step, Streamed};
@@ -31,7 +32,7 @@ pub(super) fn replay(
     site: &Streamed,
     walk: &Recording,
     options: StreamOptions,
-    link: LinkOptions,
+    link: SimulatedLinkOptions,
 ) -> Outcome {
     let bandwidth = link.bandwidth;
     let mut link = SimulatedLink::new(site.catalog(), link);
@@ -71,8 +72,8 @@ pub(super) fn replay(
 }
 
 /// Returns the input of a frame.
-pub(super) fn frame_of<'a>(walk: &Recording, step: &'a Step, now: Duration) -> Frame<'a> {
-    Frame {
+pub(super) fn frame_of<'a>(walk: &Recording, step: &'a Step, now: Duration) -> StreamFrame<'a> {
+    StreamFrame {
         now,
         eye: Eye {
             cell: Some(step.cell),

@@ -7,8 +7,8 @@ use anyhow::{Context, ensure};
 use enfilade::World;
 use enfilade::runtime::View;
 use enfilade::stream::{
-    Cause, Changes, Eye, Frame, InView, LinkOptions, PieceId, Policy, SimulatedLink, StreamOptions,
-    Streamer,
+    Changes, Eye, InView, PieceId, Policy, SimulatedLink, SimulatedLinkOptions, StandInCause,
+    StreamFrame, StreamOptions, Streamer,
 };
 use enfilade_testkit::Rng;
 
@@ -76,7 +76,7 @@ pub(super) fn settled(world: &World) -> anyhow::Result<Figure> {
         max_resident: largest + largest / 2,
         ..StreamOptions::default()
     };
-    let mut link = SimulatedLink::new(site.catalog(), LinkOptions::default());
+    let mut link = SimulatedLink::new(site.catalog(), SimulatedLinkOptions::default());
     let catalog = site.catalog().clone();
     let pvs = Some(site.pvs.clone());
     let mut streamer = Streamer::new(catalog, &site.world.graph, pvs, options);
@@ -100,7 +100,7 @@ pub(super) fn settled(world: &World) -> anyhow::Result<Figure> {
 /// Returns the number of cells in view of which a piece has failed.
 fn n_failing_in(changes: &Changes) -> usize {
     let causes = changes.stand_ins.iter().map(|s| s.cause);
-    causes.filter(|c| *c == Cause::Failing).count()
+    causes.filter(|c| *c == StandInCause::Failing).count()
 }
 
 /// Rests in a view until it is settled. Returns `false` if it is not after five minutes.
@@ -115,7 +115,7 @@ fn rest(
     for _ in 0..MOST_FRAMES {
         *now += FRAME;
         link.advance(*now);
-        let frame = Frame {
+        let frame = StreamFrame {
             now: *now,
             eye: stand.eye,
             in_view: &stand.in_view,
@@ -148,11 +148,11 @@ pub(super) fn faults(world: &World) -> anyhow::Result<Figure> {
         let mut sets = Vec::new();
         for has_faults in [false, true] {
             let rate = |r: f64| if has_faults { r } else { 0.0 };
-            let link = LinkOptions {
+            let link = SimulatedLinkOptions {
                 error_rate: rate(0.1),
                 short_read_rate: rate(0.3),
                 seed,
-                ..LinkOptions::default()
+                ..SimulatedLinkOptions::default()
             };
             let mut link = SimulatedLink::new(site.catalog(), link);
             let pvs = Some(site.pvs.clone());
@@ -167,7 +167,7 @@ pub(super) fn faults(world: &World) -> anyhow::Result<Figure> {
                     link.set_down((1..126).contains(&i));
                     now += FRAME;
                     link.advance(now);
-                    let frame = Frame {
+                    let frame = StreamFrame {
                         now,
                         eye: stand.eye,
                         in_view: &stand.in_view,

@@ -12,8 +12,8 @@ use std::time::Duration;
 use anyhow::{Context, ensure};
 use enfilade::cpg::wire::{encode_glb, read_piece};
 use enfilade::stream::{
-    Changes, Fetch, FetchError, FileFetch, Frame, LinkOptions, PackedFiles, PackedHead,
-    PackedWorld, PieceId, Reply, SimulatedLink, Source, StreamOptions, Streamer, WorldPieces,
+    Changes, Fetch, FetchError, FileFetch, PackedFiles, PackedHead, PackedWorld, PieceId, Reply,
+    SimulatedLink, SimulatedLinkOptions, Source, StreamFrame, StreamOptions, Streamer, WorldPieces,
 };
 use serde_json::{Value, json};
 
@@ -76,7 +76,7 @@ struct Disk<'a> {
 }
 
 impl<'a> Disk<'a> {
-    fn new(head: &'a PackedHead, files: &PackedFiles, options: LinkOptions) -> Self {
+    fn new(head: &'a PackedHead, files: &PackedFiles, options: SimulatedLinkOptions) -> Self {
         Self {
             link: SimulatedLink::new(&head.catalog, options),
             head,
@@ -146,10 +146,10 @@ impl<'a> Walker<'a> {
         }
     }
 
-    fn frame(&mut self, frame: Frame<'_>) -> anyhow::Result<()> {
+    fn frame(&mut self, frame: StreamFrame<'_>) -> anyhow::Result<()> {
         self.now += FRAME;
         self.disk.link.advance(self.now);
-        let frame = Frame {
+        let frame = StreamFrame {
             now: self.now,
             ..frame
         };
@@ -170,10 +170,10 @@ impl<'a> Walker<'a> {
     }
 }
 
-fn link() -> LinkOptions {
-    LinkOptions {
+fn link() -> SimulatedLinkOptions {
+    SimulatedLinkOptions {
         bandwidth: 1e7,
-        ..LinkOptions::default()
+        ..SimulatedLinkOptions::default()
     }
 }
 
@@ -200,7 +200,7 @@ fn walk(dir: &Path) -> anyhow::Result<Value> {
         let mut frames = 0..MOST_FRAMES;
         while frames.next().is_some() {
             let (now, eye, in_view) = (walker.now, stand.eye, &stand.in_view[..]);
-            walker.frame(Frame { now, eye, in_view })?;
+            walker.frame(StreamFrame { now, eye, in_view })?;
             if walker.streamer.view_settled() {
                 break;
             }

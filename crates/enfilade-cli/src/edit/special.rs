@@ -5,7 +5,7 @@ use enfilade::bake::edit::special;
 use enfilade::bake::edit::special::LinkOptions;
 use enfilade::cpg::{CellPortalGraph, MonitorCamera, PortalId, SpecialId, World};
 use enfilade::geom::{DMat4, Similarity, shown};
-use enfilade::internals::bake::edit::special::Spot;
+use enfilade::internals::bake::edit::special::SpecialSpot;
 
 use super::{Polygon, parse_polygon};
 use crate::inspect::cell_of;
@@ -269,10 +269,10 @@ fn special_of(graph: &CellPortalGraph, text: &str) -> anyhow::Result<SpecialId> 
     })
 }
 
-fn spot_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<Spot> {
+fn spot_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<SpecialSpot> {
     Ok(match place {
-        Place::Wall(polygon) => Spot::Wall(polygon.0.clone()),
-        Place::Portal(portal, cell) => Spot::Doorway {
+        Place::Wall(polygon) => SpecialSpot::Wall(polygon.0.clone()),
+        Place::Portal(portal, cell) => SpecialSpot::Doorway {
             portal: PortalId(*portal),
             cell: cell.as_deref().map(|c| cell_of(graph, c)).transpose()?,
         },
@@ -280,7 +280,7 @@ fn spot_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<Spot> {
 }
 
 /// Returns both sides of a portal for which no cell is given.
-fn sides_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<Vec<Spot>> {
+fn sides_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<Vec<SpecialSpot>> {
     let cells = match place {
         Place::Portal(portal, None) => graph
             .portals
@@ -290,7 +290,7 @@ fn sides_of(graph: &CellPortalGraph, place: &Place) -> anyhow::Result<Vec<Spot>>
     };
     Ok(match cells {
         Some((portal, cells)) => (cells.into_iter())
-            .map(|cell| Spot::Doorway {
+            .map(|cell| SpecialSpot::Doorway {
                 portal: PortalId(portal),
                 cell: Some(cell),
             })

@@ -1,7 +1,7 @@
 //! Pictures from above, with the view frozen.
 
 use enfilade::cpg::World;
-use enfilade_render::{Camera, Frame, Mark, MarkShape, Picture, Projection, Studio, Style};
+use enfilade_render::{Camera, Frame, MarkShape, Picture, PictureMark, Projection, Studio, Style};
 
 use super::light;
 
@@ -20,7 +20,7 @@ pub(crate) fn above(
     let seen = studio.viewer.see(&studio.sight, &studio.state, &view);
     let cut = cut.unwrap_or(camera.eye[1] + 0.5);
     let width = size[1] as f32 / 260.0;
-    let line = |shape, color, width| Mark {
+    let line = |shape, color, width| PictureMark {
         shape,
         color,
         width,

@@ -6,7 +6,7 @@ use enfilade::cpg::{CellId, PortalId, World};
 use enfilade::runtime::{Sight, View};
 use enfilade::world::{PartId, Space, SpaceViewer};
 use enfilade_render::{
-    Camera, Culling, Mark, Picture, PortalTextureCounts, SpaceShot, Studio, Style,
+    Camera, Culling, Picture, PictureMark, PortalTextureCounts, SpaceShot, Studio, Style,
 };
 
 use super::textured::settle;
@@ -62,7 +62,7 @@ impl Mirrored {
         camera: &Camera,
         culling: Culling,
         style: Style,
-        marks: &[Mark],
+        marks: &[PictureMark],
         size: [u32; 2],
     ) -> anyhow::Result<(Picture, PortalTextureCounts)> {
         let view = camera.view(size[0] as f32 / size[1] as f32)?;

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use anyhow::Context;
 use enfilade::cpg::CellId;
 use enfilade::runtime::Seen;
-use enfilade::stream::{Catalog, InView, PackedFiles, PackedHead, PackedPlace, Piece, PieceId};
+use enfilade::stream::{
+    Catalog, InView, PackedFiles, PackedHead, PackedPlace, PieceId, PieceSizes,
+};
 use enfilade_render::StreamLimits;
 
 /// Most vertices and indices that a byte of a piece decodes to: four times one of a byte.
@@ -97,7 +99,7 @@ impl Packed {
     pub(super) fn on_adapter(&self) -> Catalog {
         let catalog = &self.head.catalog;
         let first_picture = catalog.pieces().len() - self.head.world.images.len();
-        let sized = |(i, piece): (usize, &Piece)| {
+        let sized = |(i, piece): (usize, &PieceSizes)| {
             let n = piece.n_resident;
             let on_adapter = if i < first_picture {
                 // A vertex of 12 bytes takes 40.
@@ -105,7 +107,7 @@ impl Packed {
             } else {
                 n.saturating_mul(EXPANSION).min(LARGEST_PICTURE)
             };
-            Piece {
+            PieceSizes {
                 n_resident: n.max(on_adapter),
                 ..*piece
             }

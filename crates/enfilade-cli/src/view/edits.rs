@@ -7,7 +7,7 @@ use enfilade::cpg::PortalId;
 use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::DVec3;
 use enfilade::world::PartId;
-use enfilade_render::{Mark, portal_looked_at};
+use enfilade_render::{PictureMark, portal_looked_at};
 
 use super::app::App;
 use super::editing::{EditKey, EditRay, Outcome};
@@ -18,7 +18,7 @@ use crate::output::write_whole;
 
 impl App<'_> {
     /// Finds what the pointer means for the editor; returns the marks that show it.
-    pub(super) fn look_at_edits(&mut self) -> Vec<Mark> {
+    pub(super) fn look_at_edits(&mut self) -> Vec<PictureMark> {
         let (Some(editor), Some(open)) = (&mut self.editor, &mut self.open) else {
             return Vec::new();
         };

@@ -12,8 +12,8 @@ use enfilade::runtime::View;
 use enfilade::stream::Eye;
 use enfilade::world::{PartId, Place, Space};
 use enfilade_render::{
-    AdapterChoice, Camera, Culling, Frame, Mark, Paint, PortalTextureOptions, PortalTexturePaint,
-    Prop, SpaceShot, Sparing, Studio, Style,
+    AdapterChoice, Camera, Culling, Frame, Paint, PictureMark, PortalTextureOptions,
+    PortalTexturePaint, Prop, SpaceShot, Sparing, Studio, Style,
 };
 use winit::dpi::PhysicalSize;
 use winit::keyboard::KeyCode;
@@ -263,7 +263,7 @@ impl Open {
         world: &World,
         camera: &Camera,
         seconds: f64,
-        marks: &mut Vec<Mark>,
+        marks: &mut Vec<PictureMark>,
     ) -> anyhow::Result<()> {
         use wgpu::CurrentSurfaceTexture as Got;
         let size = [self.config.width, self.config.height];
@@ -359,7 +359,7 @@ impl Open {
         view: &View,
         target: wgpu::SurfaceTexture,
         seconds: f64,
-        marks: &[Mark],
+        marks: &[PictureMark],
     ) -> anyhow::Result<()> {
         let size = [self.config.width, self.config.height];
         let output = target
@@ -455,7 +455,7 @@ impl Open {
         screenshot: &Path,
         adapter: &AdapterChoice,
         world: &World,
-        marks: &[Mark],
+        marks: &[PictureMark],
         outputs: &mut Outputs,
     ) -> anyhow::Result<()> {
         self.n_shots += 1;

@@ -62,7 +62,7 @@ impl Pointed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use enfilade::bake::edit::special::Spot;
+    use enfilade::bake::edit::special::SpecialSpot;
     use enfilade::cpg::PortalId;
     use enfilade::internals::bake::edit::special::mirror;
     use enfilade_render::portal_looked_at;
@@ -104,7 +104,7 @@ mod tests {
             portal_looked_at(&space, &pointed.ray).map(|f| f.1)
         };
         assert_eq!(found(&world), None);
-        mirror(&mut world, &Spot::Wall(wall.to_vec())).unwrap();
+        mirror(&mut world, &SpecialSpot::Wall(wall.to_vec())).unwrap();
         assert_eq!(found(&world), Some(PortalId(0)));
     }
 }

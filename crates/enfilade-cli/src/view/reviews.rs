@@ -2,7 +2,7 @@
 
 use enfilade::geom::DVec3;
 use enfilade::world::{PartId, Space};
-use enfilade_render::{Camera, FOV, Mark};
+use enfilade_render::{Camera, FOV, PictureMark};
 
 use super::app::App;
 use super::open::Open;
@@ -43,7 +43,7 @@ impl App<'_> {
     }
 
     /// Looks at the portals of a review, and lends their marks to the frame.
-    pub(super) fn look_at_review(&mut self) -> anyhow::Result<Vec<Mark>> {
+    pub(super) fn look_at_review(&mut self) -> anyhow::Result<Vec<PictureMark>> {
         let (Some(reviewer), Some(open)) = (&mut self.reviewer, &mut self.open) else {
             return Ok(Vec::new());
         };

@@ -83,7 +83,7 @@ mod tests {
     use enfilade::cpg::{Fitting, FittingPart, Motion, MotionKind};
     use enfilade::geom::Aabb;
     use enfilade::geom::scene::{Mesh, Primitive};
-    use enfilade::internals::bake::edit::special::{Spot, link};
+    use enfilade::internals::bake::edit::special::{SpecialSpot, link};
     use enfilade_testkit::{GridParams, room_grid};
 
     /// Rooms in a row, and a person in the middle of the first.
@@ -217,7 +217,7 @@ mod tests {
         let [bottom, top] = [low[1], low[1] + 2.0];
         let [z0, z1] = [middle(2) - 0.5, middle(2) + 0.5];
         let [x0, x1] = [middle(0) - 0.5, middle(0) + 0.5];
-        let corners = |points: [[f64; 3]; 4]| Spot::Wall(points.map(DVec3::from).to_vec());
+        let corners = |points: [[f64; 3]; 4]| SpecialSpot::Wall(points.map(DVec3::from).to_vec());
         let from = corners([[x, bottom, z0], [x, bottom, z1], [x, top, z1], [x, top, z0]]);
         let into = corners([[x0, bottom, z], [x1, bottom, z], [x1, top, z], [x0, top, z]]);
         add_block(&mut world, [x, bottom, z0], [x + 0.005, top, z1]);

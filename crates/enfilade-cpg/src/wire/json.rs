@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use crate::{Place, PortalKind, Why};
+use crate::{DecidedPlace, PortalKind, Why};
 
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -239,7 +239,7 @@ pub(super) struct Graph {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) pvs: Option<PvsJson>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<DecidedPlace>,
     pub(super) provenance: ProvenanceJson,
     pub(super) statistics: BTreeMap<String, f64>,
 }

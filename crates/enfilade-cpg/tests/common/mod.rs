@@ -2,9 +2,9 @@
 #![allow(dead_code, reason = "every test binary uses a part of it")]
 
 use enfilade_cpg::{
-    Batch, Cell, CellId, CellPortalGraph, CellSet, DetailObject, Fact, Fitting, FittingPart,
-    Locator, LocatorNode, MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Place, Portal,
-    PortalId, PortalKind, Provenance, Pvs, Reason, SourceRuns, SpecialId, SpecialPortal,
+    Batch, Cell, CellId, CellPortalGraph, CellSet, DecidedPlace, DetailObject, Fact, Fitting,
+    FittingPart, Locator, LocatorNode, MonitorCamera, Motion, MotionKind, PartNumbers, Pass,
+    Portal, PortalId, PortalKind, Provenance, Pvs, Reason, SourceRuns, SpecialId, SpecialPortal,
     SpecialShape, Statistics, VisibleParts, VisibleVolumes, Way, Why, World,
 };
 use enfilade_geom::scene::{
@@ -148,7 +148,7 @@ pub(crate) fn two_rooms() -> World {
         statistics: Statistics {
             counts: [("input_triangles".to_owned(), 8.0), ("odd".to_owned(), 0.1)].into(),
         },
-        places: vec![Place {
+        places: vec![DecidedPlace {
             at: [1.0, 2.0, 3.0],
             why: Why::compared(Reason::Wide, 0.7, &[(Fact::Share, 0.75)]),
         }],

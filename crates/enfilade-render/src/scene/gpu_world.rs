@@ -12,7 +12,7 @@ use super::placed::{Instance, Moving, Placed, bounds_of, placed};
 use super::streamed::Streamed;
 use super::textures::load_textures;
 use crate::gpu::{Gpu, RenderError};
-use crate::marks::{Mark, MarkShape};
+use crate::marks::{MarkShape, PictureMark};
 use crate::materials::looks_of;
 
 /// A world on the adapter, ready to be drawn.
@@ -164,13 +164,13 @@ impl GpuWorld {
     }
 
     /// Returns the polygon drawn in a portal instead of the cell behind it.
-    pub(crate) fn stand_in(&self, portal: PortalId, cell: CellId) -> Mark {
+    pub(crate) fn stand_in(&self, portal: PortalId, cell: CellId) -> PictureMark {
         let [r, g, b] = self
             .cell_looks
             .get(cell.0 as usize)
             .copied()
             .unwrap_or_default();
-        Mark {
+        PictureMark {
             shape: MarkShape::Area(
                 self.outlines
                     .get(portal.0 as usize)

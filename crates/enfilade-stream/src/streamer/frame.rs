@@ -28,7 +28,7 @@ pub struct InView {
 
 /// Input of a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
+pub struct StreamFrame<'a> {
     /// Time since any fixed point; never less than in the frame before.
     pub now: Duration,
     /// The eye.
@@ -82,13 +82,13 @@ pub struct StandIn {
     /// Its share of the screen.
     pub share: f32,
     /// The reason.
-    pub cause: Cause,
+    pub cause: StandInCause,
 }
 
 /// The reason why a cell in view is not complete: the last of these that holds for one of its pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
-pub enum Cause {
+pub enum StandInCause {
     /// It covers less of the screen than [`StreamOptions::min_share`](crate::StreamOptions::min_share).
     Small,
     /// It does not fit in memory together with larger cells in view and pinned ones.

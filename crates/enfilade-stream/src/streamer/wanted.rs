@@ -2,7 +2,7 @@
 
 use enfilade_cpg::CellId;
 
-use super::frame::{Cause, InView, StandIn};
+use super::frame::{InView, StandIn, StandInCause};
 use super::slots::Slots;
 use super::state::State;
 use crate::{Catalog, PieceId};
@@ -377,27 +377,27 @@ impl Wanted {
             }
             let is_small = clean(share) < self.min_share;
             let cause = if lacks.n_missing > 0 {
-                Some(Cause::Missing)
+                Some(StandInCause::Missing)
             } else if is_small {
-                Some(Cause::Small)
+                Some(StandInCause::Small)
             } else if self.fit == Fit::Some {
                 self.cause_of(cell, catalog, slots)
             } else if lacks.n_failing > 0 {
-                Some(Cause::Failing)
+                Some(StandInCause::Failing)
             } else {
-                Some(Cause::Pending)
+                Some(StandInCause::Pending)
             };
             out.extend(cause.map(|cause| StandIn { cell, share, cause }));
         }
     }
 
     /// Returns the cause why a large cell is not complete of which no piece is missing, if some of the view does not fit.
-    fn cause_of(&self, cell: CellId, catalog: &Catalog, slots: &Slots) -> Option<Cause> {
+    fn cause_of(&self, cell: CellId, catalog: &Catalog, slots: &Slots) -> Option<StandInCause> {
         let cause = |&piece: &PieceId| match slots.state(piece) {
             State::Resident => None,
-            _ if !self.has(piece, catalog, slots) => Some(Cause::NoRoom),
-            State::Failing => Some(Cause::Failing),
-            _ => Some(Cause::Pending),
+            _ if !self.has(piece, catalog, slots) => Some(StandInCause::NoRoom),
+            State::Failing => Some(StandInCause::Failing),
+            _ => Some(StandInCause::Pending),
         };
         let causes = catalog.pieces_of(cell).iter().filter_map(cause);
         causes.max()

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use enfilade_cpg::{CellId, Pvs, World};
 use enfilade_stream::{
-    Catalog, Changes, Eye, Frame, InView, LinkOptions, Piece, PieceId, Reply, SimulatedLink,
-    Source, StreamOptions, Streamer,
+    Catalog, Changes, Eye, InView, PieceId, PieceSizes, Reply, SimulatedLink, SimulatedLinkOptions,
+    Source, StreamFrame, StreamOptions, Streamer,
 };
 use enfilade_testkit::Rng;
 
@@ -93,7 +93,7 @@ impl Program {
         catalog: &Catalog,
         pvs: Option<Pvs>,
         options: StreamOptions,
-        link: LinkOptions,
+        link: SimulatedLinkOptions,
     ) -> Self {
         let source = Watched {
             link: SimulatedLink::new(catalog, link),
@@ -137,7 +137,7 @@ impl Program {
     pub(crate) fn frame(&mut self) {
         self.now += FRAME;
         self.source.link.advance(self.now);
-        let frame = Frame {
+        let frame = StreamFrame {
             now: self.now,
             eye: self.eye,
             in_view: &self.view,
@@ -199,7 +199,7 @@ impl Program {
 /// One piece of `size` for each cell.
 pub(crate) fn piece_a_cell(world: &World, size: u64) -> Catalog {
     let n = world.graph.cells.len() as u32;
-    let piece = Piece {
+    let piece = PieceSizes {
         n_packed: size,
         n_resident: size,
     };
@@ -214,7 +214,7 @@ pub(crate) fn random_catalog(rng: &mut Rng, n_cells: usize) -> Catalog {
     let mut pieces = Vec::new();
     for i in 0..n {
         let size = 1 + rng.below(30_000) as u64;
-        pieces.push(Piece {
+        pieces.push(PieceSizes {
             n_packed: size / 3 + 1,
             n_resident: size,
         });

@@ -1,6 +1,6 @@
 //! Claims about why cells, portals and places are there.
 
-use enfilade_cpg::{Fact, Place, Reason, Why, World};
+use enfilade_cpg::{DecidedPlace, Fact, Reason, Why, World};
 
 use super::{Tampering, pick, room};
 
@@ -92,7 +92,7 @@ pub(super) const ALL: &[Tampering] = &[
     Tampering::new("matter in the middle of a room", |w, at| {
         let i = room(w, at)?;
         let [low, high] = w.graph.cells[i].aabb;
-        w.graph.places.push(Place {
+        w.graph.places.push(DecidedPlace {
             at: [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])),
             why: Why::compared(Reason::Solid, 1.0, &[(Fact::Inside, 1.1)]),
         });

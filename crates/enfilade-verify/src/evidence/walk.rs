@@ -279,8 +279,8 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Returns `true` if more planes, and splits beyond those of the trace, close the chain through `q`: two programs
-    /// see different edges of slivers as thin as rounding.
+    /// Returns `true` if no line passes the chain once portal `q` is added to it. Tries more planes and splits than the trace
+    /// has, since its writer and this reader may round the edges of thin slivers differently.
     fn closes_with(&mut self, q: usize, target: Option<Part>, source: Option<Part>) -> bool {
         self.chain.push((q, target));
         let is_closed = source.is_none_or(|source| self.closes(source, MAX_TRIES));

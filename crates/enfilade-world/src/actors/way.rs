@@ -55,7 +55,7 @@ fn share_of(from: DVec3, to: DVec3, p: DVec3) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::Exit;
+    use crate::layout::LayoutExit;
     use crate::paths::{PathPoint, PathPortal};
     use crate::space::PartId;
     use enfilade_cpg::PortalId;
@@ -83,7 +83,7 @@ mod tests {
             .to_vec(),
             portals: vec![PathPortal {
                 part: PartId::ROOT,
-                exit: Exit {
+                exit: LayoutExit {
                     portal: PortalId(0),
                     to: there,
                 },
@@ -110,7 +110,7 @@ mod tests {
                 .to_vec(),
             portals: vec![PathPortal {
                 part: PartId::ROOT,
-                exit: Exit {
+                exit: LayoutExit {
                     portal: PortalId(0),
                     to: there,
                 },

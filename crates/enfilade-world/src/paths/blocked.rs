@@ -15,7 +15,7 @@ use super::floors::{Floors, Hindrance, is_walked};
 use super::grounds::NONE;
 use super::path_search::{PathSearch, crawls, is_void};
 use super::walk_map::{Stand, WalkMap};
-use crate::layout::Exit;
+use crate::layout::LayoutExit;
 use crate::space::{PartId, Space};
 
 /// How far a walker gets who finds no path, and the obstacle there.
@@ -216,7 +216,7 @@ impl Look<'_> {
     }
 
     /// The price of a portal, in detours.
-    fn price(&self, exit: &Exit) -> f64 {
+    fn price(&self, exit: &LayoutExit) -> f64 {
         let layout = self.space.layout(PartId::ROOT);
         let is_void = !self.crawls && is_void(self.space, PartId::ROOT, exit.to);
         match layout.opening(exit.portal).kind() {

@@ -8,7 +8,7 @@ use enfilade_cpg::PortalId;
 
 use super::all_pairs::{FAR, sum};
 use super::part_hops::{PartHops, UNITS};
-use crate::layout::Exit;
+use crate::layout::LayoutExit;
 use crate::space::{PartId, Place, Space};
 
 /// Distances and next portals between all cells of a space.
@@ -170,7 +170,7 @@ impl Hops {
                 near = ends[end].cell;
             }
         }
-        let Exit { portal, to: cell } = self.parts[part.idx()].next(from.cell, near)?;
+        let LayoutExit { portal, to: cell } = self.parts[part.idx()].next(from.cell, near)?;
         Some(Hop {
             part,
             portal,

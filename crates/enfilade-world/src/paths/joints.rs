@@ -15,7 +15,7 @@ use super::pull::Bend;
 use super::strides::Strides;
 use super::walk_map::{PartMap, WalkMap};
 use crate::bodies::{Caster, is_free_between};
-use crate::layout::{Exit, Layout};
+use crate::layout::{Layout, LayoutExit};
 use crate::shape::is_near;
 use crate::space::{PartId, Space};
 
@@ -340,7 +340,7 @@ fn follow(
         if cell == goal {
             return true;
         }
-        let crossing = |exit: &Exit| {
+        let crossing = |exit: &LayoutExit| {
             let opening = layout.opening(exit.portal);
             let heights = [a, b].map(|p| opening.height_of(p));
             let t = heights[0] / (heights[0] - heights[1]);

@@ -8,7 +8,7 @@ use super::search::{Arrival, LengthSearch};
 use super::strides::{Strides, walk_straight};
 use super::walk_map::{PartMap, Stand, WalkMap};
 use super::{Path, PathPoint, PathPortal};
-use crate::layout::{Exit, Layout};
+use crate::layout::{Layout, LayoutExit};
 use crate::space::{PartId, Space};
 use enfilade_cpg::PortalId;
 
@@ -286,7 +286,7 @@ impl Tools {
                     self.profile.push(at);
                     if let Some(portal) = floors.portal_of(from, direction) {
                         let to = floors.floor(to).cell;
-                        let exit = Exit { portal, to };
+                        let exit = LayoutExit { portal, to };
                         path.portals.push(PathPortal { part, exit, at });
                     }
                 },

@@ -11,7 +11,7 @@
 
 use enfilade_cpg::{CellId, PortalId};
 
-use crate::layout::{Exit, Layout};
+use crate::layout::{Layout, LayoutExit};
 use crate::paths::all_pairs::{AllPairs, Edge, FAR, NONE, sum};
 use crate::paths::trees::number_trees;
 
@@ -61,7 +61,7 @@ enum Role {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Towards the root: the portal, and the cell behind it. The root itself at the root.
-    up: Exit,
+    up: LayoutExit,
     root: CellId,
     /// The highest cell reached through open portals.
     top: CellId,
@@ -108,7 +108,7 @@ struct Out {
     junction: u32,
     length: u32,
     /// The next portal on the way there; `None` at the junction itself.
-    through: Option<Exit>,
+    through: Option<LayoutExit>,
 }
 
 impl PartHops {
@@ -218,7 +218,7 @@ impl PartHops {
     /// # Panics
     ///
     /// If there is no such cell.
-    pub(super) fn next(&self, from: CellId, to: CellId) -> Option<Exit> {
+    pub(super) fn next(&self, from: CellId, to: CellId) -> Option<LayoutExit> {
         let [a, b] = [from, to].map(|c| &self.nodes[c.idx()]);
         if from == to {
             return None;
@@ -263,21 +263,21 @@ impl PartHops {
     }
 
     /// Returns the first step from a cell to one of its descendants.
-    fn down(&self, from: CellId, to: CellId) -> Exit {
+    fn down(&self, from: CellId, to: CellId) -> LayoutExit {
         let range =
             self.first_branch[from.idx()] as usize..self.first_branch[from.idx() + 1] as usize;
         let number = self.nodes[to.idx()].below[0];
         let branches = &self.branches[range];
         let i = branches.partition_point(|c| self.nodes[c.idx()].below[0] <= number);
         let branch = branches[i - 1];
-        Exit {
+        LayoutExit {
             portal: self.nodes[branch.idx()].up.portal,
             to: branch,
         }
     }
 
-    /// Returns the length between two roots, and the portal to take first.
-    fn core_way(&self, from: CellId, to: CellId) -> (u32, Option<Exit>) {
+    /// Returns the length of the shortest way between the core cells on which two trees of cells hang, and the portal to take first.
+    fn core_way(&self, from: CellId, to: CellId) -> (u32, Option<LayoutExit>) {
         let (outs, ins) = (self.outs(from), self.outs(to));
         let mut best = self.along_chain(from, to);
         for out in outs.into_iter().flatten() {
@@ -337,7 +337,7 @@ impl PartHops {
     }
 
     /// Returns the next portal from a stop of a chain towards an end.
-    fn along(&self, chain: u32, place: u32, end: usize) -> Exit {
+    fn along(&self, chain: u32, place: u32, end: usize) -> LayoutExit {
         let c = &self.chains[chain as usize];
         let place = place as usize;
         let stops = &self.stops[c.first_stop as usize..][..c.n_stops as usize];
@@ -346,14 +346,14 @@ impl PartHops {
         } else {
             stops.get(place + 1).map(|s| s.cell)
         };
-        Exit {
+        LayoutExit {
             portal: self.rails[c.first_rail as usize + place + end],
             to: next.unwrap_or(self.cell_of_junction[c.ends[end] as usize]),
         }
     }
 
     /// Returns the first portal of a chain from the junction at one of its ends.
-    fn onto(&self, chain: u32, end: usize) -> Exit {
+    fn onto(&self, chain: u32, end: usize) -> LayoutExit {
         let c = &self.chains[chain as usize];
         let stops = &self.stops[c.first_stop as usize..][..c.n_stops as usize];
         let (first, rail) = match end {
@@ -361,19 +361,19 @@ impl PartHops {
             _ => (stops.last(), c.n_stops),
         };
         let other = self.cell_of_junction[c.ends[1 - end] as usize];
-        Exit {
+        LayoutExit {
             portal: self.rails[(c.first_rail + rail) as usize],
             to: first.map_or(other, |s| s.cell),
         }
     }
 
-    fn onto_from(&self, chain: u32, junction: u32) -> Exit {
+    fn onto_from(&self, chain: u32, junction: u32) -> LayoutExit {
         let ends = self.chains[chain as usize].ends;
         self.onto(chain, usize::from(ends[0] != junction))
     }
 
     /// Returns the portal from a junction into the chain of a root, given the root's way out to that junction.
-    fn back_in(&self, root: CellId, out: Out) -> Option<Exit> {
+    fn back_in(&self, root: CellId, out: Out) -> Option<LayoutExit> {
         let RootPlace::Chain(chain, place) = self.nodes[root.idx()].place else {
             return None;
         };
@@ -382,7 +382,7 @@ impl PartHops {
     }
 
     /// Returns the path between two stops of one chain, without leaving it.
-    fn along_chain(&self, from: CellId, to: CellId) -> (u32, Option<Exit>) {
+    fn along_chain(&self, from: CellId, to: CellId) -> (u32, Option<LayoutExit>) {
         let places = [from, to].map(|c| self.nodes[c.idx()].place);
         if let [RootPlace::Chain(chain, i), RootPlace::Chain(other, j)] = places
             && chain == other
@@ -419,7 +419,7 @@ impl<'a> Core<'a> {
             }
         }
         let nodes = all().map(|cell| Node {
-            up: Exit {
+            up: LayoutExit {
                 portal: PortalId(NONE),
                 to: cell,
             },
@@ -460,8 +460,8 @@ impl<'a> Core<'a> {
     }
 
     /// Returns the first portal of a cell that belongs to no tree and no chain.
-    fn first_left(&self, cell: CellId) -> Option<Exit> {
-        let is_left = |e: &&Exit| {
+    fn first_left(&self, cell: CellId) -> Option<LayoutExit> {
+        let is_left = |e: &&LayoutExit| {
             let step = &self.steps[e.portal.idx()];
             step.length != FAR && matches!(step.role, Role::Wall)
         };
@@ -566,7 +566,7 @@ impl<'a> Core<'a> {
             node.below = below;
         }
         for &cell in self.peeled.iter().rev() {
-            let Exit { portal, to } = self.nodes[cell.idx()].up;
+            let LayoutExit { portal, to } = self.nodes[cell.idx()].up;
             let above = self.nodes[to.idx()];
             let node = &mut self.nodes[cell.idx()];
             (node.root, node.top) = (above.root, above.root);

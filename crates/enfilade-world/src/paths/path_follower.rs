@@ -32,7 +32,7 @@ const PROGRESS: f64 = 0.05;
 /// State of a walk along a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Progress {
+pub enum WalkProgress {
     /// It is on its way.
     Walking,
     /// It is within its radius of the end.
@@ -156,7 +156,7 @@ impl PathFollower {
 
     /// Walks on for some seconds, at most a tenth. Moves leaves of doors: those ahead open, and one that is in the way shuts if it
     /// is not needed. Waits where the path leads into a part that has moved away since.
-    pub fn step(&mut self, walker: &mut Walker, space: &mut Space, seconds: f64) -> Progress {
+    pub fn step(&mut self, walker: &mut Walker, space: &mut Space, seconds: f64) -> WalkProgress {
         let feet = walker.feet();
         let agent = *walker.agent();
         let frame = walker.frame;
@@ -165,7 +165,7 @@ impl PathFollower {
         let end = self.points.len().checked_sub(1);
         let left = end.map_or(DVec3::ZERO, |i| self.point(space, frame, i) - feet);
         if left.with_y(0.0).length() <= agent.radius && left.y.abs() <= agent.step {
-            return Progress::Arrived;
+            return WalkProgress::Arrived;
         }
         self.open_doors(walker, space, seconds);
         let ahead = joined.min(self.passed + AHEAD);
@@ -188,9 +188,9 @@ impl PathFollower {
             self.shut_leaf(part, detail, walker, space);
         }
         if self.idle > PATIENCE {
-            Progress::Stuck
+            WalkProgress::Stuck
         } else {
-            Progress::Walking
+            WalkProgress::Walking
         }
     }
 

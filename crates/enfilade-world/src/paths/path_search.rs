@@ -7,7 +7,7 @@ use super::legs::{Entrance, PartEntry, PartLeg, Tools, length_of};
 use super::search::LengthSearch;
 use super::walk_map::{Stand, WalkMap};
 use super::{NoPath, Path, PathPortal};
-use crate::layout::Exit;
+use crate::layout::LayoutExit;
 use crate::space::{PartId, Place, Space};
 use enfilade_cpg::{CellId, PortalId};
 
@@ -427,7 +427,7 @@ fn write_step(space: &Space, joint: &Joint, side: usize, to: DVec3, path: &mut P
         };
         path.portals.push(PathPortal {
             part: passed.part,
-            exit: Exit {
+            exit: LayoutExit {
                 portal: passed.portal,
                 to: passed.cells[side],
             },

@@ -20,7 +20,7 @@ use std::collections::BinaryHeap;
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 
-use crate::layout::Exit;
+use crate::layout::LayoutExit;
 use crate::paths::ends::{End, Limit};
 use crate::paths::ways::{Ways, side};
 
@@ -48,7 +48,7 @@ impl Arrival {
 #[non_exhaustive]
 pub struct PassedPortal {
     /// The portal, and the cell entered through it.
-    pub exit: Exit,
+    pub exit: LayoutExit,
     /// Least length to a point of it, extra costs included, its own too. [Units: wu]
     pub length: f64,
 }
@@ -110,7 +110,7 @@ impl LengthSearch {
         cell: CellId,
         from: DVec3,
         radius: f64,
-        pass: impl FnMut(Exit) -> Option<f64>,
+        pass: impl FnMut(LayoutExit) -> Option<f64>,
     ) {
         let straight = |_: usize, p: DVec3| from.distance(p);
         self.run_from(ways, cell, from, straight, radius, pass);
@@ -129,7 +129,7 @@ impl LengthSearch {
         from: DVec3,
         mut first: impl FnMut(usize, DVec3) -> f64,
         radius: f64,
-        mut pass: impl FnMut(Exit) -> Option<f64>,
+        mut pass: impl FnMut(LayoutExit) -> Option<f64>,
     ) {
         self.begin(ways);
         self.start = Some((cell, from));
@@ -151,7 +151,7 @@ impl LengthSearch {
         &mut self,
         ways: &Ways,
         radius: f64,
-        mut pass: impl FnMut(Exit) -> Option<f64>,
+        mut pass: impl FnMut(LayoutExit) -> Option<f64>,
     ) {
         self.radius = radius;
         while let Some(Reverse((bits, node))) = self.heap.peek().copied() {
@@ -191,7 +191,7 @@ impl LengthSearch {
         end: End<'_>,
         direct: f64,
         limit: Limit,
-        mut pass: impl FnMut(Exit) -> Option<f64>,
+        mut pass: impl FnMut(LayoutExit) -> Option<f64>,
     ) {
         loop {
             let mut least = direct;
@@ -238,7 +238,7 @@ impl LengthSearch {
         }
     }
 
-    fn settle(&mut self, ways: &Ways, exit: Exit, length: f64) {
+    fn settle(&mut self, ways: &Ways, exit: LayoutExit, length: f64) {
         let portal = exit.portal.idx();
         let toll = &mut self.tolls[2 * portal + side(ways.cells[portal], exit.to)];
         if !toll.is_reached {
@@ -248,7 +248,12 @@ impl LengthSearch {
         }
     }
 
-    fn toll(&mut self, ways: &Ways, exit: Exit, pass: &mut impl FnMut(Exit) -> Option<f64>) -> f64 {
+    fn toll(
+        &mut self,
+        ways: &Ways,
+        exit: LayoutExit,
+        pass: &mut impl FnMut(LayoutExit) -> Option<f64>,
+    ) -> f64 {
         let portal = exit.portal.idx();
         let toll = &mut self.tolls[2 * portal + side(ways.cells[portal], exit.to)];
         if toll.stamp != self.stamp {
@@ -261,7 +266,7 @@ impl LengthSearch {
         toll.cost
     }
 
-    fn relax(&mut self, node: u32, before: u32, length: f64, exit: Exit) {
+    fn relax(&mut self, node: u32, before: u32, length: f64, exit: LayoutExit) {
         let sequence = match before {
             START => 0,
             _ => self.labels[before as usize].sequence,
@@ -275,7 +280,7 @@ impl LengthSearch {
         }
         *label = Label {
             length,
-            sequence: mixed(sequence, exit),
+            sequence: hash_extended(sequence, exit),
             before,
             stamp: self.stamp,
             is_settled: false,
@@ -411,7 +416,12 @@ impl LengthSearch {
 
     /// Writes the portals of a path, from the start on, each with the cell entered through it and the point of crossing. Clears
     /// `crossings` first. [Units: wu]
-    pub fn crossings(&self, ways: &Ways, arrival: &Arrival, crossings: &mut Vec<(Exit, DVec3)>) {
+    pub fn crossings(
+        &self,
+        ways: &Ways,
+        arrival: &Arrival,
+        crossings: &mut Vec<(LayoutExit, DVec3)>,
+    ) {
         crossings.clear();
         let back = self.back(ways, arrival);
         crossings.extend(back.map(|(exit, k)| (exit, ways.points[k as usize])));
@@ -419,7 +429,11 @@ impl LengthSearch {
     }
 
     /// Returns the portals of a path from its end to the start, each with the index of the point among all points.
-    pub(crate) fn back(&self, ways: &Ways, arrival: &Arrival) -> impl Iterator<Item = (Exit, u32)> {
+    pub(crate) fn back(
+        &self,
+        ways: &Ways,
+        arrival: &Arrival,
+    ) -> impl Iterator<Item = (LayoutExit, u32)> {
         let mut at = arrival.node.unwrap_or(START);
         std::iter::from_fn(move || {
             let node = Some(at).filter(|&node| node != START)?;
@@ -436,7 +450,7 @@ fn grow<T: Clone + Default>(buffer: &mut Vec<T>, n: usize) {
 }
 
 /// Returns the hash of a sequence extended by one portal; two sequences collide with probability 2⁻⁶⁴.
-fn mixed(sequence: u64, exit: Exit) -> u64 {
+fn hash_extended(sequence: u64, exit: LayoutExit) -> u64 {
     // The finalizer of SplitMix64.
     let mut x = sequence ^ (u64::from(exit.portal.0) << 32 | u64::from(exit.to.0));
     x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 
-use crate::layout::{Exit, Layout};
+use crate::layout::{Layout, LayoutExit};
 use crate::paths::sampling::{Sampling, sample};
 
 /// The graph of a search: crossings, and the lengths between them within each cell. Made once, read by all searches.
@@ -19,7 +19,7 @@ pub struct Ways {
     pub(super) cells: Vec<[CellId; 2]>,
     /// Per cell its first exit, and the number of all.
     pub(super) first_exit: Vec<u32>,
-    pub(super) exits: Vec<Exit>,
+    pub(super) exits: Vec<LayoutExit>,
     /// Per portal, the index of its first point among the points of either of its cells.
     pub(super) place: Vec<[u32; 2]>,
     /// Per cell the number of its points.
@@ -167,7 +167,7 @@ impl Ways {
         first..first + self.range(portal).len()
     }
 
-    pub(crate) fn exits_of(&self, cell: CellId) -> &[Exit] {
+    pub(crate) fn exits_of(&self, cell: CellId) -> &[LayoutExit] {
         let first = &self.first_exit[cell.idx()..];
         &self.exits[first[0] as usize..first[1] as usize]
     }
@@ -218,9 +218,9 @@ impl Ways {
         2 * point + side(self.cells[portal], into) as u32
     }
 
-    pub(super) fn exit_of(&self, node: u32) -> Exit {
+    pub(super) fn exit_of(&self, node: u32) -> LayoutExit {
         let portal = self.portal[node as usize / 2];
-        Exit {
+        LayoutExit {
             portal: PortalId(portal),
             to: self.cells[portal as usize][node as usize % 2],
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use enfilade_cpg::{CellId, PortalId};
 use enfilade_geom::DVec3;
 
-use crate::layout::Exit;
+use crate::layout::LayoutExit;
 use crate::paths::{Corner, End, LengthSearch, Limit, Seen, Sequences};
 use crate::sound::acoustics::{Acoustics, Heard, rise, toll};
 use crate::sound::bands::N_BANDS;
@@ -295,7 +295,7 @@ impl Listener {
             self.is_stale = false;
             let (lengths, tolls) = (&self.lengths, &self.searched_tolls);
             let first = |place: usize, _| lengths[place];
-            let pass = |exit: Exit| Some(tolls[exit.portal.idx()]);
+            let pass = |exit: LayoutExit| Some(tolls[exit.portal.idx()]);
             (self.search).run_from(&graph.ways, cell, at, first, FIRST_REACH, pass);
         }
     }

@@ -12,7 +12,7 @@ use enfilade_cpg::{CellId, Locator, PortalId};
 use enfilade_geom::Aabb;
 
 use super::{PartId, Place, Space};
-use crate::layout::{CellShape, Exit, Layout, OpeningShape};
+use crate::layout::{CellShape, Layout, LayoutExit, OpeningShape};
 
 /// One layout of all parts.
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ impl Joined {
             hosted: Vec::new(),
             first,
         };
-        let mut exits: Vec<Vec<Exit>> = Vec::with_capacity(n_cells);
+        let mut exits: Vec<Vec<LayoutExit>> = Vec::with_capacity(n_cells);
         for part in (0..n_parts as u32).map(PartId) {
             joined.add_part(space, part, &mut exits);
         }
@@ -114,7 +114,7 @@ impl Joined {
         }
     }
 
-    fn add_part(&mut self, space: &Space, id: PartId, exits: &mut Vec<Vec<Exit>>) {
+    fn add_part(&mut self, space: &Space, id: PartId, exits: &mut Vec<Vec<LayoutExit>>) {
         let part = &space.parts[id.idx()];
         let (own, pose) = (&part.layout, &part.pose);
         let is_root = id == PartId::ROOT;
@@ -136,7 +136,7 @@ impl Joined {
             });
             let is_place = part.border != Some(cell);
             let own = own.exits(cell).iter().filter(|_| is_place);
-            let own = own.map(|e| Exit {
+            let own = own.map(|e| LayoutExit {
                 portal: PortalId(e.portal.0 + first_portal),
                 to: CellId(e.to.0 + first_cell),
             });
@@ -174,7 +174,7 @@ impl Joined {
     }
 
     /// Leads the doors of a part to what is behind them.
-    fn add_doors(&mut self, space: &Space, id: PartId, exits: &mut Vec<Vec<Exit>>) {
+    fn add_doors(&mut self, space: &Space, id: PartId, exits: &mut Vec<Vec<LayoutExit>>) {
         let part = &space.parts[id.idx()];
         for door in &part.doors {
             let portal = self.portal(id, door.portal);
@@ -213,14 +213,14 @@ impl Joined {
             if let Some((to, off)) = before.filter(|b| b.0.part.idx() < self.n_parts()) {
                 let to = self.cell(to);
                 self.lead(portal, inner, to, exits);
-                exits[to.idx()].push(Exit { portal, to: inner });
+                exits[to.idx()].push(LayoutExit { portal, to: inner });
                 self.hosted.push((portal, to, off));
             }
         }
     }
 
     /// Joins two doors by a seam.
-    fn dock(&mut self, ends: [(PortalId, CellId); 2], exits: &mut Vec<Vec<Exit>>) {
+    fn dock(&mut self, ends: [(PortalId, CellId); 2], exits: &mut Vec<Vec<LayoutExit>>) {
         let seam = CellId(self.layout.cells.len() as u32);
         self.layout.cells.push(CellShape {
             bounds: Aabb::EMPTY,
@@ -231,13 +231,13 @@ impl Joined {
         exits.push(Vec::new());
         for (k, (portal, inner)) in ends.into_iter().enumerate() {
             self.lead(portal, inner, seam, exits);
-            exits[seam.idx()].push(Exit { portal, to: inner });
+            exits[seam.idx()].push(LayoutExit { portal, to: inner });
             self.docked[portal.idx()] = Some(ends[1 - k].0);
         }
     }
 
     /// Replaces the cell behind a door.
-    fn lead(&mut self, portal: PortalId, inner: CellId, to: CellId, exits: &mut [Vec<Exit>]) {
+    fn lead(&mut self, portal: PortalId, inner: CellId, to: CellId, exits: &mut [Vec<LayoutExit>]) {
         let cells = &mut self.layout.openings[portal.idx()].cells;
         cells[usize::from(cells[0] == inner)] = to;
         let exit = exits[inner.idx()].iter_mut().find(|e| e.portal == portal);

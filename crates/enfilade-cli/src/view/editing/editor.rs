@@ -11,7 +11,7 @@ use enfilade::edit::{
 use enfilade::geom::{DVec3, shown};
 use enfilade::kit::{End, InstanceId, Kit};
 use enfilade::world::Pose;
-use enfilade_render::{EYE_HEIGHT, Mark};
+use enfilade_render::{EYE_HEIGHT, PictureMark};
 
 use super::aim::{
     EditRay, end_at, heading, portal_rectangle, pose_anywhere, pose_at_end, rectangle_in,
@@ -347,7 +347,7 @@ impl Editor {
     }
 
     /// Returns the marks that show it: doorways, the ghost of a piece, a polygon.
-    pub(crate) fn marks(&self) -> Vec<Mark> {
+    pub(crate) fn marks(&self) -> Vec<PictureMark> {
         let mut marks = Vec::new();
         if !self.is_on {
             return marks;

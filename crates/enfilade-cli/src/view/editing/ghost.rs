@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use enfilade::geom::DVec3;
 use enfilade::kit::{Assembly, Kit, Piece};
 use enfilade::world::Pose;
-use enfilade_render::{Mark, MarkShape};
+use enfilade_render::{MarkShape, PictureMark};
 
 /// Most lines of a piece; of more, the longest.
 const MOST: usize = 3000;
@@ -48,8 +48,8 @@ fn lines(piece: &Piece) -> Vec<[DVec3; 2]> {
     lines
 }
 
-fn mark(shape: MarkShape, color: [f32; 4], width: f32, on_top: bool) -> Mark {
-    Mark {
+fn mark(shape: MarkShape, color: [f32; 4], width: f32, on_top: bool) -> PictureMark {
+    PictureMark {
         shape,
         color,
         width,
@@ -66,7 +66,12 @@ fn single(p: DVec3) -> [f32; 3] {
 }
 
 /// Adds a piece at a pose: bright lines, and faint ones behind walls.
-pub(super) fn add_piece(marks: &mut Vec<Mark>, lines: &[[DVec3; 2]], pose: &Pose, fits: bool) {
+pub(super) fn add_piece(
+    marks: &mut Vec<PictureMark>,
+    lines: &[[DVec3; 2]],
+    pose: &Pose,
+    fits: bool,
+) {
     let color = COLORS[usize::from(!fits)];
     for ends in lines {
         let line = MarkShape::Line(ends.map(|p| single(pose.point(p))));
@@ -76,7 +81,7 @@ pub(super) fn add_piece(marks: &mut Vec<Mark>, lines: &[[DVec3; 2]], pose: &Pose
 }
 
 /// Adds a polygon that is drawn.
-pub(super) fn add_polygon(marks: &mut Vec<Mark>, corners: &[DVec3], fits: bool) {
+pub(super) fn add_polygon(marks: &mut Vec<PictureMark>, corners: &[DVec3], fits: bool) {
     let color = COLORS[usize::from(!fits)];
     let outline: Vec<[f32; 3]> = corners.iter().map(|p| single(*p)).collect();
     if outline.len() > 2 {
@@ -88,13 +93,13 @@ pub(super) fn add_polygon(marks: &mut Vec<Mark>, corners: &[DVec3], fits: bool) 
 }
 
 /// Adds the outline of a change by hand that is there.
-pub(super) fn add_known(marks: &mut Vec<Mark>, corners: &[DVec3]) {
+pub(super) fn add_known(marks: &mut Vec<PictureMark>, corners: &[DVec3]) {
     let outline = MarkShape::Outline(corners.iter().map(|p| single(*p)).collect());
     marks.push(mark(outline, AIMED, 2.0, true));
 }
 
 /// Adds a cross at a point.
-pub(super) fn add_point(marks: &mut Vec<Mark>, at: DVec3, size: f64, fits: bool) {
+pub(super) fn add_point(marks: &mut Vec<PictureMark>, at: DVec3, size: f64, fits: bool) {
     let color = COLORS[usize::from(!fits)];
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         let line = MarkShape::Line([at - axis * size, at + axis * size].map(single));
@@ -103,7 +108,11 @@ pub(super) fn add_point(marks: &mut Vec<Mark>, at: DVec3, size: f64, fits: bool)
 }
 
 /// Adds the doorways of a level that lead outdoors.
-pub(super) fn add_ends(marks: &mut Vec<Mark>, level: &Assembly, aimed: Option<enfilade::kit::End>) {
+pub(super) fn add_ends(
+    marks: &mut Vec<PictureMark>,
+    level: &Assembly,
+    aimed: Option<enfilade::kit::End>,
+) {
     for end in level.open_ends() {
         let Ok(instance) = level.standing(end.instance) else {
             continue;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use enfilade::cpg::World;
 use enfilade::geom::DVec3;
 use enfilade::internals::bake::delaunay::{Choice, Decision, OUTDOOR_CELL};
-use enfilade_render::Mark;
+use enfilade_render::PictureMark;
 
 use super::legend::{LegendLine, ReviewShown};
 use super::scale::{PortalClass, WeightScale};
@@ -120,12 +120,12 @@ impl<'a> Reviewer<'a> {
     }
 
     /// Lends the marks of the portals to a frame.
-    pub(crate) fn lend_marks(&mut self) -> Vec<Mark> {
+    pub(crate) fn lend_marks(&mut self) -> Vec<PictureMark> {
         self.sheets.lend(self.aimed)
     }
 
     /// Takes the marks back.
-    pub(crate) fn take_marks(&mut self, marks: Vec<Mark>) {
+    pub(crate) fn take_marks(&mut self, marks: Vec<PictureMark>) {
         self.sheets.give_back(marks);
     }
 

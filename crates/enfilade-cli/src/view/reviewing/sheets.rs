@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use enfilade::geom::{Aabb, DVec3};
 use enfilade::internals::bake::delaunay::{RemainingPortal, Session};
-use enfilade_render::{Mark, MarkShape};
+use enfilade_render::{MarkShape, PictureMark};
 
 use super::scale::{PortalClass, WeightScale};
 
@@ -99,7 +99,7 @@ fn passes(polygon: &[DVec3], eye: DVec3, toward: DVec3) -> Option<f64> {
 pub(super) struct Sheets {
     portals: Vec<RemainingPortal>,
     sheets: Vec<PortalSheet>,
-    marks: Vec<Mark>,
+    marks: Vec<PictureMark>,
     /// Number of the marks, which are lent at times.
     n_marks: usize,
 }
@@ -162,7 +162,7 @@ impl Sheets {
     }
 
     /// Lends the marks to a frame, with those of the portal at the crosshair; [`Sheets::give_back`] takes them.
-    pub(super) fn lend(&mut self, aimed: Option<usize>) -> Vec<Mark> {
+    pub(super) fn lend(&mut self, aimed: Option<usize>) -> Vec<PictureMark> {
         let mut marks = std::mem::take(&mut self.marks);
         if let Some(k) = aimed {
             add_border(&mut marks, &self.sheets[k], AIMED, 3.0, true);
@@ -171,7 +171,7 @@ impl Sheets {
     }
 
     /// Takes back the marks lent, whatever was added to them.
-    pub(super) fn give_back(&mut self, mut marks: Vec<Mark>) {
+    pub(super) fn give_back(&mut self, mut marks: Vec<PictureMark>) {
         marks.truncate(self.n_marks);
         self.marks = marks;
     }
@@ -182,14 +182,14 @@ fn single(p: DVec3) -> [f32; 3] {
 }
 
 fn add_sheet(
-    marks: &mut Vec<Mark>,
+    marks: &mut Vec<PictureMark>,
     portal: &RemainingPortal,
     sheet: &PortalSheet,
     class: PortalClass,
 ) {
     let [r, g, b] = class.linear();
     for polygon in &sheet.openings {
-        marks.push(Mark {
+        marks.push(PictureMark {
             shape: MarkShape::Area(polygon.iter().map(|p| single(*p)).collect()),
             color: [r, g, b, 0.4],
             width: 0.0,
@@ -208,8 +208,8 @@ fn add_sheet(
     }
 }
 
-fn line(ends: [DVec3; 2], color: [f32; 4], width: f32, on_top: bool) -> Mark {
-    Mark {
+fn line(ends: [DVec3; 2], color: [f32; 4], width: f32, on_top: bool) -> PictureMark {
+    PictureMark {
         shape: MarkShape::Line(ends.map(single)),
         color,
         width,
@@ -218,7 +218,7 @@ fn line(ends: [DVec3; 2], color: [f32; 4], width: f32, on_top: bool) -> Mark {
 }
 
 fn add_border(
-    marks: &mut Vec<Mark>,
+    marks: &mut Vec<PictureMark>,
     sheet: &PortalSheet,
     color: [f32; 4],
     width: f32,

@@ -1,0 +1,31 @@
+//! Tests of the crate, in one program: each file alone would be linked with all of it.
+
+mod bound;
+mod branches;
+mod conformance;
+mod corridors;
+mod delaunay;
+mod doors;
+mod edit;
+mod faults;
+mod given;
+mod gjorup;
+mod guided;
+mod kinds;
+mod land;
+mod leak;
+mod marked;
+mod matter;
+mod missing;
+mod names;
+mod pieces;
+mod rebake;
+mod reordered;
+mod review;
+mod simplify;
+mod sources;
+mod spaces;
+mod specials;
+mod stops;
+mod turned;
+mod whys;

@@ -1,0 +1,5 @@
+//! Tests of the crate, in one program: each file alone would be linked with all of it.
+
+mod scenes;
+mod shuffle;
+mod solids;

@@ -1,0 +1,4 @@
+//! Tests of the crate, in one program: each file alone would be linked with all of it.
+
+mod files;
+mod types;
