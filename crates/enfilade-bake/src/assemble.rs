@@ -104,7 +104,7 @@ pub(crate) fn assemble(cut: &Cut<'_>, provenance: Provenance, statistics: Statis
         specials: Vec::new(),
         cells,
         portals,
-        locator: partition.locator.clone(),
+        locator: partition.locator.clone().into(),
         provenance,
         statistics,
         places: Vec::new(),

@@ -153,8 +153,10 @@ impl World {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::PortalKind;
+    use crate::{Locator, PortalKind};
 
     fn three_cells() -> CellPortalGraph {
         let cell = |name: &str, portals: &[u32]| Cell {
@@ -215,7 +217,10 @@ mod tests {
         }
         assert_eq!(graph.cell_named("cell-1"), None);
         assert_eq!(graph.outdoors(), Some(CellId(1)));
-        graph.locator.outside = graph.outdoors();
+        graph.locator = Arc::new(Locator {
+            outside: graph.outdoors(),
+            ..Locator::default()
+        });
         assert_eq!(graph.locate([1.0, 2.0, 3.0]), Some(CellId(1)));
         assert_eq!(graph.locate([1.0, f32::NAN, 3.0]), None);
         assert_eq!(graph.locate([f32::INFINITY, 2.0, 3.0]), None);

@@ -1,6 +1,7 @@
 //! Cells, portals and the graph they form.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
@@ -99,8 +100,8 @@ pub struct CellPortalGraph {
     pub portals: Vec<Portal>,
     /// Mirrors, monitors, teleporters. Indexed by [`SpecialId`](crate::SpecialId).
     pub specials: Vec<SpecialPortal>,
-    /// Finds the cell of a point.
-    pub locator: Locator,
+    /// Finds the cell of a point; what is prepared from the graph shares it.
+    pub locator: Arc<Locator>,
     /// Decisions of the bake about places that are neither a cell nor a portal: openings within a cell that nearly parted it,
     /// and spaces that are not cells.
     pub places: Vec<DecidedPlace>,

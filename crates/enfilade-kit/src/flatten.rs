@@ -1,6 +1,7 @@
 //! From instances to one world: cells, portals, locator and geometry of all, as a bake would have made them.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, Fitting, Motion, MotionKind, Portal, PortalId,
@@ -359,9 +360,9 @@ impl<'a> Flat<'a> {
         let drawn = world.batches.iter().flat_map(|b| &b.primitive.positions);
         let bounds = drawn.fold(bounds, |b, p| b.including(point(*p)));
         if !bounds.is_empty() {
-            world.graph.locator = grown(bounds.expanded(AROUND), OUTDOORS, &planted);
+            world.graph.locator = grown(bounds.expanded(AROUND), OUTDOORS, &planted).into();
         }
-        world.graph.locator.outside = Some(OUTDOORS);
+        Arc::make_mut(&mut world.graph.locator).outside = Some(OUTDOORS);
         list_objects(&mut world);
         (world.graph.provenance, world.graph.statistics.counts) = origin(level, &world.graph);
         measure(&mut world);

@@ -43,7 +43,7 @@ pub(crate) fn move_to_faces(world: &mut World, outdoors: CellId, attachments: &m
     if tunnels.is_empty() {
         return;
     }
-    world.graph.locator = with_tunnels(world, outdoors, &tunnels);
+    world.graph.locator = with_tunnels(world, outdoors, &tunnels).into();
     for (cell, sides) in &tunnels {
         show_tunnel(world, *cell, sides);
     }
@@ -76,7 +76,7 @@ fn with_tunnels(world: &World, outdoors: CellId, tunnels: &[(CellId, Vec<Plane>)
             (chain(sides, Locator::leaf(Some(*cell)), outdoors), bounds)
         })
         .collect();
-    let own = &world.graph.locator;
+    let own: &Locator = &world.graph.locator;
     let is_inner = |cell: CellId| (cell != outdoors).then_some(cell);
     let planted = trees.iter().map(|(tree, bounds)| (tree, *bounds));
     let planted = planted.chain([(own, own.bounds)]);
@@ -212,7 +212,7 @@ pub(crate) fn shape(world: &mut World, outdoors: CellId) -> PieceShape {
         },
     );
     shape.matter.extend(sheets(world, outdoors));
-    world.graph.locator = boxed(&world.graph.locator, &shape.bounds, outdoors);
+    world.graph.locator = boxed(&world.graph.locator, &shape.bounds, outdoors).into();
     let air = shape.air.iter();
     shape.air_bounds = air.fold(Aabb::EMPTY, |bounds, body| bounds.union(body.bounds));
     let bodies = shape.air.iter().chain(&shape.matter);

@@ -214,10 +214,10 @@ pub fn open_air() -> World {
         outdoor: true,
         ..Cell::default()
     });
-    open.graph.locator = Locator {
+    open.graph.locator = Arc::new(Locator {
         outside: Some(CellId(0)),
         ..Locator::default()
-    };
+    });
     open
 }
 

@@ -502,7 +502,7 @@ fn bad_kits_and_names_are_refused_with_reason() {
     for cell in &mut closed.graph.cells {
         cell.outdoor = false;
     }
-    closed.graph.locator.outside = None;
+    Arc::make_mut(&mut closed.graph.locator).outside = None;
     assert_eq!(
         Piece::new("p", closed, &Choice::Doorways).unwrap_err(),
         PieceError::NoOutdoors

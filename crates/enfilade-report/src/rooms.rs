@@ -5,6 +5,7 @@
 //! to the wall, as in the rules by which architects measure.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use enfilade_cpg::{CellId, Portal, PortalKind, World};
 use enfilade_geom::poly::cut_out;
@@ -301,7 +302,7 @@ mod tests {
 
     fn world_of(boxes: &[[[f64; 3]; 2]], cell_of: impl Fn(usize) -> CellId) -> World {
         let mut world = World::default();
-        let locator = &mut world.graph.locator;
+        let locator = Arc::make_mut(&mut world.graph.locator);
         let bounds: Vec<DVec3> = boxes.iter().flatten().map(|p| DVec3::from(*p)).collect();
         let bounds = Aabb::of_points(&bounds);
         for (n, [min, max]) in boxes.iter().enumerate() {

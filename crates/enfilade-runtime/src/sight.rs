@@ -34,7 +34,7 @@ pub use skeleton_bytes::SkeletonError;
 /// Build it once; any number of [`Viewer`](crate::Viewer)s on any threads can share it.
 #[derive(Clone, Debug)]
 pub struct Sight {
-    pub(crate) locator: Locator,
+    pub(crate) locator: Arc<Locator>,
     /// Exits of cell `c` are `exits[first_exit[c]..first_exit[c + 1]]`.
     first_exit: Vec<u32>,
     exits: Vec<Exit>,

@@ -10,6 +10,8 @@
 //! where no portal is, or meets a triangle overlapped by another of other cells. The triangle tests are
 //! identical in all trees, to the bit.
 
+use std::sync::Arc;
+
 use enfilade_cpg::{CellId, Locator, World};
 use enfilade_geom::ray::hit_triangle;
 use enfilade_geom::{Aabb, Bvh, DVec2, DVec3, Plane, Ray, Triangle, world_tolerance};
@@ -60,7 +62,7 @@ const OPENING: u32 = 1 << 30;
 /// often it is placed.
 #[derive(Clone, Debug)]
 pub struct Sightlines {
-    pub(crate) locator: Locator,
+    pub(crate) locator: Arc<Locator>,
     pub(crate) whole: Bvh,
     /// Per triangle: batch, and index in it.
     pub(crate) source: Vec<(u32, u32)>,

@@ -1,5 +1,7 @@
 //! Worlds put together into one at an instant: the truth for rooms that move.
 
+use std::sync::Arc;
+
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, Locator, LocatorNode, Portal, PortalId, PortalKind, World,
 };
@@ -104,7 +106,7 @@ pub fn assembled(all: &[Standing<'_>], doors: &[(usize, PortalId, Beyond)]) -> A
             });
         }
     }
-    world.graph.locator = locator(all, &first_cell);
+    world.graph.locator = locator(all, &first_cell).into();
     Assembled { world, first_cell }
 }
 
@@ -288,12 +290,12 @@ pub fn chamber(size: DVec3, [from, to]: [f64; 2], height: f64) -> World {
                 fittings: Vec::new(),
                 why: Vec::new(),
             }],
-            locator: Locator {
+            locator: Arc::new(Locator {
                 bounds: Aabb::new(DVec3::ZERO, size),
                 outside: Some(CellId(1)),
                 root: Locator::leaf(Some(CellId(0))),
                 ..Locator::default()
-            },
+            }),
             ..CellPortalGraph::default()
         },
         batches: vec![Batch {

@@ -1,6 +1,7 @@
 //! Shared cell and portal layout of all queries.
 
 use std::fmt;
+use std::sync::Arc;
 
 use enfilade_cpg::{CellId, Locator, Portal, PortalId, PortalKind, SpecialId, Way, World};
 use enfilade_geom::{Aabb, DVec3, Plane, Similarity, Winding, world_tolerance};
@@ -24,7 +25,7 @@ pub struct Layout {
     /// Per piece its first vertex, and the number of all.
     pub(crate) first_corner: Vec<u32>,
     pub(crate) corners: Vec<DVec3>,
-    pub(crate) locator: Locator,
+    pub(crate) locator: Arc<Locator>,
     pub(crate) tolerance: f64,
 }
 

@@ -47,7 +47,7 @@ fn rooms(n: u32) -> World {
     let graph = CellPortalGraph {
         cells: cells.collect(),
         portals: (1..n).map(doorway).collect(),
-        locator: locator(n),
+        locator: locator(n).into(),
         ..CellPortalGraph::default()
     };
     World {

@@ -242,7 +242,7 @@ pub(crate) fn cut_cell(
     // 3. Everything that refers to the cell.
     let mut out = world.clone();
     out.pvs = None;
-    out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids);
+    out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids).into();
     let halved = parts.hand_out_portals(&mut out, complex.opening_tolerance());
     parts
         .hand_out_specials(&mut out, &halved, complex.opening_tolerance())

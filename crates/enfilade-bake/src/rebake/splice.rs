@@ -155,7 +155,7 @@ impl Joint<'_> {
             specials: Vec::new(),
             cells,
             portals,
-            locator,
+            locator: locator.into(),
             provenance: old.graph.provenance.clone(),
             statistics: old.graph.statistics.clone(),
             places: self.places(),

@@ -1,6 +1,7 @@
 //! The whole scene baked anew, with the numbers of the old world.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use enfilade_cpg::{CellId, Locator, PortalId, World};
 use enfilade_geom::scene::Scene;
@@ -133,9 +134,10 @@ fn renumber(world: &mut World, number: &[u32]) {
             *at = Locator::leaf(Some(of(cell)));
         }
     };
-    leaf(&mut graph.locator.root);
-    graph.locator.outside = graph.locator.outside.map(of);
-    for node in &mut graph.locator.nodes {
+    let locator = Arc::make_mut(&mut graph.locator);
+    leaf(&mut locator.root);
+    locator.outside = locator.outside.map(of);
+    for node in &mut locator.nodes {
         node.children.iter_mut().for_each(leaf);
     }
     world.batches.iter_mut().for_each(|b| list(&mut b.cells));

@@ -88,7 +88,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     }
     let mut out = world.clone();
     out.pvs = None;
-    out.graph.locator = locator(&old.locator, &cell_of);
+    out.graph.locator = locator(&old.locator, &cell_of).into();
     out.graph.cells = cells;
     out.graph.portals = portals;
     out.graph.places = places;

@@ -275,7 +275,7 @@ impl<'a> Reader<'a> {
             portals,
             specials,
             places: graph.places.clone(),
-            locator,
+            locator: locator.into(),
             provenance: Provenance {
                 generator: p.generator.clone(),
                 method: p.method.clone(),

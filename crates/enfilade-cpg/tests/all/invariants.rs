@@ -1,5 +1,7 @@
 //! Breaks every invariant once, and validates portals as a builder makes them, which must pass.
 
+use std::sync::Arc;
+
 use crate::common;
 
 use common::two_rooms;
@@ -102,35 +104,35 @@ breaks! {
         => GraphError::PortalArea { portal: 1, .. },
     a_portal_has_pieces: |w| { w.graph.portals[1].pieces.clear(); w.graph.portals[1].area = 0.0; }
         => GraphError::PortalArea { portal: 1, .. },
-    the_locators_box_is_finite: |w| w.graph.locator.bounds.max.x = f64::INFINITY
+    the_locators_box_is_finite: |w| Arc::make_mut(&mut w.graph.locator).bounds.max.x = f64::INFINITY
         => GraphError::LocatorBounds { .. },
-    the_locators_box_is_ordered: |w| w.graph.locator.bounds.max.x = -1.0
+    the_locators_box_is_ordered: |w| Arc::make_mut(&mut w.graph.locator).bounds.max.x = -1.0
         => GraphError::LocatorBounds { .. },
-    the_locators_planes_are_finite: |w| w.graph.locator.planes[1][3] = f64::NAN
+    the_locators_planes_are_finite: |w| Arc::make_mut(&mut w.graph.locator).planes[1][3] = f64::NAN
         => GraphError::LocatorPlane { plane: 1, .. },
-    the_locators_nodes_have_planes: |w| w.graph.locator.nodes[1].plane = 2
+    the_locators_nodes_have_planes: |w| Arc::make_mut(&mut w.graph.locator).nodes[1].plane = 2
         => GraphError::LocatorNode { node: 1, plane: 2, n_planes: 2 },
-    children_come_after_their_parent: |w| w.graph.locator.nodes[1].children[0] = 1
+    children_come_after_their_parent: |w| Arc::make_mut(&mut w.graph.locator).nodes[1].children[0] = 1
         => GraphError::LocatorChild { node: Some(1), child: 1 },
-    children_exist: |w| w.graph.locator.nodes[1].children[0] = 2
+    children_exist: |w| Arc::make_mut(&mut w.graph.locator).nodes[1].children[0] = 2
         => GraphError::LocatorChild { node: Some(1), child: 2 },
-    leaves_are_cells: |w| w.graph.locator.nodes[1].children[1] = -5
+    leaves_are_cells: |w| Arc::make_mut(&mut w.graph.locator).nodes[1].children[1] = -5
         => GraphError::LocatorChild { node: Some(1), child: -5 },
-    the_least_leaf_is_no_cell: |w| w.graph.locator.root = i32::MIN
+    the_least_leaf_is_no_cell: |w| Arc::make_mut(&mut w.graph.locator).root = i32::MIN
         => GraphError::LocatorChild { node: None, child: i32::MIN },
-    the_root_exists: |w| w.graph.locator.root = 2
+    the_root_exists: |w| Arc::make_mut(&mut w.graph.locator).root = 2
         => GraphError::LocatorChild { node: None, child: 2 },
-    the_outside_is_a_cell: |w| w.graph.locator.outside = Some(CellId(3))
+    the_outside_is_a_cell: |w| Arc::make_mut(&mut w.graph.locator).outside = Some(CellId(3))
         => GraphError::LocatorOutside { cell: 3, n_cells: 3 },
-    the_outside_is_the_outdoors: |w| w.graph.locator.outside = Some(CellId(1))
+    the_outside_is_the_outdoors: |w| Arc::make_mut(&mut w.graph.locator).outside = Some(CellId(1))
         => GraphError::OutsideOutdoors { outside: Some(1), outdoors: Some(2) },
-    the_outdoors_is_outside: |w| w.graph.locator.outside = None
+    the_outdoors_is_outside: |w| Arc::make_mut(&mut w.graph.locator).outside = None
         => GraphError::OutsideOutdoors { outside: None, outdoors: Some(2) },
     a_room_lies_in_the_locators_box: |w| w.graph.cells[0].aabb[1][1] += 2.0
         => GraphError::FarBox { .. },
     the_outdoors_lies_around_the_model: |w| w.graph.cells[2].aabb[1][1] = 1e30
         => GraphError::FarBox { .. },
-    the_locator_lies_around_the_model: |w| w.graph.locator.bounds.max.x = 1e30
+    the_locator_lies_around_the_model: |w| Arc::make_mut(&mut w.graph.locator).bounds.max.x = 1e30
         => GraphError::FarBox { .. },
     a_count_is_finite: |w| w.graph.statistics.counts = [("n".to_owned(), f64::NAN)].into()
         => GraphError::Statistic { .. },
@@ -225,8 +227,8 @@ fn chain(n: i32) -> World {
         plane: 0,
         children: [i + 1, -1],
     };
-    world.graph.locator.nodes = (0..n).map(node).collect();
-    world.graph.locator.nodes[n as usize - 1].children[0] = -3;
+    Arc::make_mut(&mut world.graph.locator).nodes = (0..n).map(node).collect();
+    Arc::make_mut(&mut world.graph.locator).nodes[n as usize - 1].children[0] = -3;
     world
 }
 
@@ -249,7 +251,7 @@ fn a_locator_is_as_deep_as_it_may_be_and_no_deeper() {
 fn a_locator_whose_nodes_are_children_twice_is_refused() {
     for n in [2, 10_000] {
         let mut world = chain(n);
-        for (i, node) in (1..).zip(&mut world.graph.locator.nodes) {
+        for (i, node) in (1..).zip(&mut Arc::make_mut(&mut world.graph.locator).nodes) {
             node.children = [if i < n { i } else { -3 }; 2];
         }
         let said = world.validate().unwrap_err();
@@ -258,7 +260,7 @@ fn a_locator_whose_nodes_are_children_twice_is_refused() {
     }
     // A node must not be the child of two others either.
     let mut world = chain(3);
-    world.graph.locator.nodes[0].children[1] = 2;
+    Arc::make_mut(&mut world.graph.locator).nodes[0].children[1] = 2;
     let said = world.validate().unwrap_err();
     assert_eq!(said, [GraphError::LocatorShared { node: 2 }]);
 }

@@ -1,5 +1,7 @@
 //! Encoding and decoding the world file preserve the world; equal worlds give equal bytes.
 
+use std::sync::Arc;
+
 use crate::common;
 
 use common::{floor, nasty_rooms, two_rooms};
@@ -290,8 +292,8 @@ fn buffer_views_start_at_multiples_of_eight_whatever_lies_before_them() {
     let node = world.graph.locator.nodes[1];
     for n in 1..20 {
         world.images[0].bytes = vec![7; n];
-        world.graph.locator.nodes = vec![node; n];
-        world.graph.locator.root = n as i32 - 1;
+        Arc::make_mut(&mut world.graph.locator).nodes = vec![node; n];
+        Arc::make_mut(&mut world.graph.locator).root = n as i32 - 1;
         let bytes = encode_glb(&world).unwrap();
         let root = json(&bytes);
         for view in root["bufferViews"].as_array().unwrap() {

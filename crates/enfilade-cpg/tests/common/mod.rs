@@ -138,7 +138,7 @@ pub(crate) fn two_rooms() -> World {
             cell("outdoors", [[-1.0, -1.0, -1.0], [9.0, 4.0, 6.0]], &[1]),
         ],
         portals: vec![door, window],
-        locator,
+        locator: locator.into(),
         provenance: Provenance {
             generator: "enfilade 0.1.0".into(),
             method: "watershed".into(),

@@ -1,5 +1,7 @@
 //! Plain data, read back by other readers.
 
+use std::sync::Arc;
+
 use super::*;
 use enfilade_cpg::{Batch, DetailObject, Fitting, Locator, LocatorNode, Portal, Pvs, World};
 use enfilade_geom::scene::{Mesh, Primitive};
@@ -45,7 +47,7 @@ fn world() -> World {
             cell("outdoors", [-1.0, 9.0], &[1]),
         ],
         portals: vec![door, portal(8.0, [1, 2], PortalKind::Window)],
-        locator: Locator {
+        locator: Arc::new(Locator {
             bounds: Aabb::new(DVec3::ZERO, DVec3::new(8.0, 3.0, 5.0)),
             outside: Some(CellId(2)),
             planes: vec![[1.0, 0.0, 0.0, -4.0]],
@@ -54,7 +56,7 @@ fn world() -> World {
                 children: [1, 0].map(|c| Locator::leaf(Some(CellId(c)))),
             }],
             root: 0,
-        },
+        }),
         ..CellPortalGraph::default()
     };
     let triangle = |x: f32| Primitive {

@@ -99,7 +99,7 @@ fn two_storeys() -> World {
     let graph = CellPortalGraph {
         cells,
         portals: vec![stair],
-        locator,
+        locator: locator.into(),
         ..CellPortalGraph::default()
     };
     World {

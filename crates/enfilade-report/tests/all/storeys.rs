@@ -79,7 +79,7 @@ fn world(halls: &[Hall], doors: &[Door]) -> World {
         graph: CellPortalGraph {
             cells,
             portals,
-            locator: locator_of_boxes(&boxes, bounds, None),
+            locator: locator_of_boxes(&boxes, bounds, None).into(),
             ..CellPortalGraph::default()
         },
         ..World::default()

@@ -1,5 +1,7 @@
 //! Scaling of a finished world.
 
+use std::sync::Arc;
+
 use enfilade_cpg::World;
 
 /// Scales `world` about the origin, with its graph, locator and geometry. Leaves of doors lose their motion.
@@ -16,7 +18,7 @@ pub fn scaled_world(mut world: World, factor: f32) -> World {
         portal.area *= factor.powi(2);
         portal.fittings.clear();
     }
-    let locator = &mut world.graph.locator;
+    let locator = Arc::make_mut(&mut world.graph.locator);
     locator.bounds.min *= f64::from(factor);
     locator.bounds.max *= f64::from(factor);
     for plane in &mut locator.planes {

@@ -47,7 +47,7 @@ pub(super) fn world_of(
         graph: CellPortalGraph {
             cells,
             portals: walls.portals,
-            locator: grid.locator(),
+            locator: grid.locator().into(),
             ..CellPortalGraph::default()
         },
         batches,

@@ -1,5 +1,7 @@
 //! Claims about cells, portals, counts and the locator.
 
+use std::sync::Arc;
+
 use enfilade_cpg::{CellId, FittingPart, Locator, Portal, PortalKind, World};
 use enfilade_geom::{DVec3, poly};
 
@@ -83,7 +85,7 @@ pub(super) const ALL: &[Tampering] = &[
     Tampering::new("another outside", |w, at| {
         let outside = [None, Some(CellId(1)), Some(CellId(2))][at];
         let is_other = w.graph.locator.outside != outside;
-        w.graph.locator.outside = outside;
+        Arc::make_mut(&mut w.graph.locator).outside = outside;
         is_other.then_some(())
     }),
     Tampering::new("another outdoors", |w, at| {
@@ -181,34 +183,34 @@ pub(super) const ALL: &[Tampering] = &[
     Tampering::new("a plane of the locator moved", |w, at| {
         let n = w.graph.locator.planes.len();
         let i = [0, n / 2, n / 3][at];
-        w.graph.locator.planes.get_mut(i)?[3] += 0.05;
+        Arc::make_mut(&mut w.graph.locator).planes.get_mut(i)?[3] += 0.05;
         Some(())
     }),
     Tampering::new("a plane of the locator moved by 0.3 m", |w, at| {
         let n = w.graph.locator.planes.len();
         // Many divide what is of one cell on both sides.
         let moved = (0..n).map(|i| (i + at * n / 3) % n).find_map(|i| {
-            let mut moved = w.graph.locator.clone();
+            let mut moved = Locator::clone(&w.graph.locator);
             moved.planes[i][3] -= 0.3;
             answers_differ(&w.graph.locator, &moved).then_some(moved)
         });
-        w.graph.locator = moved?;
+        w.graph.locator = moved?.into();
         Some(())
     }),
     Tampering::new("a leaf of the locator of another cell", |w, at| {
         let [leaf, other] = two_rooms(w, at)?.map(|i| Locator::leaf(Some(CellId(i as u32))));
-        let nodes = w.graph.locator.nodes.iter_mut();
+        let nodes = Arc::make_mut(&mut w.graph.locator).nodes.iter_mut();
         let mut leaves = nodes.flat_map(|n| &mut n.children).filter(|c| **c == leaf);
         *leaves.next()? = other;
         Some(())
     }),
     Tampering::new("the locator's box halved", |w, at| {
-        let b = &mut w.graph.locator.bounds;
+        let b = &mut Arc::make_mut(&mut w.graph.locator).bounds;
         b.max[at] = 0.5 * (b.min[at] + b.max[at]);
         Some(())
     }),
     Tampering::new("a node of the locator that is a child twice", |w, at| {
-        let nodes = &mut w.graph.locator.nodes;
+        let nodes = &mut Arc::make_mut(&mut w.graph.locator).nodes;
         let inner = |i: usize| nodes[i].children.iter().any(|&c| c >= 0);
         let i = pick(nodes.len(), at, inner)?;
         let children = &mut nodes[i].children;

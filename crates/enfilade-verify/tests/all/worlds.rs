@@ -1,5 +1,7 @@
 //! Worlds that keep their promises pass; each promise, broken once, is found broken.
 
+use std::sync::Arc;
+
 use crate::common;
 
 use common::{A, B, DOOR, DOOR_X, OUTDOORS, WINDOW, house, house_with_locator_plane, moved};
@@ -180,7 +182,7 @@ fn a_locator_that_says_solid_in_the_air_is_seen() {
     let mut world = house();
     // The first half of the doorway becomes solid.
     let leaf = enfilade_cpg::Locator::leaf(None);
-    let nodes = world.graph.locator.nodes.iter_mut();
+    let nodes = Arc::make_mut(&mut world.graph.locator).nodes.iter_mut();
     for node in nodes.filter(|n| n.plane == 11) {
         node.children[0] = leaf;
     }

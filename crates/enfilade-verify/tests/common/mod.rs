@@ -5,6 +5,8 @@
 
 #![allow(dead_code, reason = "each test program uses its part")]
 
+use std::sync::Arc;
+
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, Locator, LocatorNode, Portal, PortalId, PortalKind, World,
 };
@@ -248,7 +250,7 @@ pub(crate) fn house_with_locator_plane(door_x: f64) -> World {
     let graph = CellPortalGraph {
         cells,
         portals,
-        locator,
+        locator: locator.into(),
         ..CellPortalGraph::default()
     };
     World {
@@ -308,7 +310,7 @@ pub(crate) fn moved(mut world: World, by: &DMat4) -> World {
         let b = b[0].union(b[1]);
         c.aabb = [b.min.as_vec3().to_array(), b.max.as_vec3().to_array()];
     }
-    let locator = &mut world.graph.locator;
+    let locator = Arc::make_mut(&mut world.graph.locator);
     let before = locator.bounds.volume();
     locator.bounds = box_of(locator.bounds.min, locator.bounds.max);
     let outdoors = &mut world.graph.cells[2];

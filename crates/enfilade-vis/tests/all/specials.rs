@@ -2,6 +2,7 @@
 //! matrices.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use enfilade_cpg::{
     Cell, CellId, CellPortalGraph, MonitorCamera, PartNumbers, Pass, Portal, PortalId, PortalKind,
@@ -380,7 +381,7 @@ fn what_is_beyond_a_bound_may_lead_on() {
     assert_eq!(rows(4, &graph), (all.clone(), 0));
     assert_eq!(rows(0, &graph), (all.clone(), 3));
     // The surroundings of the locator are the cell of an eye far away.
-    graph.locator.outside = Some(CellId(0));
+    Arc::make_mut(&mut graph.locator).outside = Some(CellId(0));
     graph.specials.push(special(3, Way::Monitor(camera)));
     let everything = vec![0, 1, 2, 3];
     for depth in [0, 4] {

@@ -5,6 +5,8 @@
 //! can skip are removed. No step makes the path longer, so the process ends, at a path that is the shortest of those it can be
 //! pulled to without leaving the floors. O(rounds · bends · squares along them).
 
+use std::sync::Arc;
+
 use enfilade_geom::DVec3;
 
 use crate::paths::floors::{Floors, Hindrance};
@@ -181,11 +183,11 @@ mod tests {
         });
         world.graph = CellPortalGraph {
             cells: vec![Cell::default()],
-            locator: Locator {
+            locator: Arc::new(Locator {
                 bounds: Aabb::new(low, high),
                 root: Locator::leaf(Some(CellId(0))),
                 ..Locator::default()
-            },
+            }),
             ..CellPortalGraph::default()
         };
         let floors = Floors::new(&Layout::new(&world), None, &world, Agent::default(), |_| {

@@ -47,7 +47,7 @@ impl Joined {
                 specials_by_cell: Vec::new(),
                 first_corner: vec![0],
                 corners: Vec::new(),
-                locator: Locator::default(),
+                locator: Locator::default().into(),
                 tolerance: 0.0,
             },
             docked: vec![None; n_portals],

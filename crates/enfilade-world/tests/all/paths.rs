@@ -3,6 +3,7 @@
 //! Covers W10.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, Fitting, FittingPart, Locator, PortalId, PortalKind,
@@ -355,11 +356,11 @@ fn hall(boxes: &[Aabb]) -> Space {
                 aabb: [bounds.min, bounds.max].map(|p| p.as_vec3().to_array()),
                 ..Cell::default()
             }],
-            locator: Locator {
+            locator: Arc::new(Locator {
                 bounds,
                 root: Locator::leaf(Some(CellId(0))),
                 ..Locator::default()
-            },
+            }),
             ..CellPortalGraph::default()
         },
         batches: vec![Batch {

@@ -1,6 +1,7 @@
 //! A scene as it is, as a world of one cell: to look at before anything is baked.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use enfilade::cpg::{Batch, Cell, CellId, CellPortalGraph, Locator, World};
 use enfilade::geom::scene::{Primitive, Scene};
@@ -56,12 +57,12 @@ pub(crate) fn scene_world(scene: &Scene) -> World {
     World {
         graph: CellPortalGraph {
             cells: vec![cell],
-            locator: Locator {
+            locator: Arc::new(Locator {
                 bounds,
                 outside: Some(CellId(0)),
                 root: Locator::leaf(Some(CellId(0))),
                 ..Locator::default()
-            },
+            }),
             ..CellPortalGraph::default()
         },
         batches: merged.into_values().map(batch).collect(),
