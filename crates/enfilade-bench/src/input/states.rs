@@ -2,8 +2,8 @@
 //! refused, or what was asked for is made without it, with the same bytes.
 //!
 //! Others have tests: textures of portals (`portal_textures/file.rs` and `portal_textures_ahead.rs` of `enfilade-render`), journals of
-//! editing (`enfilade-edit/tests/sessions.rs`), saved worlds (`enfilade-world/tests/saved.rs`) and skeletons
-//! (`enfilade-runtime/tests/hollow.rs`).
+//! editing (`enfilade-edit/tests/all/sessions.rs`), saved worlds (`enfilade-world/tests/all/saved.rs`) and skeletons
+//! (`enfilade-runtime/tests/all/hollow.rs`).
 
 use std::collections::BTreeMap;
 use std::fs;
