@@ -6,12 +6,12 @@
 
 mod answer;
 #[cfg(target_arch = "wasm32")]
-mod ffi;
+pub mod ffi;
 mod options;
 mod steps;
 mod work;
 
-pub use answer::{Answer, Failure};
+pub use answer::{Answer, Failure, Question};
 pub use options::BakeRequest;
-pub use steps::Steps;
+pub use steps::{Steps, Told};
 pub use work::baked;
