@@ -150,6 +150,7 @@ async function finish(found: Baked, seconds: number): Promise<void> {
   $('title').focus();
   // The world has all triangles of the model, whatever its format was.
   await model.load(found.world.slice().buffer);
+  model.aimAt(roomsOf(found));
   showStorey(storey);
 }
 
@@ -212,6 +213,7 @@ function fillDownloads(found: Baked, of: Job): void {
 function ask({ about, proposed }: Question): HTMLElement {
   const values = about === 'unit' ? ['mm', 'cm', 'm', 'in', 'ft'] : ['y', 'z'];
   const select = make('select', {}, ...values.map((value) => make('option', { value }, about === 'up' ? value.toUpperCase() : value)));
+  if (proposed && !values.includes(proposed)) select.append(make('option', { value: proposed }, proposed));
   select.value = proposed ?? values[0]!;
   const button = make('button', { type: 'button' }, text('retry'));
   button.addEventListener('click', () => {

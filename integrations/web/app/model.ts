@@ -5,7 +5,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
-import type { Baked } from '../src/bake.js';
+import type { Baked, BakedRoom } from '../src/bake.js';
 import type { Pointing } from './plan.js';
 import { shapesOf } from './shapes.js';
 
@@ -94,7 +94,7 @@ export class ModelView {
     this.recut();
   }
 
-  /** Looks at all of it. */
+  /** Looks at all of it, or at all rooms if some are known: a building may stand in a wide country. */
   private aim(): void {
     const [middle, size] = [this.box.getCenter(new Vector3()), this.box.getSize(new Vector3())];
     const far = 0.5 * size.length() + 1;
@@ -106,6 +106,14 @@ export class ModelView {
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.ask();
+  }
+
+  /** Looks at all rooms of a world. */
+  aimAt(rooms: BakedRoom[]): void {
+    if (rooms.length === 0) return;
+    this.box.makeEmpty();
+    for (const { aabb } of rooms) for (const point of aabb) this.box.expandByPoint(new Vector3(...point));
+    this.aim();
   }
 
   /** Shows the rooms of a storey of a world, and cuts the model above its floor. */
@@ -154,7 +162,7 @@ export class ModelView {
     for (const mesh of this.floors.children as Mesh[]) {
       const { cell, color } = mesh.userData as { cell: number; color: string };
       const own = (mesh.material as MeshBasicMaterial).color.set(color);
-      if (cell === chosen) own.lerp(new Color(0x1565a8), 0.55);
+      if (cell === chosen) own.set(0x7db8f0);
       else if (cell === hovered) own.multiplyScalar(0.85);
     }
     this.ask();

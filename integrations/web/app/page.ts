@@ -21,4 +21,6 @@ export function make<K extends keyof HTMLElementTagNameMap>(
 /** Shows some of the parts of the page, and hides the others. */
 export function show(...ids: string[]): void {
   for (const id of ['start', 'work', 'failed', 'done', 'plan', 'model', 'told', 'results']) $(id).hidden = !ids.includes(id);
+  // A model that is not cut has no choice of it.
+  $('cut').hidden = !ids.includes('plan');
 }

@@ -1,13 +1,14 @@
 #!/bin/sh
 # Builds enfilade-bake.wasm from bake/, as wasm.sh builds the run-time: with the wasm32 target of the toolchain if it is
 # installed, otherwise with a compiler that builds the standard library from its sources (Debian: rustc-web rust-web-src
-# lld-19). Then optimizes it. WASM_OPT is the optimizer, and `none` leaves it out.
+# lld-19). Then optimizes it. BAKE_PROFILE=gate builds sooner what runs slower, and optimizes no further.
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
 target=${CARGO_TARGET_DIR:-$here/../../target/web}
 cd "$here/bake"
 export CARGO_TARGET_DIR="$target"
-build="rustc --lib --crate-type cdylib --locked --release"
+profile=${BAKE_PROFILE:-release}
+build="rustc --lib --crate-type cdylib --locked --profile $profile"
 # Trees of planes are deep. Four numbers at a time, with the same bits as one by one.
 flags="-C link-arg=-zstack-size=8388608 -C target-feature=+simd128"
 if [ -d "$(rustc --print sysroot)/lib/rustlib/wasm32-unknown-unknown/lib" ]; then
@@ -24,11 +25,10 @@ else
 fi
 features="--enable-bulk-memory --enable-sign-ext --enable-mutable-globals --enable-nontrapping-float-to-int"
 features="$features --enable-reference-types --enable-multivalue --enable-simd"
-built="$target/wasm32-unknown-unknown/release/enfilade_web_bake.wasm"
+built="$target/wasm32-unknown-unknown/$profile/enfilade_web_bake.wasm"
 mkdir -p "$here/dist"
-optimizer=${WASM_OPT:-wasm-opt}
-if command -v "$optimizer" >/dev/null; then
-  "$optimizer" -O2 $features "$built" -o "$here/dist/enfilade-bake.wasm"
+if [ "$profile" = release ] && command -v wasm-opt >/dev/null; then
+  wasm-opt -O2 $features "$built" -o "$here/dist/enfilade-bake.wasm"
 else
   cp "$built" "$here/dist/enfilade-bake.wasm"
 fi

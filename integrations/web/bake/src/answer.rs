@@ -1,7 +1,7 @@
 //! What a bake returns: bytes, a drawing, and data for the page.
 
 use enfilade_cpg::{Cell, World};
-use enfilade_import::{ImportReport, Up};
+use enfilade_import::ImportReport;
 use enfilade_report::{InputDoubt, Plans, Verdict};
 use serde::Serialize;
 
@@ -34,7 +34,29 @@ pub struct Question {
     /// The evidence, and the option of the command.
     pub text: String,
     /// The value that the evidence speaks for, if there is one: a setting.
-    pub proposed: Option<&'static str>,
+    pub proposed: Option<String>,
+}
+
+/// The properties that are asked for.
+const ABOUT: [&str; 2] = ["unit", "up"];
+
+impl Question {
+    fn new(about: &'static str, text: &str) -> Self {
+        Self {
+            about,
+            text: text.to_owned(),
+            proposed: proposed(text, about),
+        }
+    }
+}
+
+/// Returns the value that a text proposes for a setting, as an option of the command.
+fn proposed(text: &str, about: &str) -> Option<String> {
+    let option = format!("--{about} ");
+    let (_, rest) = text.split_once(&option)?;
+    let value = rest.split_whitespace().next()?;
+    let value = value.trim_end_matches(|c: char| !c.is_alphanumeric());
+    (!value.is_empty()).then(|| value.to_owned())
 }
 
 impl Failure {
@@ -46,6 +68,18 @@ impl Failure {
         }
     }
 
+    /// Adds the questions about an input; without a report, those whose answers the text proposes.
+    pub(crate) fn asking(mut self, report: Option<&ImportReport>) -> Self {
+        self.questions = report.map(questions).unwrap_or_default();
+        for about in ABOUT {
+            let is_asked = self.questions.iter().any(|q| q.about == about);
+            if !is_asked && proposed(&self.text, about).is_some() {
+                self.questions.push(Question::new(about, &self.text));
+            }
+        }
+        self
+    }
+
     pub(crate) fn settings(text: &str) -> Self {
         Self::new("settings", format!("settings: {text}"))
     }
@@ -53,23 +87,11 @@ impl Failure {
 
 /// Returns what is in doubt about unit and axis.
 pub(crate) fn questions(report: &ImportReport) -> Vec<Question> {
-    let unit = |text: &Option<String>, proposed| {
-        text.clone().map(|text| Question {
-            about: "unit",
-            text,
-            proposed,
-        })
-    };
-    let up = report.up_doubt.as_ref().map(|doubt| Question {
-        about: "up",
-        text: doubt.text.clone(),
-        proposed: doubt.up.map(|up| match up {
-            Up::Y => "y",
-            Up::Z => "z",
-        }),
-    });
-    let of_unit = unit(&report.unit_doubt, None).or_else(|| unit(&report.feet_hint, Some("ft")));
-    of_unit.into_iter().chain(up).collect()
+    let unit = report.unit_doubt.as_ref().or(report.feet_hint.as_ref());
+    let unit = unit.map(|text| Question::new("unit", text));
+    let up = report.up_doubt.as_ref();
+    let up = up.map(|doubt| Question::new("up", &doubt.text));
+    unit.into_iter().chain(up).collect()
 }
 
 /// Returns the doubts about the input, as the verdict takes them.
@@ -169,4 +191,18 @@ pub(crate) fn storeys(plans: &Plans<'_>) -> Vec<Floor> {
         cells: storey.cells.iter().map(|cell| cell.0).collect(),
     };
     plans.storeys().map(floor).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_text_proposes_is_a_question() {
+        let text = "larger than 2000 m; give the unit of its numbers, --unit mm or --unit cm, and `--up z`";
+        let failure = Failure::new("files", text).asking(None);
+        let proposed: Vec<_> = failure.questions.iter().map(|q| q.proposed.as_deref()).collect();
+        assert_eq!(proposed, [Some("mm"), Some("z")]);
+        assert!(Failure::new("files", "damaged").asking(None).questions.is_empty());
+    }
 }

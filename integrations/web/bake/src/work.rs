@@ -25,11 +25,11 @@ pub fn baked(
     let began = Instant::now();
     let (import, resolved) = request.resolve()?;
     steps.begin_reading();
-    let read = import_held(files, &import).map_err(|e| Failure::new("files", e.to_string()))?;
+    let read = import_held(files, &import);
+    let read = read.map_err(|e| Failure::new("files", e.to_string()).asking(None))?;
     let Imported { mut scene, report, .. } = read;
     if let Some(why) = report.refusal() {
-        let questions = questions(&report);
-        return Err(Failure { questions, ..Failure::new("refused", why) });
+        return Err(Failure::new("refused", why).asking(Some(&report)));
     }
     scene.rooms.extend_from_slice(&resolved.names);
     let mut warnings: Vec<String> = report.left_out.iter().map(ToString::to_string).collect();
@@ -61,8 +61,7 @@ pub fn baked(
     let verdict = Verdict::of(&world, &input_doubts(&report)).untried();
     if is_empty(&world) && !request.allow_empty {
         let text = format!("no room was found: {}", verdict.why());
-        let questions = questions(&report);
-        return Err(Failure { questions, ..Failure::new("empty", text) });
+        return Err(Failure::new("empty", text).asking(Some(&report)));
     }
     let triangles = world.graph.statistics.counts.get("input_triangles");
     let plans = Plans::new(&world, &PlanOptions::default());
@@ -132,10 +131,7 @@ fn of_bake(error: &BakeError, report: &ImportReport) -> Failure {
         BakeError::Setting { .. } | BakeError::Material(_) => "settings",
         _ => "bake",
     };
-    Failure {
-        questions: questions(report),
-        ..Failure::new(kind, error.to_string())
-    }
+    Failure::new(kind, error.to_string()).asking(Some(report))
 }
 
 #[cfg(test)]
