@@ -63,13 +63,17 @@ impl HeldFiles {
         let decoded = percent_encoding::percent_decode_str(reference).decode_utf8_lossy();
         let folder = scene.parent().unwrap_or(Path::new("")).to_string_lossy();
         let beside = [&*decoded, reference].map(|name| tidy(&format!("{folder}/{name}")));
-        let found = beside.iter().find_map(|name| self.files.get_key_value(name));
+        let found = beside
+            .iter()
+            .find_map(|name| self.files.get_key_value(name));
         let (name, bytes) = found.or_else(|| self.alone(&decoded)).ok_or_else(|| {
             format!("refers to the file '{reference}', which is not there; give it, too")
         })?;
         if bytes.len() as u64 > limit {
             let n = bytes.len();
-            return Err(format!("refers to '{reference}' of {n} bytes, more than {limit}"));
+            return Err(format!(
+                "refers to '{reference}' of {n} bytes, more than {limit}"
+            ));
         }
         Ok((name.into(), bytes.clone()))
     }
@@ -123,13 +127,22 @@ mod tests {
     use super::*;
 
     fn held(names: &[&str]) -> HeldFiles {
-        let files = names.iter().map(|name| ((*name).to_owned(), name.as_bytes().to_vec()));
+        let files = names
+            .iter()
+            .map(|name| ((*name).to_owned(), name.as_bytes().to_vec()));
         files.collect()
     }
 
     #[test]
     fn references_are_found_beside_their_scene_or_by_their_name_alone() {
-        let files = held(&["a/x.gltf", "a/x y.bin", "b/x.bin", "c/One.PNG", "d/t.png", "e/t.png"]);
+        let files = held(&[
+            "a/x.gltf",
+            "a/x y.bin",
+            "b/x.bin",
+            "c/One.PNG",
+            "d/t.png",
+            "e/t.png",
+        ]);
         let found = |reference| {
             let found = files.reference(Path::new("a/x.gltf"), reference, 100);
             found.map(|(path, _)| path.display().to_string())

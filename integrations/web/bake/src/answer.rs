@@ -192,17 +192,3 @@ pub(crate) fn storeys(plans: &Plans<'_>) -> Vec<Floor> {
     };
     plans.storeys().map(floor).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_a_text_proposes_is_a_question() {
-        let text = "larger than 2000 m; give the unit of its numbers, --unit mm or --unit cm, and `--up z`";
-        let failure = Failure::new("files", text).asking(None);
-        let proposed: Vec<_> = failure.questions.iter().map(|q| q.proposed.as_deref()).collect();
-        assert_eq!(proposed, [Some("mm"), Some("z")]);
-        assert!(Failure::new("files", "damaged").asking(None).questions.is_empty());
-    }
-}

@@ -2,8 +2,8 @@
 
 use enfilade_bake::bsp::find_leak;
 use enfilade_bake::{BakeConfig, BakeContext, BakeError, BakeOutput, bake};
-use enfilade_cpg::wire::{decode_glb, encode_glb};
 use enfilade_cpg::World;
+use enfilade_cpg::wire::{decode_glb, encode_glb};
 use enfilade_geom::Instant;
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_import::{HeldFiles, ImportReport, Imported, import_held};
@@ -27,7 +27,9 @@ pub fn baked(
     steps.begin_reading();
     let read = import_held(files, &import);
     let read = read.map_err(|e| Failure::new("files", e.to_string()).asking(None))?;
-    let Imported { mut scene, report, .. } = read;
+    let Imported {
+        mut scene, report, ..
+    } = read;
     if let Some(why) = report.refusal() {
         return Err(Failure::new("refused", why).asking(Some(&report)));
     }
@@ -50,7 +52,12 @@ pub fn baked(
     drop(scene);
     told(&mut baked.world, &report, &import);
     // Readers of its file get it rounded, and so do the plan and the facts.
-    let defect = |e: String| Failure::new("defect", format!("the baked world breaks an invariant: {e}"));
+    let defect = |e: String| {
+        Failure::new(
+            "defect",
+            format!("the baked world breaks an invariant: {e}"),
+        )
+    };
     steps.begin_plan();
     let bytes = encode_glb(&baked.world).map_err(|e| defect(e.to_string()))?;
     let world = decode_glb(&bytes).map_err(|e| defect(e.to_string()))?;
@@ -132,49 +139,4 @@ fn of_bake(error: &BakeError, report: &ImportReport) -> Failure {
         _ => "bake",
     };
     Failure::new(kind, error.to_string()).asking(Some(report))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn house() -> HeldFiles {
-        let house = enfilade_demo::furnished_house().scene;
-        let glb = enfilade_import::export_glb(&house);
-        [("house.glb".to_owned(), glb)].into_iter().collect()
-    }
-
-    #[test]
-    fn a_house_becomes_a_world_with_a_plan_and_rooms_step_by_step() {
-        let told = std::sync::Mutex::new(Vec::new());
-        let tell = |name: &str, at: usize, n: usize| {
-            told.lock().unwrap().push((name.to_owned(), at, n));
-        };
-        let done = baked(&house(), &BakeRequest::default(), &Steps::new(&tell));
-        let answer = done.map_err(|e| e.text).unwrap();
-        assert!(answer.world.starts_with(b"glTF") && answer.plan.contains("data-cell"));
-        let facts: serde_json::Value = serde_json::from_str(&answer.facts).unwrap();
-        let rooms = facts["rooms"].as_array().unwrap();
-        assert!(rooms.iter().any(|r| r["kind"] == "room" && r["floorArea"].as_f64() > Some(5.0)));
-        assert!(facts["text"].as_str().unwrap().starts_with("trust: "));
-        let told = told.into_inner().unwrap();
-        assert_eq!((&*told[0].0, &*told.last().unwrap().0), ("reading", "plan"));
-        assert!(told.iter().all(|(_, at, n)| at < n), "{told:?}");
-    }
-
-    #[test]
-    fn what_is_wrong_is_said_with_its_kind() {
-        let quiet = |_: &str, _: usize, _: usize| {};
-        let failed = |files: &HeldFiles, request: &str| {
-            let request = BakeRequest::of_json(request)?;
-            baked(files, &request, &Steps::new(&quiet)).map(|_| ())
-        };
-        let junk = [("junk.glb".to_owned(), b"glTF junk".to_vec())].into_iter().collect();
-        assert_eq!(failed(&junk, "{}").unwrap_err().kind, "files");
-        assert_eq!(failed(&house(), r#"{"method":"x"}"#).unwrap_err().kind, "settings");
-        let text = failed(&house(), r#"{"settings":{"voxell":1}}"#).unwrap_err().text;
-        assert!(text.contains("voxell") && !text.contains("line"), "{text}");
-        let small = failed(&house(), r#"{"maxMemory":1000}"#).unwrap_err();
-        assert!(small.text.contains("memory"), "{}", small.text);
-    }
 }
