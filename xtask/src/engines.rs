@@ -233,10 +233,13 @@ fn build_web() -> anyhow::Result<()> {
     for args in [
         &["ci", "--silent"][..],
         &["run", "-s", "wasm"],
+        &["run", "-s", "bake"],
         &["run", "-s", "build"],
     ] {
         // Rows alone go to standard output.
-        run_to_end(web("npm", GATE, args).stdout(std::io::stderr()))?;
+        let mut npm = web("npm", GATE, args);
+        npm.env("BAKE_PROFILE", GATE.0);
+        run_to_end(npm.stdout(std::io::stderr()))?;
     }
     Ok(())
 }

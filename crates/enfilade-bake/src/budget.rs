@@ -1,15 +1,16 @@
 //! Limits on the resources of a bake, and the work that a scene is worth.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use enfilade_geom::scene::{Role, Scene};
-use enfilade_geom::{Allowance, MemoryProbe};
+use enfilade_geom::{Allowance, Instant, MemoryProbe};
 
 /// Limits on the resources of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
     /// Memory. Voxels and points are as many as fit; a bake that needs more is refused before it begins. Default:
-    /// 8 GiB, and less for few triangles: 2,000 of them get no more voxels or points than fit in 1 GiB. [Units: bytes]
+    /// 8 GiB, 2 GiB where addresses have 32 bits, and less for few triangles: 2,000 of them get no more voxels or points than
+    /// fit in 1 GiB. [Units: bytes]
     pub memory: Option<u64>,
     /// Time after which a bake is refused. Without it, a bake ends when its work is out of all proportion to its
     /// triangles and voxels, whatever the clock: the work of a minute for 2,000 triangles, and at least four times that
@@ -23,7 +24,9 @@ pub struct Budget {
 }
 
 /// Default limit of a bake's memory. [Units: bytes]
-const MEMORY: u64 = 8 << 30;
+const MEMORY: u64 = if IS_SMALL { 2 << 30 } else { 8 << 30 };
+/// No program can hold more than 4 GiB: its memory is watched in any case, and a bake ends before that is gone.
+const IS_SMALL: bool = cfg!(target_pointer_width = "32");
 
 /// Work that any scene is worth, and additional work for each triangle, in units of [`Allowance`]. The most expensive
 /// real scenes, a house by tetrahedra and a vessel by the partition, take a quarter of it; by the watershed, none takes
@@ -61,10 +64,15 @@ impl Budget {
         let began = self.began.unwrap_or_else(Instant::now);
         let until = self.time.and_then(|t| began.checked_add(t));
         let allowance = Allowance::new(work, until);
-        match (self.memory, probe) {
+        match (self.memory.or(IS_SMALL.then_some(MEMORY)), probe) {
             (Some(bytes), Some(probe)) => allowance.holding(bytes, probe),
             _ => allowance,
         }
+    }
+
+    /// Returns the memory beyond which a bake that is watched ends. [Units: bytes]
+    pub(crate) fn bound(&self) -> u64 {
+        self.memory.unwrap_or(MEMORY)
     }
 
     /// Returns the additional work for so many voxels.

@@ -3,9 +3,9 @@
 use std::fmt;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use enfilade_geom::{Allowance, AllowanceEnd, MemoryProbe};
+use enfilade_geom::{Allowance, AllowanceEnd, Instant, MemoryProbe};
 
 use crate::{BakeError, Budget, Method, Pieces, Resolution, Stage};
 
@@ -142,7 +142,7 @@ impl<'a> BakeContext<'a> {
             },
             AllowanceEnd::Memory => BakeError::TooMuchMemory {
                 stage,
-                memory: self.budget.memory.unwrap_or_default(),
+                memory: self.budget.bound(),
             },
             AllowanceEnd::Cancelled => BakeError::Cancelled,
             AllowanceEnd::Work => BakeError::TooMuchWork {

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
-use std::time::Instant;
+
+use crate::Instant;
 
 /// Work between two looks at the clock. About half a millisecond.
 const LOOK: u64 = 1 << 12;

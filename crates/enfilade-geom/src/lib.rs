@@ -8,6 +8,7 @@ mod aabb;
 mod allowance;
 mod attitude;
 mod bvh;
+mod clock;
 pub mod filler;
 mod flight;
 mod loose_grid;
@@ -29,6 +30,9 @@ pub use aabb::Aabb;
 pub use allowance::{Allowance, AllowanceEnd, MemoryProbe, PROGRAM, Purse, Tab};
 pub use attitude::{Attitude, faces, is_rather_level, lies_along};
 pub use bvh::{Bvh, NearSeries, Nearest};
+pub use clock::Instant;
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+pub use clock::set_clock;
 pub use flight::{MOST_FLIGHT_PLAN, are_treads, is_flight};
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4};
 pub use loose_grid::LooseGrid;

@@ -5,6 +5,7 @@ mod openings;
 mod variants;
 
 use crate::groups::name_groups;
+use crate::held::HeldFiles;
 use crate::left_out::leave_out;
 use crate::order::sort;
 use crate::origins::Origins;
@@ -26,6 +27,8 @@ pub(crate) struct Builder<'a> {
     pub(crate) path: PathBuf,
     /// Folder of its relative references; `None` when read from memory.
     folder: Option<PathBuf>,
+    /// Files in memory, to which it may refer instead.
+    held: Option<&'a HeldFiles>,
     pub(crate) base: DMat4,
     scene: Scene,
     pub(crate) is_detail_file: bool,
@@ -76,6 +79,7 @@ impl<'a> Builder<'a> {
             report: ImportReport::default(),
             path: PathBuf::new(),
             folder: None,
+            held: None,
             scene: Scene::default(),
             is_detail_file: false,
             n_triangles: 0,
@@ -88,6 +92,11 @@ impl<'a> Builder<'a> {
             steps: GridSteps::new(),
             origins: Origins::default(),
         })
+    }
+
+    /// Lets scenes refer to files in memory, and to no others.
+    pub(crate) fn hold(&mut self, held: &'a HeldFiles) {
+        self.held = Some(held);
     }
 
     /// Starts a file.
@@ -129,7 +138,10 @@ impl<'a> Builder<'a> {
     ) -> Result<Vec<u8>, String> {
         let folder = self.folder.as_deref();
         let may_leave = self.options.allow_outside;
-        let (path, bytes) = files::read_reference(folder, reference, may_leave, limit)?;
+        let (path, bytes) = match self.held {
+            Some(held) => held.reference(&self.path, reference, limit)?,
+            None => files::read_reference(folder, reference, may_leave, limit)?,
+        };
         if !self.report.references.contains(&path) {
             self.report.references.push(path);
         }

@@ -29,6 +29,7 @@ mod files;
 mod foreign;
 mod gltf;
 mod groups;
+mod held;
 mod ifc;
 mod left_out;
 mod map;
@@ -59,6 +60,7 @@ pub use enfilade_prepare::{
 };
 pub use error::ImportError;
 pub use export::export_glb;
+pub use held::{HeldFiles, import_held};
 pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};

@@ -60,10 +60,8 @@ mod unfold;
 mod volumes;
 mod windows;
 
-use std::time::Instant;
-
 use enfilade_cpg::{Pvs, SightGraph};
-use enfilade_geom::{Bvh, DVec3};
+use enfilade_geom::{Bvh, DVec3, Instant};
 
 use config::KEPT;
 use rays::Blocker;

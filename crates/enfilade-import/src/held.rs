@@ -1,0 +1,169 @@
+//! Scenes of several files in memory, for programs without a disk.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use crate::builder::Builder;
+use crate::{ImportError, ImportOptions, Imported, finish, read_any};
+
+/// Endings of files to which scenes refer, and that are none themselves: buffers, materials, pictures.
+const REFERRED: [&str; 14] = [
+    "bin", "mtl", "png", "jpg", "jpeg", "webp", "ktx2", "basis", "dds", "bmp", "gif", "tga",
+    "avif", "wad",
+];
+
+/// Files in memory, by name: that of a dropped file, or a path with `/` below the dropped folder.
+#[derive(Clone, Debug, Default)]
+pub struct HeldFiles {
+    files: BTreeMap<String, Vec<u8>>,
+    /// Names of files of which all objects are detail.
+    detail: BTreeSet<String>,
+}
+
+impl FromIterator<(String, Vec<u8>)> for HeldFiles {
+    fn from_iter<T: IntoIterator<Item = (String, Vec<u8>)>>(files: T) -> Self {
+        Self {
+            files: files.into_iter().collect(),
+            detail: BTreeSet::new(),
+        }
+    }
+}
+
+impl HeldFiles {
+    /// Adds a file; all objects of a scene may be detail.
+    pub fn add(&mut self, name: String, bytes: Vec<u8>, is_detail: bool) {
+        if is_detail {
+            self.detail.insert(name.clone());
+        }
+        self.files.insert(name, bytes);
+    }
+
+    /// Iterates over the scenes: all files but those that scenes refer to. If there are only such files, over all of them.
+    fn scenes(&self) -> impl Iterator<Item = (&str, &[u8])> {
+        let is_scene = |name: &str| {
+            let ending = Path::new(name).extension().unwrap_or_default();
+            let ending = ending.to_string_lossy().to_ascii_lowercase();
+            !REFERRED.contains(&ending.as_str())
+        };
+        let has_scene = self.files.keys().any(|name| is_scene(name));
+        let all = self.files.iter().map(|(name, bytes)| (&**name, &**bytes));
+        all.filter(move |(name, _)| !has_scene || is_scene(name))
+    }
+
+    /// Returns the file that a scene refers to: beside it as named, or else the only one of that name in any folder.
+    pub(crate) fn reference(
+        &self,
+        scene: &Path,
+        reference: &str,
+        limit: u64,
+    ) -> Result<(PathBuf, Vec<u8>), String> {
+        if reference.contains("://") {
+            return Err(format!("refers to '{reference}'; only files are read"));
+        }
+        let decoded = percent_encoding::percent_decode_str(reference).decode_utf8_lossy();
+        let folder = scene.parent().unwrap_or(Path::new("")).to_string_lossy();
+        let beside = [&*decoded, reference].map(|name| tidy(&format!("{folder}/{name}")));
+        let found = beside
+            .iter()
+            .find_map(|name| self.files.get_key_value(name));
+        let (name, bytes) = found.or_else(|| self.alone(&decoded)).ok_or_else(|| {
+            format!("refers to the file '{reference}', which is not there; give it, too")
+        })?;
+        if bytes.len() as u64 > limit {
+            let n = bytes.len();
+            return Err(format!(
+                "refers to '{reference}' of {n} bytes, more than {limit}"
+            ));
+        }
+        Ok((name.into(), bytes.clone()))
+    }
+
+    /// Returns the only file whose name without folders is that of a path, in letters of any case.
+    fn alone(&self, path: &str) -> Option<(&String, &Vec<u8>)> {
+        let last = |path: &str| {
+            let path = path.replace('\\', "/");
+            path.rsplit('/').next().unwrap_or_default().to_lowercase()
+        };
+        let wanted = last(path);
+        let mut all = self.files.iter().filter(|(name, _)| last(name) == wanted);
+        all.next().filter(|_| all.next().is_none())
+    }
+}
+
+/// A path without `.`, and with `..` followed.
+fn tidy(path: &str) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for name in path.split(['/', '\\']) {
+        match name {
+            "" | "." => {}
+            ".." => {
+                names.pop();
+            }
+            name => names.push(name),
+        }
+    }
+    names.join("/")
+}
+
+/// Works as [`import`](crate::import) on files in memory; scenes refer to others of them, and never to the disk.
+///
+/// # Errors
+///
+/// As [`import`](crate::import).
+pub fn import_held(files: &HeldFiles, options: &ImportOptions) -> Result<Imported, ImportError> {
+    let mut builder = Builder::new(options)?;
+    builder.hold(files);
+    for (name, bytes) in files.scenes() {
+        let path = Path::new(name);
+        builder.begin_file(path, None, files.detail.contains(name));
+        builder.add_read_bytes(bytes.len() as u64);
+        read_any(bytes, path, &mut builder)?;
+    }
+    finish(builder, options)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn held(names: &[&str]) -> HeldFiles {
+        let files = names
+            .iter()
+            .map(|name| ((*name).to_owned(), name.as_bytes().to_vec()));
+        files.collect()
+    }
+
+    #[test]
+    fn references_are_found_beside_their_scene_or_by_their_name_alone() {
+        let files = held(&[
+            "a/x.gltf",
+            "a/x y.bin",
+            "b/x.bin",
+            "c/One.PNG",
+            "d/t.png",
+            "e/t.png",
+        ]);
+        let found = |reference| {
+            let found = files.reference(Path::new("a/x.gltf"), reference, 100);
+            found.map(|(path, _)| path.display().to_string())
+        };
+        assert_eq!(found("x%20y.bin").as_deref(), Ok("a/x y.bin"));
+        assert_eq!(found("..\\b\\x.bin").as_deref(), Ok("b/x.bin"));
+        assert_eq!(found("textures/one.png").as_deref(), Ok("c/One.PNG"));
+        assert!(found("t.png").unwrap_err().contains("give it, too"));
+        assert!(found("http://host/x.bin").is_err());
+        assert!(files.reference(Path::new(""), "x.bin", 3).is_err());
+    }
+
+    #[test]
+    fn a_scene_reads_its_materials_from_memory() {
+        let obj = b"mtllib m.mtl\nusemtl red\no Wall\nv 0 0 0\nv 4 0 0\nv 4 3 0\nf 1 2 3\n";
+        let files = [("a.obj", &obj[..]), ("m.mtl", b"newmtl red\nKd 1 0 0\n")];
+        let files = files.map(|(name, bytes)| (name.to_owned(), bytes.to_vec()));
+        let read = import_held(&HeldFiles::from_iter(files), &ImportOptions::default()).unwrap();
+        assert_eq!(read.scene.objects.len(), 1);
+        assert!(read.scene.materials.iter().any(|m| m.name == "red"));
+        let alone = import_held(&held(&["m.mtl"]), &ImportOptions::default());
+        assert!(alone.is_err());
+    }
+}

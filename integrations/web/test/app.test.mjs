@@ -1,0 +1,142 @@
+// The page that bakes, in a browser: files in, rooms out, without a network, by keyboard, in two languages, on a phone.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { after, test } from 'node:test';
+import { command } from '../scripts/worlds.mjs';
+import { at, browser } from './browser.mjs';
+import { formats, scaled } from './rooms.mjs';
+import { serve } from './server.mjs';
+
+const own = await browser();
+const server = await serve({ app: at('dist/app') });
+after(async () => {
+  await own.close();
+  server.close();
+});
+
+const WAIT = { timeout: 120_000 };
+const upload = (files) => files.map(({ name, bytes }) => ({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(bytes) }));
+
+/** Opens the page; what it asks of the network and what it says is wrong is kept. */
+async function open(settings = {}) {
+  const context = await own.newContext({ viewport: { width: 1280, height: 900 }, locale: 'en-US', ...settings });
+  const tab = await context.newPage();
+  const [errors, requests] = [[], []];
+  tab.on('pageerror', (error) => errors.push(error.message));
+  tab.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  tab.on('request', (request) => requests.push(request.url()));
+  await tab.goto(`${server.address}/app/`);
+  await tab.waitForFunction(() => document.documentElement.dataset.ready, undefined, WAIT);
+  await tab.waitForLoadState('networkidle');
+  const done = () => tab.waitForSelector('#done:not([hidden]), #failed:not([hidden])', WAIT);
+  return { context, tab, errors, requests, done };
+}
+
+test('a house becomes rooms without a network, and they are the rooms of the command', async () => {
+  const { context, tab, errors, requests, done } = await open({ acceptDownloads: true });
+  const before = requests.length;
+  await context.setOffline(true);
+  await tab.click('[data-example=house]');
+  await tab.waitForSelector('#model:not([hidden])', WAIT);
+  await done();
+  assert.match(await tab.textContent('#title'), /house\.glb: 12 rooms/);
+  assert.equal(await tab.locator('#rooms tbody tr').count(), 12);
+  // Pointing at a room of the plan shows it in the list, and the other way round.
+  const path = tab.locator('#plan .cell[tabindex]').first();
+  const cell = await path.getAttribute('data-cell');
+  await path.focus();
+  await tab.keyboard.press('Enter');
+  assert.equal(await tab.getAttribute('#rooms tr.chosen', 'data-cell'), cell);
+  const upstairs = tab.locator('#rooms tbody tr', { has: tab.locator('td:nth-child(2):text-is("2")') }).first();
+  await upstairs.locator('button').click();
+  assert.equal(await tab.getAttribute('#storeys [aria-pressed=true]', 'data-storey'), '2');
+  assert.equal(await tab.getAttribute('#plan .cell.chosen', 'data-cell'), await upstairs.getAttribute('data-cell'));
+  assert.match(await tab.textContent('#told'), /m², .* high, storey 2/);
+  const saved = async (key) => {
+    const [download] = await Promise.all([tab.waitForEvent('download'), tab.click(`[data-save=${key}]`)]);
+    return readFileSync(await download.path());
+  };
+  const options = { maxBuffer: 1e8, stdio: ['ignore', 'pipe', 'ignore'] };
+  const native = execFileSync(command, ['-q', 'bake', at('dist/app/examples/house.glb'), '-o', '-'], options);
+  assert.ok((await saved('world')).equals(native), 'the world has other bytes');
+  assert.equal((await saved('csv')).toString().trim().split('\r\n').length, 13);
+  assert.match((await saved('planSvg')).toString(), /^<\?xml/);
+  await tab.click('[data-language=de]');
+  assert.match(await tab.textContent('#title'), /12 Räume/);
+  assert.deepEqual(requests.slice(before).filter((url) => !url.startsWith('blob:')), []);
+  assert.deepEqual(errors, []);
+  await context.close();
+});
+
+test('the page can connect to nobody else', async () => {
+  const { context, tab, requests } = await open();
+  const other = await serve({});
+  const tries = await tab.evaluate(async (address) => {
+    const blocked = [];
+    document.addEventListener('securitypolicyviolation', (event) => blocked.push(event.effectiveDirective));
+    const fetched = await fetch(address).then(() => 'open', () => 'blocked');
+    const beacon = navigator.sendBeacon(address, 'x');
+    const picture = await new Promise((end) => {
+      const image = new Image();
+      image.onload = () => end('open');
+      image.onerror = () => end('blocked');
+      image.src = `${address}/x.png`;
+    });
+    await new Promise((end) => setTimeout(end, 100));
+    return { fetched, beacon, picture, blocked };
+  }, other.address);
+  assert.deepEqual([tries.fetched, tries.picture], ['blocked', 'blocked']);
+  assert.ok(tries.blocked.includes('connect-src') && tries.blocked.includes('img-src'), tries.blocked.join());
+  assert.equal(other.counts.requests, 0);
+  assert.ok(requests.every((url) => url.startsWith(server.address) || url.startsWith('blob:') || url.startsWith('data:') || url.startsWith(other.address)));
+  other.close();
+  await context.close();
+});
+
+test('what is wrong is said, a question is answered, and a bake is cancelled', async () => {
+  const { context, tab, errors, done } = await open();
+  await tab.setInputFiles('#files', upload([{ name: 'a.ifc', bytes: new Uint8Array(4) }]));
+  await done();
+  assert.match(await tab.textContent('#why'), /command/);
+  await tab.click('#failed [data-again]');
+  await tab.setInputFiles('#files', upload([{ name: 'a.glb', bytes: new TextEncoder().encode('glTF and no more') }]));
+  await done();
+  assert.ok((await tab.textContent('#why')).length > 20);
+  await tab.click('#failed [data-again]');
+  await tab.setInputFiles('#files', upload(scaled(1000)));
+  await done();
+  await tab.selectOption('#ask select', 'mm');
+  await tab.click('#ask button');
+  await tab.waitForSelector('#done:not([hidden])', WAIT);
+  assert.match(await tab.textContent('#title'), /rooms\.stl: 2 rooms/);
+  await tab.click('#done [data-again]');
+  await tab.click('[data-example=tower]');
+  await tab.waitForSelector('#work:not([hidden])');
+  await tab.click('#cancel');
+  await tab.waitForSelector('#start:not([hidden])');
+  await tab.setInputFiles('#files', upload(formats.gltf));
+  await done();
+  assert.match(await tab.textContent('#title'), /rooms\.gltf: 2 rooms/);
+  // A damaged model has no picture, which is no error of the page.
+  assert.deepEqual(errors, []);
+  await context.close();
+});
+
+test('on a phone nothing is cut off, and all that can be pressed has a name', async () => {
+  const { context, tab, errors, done } = await open({ viewport: { width: 390, height: 844 }, locale: 'de-DE', colorScheme: 'dark' });
+  assert.match(await tab.textContent('#choose'), /wählen/);
+  const isCutOff = () => tab.evaluate(() => document.documentElement.scrollWidth > innerWidth);
+  assert.equal(await isCutOff(), false);
+  await tab.setInputFiles('#files', upload(formats.obj));
+  await done();
+  assert.equal(await isCutOff(), false);
+  const nameless = await tab.evaluate(() =>
+    [...document.querySelectorAll('button, select, input:not([hidden]), [tabindex="0"], progress')]
+      .filter((e) => !(e.textContent.trim() || e.getAttribute('aria-label') || e.labels?.length))
+      .map((e) => e.outerHTML.slice(0, 80)),
+  );
+  assert.deepEqual(nameless, []);
+  assert.deepEqual(errors, []);
+  await context.close();
+});
