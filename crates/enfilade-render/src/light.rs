@@ -23,9 +23,9 @@ pub(crate) use balance::sun_of;
 /// Texels in a row of a table; `light.wgsl` uses the same number.
 const ROW: u32 = 1024;
 /// Mean brightness of a room in its pictures, relative to the outdoors.
-const MIDDLE: f32 = 0.7;
+const MIDDLE: f32 = 0.75;
 /// The longest exposure, relative to that of the outdoors.
-const LONGEST: f32 = 4.0;
+const LONGEST: f32 = 8.0;
 /// … and the shortest: of a court with white walls, in the sun.
 const SHORTEST: f32 = 0.3;
 /// Texels of a cell in the table.

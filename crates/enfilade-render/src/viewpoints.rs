@@ -286,7 +286,7 @@ fn interest(studio: &mut Studio, world: &World, camera: &Camera) -> Result<f32, 
         + 1.5 * depths.iter().sum::<f32>() / n
         + 1.5 * quarter
         + 2.0 * share(furnished).min(0.4)
-        + 15.0 * contrast(studio, camera)?
+        + 10.0 * contrast(studio, camera)?
         - 5.0 * share(near)
         - 8.0 * (largest_wall(camera, &solid.pixels) - 0.2).max(0.0)
         - 2.5 * (cropped as f32 / (2 * (SMALL[0] + SMALL[1])) as f32)

@@ -62,11 +62,13 @@ pub(crate) fn graph_svg(world: &World, storeys: &[&Storey]) -> String {
         .collect();
     let mut out = format!(
         "<svg class=\"graph\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.0}\" height=\"{:.0}\" viewBox=\"0 0 {:.0} {:.0}\" \
-         font-family=\"sans-serif\" role=\"img\" aria-label=\"graph of rooms\" style=\"max-width:{:.0}px\">\n",
+         font-family=\"sans-serif\" role=\"img\" aria-label=\"graph of rooms\" style=\"min-width:{:.0}px;max-width:{:.0}px\">\n",
         size.x,
         size.y,
         size.x,
         size.y,
+        // Scrolled rather than made smaller: its numbers stay legible.
+        size.x,
         LARGEST * size.x
     );
     for ((a, b), kind) in &edges {

@@ -56,7 +56,7 @@ pub(crate) fn matrix_svg(world: &World, visible: &Pvs, order: &Order) -> String 
     let (side, size) = (SIDE, n * SIDE);
     let mut out = format!(
         "<svg class=\"matrix\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{0}\" viewBox=\"-{HEAD} -{HEAD} {0} {0}\" \
-         font-family=\"sans-serif\" font-size=\"9\" role=\"img\" aria-label=\"visibility matrix\" style=\"max-width:{1}px\">\n\
+         font-family=\"sans-serif\" font-size=\"11\" role=\"img\" aria-label=\"visibility matrix\" style=\"min-width:{0}px;max-width:{1}px\">\n\
          <rect width=\"{size}\" height=\"{size}\" fill=\"#f1f1ee\"/><path fill=\"#1c3d5a\" d=\"",
         size + HEAD + 4,
         2 * (size + HEAD + 4)

@@ -303,6 +303,15 @@ impl<'a> Plans<'a> {
             let title = self.title(&self.pages[index]);
             sheet.title = sheet.title.min(room / width(&title));
         }
+        let mut beside = 0.0;
+        if !has_legend {
+            // Legible, and rather beyond a narrow plan than cut off.
+            let least = sheet.sizes.least;
+            sheet.title = sheet.title.clamp(least, 2.0 * least);
+            let titles = which.iter().map(|&k| width(&self.title(&self.pages[k])));
+            let widest = titles.fold(0.0, f64::max) * sheet.title;
+            beside = (widest + 2.0 * margin - size.x).max(0.0);
+        }
         for (k, &index) in which.iter().enumerate() {
             let place = DVec2::new((k % columns) as f64, (k / columns) as f64) * size;
             self.draw(index, place + margin - self.min, &mut sheet);
@@ -315,7 +324,7 @@ impl<'a> Plans<'a> {
             let names = sheet.numbers(self.world, bar, whole.x - 2.0 * margin);
             return Drawing {
                 title: "Floor plan".into(),
-                size: whole + DVec2::Y * names,
+                size: whole + DVec2::new(beside, names),
                 zoom,
                 items: sheet.items,
             };

@@ -33,6 +33,9 @@ pub use paths::{
     Obstacle, PassedPortal, Path, PathFollower, PathPoint, PathPortal, PathSearch, Sampling,
     WalkMap, WalkMapKey, WalkProgress, Ways,
 };
+// Messages of the command and of Python.
+#[doc(hidden)]
+pub use paths::{AskedWalk, WalkWords};
 pub use pose::Pose;
 pub use saved::{
     SavedActor, SavedActors, SavedError, SavedPose, SavedSpace, SavedThing, SavedThings, SavedTie,

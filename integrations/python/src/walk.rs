@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use enfilade::geom::DVec3;
-use enfilade::world::{Agent, PartId, Path, PathSearch, WalkMap};
+use enfilade::internals::world::{AskedWalk, WalkWords};
+use enfilade::world::{Agent, PartId, Path, WalkMap};
 use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -11,6 +12,15 @@ use pyo3::prelude::*;
 use crate::arrays::table;
 use crate::errors::NoPathError;
 use crate::world::{KeptMap, World};
+
+/// The names of the parameters.
+const WORDS: WalkWords<'_> = WalkWords {
+    ends: ["start", "end"],
+    step: "step",
+    height: "height",
+    radius: "radius",
+    no_objects: "objects=False",
+};
 
 /// Length, length in plan, cells, portals, and the points where it bends.
 type PathArrays<'py> = (f64, f64, Vec<u32>, Vec<u32>, Bound<'py, PyArray2<f64>>);
@@ -72,11 +82,18 @@ impl World {
         let start = py.detach(|| {
             let map = self.map(walker, objects)?;
             let space = self.space()?;
-            let points = ends.map(|p| (PartId::ROOT, DVec3::from_array(p)));
-            let may_pass = |_, portal| !closed.contains(&portal);
-            PathSearch::new()
-                .find(&map, space, points, may_pass, &mut path)
-                .map_err(|e| NoPathError::new_err(e.to_string()))?;
+            let asked = AskedWalk {
+                space,
+                map: &map,
+                walker,
+                has_objects: objects,
+                ends: ends.map(DVec3::from_array),
+                closed: &closed,
+                // Programs ask for many walks, and each other walker takes a map of its own.
+                has_others: false,
+                words: WORDS,
+            };
+            asked.find(&mut path).map_err(NoPathError::new_err)?;
             let first = path.points[0].at + DVec3::Y * 0.5 * height;
             PyResult::Ok(space.layout(PartId::ROOT).locate(first))
         })?;

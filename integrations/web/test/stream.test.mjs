@@ -169,6 +169,52 @@ test('a walk in one page opens the packed file beside it, and its buttons lead t
   await walk.close();
 });
 
+test('furniture stops a walker, and not one who flies', async (t) => {
+  const address = await packedWalk(t, 'walk.enf');
+  const { tab, close } = await opened(own, `${address}/walk.enf/`, false);
+  await tab.waitForFunction(() => globalThis.walk?.streamed.streamer.settled, undefined, { timeout: 60_000 });
+  const reached = await tab.evaluate(() => {
+    const { culler, controls, walker, world } = globalThis.walk;
+    // What is in view has come: objects on the floor, higher than a step, with free floor on one side.
+    const boxes = culler.parts.details.flatMap((object, id) => {
+      if (!object || world.portals.some(({ leaves }) => leaves.some(({ detail }) => detail === id))) return [];
+      const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+      object.updateWorldMatrix(true, true);
+      object.traverse(({ geometry, matrixWorld }) => {
+        if (!geometry) return;
+        geometry.computeBoundingBox();
+        const { min, max } = geometry.boundingBox.clone().applyMatrix4(matrixWorld);
+        [min, max].forEach((p) => p.toArray().forEach((v, k) => ([low[k], high[k]] = [Math.min(low[k], v), Math.max(high[k], v)])));
+      });
+      return high[1] - low[1] > 0.6 && high[0] - low[0] > 0.5 && high[2] - low[2] > 0.5 ? [{ low, high }] : [];
+    });
+    const walks = [];
+    for (const { low, high } of boxes) {
+      const z = (low[2] + high[2]) / 2;
+      for (const [from, way] of [[low[0] - 0.9, 1], [high[0] + 0.9, -1]]) {
+        const eye = [from, low[1] + 1.6, z];
+        if (world.locate(eye) < 0 || world.locate([eye[0] - 0.3 * way, eye[1], z]) < 0) continue;
+        const ends = [false, true].map((flies) => {
+          eye.forEach((v, k) => (walker.eye[k] = v));
+          walker.flies = flies;
+          // Less than the time after which one gets out of furniture.
+          for (let step = 0; step < 28; step++) walker.move(0.05 * way, 0, 0, 1 / 30);
+          return way * (walker.eye[0] - (way > 0 ? low[0] : high[0]));
+        });
+        walks.push(ends);
+      }
+    }
+    controls.yaw = 0;
+    return walks;
+  });
+  const stopped = reached.filter(([walked, flown]) => walked < -0.1 && flown > 0.2);
+  assert.ok(stopped.length > 0, JSON.stringify(reached));
+  // Lamps and plants are thinner than their boxes.
+  const through = reached.filter(([walked, flown]) => walked > 0.4 && flown > 0.4);
+  assert.ok(through.length <= stopped.length, JSON.stringify(reached));
+  await close();
+});
+
 test('two thumbs walk and look, and a tap opens a door', async () => {
   const phone = await own.newContext({ viewport: { width: 400, height: 640 }, hasTouch: true, isMobile: true });
   const walk = await phone.newPage();

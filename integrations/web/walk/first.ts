@@ -3,6 +3,7 @@ import { decompress } from 'fzstd';
 import type { Group, Mesh } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { drawBothSides } from '../src/three.js';
+import { glaze } from './glass.js';
 import type { Stage } from './stage.js';
 
 /** The model, and the place from which it was made. */
@@ -20,6 +21,7 @@ export async function showFirst(stage: Stage, packed: Promise<Uint8Array> | unde
   const { scene: model } = await new GLTFLoader().parseAsync(bytes.slice().buffer as ArrayBuffer, '');
   const { eye, yaw } = model.userData as FirstPicture;
   drawBothSides(model);
+  glaze(model);
   stage.scene.add(model);
   return { model, eye, yaw };
 }

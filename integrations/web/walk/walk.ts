@@ -6,8 +6,10 @@ import { cullerOf, enfilade, type PortalCuller } from '../src/three.js';
 import { EYE, Walker } from './body.js';
 import { Controls } from './controls.js';
 import { removeFirst, showFirst, type FirstPicture } from './first.js';
+import { glazeAll } from './glass.js';
 import { made, moduleOfWalk } from './made.js';
 import { RoomMap } from './map.js';
+import { Obstacles } from './obstacles.js';
 import { Stage } from './stage.js';
 import { StoreyButtons } from './storeys.js';
 
@@ -90,12 +92,13 @@ async function main(): Promise<void> {
   let first = await begin(stage, controls);
   const { culler, streamed, name } = await open(scene);
   const { world } = culler;
+  glazeAll(culler);
   // Doors that are shut in the model hide what is behind them, until they are opened.
   for (const portal of world.portals) {
     if (portal.leaves.length > 0) culler.setOpenness(portal.id, world.openness(portal.id));
   }
   const start = first ?? world.start() ?? { eye: [0, EYE, 0] as [number, number, number], yaw: 0 };
-  const walker = new Walker(world, [...start.eye]);
+  const walker = new Walker(world, [...start.eye], new Obstacles(culler));
   if (!first) controls.yaw = start.yaw;
   const map = new RoomMap(element('map') as HTMLCanvasElement, world);
   const storeys = new StoreyButtons(element('storeys'), made.storeys ?? [], (storey) => {
@@ -129,7 +132,7 @@ async function main(): Promise<void> {
     const steps = Math.ceil(seconds / STEP);
     for (let i = 0; i < steps; i++) {
       const [x, up, z] = controls.motion(seconds / steps);
-      walker.move(x, up, z);
+      walker.move(x, up, z, seconds / steps);
       walker.fall(seconds / steps);
     }
     culler.animate(seconds);

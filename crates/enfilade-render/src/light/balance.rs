@@ -30,6 +30,9 @@ const SUN: Vec3 = Vec3::new(3.2, 2.9, 2.4);
 const LAMP: f32 = 0.05;
 /// Color of that lamp.
 const LAMP_COLOR: Vec3 = Vec3::new(1.05, 1.0, 0.91);
+/// Largest reflectance of a surface: where nothing has a color, a room still reflects as much as a furnished one with white
+/// walls and a dark floor, or its light would be the same from all sides.
+const WHITEST: f32 = 0.6;
 const ROUNDS: usize = 80;
 
 /// An opening of the graph for light.
@@ -119,11 +122,23 @@ pub(super) struct Balance {
     pub(super) sent: Vec<Vec3>,
     /// For each cell, light of its lamp on a wall. Linear, in skies.
     pub(super) lamps: Vec<Vec3>,
+    /// For each cell, the share of light that its walls reflect in their true colors.
+    pub(super) whiteness: Vec<f32>,
 }
 
-/// Returns area and reflectance of the walls of each cell.
-fn walls(world: &World) -> Vec<(f32, Vec3)> {
-    let mut sums = vec![(0.0, Vec3::ZERO); world.graph.cells.len()];
+/// The walls of a cell.
+struct Walls {
+    /// [Units: wu²]
+    area: f32,
+    /// Reflectance by which they light each other.
+    reflects: Vec3,
+    /// Reflectance of their true colors.
+    whiteness: f32,
+}
+
+/// Returns the walls of each cell.
+fn walls(world: &World) -> Vec<Walls> {
+    let mut sums = vec![(0.0, Vec3::ZERO, 0.0); world.graph.cells.len()];
     for batch in &world.batches {
         let p = &batch.primitive;
         let look = (p.material).and_then(|m| world.materials.get(m as usize));
@@ -134,7 +149,8 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
         let [r, g, b, _] = look.base_color;
         // A texture counts as halving the reflectance; it is not decoded.
         let dim = if look.texture.is_some() { 0.5 } else { 1.0 };
-        let color = (Vec3::new(r, g, b) * dim).clamp(Vec3::splat(0.02), Vec3::splat(0.85));
+        let own = luminance(Vec3::new(r, g, b) * dim);
+        let color = (Vec3::new(r, g, b) * dim).clamp(Vec3::splat(0.02), Vec3::splat(WHITEST));
         let corner = |i: u32| Vec3::from(p.positions[i as usize]);
         let area: f32 = (p.triples().iter())
             .map(|t| {
@@ -146,16 +162,24 @@ fn walls(world: &World) -> Vec<(f32, Vec3)> {
         let area = area / batch.cells.len() as f32;
         for cell in &batch.cells {
             let sum = &mut sums[cell.idx()];
-            *sum = (sum.0 + area, sum.1 + color * area);
+            *sum = (sum.0 + area, sum.1 + color * area, sum.2 + own * area);
         }
     }
-    let mean = |(area, sum): (f32, Vec3)| {
+    let mean = |(area, sum, own): (f32, Vec3, f32)| {
         if area > 0.0 {
             // Half the tint: eyes adapt to the light of a room as white.
             let color = sum / area;
-            (area, color.lerp(Vec3::splat(luminance(color)), 0.5))
+            Walls {
+                area,
+                reflects: color.lerp(Vec3::splat(luminance(color)), 0.5),
+                whiteness: own / area,
+            }
         } else {
-            (1.0, Vec3::splat(0.5))
+            Walls {
+                area: 1.0,
+                reflects: Vec3::splat(0.5),
+                whiteness: 0.5,
+            }
         }
     };
     sums.into_iter().map(mean).collect()
@@ -186,7 +210,7 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
     let cells = &world.graph.cells;
     let walls = walls(world);
     let mut gains = vec![Vec3::ZERO; cells.len()];
-    let mut surface: Vec<f32> = walls.iter().map(|w| w.0).collect();
+    let mut surface: Vec<f32> = walls.iter().map(|w| w.area).collect();
     for hole in holes {
         let from_sun = sunshine(world, lines, hole, sun);
         for cell in hole.cells {
@@ -206,13 +230,13 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
                 if cell.outdoor {
                     continue;
                 }
-                let mut flux = gains[i] + sent[i] * walls[i].0;
+                let mut flux = gains[i] + sent[i] * walls[i].area;
                 for portal in &cell.portals {
                     let hole = &holes[portal.idx()];
                     let behind = hole.other(CellId(i as u32));
                     flux += sent[behind.idx()] * hole.area * hole.passes;
                 }
-                sent[i] = walls[i].1 * (flux / surface[i].max(1e-6) + lamps[i]);
+                sent[i] = walls[i].reflects * (flux / surface[i].max(1e-6) + lamps[i]);
             }
         }
         sent
@@ -220,16 +244,17 @@ pub(super) fn balance(world: &World, lines: &Sightlines, holes: &[Hole], sun: Ve
     let mut lamps = vec![Vec3::ZERO; cells.len()];
     let by_day = solve(&lamps);
     for (i, cell) in cells.iter().enumerate() {
-        let falls = luminance(by_day[i] / walls[i].1);
+        let falls = luminance(by_day[i] / walls[i].reflects);
         if !cell.outdoor {
             // Reflected light comes on top.
-            let own = 1.0 - luminance(walls[i].1);
+            let own = 1.0 - luminance(walls[i].reflects);
             lamps[i] = LAMP_COLOR * ((LAMP - falls).max(0.0) * own);
         }
     }
     Balance {
         sent: solve(&lamps),
         lamps,
+        whiteness: walls.iter().map(|w| w.whiteness).collect(),
     }
 }
 

@@ -23,7 +23,18 @@ const MOST_IN_ALL: u64 = 30_000;
 /// Least share of the light for which portals behind a portal are followed.
 const WORTH: f32 = 0.004;
 /// Exponent from light to brightness.
-const ADAPTATION: f32 = 0.72;
+const ADAPTATION: f32 = 0.88;
+/// Reflectance of a usual room, on which exposures are based; and of the darkest that is exposed longer for it.
+const USUAL: f32 = 0.6;
+const DARKEST: f32 = 0.4;
+/// Largest distance between lamps. [Units: wu]
+const BETWEEN_LAMPS: f32 = 4.0;
+/// Height of lamps in a room, as a share of its own.
+const LAMP_HEIGHT: f32 = 0.85;
+/// Share of a lamp's light that comes straight from it; the rest is spread by its shade and the ceiling.
+const STRAIGHT: f32 = 0.6;
+/// Size of a lamp: nearer to it, it is no point. [Units: wu]
+const LAMP_SIZE: f32 = 0.8;
 /// Brightness of a surface under the open sky.
 const BRIGHTEST: f32 = 1.0;
 
@@ -58,7 +69,7 @@ pub(super) struct Probes {
     pub(super) size: UVec3,
     /// Shared-exponent colors, x fastest, then y.
     pub(super) texels: Vec<u32>,
-    /// For each cell, mean brightness of its air; 0 outdoors.
+    /// For each cell, mean brightness of its air and, by it, of its walls; 0 outdoors.
     pub(super) brightness: Vec<f32>,
 }
 
@@ -106,6 +117,51 @@ struct Room<'a> {
     lines: &'a Sightlines,
     holes: &'a [Hole],
     balance: &'a Balance,
+}
+
+/// Places of the lamps of a room, in rows below the ceiling, and a factor that makes their mean light 1.
+struct Lamps {
+    at: Vec<Vec3>,
+    scale: f32,
+}
+
+impl Lamps {
+    fn new([low, high]: [Vec3; 2]) -> Self {
+        let extent = high - low;
+        let n = |k: usize| (extent[k] / BETWEEN_LAMPS).ceil().clamp(1.0, 8.0) as u32;
+        let (nx, nz) = (n(0), n(2));
+        let place = |i: u32| {
+            let [x, z] = [(i % nx, nx), (i / nx, nz)].map(|(i, n)| (i as f32 + 0.5) / n as f32);
+            low + extent * Vec3::new(x, LAMP_HEIGHT, z)
+        };
+        let mut out = Self {
+            at: (0..nx * nz).map(place).collect(),
+            scale: 1.0,
+        };
+        // Points all over the box.
+        let steps = [0.1, 0.3, 0.5, 0.7, 0.9];
+        let points = (0..125).map(|i| {
+            let at = Vec3::new(steps[i % 5], steps[i / 5 % 5], steps[i / 25]);
+            low + extent * at
+        });
+        let sum: f32 = points.map(|p| out.shine(p).iter().sum::<f32>()).sum();
+        out.scale = 6.0 * 125.0 / sum.max(1e-6);
+        out
+    }
+
+    /// Returns the light on six surfaces at a point.
+    fn shine(&self, p: Vec3) -> [f32; 6] {
+        let mut out = [0.0; 6];
+        for lamp in &self.at {
+            let way = *lamp - p;
+            let d2 = way.length_squared() + LAMP_SIZE * LAMP_SIZE;
+            let each = self.scale / (d2 * d2.sqrt());
+            for (k, facing) in WAYS.iter().enumerate() {
+                out[k] += way.dot(*facing).max(0.0) * each;
+            }
+        }
+        out
+    }
 }
 
 /// View of a point through portals: the part left of the last one, and the share of the light that passes all.
@@ -215,14 +271,16 @@ impl Room<'_> {
     }
 
     /// Returns the light on surfaces at a point of a cell. Linear, in skies.
-    fn falling(&self, p: Vec3, cell: CellId) -> [Vec3; 6] {
+    fn falling(&self, p: Vec3, cell: CellId, lamps: &Lamps) -> [Vec3; 6] {
         let mut out = Falling::default();
         self.add(&mut out, p, cell, None, &mut Vec::new());
         let walls = self.balance.sent[cell.idx()];
         let lamp = self.balance.lamps[cell.idx()];
+        let straight = lamps.shine(p);
         std::array::from_fn(|k| {
-            // Lamps hang below the ceiling.
-            let from_lamp = lamp * (1.0 + 0.45 * WAYS[k].y);
+            // Most of the rest comes from the ceiling.
+            let spread = 1.0 + 0.45 * WAYS[k].y;
+            let from_lamp = lamp * (spread + (straight[k] - spread) * STRAIGHT);
             out.light[k] + walls * (1.0 - out.share[k]).max(0.0) + from_lamp
         })
     }
@@ -322,15 +380,18 @@ impl Probes {
             let Some(grid) = grid else { continue };
             let n = grid.n;
             let mut values = Vec::new();
+            let lamps = Lamps::new(world.graph[cell].aabb.map(Vec3::from));
             for i in 0..n.element_product() {
                 let at = UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y));
                 let p = place(sight, cell, grid, at);
-                values.push(p.map(|p| room.falling(p, cell).map(adapted)));
+                values.push(p.map(|p| room.falling(p, cell, &lamps).map(adapted)));
             }
             spread_into_gaps(n, &mut values);
             let lights = || values.iter().flatten().flatten();
             let sum: f32 = lights().map(|&light| luminance(light)).sum();
-            brightness[cell.idx()] = sum / lights().count().max(1) as f32;
+            // What a camera measures is what walls reflect: white rooms look no brighter than others.
+            let reflected = balance.whiteness[cell.idx()].clamp(DARKEST, 1.0) / USUAL;
+            brightness[cell.idx()] = reflected * sum / lights().count().max(1) as f32;
             // Without any probe in air, use the light of the walls.
             let walls = [adapted(balance.sent[cell.idx()] + balance.lamps[cell.idx()]); 6];
             for (i, value) in (0..).zip(values) {
@@ -408,7 +469,8 @@ mod tests {
             holes: &holes,
             balance: &balance,
         };
-        room.falling(p.into(), CellId(cell)).map(luminance)
+        let lamps = Lamps::new(world.graph.cells[cell as usize].aabb.map(Vec3::from));
+        room.falling(p.into(), CellId(cell), &lamps).map(luminance)
     }
 
     #[test]

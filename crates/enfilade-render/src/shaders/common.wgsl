@@ -62,3 +62,20 @@ fn to_clip(relative: vec3<f32>) -> vec4<f32> {
 fn outdoor_exposure() -> f32 {
     return pow(globals.field_shift.w, 0.3);
 }
+
+// Exponent of the contrast: middle tones are darker than the light on them, as on film; else white rooms are pale.
+const CONTRAST: f32 = 1.35;
+
+// Compresses bright values instead of clipping them: the brightest channel stays below 1, and all keep their ratio.
+fn toned(c: vec3<f32>) -> vec3<f32> {
+    let most = max(c.r, max(c.g, c.b));
+    let fitted = pow(1.0 + most * most * most, -1.0 / 3.0);
+    return c * (fitted * pow(max(most * fitted, 1e-6), CONTRAST - 1.0));
+}
+
+// Undoes `toned`.
+fn untoned(c: vec3<f32>) -> vec3<f32> {
+    let most = clamp(max(c.r, max(c.g, c.b)), 1e-6, 0.99);
+    let fitted = pow(most, 1.0 / CONTRAST);
+    return c * (fitted / most * pow(1.0 - fitted * fitted * fitted, -1.0 / 3.0));
+}

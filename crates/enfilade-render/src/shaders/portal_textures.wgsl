@@ -132,11 +132,9 @@ fn found(a: vec2<f32>, b: vec2<f32>, layer: i32, side: f32) -> Found {
     return Found(color_at(clear_uv, layer), clear_l, UNKNOWN);
 }
 
-// Undoes `toned`, changes the exposure, and does it again.
+// Changes the exposure of what has its tones already.
 fn exposed(c: vec3<f32>, by: f32) -> vec3<f32> {
-    let m = max(c.r, max(c.g, c.b));
-    let light = c * (by / max(1.0 - 0.28 * m, 0.05));
-    return light * (1.0 / (1.0 + 0.28 * max(light.r, max(light.g, light.b))));
+    return toned(untoned(c) * by);
 }
 
 struct Filled {

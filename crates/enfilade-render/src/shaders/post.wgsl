@@ -11,7 +11,7 @@ fn depth_at(p: vec2<i32>) -> f32 {
 
 const SAMPLES: i32 = 20;
 // Reach of ambient occlusion. [Units: wu]
-const REACH: f32 = 0.6;
+const REACH: f32 = 1.0;
 
 // Ambient occlusion from depths alone, after McGuire et al., "The Alchemy Screen-Space Ambient
 // Obscurance Algorithm" (HPG 2011), section 2.

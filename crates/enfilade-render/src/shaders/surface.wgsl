@@ -188,12 +188,6 @@ fn shaded(in: Surface, texel: vec4<f32>) -> Shaded {
     return Shaded(vec4(base.rgb * light + emissive, base.a), normal, toward_eye, cell);
 }
 
-// Compresses bright values instead of clipping them: the brightest channel stays below 1, and all keep their ratio.
-fn toned(c: vec3<f32>) -> vec3<f32> {
-    let most = max(c.r, max(c.g, c.b));
-    return c * pow(1.0 + most * most * most, -1.0 / 3.0);
-}
-
 fn is_above_cut(in: Surface) -> bool {
     return dot(globals.root_y.xyz, in.relative) + globals.root_y.w > globals.origin.w;
 }
