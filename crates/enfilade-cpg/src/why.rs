@@ -229,7 +229,11 @@ fn rounded(value: f64) -> f32 {
     if value == 0.0 {
         return 0.0;
     }
-    let unit = 10_f64.powf(value.abs().log10().floor() - 3.0);
+    // Not by powers and logarithms: their last bit depends on the system.
+    let text = format!("{value:e}");
+    let exponent = text.split_once('e').and_then(|(_, e)| e.parse().ok());
+    let exponent: i32 = exponent.unwrap_or_default();
+    let unit: f64 = format!("1e{}", exponent - 3).parse().unwrap_or(1.0);
     ((value / unit).round() * unit) as f32
 }
 

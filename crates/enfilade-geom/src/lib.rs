@@ -15,6 +15,7 @@ mod loose_grid;
 mod open_floor;
 mod plane;
 pub mod poly;
+pub mod portable;
 pub mod ray;
 mod rectangle;
 pub mod scene;

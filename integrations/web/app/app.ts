@@ -218,7 +218,6 @@ function ask({ about, proposed }: Question): HTMLElement {
   const button = make('button', { type: 'button' }, text('retry'));
   button.addEventListener('click', () => {
     if (!job) return;
-    $<HTMLSelectElement>(about).value = select.value;
     void start({ ...job, settings: { ...job.settings, [about]: select.value } });
   });
   return make('label', {}, text(about === 'unit' ? 'askUnit' : 'askUp'), select, button);

@@ -15,7 +15,7 @@ after(async () => {
   server.close();
 });
 
-const WAIT = { timeout: 120_000 };
+const WAIT = { timeout: 60_000 };
 const upload = (files) => files.map(({ name, bytes }) => ({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(bytes) }));
 
 /** Opens the page; what it asks of the network and what it says is wrong is kept. */
@@ -27,7 +27,8 @@ async function open(settings = {}) {
   tab.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
   tab.on('request', (request) => requests.push(request.url()));
   await tab.goto(`${server.address}/app/`);
-  await tab.waitForFunction(() => document.documentElement.dataset.ready, undefined, WAIT);
+  await tab.waitForSelector('html[data-ready], #failed:not([hidden])', { ...WAIT, state: 'attached' });
+  assert.equal(await tab.textContent('#why'), '');
   await tab.waitForLoadState('networkidle');
   const done = () => tab.waitForSelector('#done:not([hidden]), #failed:not([hidden])', WAIT);
   return { context, tab, errors, requests, done };

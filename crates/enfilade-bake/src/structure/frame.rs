@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use enfilade_geom::{Aabb, Attitude, DVec3, Triangle, Winding, triangle_area_normal};
+use enfilade_geom::{Aabb, Attitude, DVec3, Triangle, Winding, portable, triangle_area_normal};
 
 /// Walls within this angle of a direction count for it. [Units: degrees]
 const SPREAD: usize = 1;
@@ -65,7 +65,7 @@ impl Frame {
             Some([area, x, z])
                 if area >= MIN_SHARE * total && area > MIN_GAIN * along_axes && area > 0.0 =>
             {
-                let length = x.hypot(z);
+                let length = portable::hypot(x, z);
                 Self {
                     cos: x / length,
                     sin: z / length,
@@ -91,7 +91,7 @@ impl Frame {
     /// Returns the turn of the grid, from x toward z. [Units: degrees]
     #[must_use]
     pub(crate) fn degrees(self) -> f64 {
-        self.sin.atan2(self.cos).to_degrees()
+        portable::angle(self.sin, self.cos).to_degrees()
     }
 
     /// Converts a point or direction from the scene to the grid.
