@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
 use crate::{
-    CellId, Fitting, Locator, PartNumbers, Place, PortalId, Pvs, SourceRuns, SpecialPortal, Why,
+    CellId, Fitting, Locator, PartNumbers, Place, PortalId, Pvs, RoomFacts, SourceRuns,
+    SpecialPortal, Why,
 };
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
@@ -158,6 +159,8 @@ pub struct World {
     pub about: About,
     /// Cells visible from each cell, if computed. Changes of cells or portals drop it.
     pub pvs: Option<Pvs>,
+    /// Facts of all rooms, ascending by cell, if computed. Changes of cells, portals or walls drop them.
+    pub room_facts: Option<Vec<RoomFacts>>,
 }
 
 impl PartNumbers {

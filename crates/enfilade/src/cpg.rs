@@ -85,7 +85,7 @@ pub use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, CellSet, CloseDecision, DetailObject, Doubt, Exit, Fact,
     Fitting, FittingPart, GraphError, Hole, HoleReason, Locator, LocatorNode, MonitorCamera,
     Motion, MotionKind, PartNumbers, Pass, Place, Portal, PortalId, PortalKind, Provenance, Pvs,
-    Reason, RoomDoubt, SightGraph, SightGraphError, SightPortal, SourceRuns, SpecialId,
+    Reason, RoomDoubt, RoomFacts, SightGraph, SightGraphError, SightPortal, SourceRuns, SpecialId,
     SpecialPortal, SpecialProblem, SpecialShape, Statistics, VisibleParts, VisibleVolumes, Way,
     Why, World, cell_color,
 };
