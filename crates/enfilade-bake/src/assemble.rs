@@ -186,6 +186,7 @@ pub(crate) fn dressed(
         fixtures: scene.fixtures.clone(),
         about: scene.about.clone(),
         pvs: None,
+        room_facts: None,
     };
     fittings::fit(&mut world, &structure.bvh, allowance);
     world

@@ -18,7 +18,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use enfilade::bake::{BakeConfig, BakeContext, BakeOutput, Resolution, bake};
-use enfilade::cpg::wire::{decode_glb, encode_glb};
+use enfilade::cpg::wire::decode_glb;
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::shown;
@@ -38,6 +38,7 @@ use crate::specials::described;
 use crate::walk::{self, Walks, WorldFile};
 use enfilade_cli::input::{import_scene, is_stream, names_of};
 use enfilade_cli::memory::held_memory;
+use enfilade_cli::world::encode_whole;
 use enfilade_report::{Verdict, is_empty};
 
 /// Finds the rooms and doorways of a scene and writes them as a world.
@@ -184,7 +185,8 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
         }
         writeln!(Warned, "no room was found: {why}")?;
     }
-    let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
+    let bytes =
+        encode_whole(&mut baked.world).context("the baked world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;
     if args.walk {
         // Readers get this world, rounded.

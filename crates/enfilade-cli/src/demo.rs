@@ -6,7 +6,6 @@ use anyhow::Context;
 use enfilade::bake::BakeConfig;
 use enfilade::bake::edit::special;
 use enfilade::bake::edit::special::LinkOptions;
-use enfilade::cpg::wire::encode_glb;
 use enfilade::cpg::{MonitorCamera, PortalId, World};
 use enfilade::geom::{DVec3, shown};
 use enfilade::import::{ImportOptions, decode_gltf, export_glb};
@@ -19,6 +18,7 @@ use crate::formats::Format;
 use crate::living::{LampEntry, LiftEntry, LivingFile, PeopleEntry, SoundEntry};
 use crate::output::{Outputs, make_folder, write_unnamed};
 use crate::screen::{print_json, printed, write_lines};
+use enfilade_cli::world::encode_whole;
 
 /// Light of the tower's lamps, a warm white.
 const LAMP_COLOR: [f32; 3] = [1.6, 1.35, 1.0];
@@ -104,8 +104,9 @@ pub(crate) fn run(args: &Demo) -> anyhow::Result<()> {
 fn baked(generated: &Generated) -> anyhow::Result<(Vec<u8>, World, Vec<u8>)> {
     let model = export_glb(&generated.scene);
     let scene = decode_gltf(&model, &ImportOptions::default())?.scene;
-    let baked = bake_scene(&scene, &BakeConfig::default(), None, None)?;
-    let bytes = encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
+    let mut baked = bake_scene(&scene, &BakeConfig::default(), None, None)?;
+    let bytes =
+        encode_whole(&mut baked.world).context("the baked world breaks an invariant (a bug)")?;
     Ok((model, baked.world, bytes))
 }
 
@@ -207,7 +208,7 @@ fn impossible() -> anyhow::Result<Made> {
         let cell = Some(cell);
         special::reflect(&mut world, &SpecialSpot::Doorway { portal, cell }, 0.25)?;
     }
-    let bytes = encode_glb(&world).context("the world breaks an invariant (a bug)")?;
+    let bytes = encode_whole(&mut world).context("the world breaks an invariant (a bug)")?;
     let plan = plan_svg(&world, &PlanOptions::default()).into_bytes();
     Ok(Made {
         world,

@@ -129,8 +129,8 @@ pub(crate) fn run(args: &Edit) -> anyhow::Result<()> {
         let changed = world.get_or_insert_with(|| before.clone());
         specials.make(changed, &mut done.notes)?;
     }
-    let world = world.context("no portal was removed")?;
-    write(&outputs, &args.output, [&before, &world], done, args.json)
+    let mut world = world.context("no portal was removed")?;
+    write(&outputs, &args.output, &before, &mut world, done, args.json)
 }
 
 /// The world without the portals to remove.

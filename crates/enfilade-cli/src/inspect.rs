@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use doors::FittingReport;
 use enfilade::bake::simplify::CostModel;
-use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, World};
+use enfilade::cpg::{Cell, CellPortalGraph, PortalKind, RoomFacts, World};
 use enfilade::internals::bake::simplify::portal_scores;
 use enfilade::internals::cpg::Seals;
 pub(crate) use objects::cell_of;
@@ -22,7 +22,7 @@ use specials::SpecialReport;
 use crate::limits::Limits;
 use crate::screen::{At, Rounded, print_json, printed_at_once};
 use enfilade_cli::world::read_world;
-use enfilade_report::{RoomFacts, cells_in_words, room_facts};
+use enfilade_report::{cells_in_words, room_facts};
 
 /// Shows the cells, portals and statistics of a world.
 #[derive(clap::Args)]
@@ -95,17 +95,21 @@ struct CellReport<'a> {
 struct RoomReport {
     storeys: Vec<String>,
     floor_area: f64,
+    area_above_1_5: f64,
+    area_above_2_3: f64,
     height: f64,
     doors: usize,
     windows: usize,
 }
 
 impl RoomReport {
-    fn of(room: RoomFacts) -> Self {
+    fn of(room: &RoomFacts) -> Self {
         let rounded = |n: f64| (1000.0 * n).round() / 1000.0;
         Self {
-            storeys: room.storeys,
+            storeys: room.storeys.clone(),
             floor_area: rounded(room.floor_area),
+            area_above_1_5: rounded(room.area_above_1_5),
+            area_above_2_3: rounded(room.area_above_2_3),
             height: rounded(room.height),
             doors: room.n_doors,
             windows: room.n_windows,
@@ -163,7 +167,7 @@ struct Stats<'a> {
 fn report(world: &World) -> Inspection<'_> {
     let graph = &world.graph;
     let mut rooms: BTreeMap<usize, RoomReport> = room_facts(world)
-        .into_iter()
+        .iter()
         .map(|room| (room.cell.0 as usize, RoomReport::of(room)))
         .collect();
     let cells = graph.cells.iter().enumerate().map(|(id, c)| CellReport {

@@ -8,7 +8,6 @@ use anyhow::{Context, bail};
 use enfilade::bake::BakeContext;
 use enfilade::bake::rebake::{Rebaked, rebake};
 use enfilade::cpg::CellId;
-use enfilade::cpg::wire::encode_glb;
 use serde::Serialize;
 
 use crate::bake::{Summary, begin, found, print_summary, settings};
@@ -18,6 +17,7 @@ use crate::progress::{BakeBar, StageBar};
 use crate::screen::{Told, Warned, print_json, write_lines};
 use enfilade_cli::input::{import_scene, names_of};
 use enfilade_cli::memory::held_memory;
+use enfilade_cli::world::encode_whole;
 use enfilade_cli::world::read_world;
 
 /// Bakes again what changed between a world's scene and a new one, and keeps the rest, with the numbers of its cells.
@@ -75,7 +75,8 @@ pub(crate) fn run(args: &Rebake) -> anyhow::Result<()> {
     drop(bar);
     let told = &mut rebaked.world.graph.provenance.settings;
     told.extend(found::settings_of(&imported.report, settings.import.repair));
-    let bytes = encode_glb(&rebaked.world).context("the new world breaks an invariant (a bug)")?;
+    let bytes =
+        encode_whole(&mut rebaked.world).context("the new world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;
     for note in &rebaked.notes {
         write_lines(&mut Warned, note)?;

@@ -6,7 +6,6 @@ use std::path::Path;
 use anyhow::Context;
 use enfilade::bake::delaunay::Choices;
 use enfilade::bake::{BakeContext, BakeOutput, Silent};
-use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::scene::Scene;
 use enfilade::internals::bake::bake_session;
 use enfilade::internals::bake::delaunay::{JOINED, Review};
@@ -16,6 +15,7 @@ use crate::bake::delaunay::choices_text;
 use crate::formats::Format;
 use crate::output::{Outputs, Written, refuse_stream, write_whole};
 use crate::screen::print_json;
+use enfilade_cli::world::encode_whole;
 
 /// The weight of a portal, or a word where it is not a ratio.
 pub(crate) fn weight_words(weight: f64, is_mouth: bool) -> String {
@@ -115,9 +115,9 @@ impl<'a> Reviewed<'a> {
         let context = BakeContext::new(&Silent, None);
         let review = &self.review;
         let (session, config) = (review.session(), review.config());
-        let baked = bake_session(self.scene, session, review.at(), config, &context)?;
-        let bytes =
-            encode_glb(&baked.world).context("the baked world breaks an invariant (a bug)")?;
+        let mut baked = bake_session(self.scene, session, review.at(), config, &context)?;
+        let bytes = encode_whole(&mut baked.world)
+            .context("the baked world breaks an invariant (a bug)")?;
         write_whole(path, &bytes)?;
         let written = Written::new(path, &bytes);
         Ok((baked, written))

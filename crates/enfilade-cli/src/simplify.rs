@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use enfilade::bake::simplify::{CostModel, Metric, SimplifySettings};
 use enfilade::cpg::World;
-use enfilade::cpg::wire::{decode_glb, encode_glb};
+use enfilade::cpg::wire::decode_glb;
 use enfilade::import::{PrtFile, read_prt, write_prt};
 use enfilade::internals::bake::bound::keep_bounds;
 use enfilade::internals::bake::simplify::simplify_graph;
@@ -18,6 +18,7 @@ use crate::output::{Outputs, Written, write_whole};
 use crate::pvs::sight_graph;
 use crate::screen::{Warned, print_json, write_lines};
 use enfilade_cli::input::{name_of, read};
+use enfilade_cli::world::encode_whole;
 
 /// Merges and cuts cells of a world until their costs are within bounds, or merges clusters of a Quake portal file.
 #[derive(clap::Args)]
@@ -143,7 +144,7 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     let world = decode_glb(&bytes).with_context(|| name_of(&args.input))?;
     settings.cost.check(&world.materials)?;
     check_portals(args, &world)?;
-    let bounded = keep_bounds(&world, &settings);
+    let mut bounded = keep_bounds(&world, &settings);
     let graph = &bounded.world.graph;
     let warnings = [
         bounded.note(),
@@ -159,7 +160,8 @@ pub(crate) fn run(args: &Simplify) -> anyhow::Result<()> {
     write(
         &outputs,
         &args.output,
-        [&world, &bounded.world],
+        &world,
+        &mut bounded.world,
         done,
         args.json,
     )
@@ -316,16 +318,17 @@ pub(crate) struct Done {
 pub(crate) fn write(
     outputs: &Outputs,
     path: &Path,
-    [before, after]: [&World; 2],
+    before: &World,
+    after: &mut World,
     done: Done,
     is_json: bool,
 ) -> anyhow::Result<()> {
-    let bytes = encode_glb(after).context("the new world breaks an invariant (a bug)")?;
+    let bytes = encode_whole(after).context("the new world breaks an invariant (a bug)")?;
     write_whole(path, &bytes)?;
     let compared = Compared {
         written: Written::new(path, &bytes),
-        cells: [before, after].map(|w| w.graph.cells.len()),
-        portals: [before, after].map(|w| w.graph.portals.len()),
+        cells: [before, &*after].map(|w| w.graph.cells.len()),
+        portals: [before, &*after].map(|w| w.graph.portals.len()),
         costs: done.costs,
         notes: done.notes,
         warning: done.warning,

@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::cpg::World;
-use enfilade::geom::Triangle;
+use enfilade::cpg::{RoomFacts, World};
 use enfilade::geom::scene::{Role, Scene, TriangleSource};
+use enfilade::geom::{Triangle, shown};
 use enfilade::runtime::{SeeOptions, Sight};
 use enfilade_verify::{
     SourceDetail, VerifyOptions, ViewOptions, ViewReport, check_drawn, compare_details,
@@ -23,6 +23,7 @@ use crate::screen::{print_json, printed, printed_at_once, write_lines};
 use enfilade_cli::answers::Answers;
 use enfilade_cli::input::{import_scene, name_of, read};
 use enfilade_cli::world::read_world_checked;
+use enfilade_report::measured_room_facts;
 
 /// Tests the promises of a world with random sight lines; exits with 1 if one is broken.
 #[derive(clap::Args)]
@@ -250,11 +251,48 @@ fn structure_of(scene: &Scene) -> Vec<Triangle> {
 /// Problems if viewers draw something else than the world, or it does not have all that came with the scene.
 fn problems_of_file(world: &World, file: &[u8], scene: Option<&Scene>) -> Vec<String> {
     let mut problems = check_drawn(file);
+    problems.extend(fact_problems(world));
     if let Some(scene) = scene {
         problems.extend(detail_problems(world, scene));
         problems.extend(compare_scene(world, scene));
     }
     problems
+}
+
+/// Largest difference of stored facts from those measured of the file, whose numbers are rounded. [Units: wu, wu²]
+const FACTS: f64 = 0.01;
+
+/// Problems if the facts of rooms are not those of its walls.
+fn fact_problems(world: &World) -> Vec<String> {
+    let Some(facts) = &world.room_facts else {
+        return Vec::new();
+    };
+    let measured = measured_room_facts(world);
+    let pairs = facts.iter().zip(&measured);
+    let wrong = pairs.filter(|(own, found)| {
+        let all = |f: &RoomFacts| [f.floor_area, f.area_above_1_5, f.area_above_2_3, f.height];
+        let mut both = all(own).into_iter().zip(all(found));
+        own.storeys != found.storeys || both.any(|(a, b)| (a - b).abs() > FACTS)
+    });
+    let told = wrong.map(|(own, found)| {
+        let words = |f: &RoomFacts| {
+            format!(
+                "storey {}, {:.2} m² ({:.2} above 1.5 m, {:.2} above 2.3 m), {:.2} m high",
+                f.storeys.join(" "),
+                f.floor_area,
+                f.area_above_1_5,
+                f.area_above_2_3,
+                f.height
+            )
+        };
+        let name = shown(&world.graph[own.cell].name);
+        format!(
+            "the facts of {name} are {}; its walls make {}",
+            words(own),
+            words(found)
+        )
+    });
+    told.collect()
 }
 
 /// Problems if the world's details are not those of the scene.

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use anyhow::Context;
 use enfilade::cpg::World;
-use enfilade::cpg::wire::decode_glb;
+use enfilade::cpg::wire::{WireError, decode_glb, encode_glb};
 use enfilade::world::WalkMapKey;
+
+use enfilade_report::measured_room_facts;
 
 use crate::input::{name_of, read_glb, read_packed};
 
@@ -40,4 +42,16 @@ pub fn read_world_hashed(path: &Path) -> anyhow::Result<(World, u64)> {
     let bytes = read_glb(path)?;
     let world = decode_glb(&bytes).with_context(|| name_of(path))?;
     Ok((world, WalkMapKey::hash(&bytes)))
+}
+
+/// Returns the file of a valid world, which it completes: facts of rooms are measured if it has none.
+///
+/// # Errors
+///
+/// Those of [`encode_glb`].
+pub fn encode_whole(world: &mut World) -> Result<Vec<u8>, WireError> {
+    if world.room_facts.is_none() {
+        world.room_facts = Some(measured_room_facts(world));
+    }
+    encode_glb(world)
 }

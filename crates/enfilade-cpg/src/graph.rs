@@ -6,8 +6,8 @@ use std::sync::Arc;
 use enfilade_geom::scene::{About, Fixture, Image, Material, Mesh, Primitive, SourceNode, Texture};
 
 use crate::{
-    CellId, DecidedPlace, Fitting, Locator, PartNumbers, PortalId, Pvs, SourceRuns, SpecialPortal,
-    Why,
+    CellId, DecidedPlace, Fitting, Locator, PartNumbers, PortalId, Pvs, RoomFacts, SourceRuns,
+    SpecialPortal, Why,
 };
 
 /// A connected region of empty space bounded by structural triangles and portals. May be concave.
@@ -160,6 +160,8 @@ pub struct World {
     pub about: About,
     /// Cells visible from each cell, if computed. Changes of cells or portals drop it.
     pub pvs: Option<Pvs>,
+    /// Facts of all rooms, ascending by cell, if computed. Changes of cells, portals or walls drop them.
+    pub room_facts: Option<Vec<RoomFacts>>,
 }
 
 impl PartNumbers {

@@ -8,6 +8,7 @@
 mod access;
 mod cell_set;
 mod doubts;
+mod facts;
 mod fitting;
 mod graph;
 mod holes;
@@ -32,6 +33,7 @@ pub mod wire;
 pub use access::Exit;
 pub use cell_set::CellSet;
 pub use doubts::Doubt;
+pub use facts::RoomFacts;
 pub use fitting::{Fitting, FittingPart, Motion, MotionKind};
 pub use graph::{
     Batch, Cell, CellPortalGraph, DetailObject, Portal, PortalKind, Provenance, Statistics, World,

@@ -16,7 +16,7 @@ mod special_error;
 
 use std::collections::HashMap;
 
-use crate::{CellPortalGraph, PartNumbers, PortalId, Why, World};
+use crate::{CellPortalGraph, PartNumbers, PortalId, RoomFacts, Why, World};
 use error::Findings;
 use extent::{check_boxes_around_geometry, check_cells_in_locator};
 use geometry::{check_cell_list, check_detail, check_mesh, check_primitive};
@@ -107,6 +107,13 @@ impl World {
             (self.pvs.as_ref()).and_then(|p| p.pair_problem(PartNumbers::new(self).n_parts()))
         {
             found.push(GraphError::PvsPair { cells, problem });
+        }
+        let facts = (self.room_facts.as_ref()).and_then(|f| RoomFacts::problem(f, &self.graph));
+        if let Some((cell, problem)) = facts {
+            found.push(GraphError::RoomFacts {
+                cell: cell.0,
+                problem,
+            });
         }
         crate::look::check(self, &mut |owner, problem| {
             found.push(GraphError::Look { owner, problem });

@@ -112,6 +112,7 @@ impl Piece {
             return Err(PieceError::Special(special.name.clone()));
         }
         world.pvs = None;
+        world.room_facts = None;
         let chosen = chosen(&world, outdoors, choice)?;
         let mut attachments: Vec<Attachment> = (chosen.into_iter())
             .map(|(name, portal)| attachment(&world, outdoors, name, portal))

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use enfilade_cpg::{CellId, PortalKind, Pvs, World};
+use enfilade_cpg::{CellId, PortalKind, Pvs, RoomFacts, World};
 
 use crate::drawing::Drawing;
 use crate::graph::graph_svg;
@@ -13,13 +13,14 @@ use crate::matrix::{Order, matrix_svg};
 use crate::plain::cells_table;
 use crate::plan::{PlanOptions, Plans};
 use crate::reasons::reasons;
-use crate::rooms::RoomFacts;
 use crate::storeys::Storey;
 use crate::svg::escaped;
 use crate::verdict::Verdict;
 
 /// Most rows in the table of rooms.
 const MAX_ROWS: usize = 1000;
+/// Least difference of two areas that the page shows. [Units: wu²]
+const SHOWN: f64 = 0.05;
 
 /// A picture of the page.
 #[derive(Clone, Debug)]
@@ -295,29 +296,36 @@ fn rooms(world: &World, plans: &Plans, is_listed: impl Fn(CellId) -> bool) -> (T
     let area: f64 = rooms.iter().map(|room| room.floor_area).sum();
     let n = rooms.len();
     rooms.truncate(MAX_ROWS);
-    let head = [
-        "name",
-        "storey",
-        "floor m²",
-        "height m",
-        "volume m³",
-        "doors",
-        "windows",
-    ];
-    let mut rows = vec![head.map(String::from).to_vec()];
+    // Under level ceilings, these columns would repeat the first.
+    let is_low = rooms
+        .iter()
+        .any(|r| r.floor_area - r.area_above_2_3 > SHOWN);
+    let low = |all: [String; 2]| all.into_iter().filter(|_| is_low);
+    let mut head = ["name", "storey", "floor m²"].map(String::from).to_vec();
+    head.extend(low(["over 1.5 m", "over 2.3 m"].map(String::from)));
+    head.extend(["height m", "volume m³", "doors", "windows"].map(String::from));
+    let mut rows = vec![head];
     rows.extend(rooms.iter().map(|room| {
         let cell = &world.graph[room.cell];
-        vec![
+        let areas = [room.area_above_1_5, room.area_above_2_3];
+        let mut row = vec![
             shortened(&cell.name).into_owned(),
             room.storeys.join(", "),
             format!("{:.1}", room.floor_area),
+        ];
+        row.extend(low(areas.map(|area| format!("{area:.1}"))));
+        row.extend([
             format!("{:.2}", room.height),
             format!("{:.1}", cell.volume),
             room.n_doors.to_string(),
             room.n_windows.to_string(),
-        ]
+        ]);
+        row
     }));
     let mut note = "Floors as seen from above, without the recesses of doors and windows; the height over most of the floor.".to_owned();
+    if is_low {
+        note += " Over 1.5 m and 2.3 m: the floor over which a room is that high.";
+    }
     if n > MAX_ROWS {
         let _ = write!(note, " The first {MAX_ROWS} of {n}.");
     } else if n > 1 {

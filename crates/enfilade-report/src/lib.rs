@@ -61,7 +61,7 @@ pub use plain::{
 pub use plan::{PlanOptions, Plans, plan_svg};
 #[cfg(feature = "print")]
 pub use raster::{MAX_PIXELS, RasterError};
-pub use rooms::{RoomFacts, room_facts};
+pub use rooms::{measured_room_facts, room_facts};
 pub use shapes::{PlanLabel, PlanShape};
 pub use storeys::{Storey, find_storeys};
 pub use verdict::{InputDoubt, Verdict, cells_in_words, is_empty, why_empty};

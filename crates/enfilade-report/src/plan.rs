@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_cpg::{CellId, World, cell_color};
+use enfilade_cpg::{CellId, RoomFacts, World, cell_color};
 use enfilade_geom::{DVec2, shown};
 
 use crate::doubts::{Doubt, doubts, rings};
@@ -11,7 +11,7 @@ use crate::floors::floor_samples;
 use crate::label::{Sizes, fit, line_height, line_size, shortened, width};
 use crate::marks::View;
 use crate::relief::Relief;
-use crate::rooms::{RoomFacts, facts_of_rooms};
+use crate::rooms::facts_of_rooms;
 use crate::section::{Label, Region, Section, cell_of, heights};
 use crate::shafts::find_shafts;
 use crate::sheet::{MARGIN, Sheet};

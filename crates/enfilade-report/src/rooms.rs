@@ -4,10 +4,11 @@
 //! world's cells. The recesses of doorways and windows between a portal and the face of its wall do not count: they belong
 //! to the wall, as in the rules by which architects measure.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use enfilade_cpg::{CellId, Portal, PortalKind, World};
+use enfilade_cpg::{CellId, Portal, PortalKind, RoomFacts, World};
 use enfilade_geom::poly::cut_out;
 use enfilade_geom::{Aabb, DVec3, Plane, Winding};
 
@@ -22,6 +23,8 @@ const MAX_BANDS: f64 = 1000.0;
 const SLIVER: f64 = 1e-3;
 /// Height of a person: a floor over another of the same room counts if one can stand between. [Units: wu]
 const STANDING: f64 = 1.9;
+/// A room that is lower than a height by less has it: coordinates are rounded. [Units: wu]
+const ROUNDING: f64 = 1e-3;
 /// Deepest recess of a doorway: thicker walls do not occur. [Units: wu]
 const DEEPEST: f64 = 1.5;
 /// Distance from an opening's edge at which its jamb is looked up. [Units: wu]
@@ -31,32 +34,24 @@ const STEP: f64 = 0.01;
 /// A portal whose normal rises more is a hatch, which has no jambs.
 const UPRIGHT: f32 = 0.5;
 
-/// Facts of a room that people ask for. [Units: wu, wu²]
-#[derive(Clone, Debug, PartialEq)]
-pub struct RoomFacts {
-    /// The room.
-    pub cell: CellId,
-    /// Names of the storeys that it stands on, from below.
-    pub storeys: Vec<String>,
-    /// Area of its floors, without the recesses of doorways.
-    pub floor_area: f64,
-    /// Clear height over half of that area or more.
-    pub height: f64,
-    /// Number of its doors.
-    pub n_doors: usize,
-    /// Number of its windows.
-    pub n_windows: usize,
+/// Returns the facts of all rooms, by cell: those that the world has, or else measured. The world must be valid.
+#[must_use]
+pub fn room_facts(world: &World) -> Cow<'_, [RoomFacts]> {
+    match &world.room_facts {
+        Some(facts) => facts.into(),
+        None => measured_room_facts(world).into(),
+    }
 }
 
-/// Returns the facts of all rooms, by cell. The world must be valid.
+/// Measures the facts of all rooms, by cell, whatever the world says; to the millimeter. The world must be valid.
 ///
 /// O(floor area + triangles + parts of the tree that sections each 0.24 m meet).
 #[must_use]
-pub fn room_facts(world: &World) -> Vec<RoomFacts> {
+pub fn measured_room_facts(world: &World) -> Vec<RoomFacts> {
     let samples = floor_samples(world);
     let (pages, _) = find_pages(world, &samples);
     let storeys: Vec<&Storey> = pages.iter().map(|p| &p.storey).collect();
-    facts_of_rooms(world, &samples, &storeys)
+    measured(world, &samples, &storeys)
 }
 
 /// Returns what [`room_facts`] does, of a world whose floors and storeys are known.
@@ -65,41 +60,62 @@ pub(crate) fn facts_of_rooms(
     samples: &Samples,
     storeys: &[&Storey],
 ) -> Vec<RoomFacts> {
+    if let Some(facts) = &world.room_facts {
+        return facts.clone();
+    }
+    measured(world, samples, storeys)
+}
+
+fn measured(world: &World, samples: &Samples, storeys: &[&Storey]) -> Vec<RoomFacts> {
     let mut levels: BTreeMap<CellId, Vec<Level>> = BTreeMap::new();
     for level in find_levels(world, samples, BAND) {
         levels.entry(level.cell).or_default().push(level);
     }
+    let n_portals = |id, kind| RoomFacts::n_portals(&world.graph, id, kind);
+    let rounded = |measure: f64| (1000.0 * measure).round() / 1000.0;
     let rooms = world.graph.rooms();
     rooms
-        .map(|(id, cell)| {
-            let counted = |kind: PortalKind| {
-                let portals = cell.portals.iter().map(|&p| &world.graph[p]);
-                portals.filter(|p| p.kind == kind).count()
-            };
+        .map(|(id, _)| {
             let on = (storeys.iter()).filter(|s| s.cells.binary_search(&id).is_ok());
             let own = levels.get(&id).map_or(&[][..], Vec::as_slice);
-            let (floor_area, height) = floor_of(world, id, own);
+            let floor = floor_of(world, id, own);
             RoomFacts {
                 cell: id,
                 storeys: on.map(|s| s.name.clone()).collect(),
-                floor_area,
-                height,
-                n_doors: counted(PortalKind::Door),
-                n_windows: counted(PortalKind::Window),
+                floor_area: rounded(floor.area),
+                area_above_1_5: rounded(floor.above_1_5),
+                area_above_2_3: rounded(floor.above_2_3),
+                height: rounded(floor.height),
+                n_doors: n_portals(id, PortalKind::Door),
+                n_windows: n_portals(id, PortalKind::Window),
             }
         })
         .collect()
 }
 
-/// The area of a room's floors, and the clear height over most of it.
-fn floor_of(world: &World, cell: CellId, levels: &[Level]) -> (f64, f64) {
+/// Measures of a room's floors.
+#[derive(Default)]
+struct Floor {
+    area: f64,
+    above_1_5: f64,
+    above_2_3: f64,
+    /// Clear height over most of the area. [Units: wu]
+    height: f64,
+}
+
+/// Measures a room's floors.
+fn floor_of(world: &World, cell: CellId, levels: &[Level]) -> Floor {
     let footprint = Footprint::new(world, cell);
     let portals = world.graph[cell].portals.iter().map(|&p| &world.graph[p]);
     let recesses: Vec<Recess> = portals.filter_map(|p| recess(world, cell, p)).collect();
     let mut heights: Vec<(f64, f64)> = Vec::new();
+    let mut out = Floor::default();
     let mut add = |floor: Winding| {
         for part in without(floor, &recesses) {
-            heights.push((footprint.clear(&part), part.area()));
+            let under = footprint.under(&part);
+            heights.push((footprint.over(&part) + under, part.area()));
+            out.above_1_5 += footprint.area_over(&part, 1.5 - under);
+            out.above_2_3 += footprint.area_over(&part, 2.3 - under);
         }
     };
     for k in 0..footprint.heights.len() {
@@ -108,14 +124,15 @@ fn floor_of(world: &World, cell: CellId, levels: &[Level]) -> (f64, f64) {
     for level in levels {
         footprint.upper(level.height).into_iter().for_each(&mut add);
     }
-    let area: f64 = heights.iter().map(|h| h.1).sum();
+    out.area = heights.iter().map(|h| h.1).sum();
     heights.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut below = 0.0;
     let middle = heights.iter().find(|h| {
         below += h.1;
-        below >= 0.5 * area
+        below >= 0.5 * out.area
     });
-    (area, middle.map_or(0.0, |h| h.0))
+    out.height = middle.map_or(0.0, |h| h.0);
+    out
 }
 
 /// The recess of an opening as seen from above, counter-clockwise about +y.
@@ -167,17 +184,41 @@ impl<'w> Footprint<'w> {
         self.not_over(self.air(self.heights[k]), &self.heights[..k])
     }
 
-    /// Returns the height of the cell at the middle of a part of a section; below the section, one step at most.
-    fn clear(&self, part: &Winding) -> f64 {
+    /// Returns the height of the cell over the middle of a part of a section.
+    fn over(&self, part: &Winding) -> f64 {
+        self.reach(part, self.bounds.max.y)
+    }
+
+    /// Returns the height of the cell under the middle of a part of a section, one step at most.
+    fn under(&self, part: &Winding) -> f64 {
+        self.reach(part, part.mean().y - BAND)
+    }
+
+    /// Returns how much of the upright line from the middle of a part to the height `y` is in the cell. [Units: wu]
+    fn reach(&self, part: &Winding, y: f64) -> f64 {
         let middle = part.mean();
         let locator = &self.world.graph.locator;
         // Beyond the box of the tree is the outdoors.
         let [low, high] = [locator.bounds.min.y, locator.bounds.max.y];
-        let reach = |y: f64| {
-            let end = middle.with_y(y.clamp(low, high));
-            end.distance(middle) * locator.share_in(self.cell, middle, end)
-        };
-        reach(self.bounds.max.y) + reach(middle.y - BAND)
+        let end = middle.with_y(y.clamp(low, high));
+        end.distance(middle) * locator.share_in(self.cell, middle, end)
+    }
+
+    /// Returns the area of a part of a section over which the cell is there, at this height above the part. [Units: wu²]
+    fn area_over(&self, part: &Winding, up: f64) -> f64 {
+        let y = part.points[0].y + up - ROUNDING;
+        if y > self.bounds.max.y {
+            return 0.0;
+        }
+        let mut moved = part.clone();
+        moved.points.iter_mut().for_each(|p| p.y = y);
+        let mut area = 0.0;
+        self.world.graph.locator.for_parts(moved, |cell, part| {
+            if cell == Some(self.cell) {
+                area += part.area();
+            }
+        });
+        area
     }
 
     /// Returns the parts of a floor under which the cell goes on, a person's height below or more.
@@ -361,6 +402,29 @@ mod tests {
             [[0.0, 1.0, 0.0], [1.0, 3.0, 4.0]],
         ];
         near(facts(&world(&hangs)), [20.0, 3.0]);
+    }
+
+    #[test]
+    fn a_sloped_ceiling_leaves_less_area_at_each_height() {
+        // As high as it is far from the wall, from 1 m to 4 m; and a ceiling of 2.3 m.
+        let mut world = world(&[[[1.0, 0.0, 0.0], [4.0, 4.0, 5.0]]]);
+        let areas = |world: &World| {
+            let facts = facts_of_rooms(world, &floor_samples(world), &[]);
+            let room = &facts[0];
+            [room.floor_area, room.area_above_1_5, room.area_above_2_3]
+        };
+        near_all(areas(&world), [15.0, 15.0, 15.0]);
+        world.graph.locator.planes[4] = [0.5_f64.sqrt(), -0.5_f64.sqrt(), 0.0, 0.0];
+        near_all(areas(&world), [15.0, 12.5, 8.5]);
+        let level = self::world(&[[[0.0; 3], [5.0, 2.3, 4.0]]]);
+        near_all(areas(&level), [20.0, 20.0, 20.0]);
+        let low = self::world(&[[[0.0; 3], [5.0, 1.4, 4.0]]]);
+        near_all(areas(&low), [20.0, 0.0, 0.0]);
+    }
+
+    fn near_all(found: [f64; 3], expected: [f64; 3]) {
+        let is_near = |k: usize| (found[k] - expected[k]).abs() < 0.01;
+        assert!((0..3).all(is_near), "{found:?} for {expected:?}");
     }
 
     #[test]

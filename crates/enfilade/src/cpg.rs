@@ -85,9 +85,9 @@ pub use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, CellSet, CloseDecision, DecidedPlace, DetailObject,
     Doubt, Exit, Fact, Fitting, FittingPart, GraphError, Hole, HoleReason, Locator, LocatorNode,
     MonitorCamera, Motion, MotionKind, PartNumbers, Pass, Portal, PortalId, PortalKind, Provenance,
-    Pvs, Reason, RoomDoubt, SightGraph, SightGraphError, SightPortal, SourceRuns, SpecialId,
-    SpecialPortal, SpecialProblem, SpecialShape, Statistics, VisibleParts, VisibleVolumes, Way,
-    Why, World, cell_color,
+    Pvs, Reason, RoomDoubt, RoomFacts, SightGraph, SightGraphError, SightPortal, SourceRuns,
+    SpecialId, SpecialPortal, SpecialProblem, SpecialShape, Statistics, VisibleParts,
+    VisibleVolumes, Way, Why, World, cell_color,
 };
 
 pub mod wire {

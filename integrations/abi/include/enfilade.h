@@ -167,6 +167,44 @@ typedef struct EnfCell {
 } EnfCell;
 
 /*
+ Facts of a room.
+ */
+typedef struct EnfRoom {
+  /*
+   Names of the storeys that it stands on, from below, parted by blanks, in UTF-8, without a zero byte at their end.
+   */
+  const char *storeys;
+  /*
+   Length of these names. [Units: bytes]
+   */
+  uint32_t storeys_length;
+  /*
+   Area of its floors as seen from above, without the recesses of doors and windows. [Units: m²]
+   */
+  float floor_area;
+  /*
+   The part of that area where the room is 1.5 m high or more. [Units: m²]
+   */
+  float area_above_1_5;
+  /*
+   The part where it is 2.3 m high or more. [Units: m²]
+   */
+  float area_above_2_3;
+  /*
+   Clear height over most of that area. [Units: m]
+   */
+  float height;
+  /*
+   Number of its doors.
+   */
+  uint32_t n_doors;
+  /*
+   Number of its windows.
+   */
+  uint32_t n_windows;
+} EnfRoom;
+
+/*
  A portal.
  */
 typedef struct EnfPortal {
@@ -659,6 +697,14 @@ int32_t enf_count(struct EnfWorld *handle, uint32_t what);
  Describes a cell.
  */
 int32_t enf_cell(struct EnfWorld *handle, uint32_t cell, struct EnfCell *out);
+
+/*
+ Tells the facts of a room: floor area, height, storeys, doors, windows. Returns `ENF_NONE`, and writes nothing, for other
+ cells and where the file has none: those that the command bakes have them.
+ */
+int32_t enf_room(struct EnfWorld *handle,
+                 uint32_t cell,
+                 struct EnfRoom *out);
 
 /*
  Describes a portal and its present state.

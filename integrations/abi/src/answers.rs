@@ -33,6 +33,28 @@ pub struct EnfCell {
     pub volume: f32,
 }
 
+/// Facts of a room.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct EnfRoom {
+    /// Names of the storeys that it stands on, from below, parted by blanks, in UTF-8, without a zero byte at their end.
+    pub storeys: *const c_char,
+    /// Length of these names. [Units: bytes]
+    pub storeys_length: u32,
+    /// Area of its floors as seen from above, without the recesses of doors and windows. [Units: m²]
+    pub floor_area: f32,
+    /// The part of that area where the room is 1.5 m high or more. [Units: m²]
+    pub area_above_1_5: f32,
+    /// The part where it is 2.3 m high or more. [Units: m²]
+    pub area_above_2_3: f32,
+    /// Clear height over most of that area. [Units: m]
+    pub height: f32,
+    /// Number of its doors.
+    pub n_doors: u32,
+    /// Number of its windows.
+    pub n_windows: u32,
+}
+
 /// A portal.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]

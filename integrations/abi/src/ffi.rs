@@ -16,8 +16,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use enfilade_runtime::View;
 
 use crate::answers::{
-    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen, EnfStart,
-    EnfStep, EnfWhy,
+    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfRoom, EnfSeen,
+    EnfStart, EnfStep, EnfWhy,
 };
 use crate::handle::EnfWorld;
 use crate::last_error;
@@ -222,6 +222,14 @@ pub unsafe extern "C" fn enf_count(handle: *mut EnfWorld, what: u32) -> i32 {
 pub unsafe extern "C" fn enf_cell(handle: *mut EnfWorld, cell: u32, out: *mut EnfCell) -> i32 {
     // SAFETY: the pointers are those of the caller.
     unsafe { describe(handle, out, |w| w.cell(cell)) }
+}
+
+/// Tells the facts of a room: floor area, height, storeys, doors, windows. Returns `ENF_NONE`, and writes nothing, for other
+/// cells and where the file has none: those that the command bakes have them.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn enf_room(handle: *mut EnfWorld, cell: u32, out: *mut EnfRoom) -> i32 {
+    // SAFETY: the pointers are those of the caller.
+    unsafe { describe_if_any(handle, out, |w| w.room(cell), ENF_NONE) }
 }
 
 /// Describes a portal and its present state.

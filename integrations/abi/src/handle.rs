@@ -10,8 +10,8 @@ use enfilade_runtime::{
 };
 
 use crate::answers::{
-    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfFact, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen,
-    EnfStart, EnfStep, EnfVisit,
+    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfFact, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfRoom,
+    EnfSeen, EnfStart, EnfStep, EnfVisit,
 };
 use crate::status as s;
 use crate::status::Failure;
@@ -30,6 +30,7 @@ pub struct EnfWorld {
     crossed: Vec<u32>,
     facts: Vec<EnfFact>,
     text: String,
+    storeys: String,
 }
 
 /// Answers of the last view, as plain numbers.
@@ -118,6 +119,7 @@ impl EnfWorld {
             crossed: Vec::new(),
             facts: Vec::new(),
             text: String::new(),
+            storeys: String::new(),
             world,
             sight,
         }
@@ -162,6 +164,31 @@ impl EnfWorld {
             aabb: six(c.aabb),
             volume: c.volume,
         })
+    }
+
+    /// Returns the facts of a cell; `None` if it is no room, or the file has no facts.
+    ///
+    /// # Errors
+    ///
+    /// If it does not exist.
+    pub fn room(&mut self, cell: u32) -> Result<Option<EnfRoom>, Failure> {
+        item(&self.world.graph.cells, cell, "cell")?;
+        let facts = self.world.room_facts.as_deref().unwrap_or_default();
+        let Ok(at) = facts.binary_search_by_key(&CellId(cell), |room| room.cell) else {
+            return Ok(None);
+        };
+        let room = &facts[at];
+        self.storeys = room.storeys.join(" ");
+        Ok(Some(EnfRoom {
+            storeys: self.storeys.as_ptr().cast(),
+            storeys_length: self.storeys.len() as u32,
+            floor_area: room.floor_area as f32,
+            area_above_1_5: room.area_above_1_5 as f32,
+            area_above_2_3: room.area_above_2_3 as f32,
+            height: room.height as f32,
+            n_doors: room.n_doors as u32,
+            n_windows: room.n_windows as u32,
+        }))
     }
 
     /// Describes a portal and its state.

@@ -9,20 +9,35 @@ use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 use enfilade_abi::EnfWorld;
-use enfilade_abi::answers::{EnfCell, EnfStart, EnfWhy};
+use enfilade_abi::answers::{EnfCell, EnfPortal, EnfRoom, EnfStart, EnfWhy};
 use enfilade_abi::ffi::*;
 use enfilade_abi::status::*;
 use enfilade_cpg::wire::encode_glb;
-use enfilade_cpg::{Fact, Reason, Why};
+use enfilade_cpg::{Fact, PortalKind, Reason, RoomFacts, Why};
 use enfilade_testkit::{GridParams, room_grid};
 
 fn file() -> Vec<u8> {
     let mut world = room_grid(&GridParams::offices(24, 1));
     let facts = [(Fact::Share, 0.2), (Fact::Area, 1.5)];
+    world.graph.portals[0].kind = PortalKind::Door;
     world.graph.portals[0].why = vec![
         Why::given(Reason::Gap),
         Why::compared(Reason::Narrow, 0.7, &facts),
     ];
+    let facts = world.graph.rooms().map(|(cell, _)| {
+        let n = |kind| RoomFacts::n_portals(&world.graph, cell, kind);
+        RoomFacts {
+            cell,
+            storeys: vec!["1".into(), "2".into()],
+            floor_area: 12.5,
+            area_above_1_5: 10.0,
+            area_above_2_3: 7.5,
+            height: 2.5,
+            n_doors: n(PortalKind::Door),
+            n_windows: n(PortalKind::Window),
+        }
+    });
+    world.room_facts = Some(facts.collect());
     encode_glb(&world).expect("a valid world")
 }
 
@@ -62,6 +77,8 @@ fn null_is_an_error_everywhere() {
             enf_count(null_mut(), ENF_CELLS),
             enf_cell(null_mut(), 0, null_mut()),
             enf_cell(w, 0, null_mut()),
+            enf_room(null_mut(), 0, null_mut()),
+            enf_room(w, 0, null_mut()),
             enf_portal(w, 0, null_mut()),
             enf_why(null_mut(), ENF_CELLS, 0, 0, null_mut()),
             enf_why(w, ENF_PORTALS, 0, 0, null_mut()),
@@ -93,7 +110,7 @@ fn null_is_an_error_everywhere() {
             enf_pick(w, null(), p, null_mut()),
         ]
     };
-    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 32]);
+    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 34]);
     assert!(last_error().contains("null"), "{}", last_error());
     // SAFETY: null is allowed.
     unsafe {
@@ -115,6 +132,7 @@ fn ids_that_do_not_exist_and_numbers_that_are_none_are_errors() {
         [
             enf_count(w, 99),
             enf_cell(w, far, MaybeUninit::uninit().as_mut_ptr()),
+            enf_room(w, far, MaybeUninit::uninit().as_mut_ptr()),
             enf_portal(w, far, MaybeUninit::uninit().as_mut_ptr()),
             enf_why(w, ENF_CELLS, far, 0, MaybeUninit::uninit().as_mut_ptr()),
             enf_why(w, ENF_PORTALS, far, 0, MaybeUninit::uninit().as_mut_ptr()),
@@ -150,7 +168,7 @@ fn ids_that_do_not_exist_and_numbers_that_are_none_are_errors() {
             ),
         ]
     };
-    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 25]);
+    assert_eq!(statuses, [ENF_BAD_ARGUMENT; 26]);
     // SAFETY: as above.
     let without_sets = unsafe { enf_pvs_row(w, 0, MaybeUninit::uninit().as_mut_ptr()) };
     assert_eq!(without_sets, ENF_NONE);
@@ -219,6 +237,42 @@ fn a_walk_begins_in_a_room() {
         let mut room = MaybeUninit::<EnfCell>::uninit();
         assert_eq!(enf_cell(*w, cell as u32, room.as_mut_ptr()), 1);
         assert_eq!(room.assume_init().kind, ENF_ROOM);
+    }
+}
+
+#[test]
+fn rooms_have_facts_and_the_outdoors_has_none() {
+    let Open(w) = &open();
+    let mut room = MaybeUninit::<EnfRoom>::uninit();
+    // SAFETY: all pointers lead to enough values, and the answer is read once it is there.
+    unsafe {
+        let mut door = MaybeUninit::<EnfPortal>::uninit();
+        assert_eq!(enf_portal(*w, 0, door.as_mut_ptr()), 1);
+        let cell = door.assume_init().cells[0];
+        assert_eq!(enf_room(*w, cell, room.as_mut_ptr()), 1);
+        let room = room.assume_init();
+        let storeys =
+            std::slice::from_raw_parts(room.storeys.cast::<u8>(), room.storeys_length as usize);
+        assert_eq!(storeys, b"1 2");
+        let measures = [
+            room.floor_area,
+            room.area_above_1_5,
+            room.area_above_2_3,
+            room.height,
+        ];
+        assert_eq!(measures, [12.5, 10.0, 7.5, 2.5]);
+        assert!(room.n_doors > 0);
+        let outdoors = (0..).find(|&cell| {
+            let mut found = MaybeUninit::<EnfCell>::uninit();
+            assert_eq!(enf_cell(*w, cell, found.as_mut_ptr()), 1);
+            found.assume_init().kind == ENF_OUTDOORS
+        });
+        let none = enf_room(
+            *w,
+            outdoors.unwrap_or_default(),
+            MaybeUninit::uninit().as_mut_ptr(),
+        );
+        assert_eq!(none, ENF_NONE);
     }
 }
 

@@ -11,7 +11,7 @@ use enfilade::import::{
     ArrayMesh, IfcConverter, ImportOptions, ImportReport, Imported, import, import_arrays,
 };
 use enfilade::internals::bake::bsp::find_leak;
-use enfilade_report::{InputDoubt, Verdict, is_empty, why_empty};
+use enfilade_report::{InputDoubt, Verdict, is_empty, measured_room_facts, why_empty};
 use enfilade_settings::{Resolved, Settings, parse_toml};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -168,6 +168,7 @@ fn work(
     }
     // As readers of its file get it: rounded.
     let bug = |e| BakeError::new_err(format!("the baked world breaks an invariant (a bug): {e}"));
+    baked.world.room_facts = Some(measured_room_facts(&baked.world));
     let bytes = encode_glb(&baked.world).map_err(bug)?;
     drop(baked.world);
     Ok((World::new(decode_glb(&bytes).map_err(bug)?), warnings))

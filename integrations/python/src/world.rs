@@ -26,7 +26,7 @@ use crate::watch::run;
 const MATTER: i32 = -1;
 
 /// Facts of a room: cell, storeys, floor area, height, and the numbers of its doors and windows.
-type RoomRow = (u32, Vec<String>, f64, f64, (usize, usize));
+type RoomRow = (u32, Vec<String>, [f64; 4], (usize, usize));
 
 /// A world, and what queries keep of it.
 #[pyclass(frozen, module = "enfilade._native")]
@@ -268,12 +268,18 @@ impl World {
         portals.map(|p| p.why.iter().map(told).collect()).collect()
     }
 
-    /// Returns the facts of rooms: cell, storeys, floor area, height, doors, windows.
+    /// Returns the facts of rooms: cell, storeys; floor area, its parts above 1.5 m and 2.3 m, height; doors, windows.
     fn rooms(&self, py: Python<'_>) -> Vec<RoomRow> {
-        let facts = py.detach(|| room_facts(&self.world));
+        let facts = py.detach(|| room_facts(&self.world).into_owned());
         let rows = facts.into_iter().map(|room| {
             let counts = (room.n_doors, room.n_windows);
-            (room.cell.0, room.storeys, room.floor_area, room.height, counts)
+            let measures = [
+                room.floor_area,
+                room.area_above_1_5,
+                room.area_above_2_3,
+                room.height,
+            ];
+            (room.cell.0, room.storeys, measures, counts)
         });
         rows.collect()
     }

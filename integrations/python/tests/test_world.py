@@ -63,6 +63,8 @@ def test_rooms_have_the_facts_that_the_command_prints(world, command, tmp_path):
         assert (room.name, list(room.storeys)) == (cell["name"], cell["storeys"])
         assert (room.doors, room.windows) == (cell["doors"], cell["windows"])
         assert room.floor_area == pytest.approx(cell["floor_area"], abs=1e-3)
+        assert room.area_above_1_5 == pytest.approx(cell["area_above_1_5"], abs=1e-3)
+        assert room.area_above_2_3 == pytest.approx(cell["area_above_2_3"], abs=1e-3)
         assert room.height == pytest.approx(cell["height"], abs=1e-3) and 2 < room.height < 4
 
 
@@ -177,7 +179,7 @@ def test_walks_pass_doors_but_not_shut_ones(world):
     np.testing.assert_allclose(walk.points[[0, -1]], [BEDROOM, BATH], atol=0.2)
     assert len(walk.cells) == len(walk.portals) + 1
     assert walk.cells[0] == world.locate(BEDROOM)
-    with pytest.raises(enfilade.NoPathError, match="no way"):
+    with pytest.raises(enfilade.NoPathError, match=r"no way: portal-\d+, .* is closed; one gets \d+\.\d\d m far"):
         world.path(BEDROOM, BATH, closed=walk.portals)
     with pytest.raises(enfilade.NoPathError, match="no floor"):
         world.path(BEDROOM, [2, 500, 2])

@@ -13,6 +13,7 @@ export interface Exports {
   enf_close(world: number): void;
   enf_count(world: number, what: number): number;
   enf_cell(world: number, cell: number, out: number): number;
+  enf_room(world: number, cell: number, out: number): number;
   enf_portal(world: number, portal: number, out: number): number;
   enf_leaf(world: number, portal: number, leaf: number, out: number): number;
   enf_detail(world: number, detail: number, out: number): number;

@@ -7,6 +7,22 @@ export type CellKind = 'room' | 'outdoors' | 'void';
 /** Kind of a portal. */
 export type PortalKind = 'open' | 'door' | 'window' | 'crack';
 
+/** Facts of a room. */
+export interface Room {
+  /** Names of the storeys that it stands on, from below. */
+  readonly storeys: readonly string[];
+  /** Area of its floors as seen from above, without the recesses of doors and windows, in square meters. */
+  readonly floorArea: number;
+  /** The part of that area where the room is 1.5 m high or more: less than all of it under sloped ceilings. */
+  readonly areaAbove1_5: number;
+  /** The part where it is 2.3 m high or more. */
+  readonly areaAbove2_3: number;
+  /** Clear height over most of that area, in meters. */
+  readonly height: number;
+  readonly doors: number;
+  readonly windows: number;
+}
+
 /** A cell: a room, the outdoors, or a space that nobody can stand in. */
 export interface Cell {
   readonly id: number;
@@ -18,6 +34,8 @@ export interface Cell {
   readonly volume: number;
   /** Its portals, ascending. */
   readonly portals: readonly number[];
+  /** What is measured of a room; undefined for other cells, and in files without facts. */
+  readonly room: Room | undefined;
 }
 
 /** A leaf of a door and its motion, measured from its pose in the file. */
@@ -182,13 +200,31 @@ export class World {
     const at = this.answer;
     const { u32, f32 } = runtime;
     const portals = u32[at + 1]! >>> 2;
-    return {
+    const found = {
       id: cell,
       name: runtime.string(u32[at]!, u32[at + 2]!),
       kind: CELL_KINDS[u32[at + 4]!]!,
       aabb: this.copyOf(at + 5, 6),
       volume: f32[at + 11]!,
       portals: [...u32.subarray(portals, portals + u32[at + 3]!)],
+    };
+    return { ...found, room: this.readRoom(cell) };
+  }
+
+  private readRoom(cell: number): Room | undefined {
+    const { runtime } = this;
+    if (runtime.checked(runtime.exports.enf_room(this.handle, cell, this.scratch + ANSWER)) < 0) return undefined;
+    runtime.refresh();
+    const at = this.answer;
+    const { u32, f32 } = runtime;
+    return {
+      storeys: runtime.string(u32[at]!, u32[at + 1]!).split(' ').filter(Boolean),
+      floorArea: f32[at + 2]!,
+      areaAbove1_5: f32[at + 3]!,
+      areaAbove2_3: f32[at + 4]!,
+      height: f32[at + 5]!,
+      doors: u32[at + 6]!,
+      windows: u32[at + 7]!,
     };
   }
 

@@ -1,10 +1,11 @@
 // Covers R1, R3 and P6 in WebAssembly: the same answers in the same order as the native library.
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { Runtime, World } from '../dist/index.js';
 import { takeApart, withoutPictures } from '../dist/glb.js';
-import { folder, worlds } from '../scripts/worlds.mjs';
+import { command, folder, worlds } from '../scripts/worlds.mjs';
 import { difference, nativeAnswers } from './native.mjs';
 
 const VIEWS = 10_000;
@@ -50,6 +51,27 @@ test('graph: each cell knows its portals, each portal its cells and leaves; a pv
   const doors = world.portals.filter((portal) => portal.kind === 'door');
   assert.equal(doors.length, 9);
   for (const { id, leaves } of doors) for (const { detail } of leaves) assert.ok(world.portalsOfDetail(detail).includes(id));
+  world.close();
+});
+
+test('rooms have the facts that the command tells', async () => {
+  const said = JSON.parse(execFileSync(command, ['inspect', `${folder}/demo.glb`, '--json'], { maxBuffer: 1 << 28 }));
+  const world = await World.open(file('demo'));
+  const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-3, `${a} for ${b}`);
+  let rooms = 0;
+  for (const { id, room } of world.cells) {
+    const told = said.cells[id];
+    assert.equal(room === undefined, told.floor_area === undefined);
+    if (!room) continue;
+    rooms++;
+    assert.deepEqual(room.storeys, told.storeys);
+    near(room.floorArea, told.floor_area);
+    near(room.areaAbove1_5, told.area_above_1_5);
+    near(room.areaAbove2_3, told.area_above_2_3);
+    near(room.height, told.height);
+    assert.deepEqual([room.doors, room.windows], [told.doors, told.windows]);
+  }
+  assert.equal(rooms, 12);
   world.close();
 });
 

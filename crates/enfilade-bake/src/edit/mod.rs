@@ -242,6 +242,7 @@ pub(crate) fn cut_cell(
     // 3. Everything that refers to the cell.
     let mut out = world.clone();
     out.pvs = None;
+    out.room_facts = None;
     out.graph.locator = spliced(&old.locator, cell, &parts.sides, parts.ids).into();
     let halved = parts.hand_out_portals(&mut out, complex.opening_tolerance());
     parts

@@ -88,6 +88,7 @@ pub(super) fn merged(world: &World, into: &[u32]) -> (World, Vec<CellId>) {
     }
     let mut out = world.clone();
     out.pvs = None;
+    out.room_facts = None;
     out.graph.locator = locator(&old.locator, &cell_of).into();
     out.graph.cells = cells;
     out.graph.portals = portals;

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::{DQuat, DVec3};
 use enfilade::kit::{Assembly, End, Link, PlaceError, PlaceOptions};
 use enfilade::world::Pose;
@@ -14,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::output::{Outputs, Written, write_whole};
 use crate::screen::print_json;
 use enfilade_cli::input::read_text;
+use enfilade_cli::world::encode_whole;
 
 /// A file of a level.
 #[derive(Deserialize)]
@@ -175,8 +175,8 @@ pub(crate) fn write_level(
     outputs: &Outputs,
     is_json: bool,
 ) -> anyhow::Result<()> {
-    let world = level.flattened()?;
-    let bytes = encode_glb(&world).context("the level breaks an invariant (a bug)")?;
+    let mut world = level.flattened()?;
+    let bytes = encode_whole(&mut world).context("the level breaks an invariant (a bug)")?;
     write_whole(path, &bytes)?;
     let links = || level.instances().flat_map(|(_, instance)| &instance.links);
     let n = |is: fn(&Link) -> bool| links().filter(|link| is(link)).count();

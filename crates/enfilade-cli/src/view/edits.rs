@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use enfilade::cpg::PortalId;
-use enfilade::cpg::wire::encode_glb;
 use enfilade::geom::DVec3;
 use enfilade::world::PartId;
 use enfilade_render::{PictureMark, portal_looked_at};
@@ -15,6 +14,7 @@ use super::open::Open;
 use super::pointed::{FAR, Pointed};
 use crate::formats::Format;
 use crate::output::write_whole;
+use enfilade_cli::world::encode_whole;
 
 impl App<'_> {
     /// Finds what the pointer means for the editor; returns the marks that show it.
@@ -67,7 +67,8 @@ impl App<'_> {
         let path = editor.save().to_owned();
         let world = editor.world().map_err(anyhow::Error::from);
         let bytes = world.and_then(|edited| {
-            let bytes = encode_glb(&edited.world);
+            // The window goes on showing its own.
+            let bytes = encode_whole(&mut edited.world.clone());
             let bytes = bytes.context("the world breaks an invariant (a bug)")?;
             Ok((bytes, edited.world.graph.rooms().count()))
         });

@@ -55,7 +55,8 @@ fn inspect_prints_the_agreed_json() {
         report["cells"][1],
         json!({"id": 1, "name": "cell-1", "aabb": [[4.0, 0.0, 0.0], [8.0, 3.0, 5.0]],
             "volume": 60.0, "triangles": 2, "detail_triangles": 2, "portals": [0, 1],
-            "outdoor": false, "kind": "room", "storeys": ["1"], "floor_area": 20.0, "height": 2.9, "doors": 0, "windows": 1})
+            "outdoor": false, "kind": "room", "storeys": ["1"], "floor_area": 20.0,
+            "area_above_1_5": 20.0, "area_above_2_3": 20.0, "height": 2.9, "doors": 0, "windows": 1})
     );
     assert_eq!(report["cells"][2]["outdoor"], json!(true));
     assert_eq!(report["cells"][2]["kind"], json!("outdoors"));

@@ -67,6 +67,14 @@ pub enum GraphError {
         /// The cell, portal or place.
         owner: String,
     },
+    /// Facts of a room contradict each other or the graph.
+    #[error("facts of the rooms, at cell {cell}: {problem}")]
+    RoomFacts {
+        /// The room.
+        cell: u32,
+        /// The problem.
+        problem: &'static str,
+    },
     /// A source or a reference to one is invalid.
     #[error("{}: {}", shown(owner), shown(problem))]
     Source {

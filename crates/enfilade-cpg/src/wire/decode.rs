@@ -23,7 +23,7 @@ use super::{CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, VERSION, W
 use crate::look::material_of_text;
 use crate::{
     Batch, Cell, CellId, CellPortalGraph, DetailObject, Locator, LocatorNode, Portal, PortalId,
-    Provenance, Pvs, SourceRuns, SpecialPortal, Statistics, World,
+    PortalKind, Provenance, Pvs, RoomFacts, SourceRuns, SpecialPortal, Statistics, World,
 };
 
 /// Decodes a world from one GLB.
@@ -196,6 +196,7 @@ impl<'a> Reader<'a> {
         let leak_path = self.leak_path()?;
         let pvs = self.pvs()?;
         let graph = self.graph()?;
+        let room_facts = self.room_facts(&graph)?;
         Ok(World {
             graph,
             batches,
@@ -209,7 +210,36 @@ impl<'a> Reader<'a> {
             fixtures,
             about,
             pvs,
+            room_facts,
         })
+    }
+
+    /// Reads the facts of rooms; their doors and windows are those of the graph.
+    fn room_facts(&mut self, graph: &CellPortalGraph) -> Result<Option<Vec<RoomFacts>>, WireError> {
+        let Some(rooms) = &self.root.extensions.graph.rooms else {
+            return Ok(None);
+        };
+        let facts = rooms.iter().map(|room| {
+            let cell = CellId(room.cell);
+            if cell.idx() >= graph.cells.len() {
+                return Err(broken(
+                    "the facts of rooms",
+                    format!("no cell {}", room.cell),
+                ));
+            }
+            let n = |kind| RoomFacts::n_portals(graph, cell, kind);
+            Ok(RoomFacts {
+                cell,
+                storeys: room.storeys.clone(),
+                floor_area: room.floor_area,
+                area_above_1_5: room.area_above_1_5,
+                area_above_2_3: room.area_above_2_3,
+                height: room.height,
+                n_doors: n(PortalKind::Door),
+                n_windows: n(PortalKind::Window),
+            })
+        });
+        facts.collect::<Result<_, _>>().map(Some)
     }
 
     fn leak_path(&mut self) -> Result<Vec<[f32; 3]>, WireError> {

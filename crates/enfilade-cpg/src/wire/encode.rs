@@ -20,7 +20,7 @@ use super::{
     CHUNK_BIN, CHUNK_JSON, EXTENSION, GLB_MAGIC, GLB_VERSION, LEAK_PATH, LIGHTS, VERSION, WireError,
 };
 use crate::look::{add_extensions, material_text, n_texcoord_sets, sampler_text};
-use crate::{CellId, World};
+use crate::{CellId, RoomFacts, World};
 
 /// Encodes a world as one GLB.
 ///
@@ -154,6 +154,7 @@ fn lay_out<'a>(layout: &mut Layout<'a>, world: &'a World) -> json::Root {
                 fixtures: placed.nodes,
                 leak_path,
                 pvs,
+                rooms: rooms(world),
                 places: graph.places.clone(),
                 provenance: provenance(world),
                 statistics: statistics(layout, world),
@@ -534,6 +535,19 @@ fn cells(world: &World) -> Vec<json::CellJson> {
         why: cell.why.clone(),
     };
     world.graph.cells.iter().enumerate().map(cell).collect()
+}
+
+fn rooms(world: &World) -> Option<Vec<json::RoomJson>> {
+    let room = |room: &RoomFacts| json::RoomJson {
+        cell: room.cell.0,
+        storeys: room.storeys.clone(),
+        floor_area: room.floor_area,
+        area_above_1_5: room.area_above_1_5,
+        area_above_2_3: room.area_above_2_3,
+        height: room.height,
+    };
+    let facts = world.room_facts.as_ref()?;
+    Some(facts.iter().map(room).collect())
 }
 
 fn portals(world: &World) -> Vec<json::PortalJson> {

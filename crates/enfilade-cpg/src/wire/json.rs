@@ -238,6 +238,9 @@ pub(super) struct Graph {
     pub(super) leak_path: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) pvs: Option<PvsJson>,
+    /// Facts of all rooms, ascending. Absent unless computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) rooms: Option<Vec<RoomJson>>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) places: Vec<DecidedPlace>,
     pub(super) provenance: ProvenanceJson,
@@ -262,6 +265,20 @@ pub(super) struct CellJson {
     pub(super) land: bool,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) why: Vec<Why>,
+}
+
+/// Facts of a room. Its doors and windows are portals.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct RoomJson {
+    pub(super) cell: u32,
+    pub(super) storeys: Vec<String>,
+    pub(super) floor_area: f64,
+    #[serde(rename = "areaAbove1_5")]
+    pub(super) area_above_1_5: f64,
+    #[serde(rename = "areaAbove2_3")]
+    pub(super) area_above_2_3: f64,
+    pub(super) height: f64,
 }
 
 #[derive(Serialize, Deserialize)]

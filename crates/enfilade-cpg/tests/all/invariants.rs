@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::common;
 
-use common::two_rooms;
+use common::{room_facts, two_rooms};
 use enfilade_cpg::{
     Cell, CellId, FittingPart, GraphError, Locator, LocatorNode, MotionKind, PortalId, PortalKind,
     World,
@@ -63,6 +63,33 @@ breaks! {
         => GraphError::CellPortals { cell: 1, .. },
     a_cell_lists_its_portals_ascending: |w| w.graph.cells[1].portals.reverse()
         => GraphError::CellPortals { cell: 1, .. },
+    facts_are_those_of_all_rooms: |w| w.room_facts = Some(room_facts(w)[1..].to_vec())
+        => GraphError::RoomFacts { cell: 0, .. },
+    facts_are_in_the_order_of_rooms: |w| {
+        let mut facts = room_facts(w);
+        facts.swap(0, 1);
+        w.room_facts = Some(facts);
+    } => GraphError::RoomFacts { cell: 0, .. },
+    a_part_of_a_floor_is_no_larger: |w| {
+        let mut facts = room_facts(w);
+        facts[1].area_above_2_3 = 18.0;
+        w.room_facts = Some(facts);
+    } => GraphError::RoomFacts { cell: 1, .. },
+    a_floor_is_a_number: |w| {
+        let mut facts = room_facts(w);
+        facts[1].floor_area = f64::NAN;
+        w.room_facts = Some(facts);
+    } => GraphError::RoomFacts { cell: 1, .. },
+    a_room_is_no_higher_than_its_box: |w| {
+        let mut facts = room_facts(w);
+        facts[1].height = 30.0;
+        w.room_facts = Some(facts);
+    } => GraphError::RoomFacts { cell: 1, .. },
+    facts_count_the_doors_of_the_graph: |w| {
+        let mut facts = room_facts(w);
+        facts[0].n_doors += 1;
+        w.room_facts = Some(facts);
+    } => GraphError::RoomFacts { cell: 0, .. },
     a_leak_path_is_a_line: |w| w.leak_path = vec![[0.0; 3]]
         => GraphError::LeakPath,
     a_leak_path_is_finite: |w| w.leak_path = vec![[0.0; 3], [f32::NAN, 0.0, 0.0]]

@@ -6,7 +6,8 @@
 use crate::common;
 
 use common::{
-    nasty_rooms, two_rooms, two_rooms_with_parts, two_rooms_with_pvs, two_rooms_with_specials,
+    nasty_rooms, room_facts, two_rooms, two_rooms_with_parts, two_rooms_with_pvs,
+    two_rooms_with_specials,
 };
 use enfilade_cpg::wire::{EXTENSION, encode_glb};
 use enfilade_cpg::{Fact, Reason, World};
@@ -149,6 +150,8 @@ fn encoded_worlds_follow_the_schema() {
         leak_path: vec![[0.0; 3], [1.0; 3]],
         ..two_rooms()
     };
+    let mut measured = two_rooms();
+    measured.room_facts = Some(room_facts(&measured));
     let seen = two_rooms_with_pvs();
     let parts = two_rooms_with_parts();
     for world in [
@@ -156,6 +159,7 @@ fn encoded_worlds_follow_the_schema() {
         nasty_rooms(),
         World::default(),
         leaking,
+        measured,
         seen,
         parts,
         two_rooms_with_specials(),
@@ -174,6 +178,7 @@ fn the_schema_names_every_field_that_is_written() {
         ..two_rooms_with_specials()
     };
     world.graph.cells[0].is_void = true;
+    world.room_facts = Some(room_facts(&world));
     let good = extension(&world);
     for (pointer, optional) in [
         (
@@ -187,6 +192,7 @@ fn the_schema_names_every_field_that_is_written() {
                 "fixtures",
                 "leakPath",
                 "pvs",
+                "rooms",
                 "places",
             ][..],
         ),
@@ -210,6 +216,7 @@ fn the_schema_names_every_field_that_is_written() {
         ("/specials/2/passes/0", &["translation", "rotation", "back"]),
         ("/locator", &["bounds", "outside", "planes", "nodes"]),
         ("/provenance", &[]),
+        ("/rooms/0", &[]),
         ("/pvs", &["parts", "volumes"]),
         ("/pvs/parts", &["runs"]),
         ("/pvs/volumes", &["planes"]),

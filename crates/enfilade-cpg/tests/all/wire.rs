@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::common;
 
-use common::{floor, nasty_rooms, two_rooms};
+use common::{floor, nasty_rooms, room_facts, two_rooms};
 use enfilade_cpg::wire::{EXTENSION, WireError, decode_glb, encode_glb};
 use enfilade_cpg::{Batch, CellId, CellSet, Pvs, SourceRuns, World};
 use enfilade_geom::scene::Primitive;
@@ -108,6 +108,27 @@ fn a_leak_path_comes_back_as_a_line_that_is_no_surface() {
     assert_eq!(root["accessors"][position]["count"], 3);
     // Without a leak path, the file does not mention it.
     assert!(!without.to_string().contains("leak"));
+}
+
+#[test]
+fn facts_of_rooms_come_back_and_cost_nothing_where_there_are_none() {
+    let mut world = two_rooms();
+    let without = encode_glb(&world).unwrap();
+    assert!(
+        json(&without)["extensions"][EXTENSION]
+            .get("rooms")
+            .is_none()
+    );
+    world.room_facts = Some(room_facts(&world));
+    let bytes = encode_glb(&world).unwrap();
+    let read = decode_glb(&bytes).unwrap();
+    assert_eq!(read.room_facts, world.room_facts);
+    assert_eq!(encode_glb(&read).unwrap(), bytes);
+    let plain = World {
+        room_facts: None,
+        ..read
+    };
+    assert_eq!(encode_glb(&plain).unwrap(), without);
 }
 
 #[test]

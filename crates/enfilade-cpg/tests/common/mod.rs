@@ -4,8 +4,8 @@
 use enfilade_cpg::{
     Batch, Cell, CellId, CellPortalGraph, CellSet, DecidedPlace, DetailObject, Fact, Fitting,
     FittingPart, Locator, LocatorNode, MonitorCamera, Motion, MotionKind, PartNumbers, Pass,
-    Portal, PortalId, PortalKind, Provenance, Pvs, Reason, SourceRuns, SpecialId, SpecialPortal,
-    SpecialShape, Statistics, VisibleParts, VisibleVolumes, Way, Why, World,
+    Portal, PortalId, PortalKind, Provenance, Pvs, Reason, RoomFacts, SourceRuns, SpecialId,
+    SpecialPortal, SpecialShape, Statistics, VisibleParts, VisibleVolumes, Way, Why, World,
 };
 use enfilade_geom::scene::{
     About, Fixture, FixtureKind, Image, Material, Mesh, Primitive, SourceNode, Texture,
@@ -286,6 +286,7 @@ pub(crate) fn two_rooms() -> World {
         }],
         leak_path: Vec::new(),
         pvs: None,
+        room_facts: None,
     }
 }
 
@@ -505,4 +506,20 @@ pub(crate) fn nasty_rooms() -> World {
     });
     world.textures.push(Texture::default());
     world
+}
+
+/// Facts of the rooms of a world: some numbers, each other.
+pub(crate) fn room_facts(world: &World) -> Vec<RoomFacts> {
+    let n = |cell, kind| RoomFacts::n_portals(&world.graph, cell, kind);
+    let facts = world.graph.rooms().map(|(cell, _)| RoomFacts {
+        cell,
+        storeys: vec!["1".into(), "2a".into()],
+        floor_area: 20.125,
+        area_above_1_5: 17.5,
+        area_above_2_3: 10.25,
+        height: 2.5,
+        n_doors: n(cell, PortalKind::Door),
+        n_windows: n(cell, PortalKind::Window),
+    });
+    facts.collect()
 }

@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-use enfilade_cpg::World;
+use enfilade_cpg::{RoomFacts, World};
 
 use super::{cell_kind, portal_kind};
-use crate::{RoomFacts, room_facts};
+use crate::room_facts;
 
-/// Returns the cells of a world as a table: `id,name,kind,storey,floor_area,height,doors,windows,volume` and the box. What is
-/// no room has no storey, floor, height, doors or windows.
+/// Returns the cells of a world as a table: `id,name,kind,storey,floor_area,area_above_1_5,area_above_2_3,height,doors,windows,volume` and
+/// the box. What is no room has no storey, areas, height, doors or windows.
 #[must_use]
 pub fn cells_csv(world: &World) -> String {
     let rooms = room_facts(world);
@@ -23,17 +23,18 @@ pub(crate) fn cells_table(
     shown: impl Fn(&str) -> Cow<'_, str>,
 ) -> String {
     let mut out = String::from(
-        "id,name,kind,storey,floor_area,height,doors,windows,volume,min_x,min_y,min_z,max_x,max_y,max_z\r\n",
+        "id,name,kind,storey,floor_area,area_above_1_5,area_above_2_3,height,doors,windows,volume,min_x,min_y,min_z,max_x,max_y,max_z\r\n",
     );
     for (id, cell) in world.graph.cells.iter().enumerate() {
         let (name, kind, volume) = (field(&shown(&cell.name)), cell_kind(cell), cell.volume);
         let [[x0, y0, z0], [x1, y1, z1]] = cell.aabb;
-        let room = rooms.iter().find(|r| r.cell.0 as usize == id);
-        let room = room.map_or(",,,,".to_owned(), |r| {
+        let at = rooms.binary_search_by_key(&id, |r| r.cell.0 as usize);
+        let room = at.ok().map(|at| &rooms[at]);
+        let room = room.map_or(",,,,,,".to_owned(), |r| {
             let storeys = r.storeys.join(" ");
             format!(
-                "{storeys},{:.3},{:.3},{},{}",
-                r.floor_area, r.height, r.n_doors, r.n_windows
+                "{storeys},{:.3},{:.3},{:.3},{:.3},{},{}",
+                r.floor_area, r.area_above_1_5, r.area_above_2_3, r.height, r.n_doors, r.n_windows
             )
         });
         let _ = write!(

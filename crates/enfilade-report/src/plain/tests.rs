@@ -177,7 +177,9 @@ fn tables_quote_commas_and_disarm_formulas() {
     let lines: Vec<&str> = cells.split("\r\n").collect();
     assert_eq!(lines.len(), 5, "{cells}");
     assert!(
-        lines[1].starts_with("0,\"Tom & \"\"Ann\"\" <1>, east\",room,1,20.000,3.000,1,0,60,"),
+        lines[1].starts_with(
+            "0,\"Tom & \"\"Ann\"\" <1>, east\",room,1,20.000,20.000,20.000,3.000,1,0,60,"
+        ),
         "{cells}"
     );
     assert!(lines[2].starts_with("1,'=hall"), "{cells}");

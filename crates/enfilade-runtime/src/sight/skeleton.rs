@@ -111,6 +111,7 @@ impl SightSkeleton {
             fixtures: world.fixtures.clone(),
             about: world.about.clone(),
             pvs,
+            room_facts: world.room_facts.clone(),
         }
     }
 

@@ -48,6 +48,10 @@ class Room:
     """The names of the storeys that it stands on, from below."""
     floor_area: float
     """In square meters, as seen from above, without the recesses of doors and windows."""
+    area_above_1_5: float
+    """The part of it over which the room is 1.5 m high or more: less than all of it under sloped ceilings."""
+    area_above_2_3: float
+    """The part over which it is 2.3 m high or more."""
     height: float
     """The clear height over most of the floor, in meters."""
     doors: int
@@ -361,8 +365,8 @@ class World:
             counts = is_window & is_out[portals.cells[:, other]]
             np.add.at(glass, portals.cells[counts, one], portals.areas[counts])
         return [
-            Room(id, cells.names[id], tuple(on), area, height, *n, float(cells.volumes[id]), float(glass[id]))
-            for id, on, area, height, n in self._native.rooms()
+            Room(id, cells.names[id], tuple(on), *measures, *n, float(cells.volumes[id]), float(glass[id]))
+            for id, on, measures, n in self._native.rooms()
         ]
 
     def outlines(self, *, height: float = 1.2) -> Dict[int, List[np.ndarray]]:
@@ -401,7 +405,7 @@ class World:
         pandas = _lazily("pandas")
         if of == "rooms":
             columns = (
-                "name storeys floor_area height volume doors windows window_area".split()
+                "name storeys floor_area area_above_1_5 area_above_2_3 height volume doors windows window_area".split()
             )
             rows = [[getattr(room, column) for column in columns] for room in self.rooms]
             frame = pandas.DataFrame(rows, columns=columns)
@@ -520,7 +524,7 @@ class World:
         objects: False to walk through objects, such as furniture.
 
         The first path of a walker takes seconds in a large building, later ones milliseconds. Raises ``NoPathError`` if
-        there is none.
+        there is none: it names the door or place where the walk ends, and how far one gets.
         """
         ends = [_arrays.point("start", start), _arrays.point("end", end)]
         found = self._native.path(ends, radius, height, step, _ids(closed), objects)
