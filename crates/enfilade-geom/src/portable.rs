@@ -61,7 +61,7 @@ mod twice {
 
     /// Returns the angle of a direction in the first quadrant. [Units: rad]
     #[must_use]
-    pub fn angle(sin: f64, cos: f64) -> f64 {
+    pub(super) fn angle(sin: f64, cos: f64) -> f64 {
         let rough = sin.atan2(cos);
         // The series of the cosine and the sine of the rough angle.
         let (mut term, mut series) = ((1.0, 0.0), [(1.0, 0.0), (0.0, 0.0)]);

@@ -6,7 +6,6 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use enfilade_cpg::{CellId, Portal, PortalKind, RoomFacts, World};
 use enfilade_geom::poly::cut_out;
@@ -331,6 +330,8 @@ fn recess(world: &World, cell: CellId, portal: &Portal) -> Option<Recess> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use enfilade_cpg::{Batch, Cell, Locator, LocatorNode};
     use enfilade_geom::scene::Primitive;
 
@@ -414,7 +415,8 @@ mod tests {
             [room.floor_area, room.area_above_1_5, room.area_above_2_3]
         };
         near_all(areas(&world), [15.0, 15.0, 15.0]);
-        world.graph.locator.planes[4] = [0.5_f64.sqrt(), -0.5_f64.sqrt(), 0.0, 0.0];
+        Arc::make_mut(&mut world.graph.locator).planes[4] =
+            [0.5_f64.sqrt(), -0.5_f64.sqrt(), 0.0, 0.0];
         near_all(areas(&world), [15.0, 12.5, 8.5]);
         let level = self::world(&[[[0.0; 3], [5.0, 2.3, 4.0]]]);
         near_all(areas(&level), [20.0, 20.0, 20.0]);

@@ -5,8 +5,6 @@
 //! can skip are removed. No step makes the path longer, so the process ends, at a path that is the shortest of those it can be
 //! pulled to without leaving the floors. O(rounds · bends · squares along them).
 
-use std::sync::Arc;
-
 use enfilade_geom::DVec3;
 
 use crate::paths::floors::{Floors, Hindrance};
@@ -157,6 +155,8 @@ fn move_bend(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::bodies::Agent;
     use crate::layout::Layout;
