@@ -6,6 +6,7 @@ use enfilade_geom::DMat4;
 use enfilade_geom::scene::{Mesh, Primitive};
 
 use crate::builder::{Builder, Placement};
+use crate::files::Beside;
 use crate::{ImportError, ImportOptions, Imported, finish, soup};
 
 /// A placed mesh as arrays.
@@ -36,7 +37,7 @@ pub fn import_arrays(
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
     let mut builder = Builder::new(options)?;
-    builder.begin_file(Path::new(name), None, false);
+    builder.begin_file(Path::new(name), Beside::Nothing, false);
     builder.set_format("arrays");
     for (i, mesh) in meshes.into_iter().enumerate() {
         builder.is_detail_file = mesh.is_detail;

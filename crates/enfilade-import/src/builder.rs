@@ -4,12 +4,12 @@ mod naming;
 mod openings;
 mod variants;
 
+use crate::files::Beside;
 use crate::groups::name_groups;
-use crate::held::HeldFiles;
 use crate::left_out::leave_out;
 use crate::order::sort;
 use crate::origins::Origins;
-use crate::{ImportError, ImportOptions, ImportReport, Limits, files};
+use crate::{ImportError, ImportOptions, ImportReport, Limits};
 use enfilade_geom::scene::{
     Entity, Filling, Image, Material, Mesh, Object, Primitive, Role, Scene, Texture,
 };
@@ -25,10 +25,8 @@ pub(crate) struct Builder<'a> {
     pub(crate) report: ImportReport,
     /// The file being read.
     pub(crate) path: PathBuf,
-    /// Folder of its relative references; `None` when read from memory.
-    folder: Option<PathBuf>,
-    /// Files in memory, to which it may refer instead.
-    held: Option<&'a HeldFiles>,
+    /// The files to which it may refer.
+    beside: Beside<'a>,
     pub(crate) base: DMat4,
     scene: Scene,
     pub(crate) is_detail_file: bool,
@@ -78,8 +76,7 @@ impl<'a> Builder<'a> {
             options,
             report: ImportReport::default(),
             path: PathBuf::new(),
-            folder: None,
-            held: None,
+            beside: Beside::Nothing,
             scene: Scene::default(),
             is_detail_file: false,
             n_triangles: 0,
@@ -94,15 +91,10 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Lets scenes refer to files in memory, and to no others.
-    pub(crate) fn hold(&mut self, held: &'a HeldFiles) {
-        self.held = Some(held);
-    }
-
     /// Starts a file.
-    pub(crate) fn begin_file(&mut self, path: &Path, folder: Option<&Path>, is_detail: bool) {
+    pub(crate) fn begin_file(&mut self, path: &Path, beside: Beside<'a>, is_detail: bool) {
         self.path = path.to_path_buf();
-        self.folder = folder.map(Path::to_path_buf);
+        self.beside = beside;
         self.is_detail_file = is_detail;
         self.report.files.push(crate::FileReport {
             path: path.to_path_buf(),
@@ -136,12 +128,8 @@ impl<'a> Builder<'a> {
         reference: &str,
         limit: u64,
     ) -> Result<Vec<u8>, String> {
-        let folder = self.folder.as_deref();
         let may_leave = self.options.allow_outside;
-        let (path, bytes) = match self.held {
-            Some(held) => held.reference(&self.path, reference, limit)?,
-            None => files::read_reference(folder, reference, may_leave, limit)?,
-        };
+        let (path, bytes) = (self.beside).read(&self.path, reference, may_leave, limit)?;
         if !self.report.references.contains(&path) {
             self.report.references.push(path);
         }

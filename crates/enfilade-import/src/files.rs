@@ -1,6 +1,7 @@
 //! Files on disk, read with a size limit, and detection of picture formats.
 
 use crate::ImportError;
+use crate::held::HeldFiles;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -106,12 +107,39 @@ pub(crate) fn decode_data_uri(uri: &str) -> Option<Result<(String, Vec<u8>), Str
     Some(bytes.map(|bytes| (mime, bytes)))
 }
 
+/// The files to which a scene may refer.
+pub(crate) enum Beside<'a> {
+    /// None: it was read from a stream.
+    Nothing,
+    /// Those of a folder.
+    Folder(PathBuf),
+    /// Those in memory.
+    Held(&'a HeldFiles),
+}
+
+impl Beside<'_> {
+    /// Reads a file of at most `limit` bytes to which a scene refers. Returns its path and bytes, or the reason for refusal.
+    pub(crate) fn read(
+        &self,
+        scene: &Path,
+        reference: &str,
+        may_leave: bool,
+        limit: u64,
+    ) -> Result<(PathBuf, Vec<u8>), String> {
+        match self {
+            Self::Nothing => read_reference(None, reference, may_leave, limit),
+            Self::Folder(folder) => read_reference(Some(folder), reference, may_leave, limit),
+            Self::Held(held) => held.reference(scene, reference, limit),
+        }
+    }
+}
+
 /// Reads a file of at most `limit` bytes that a scene in `folder` refers to. Returns its path and
 /// bytes, or the reason for refusal.
 ///
 /// All such files are read here: the author of the scene chooses the reference, but the disk is the reader's. So the
 /// file must lie in the scene's folder or below, even after following links, unless `may_leave` is set.
-pub(crate) fn read_reference(
+fn read_reference(
     folder: Option<&Path>,
     reference: &str,
     may_leave: bool,

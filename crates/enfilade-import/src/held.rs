@@ -3,9 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::builder::Builder;
-use crate::{ImportError, ImportOptions, Imported, finish, read_any};
-
 /// Endings of files to which scenes refer, and that are none themselves: buffers, materials, pictures.
 const REFERRED: [&str; 14] = [
     "bin", "mtl", "png", "jpg", "jpeg", "webp", "ktx2", "basis", "dds", "bmp", "gif", "tga",
@@ -39,7 +36,7 @@ impl HeldFiles {
     }
 
     /// Iterates over the scenes: all files but those that scenes refer to. If there are only such files, over all of them.
-    fn scenes(&self) -> impl Iterator<Item = (&str, &[u8])> {
+    pub(crate) fn scenes(&self) -> impl Iterator<Item = (&str, &[u8])> {
         let is_scene = |name: &str| {
             let ending = Path::new(name).extension().unwrap_or_default();
             let ending = ending.to_string_lossy().to_ascii_lowercase();
@@ -48,6 +45,11 @@ impl HeldFiles {
         let has_scene = self.files.keys().any(|name| is_scene(name));
         let all = self.files.iter().map(|(name, bytes)| (&**name, &**bytes));
         all.filter(move |(name, _)| !has_scene || is_scene(name))
+    }
+
+    /// Returns `true` if all objects of a file are detail.
+    pub(crate) fn is_detail(&self, name: &str) -> bool {
+        self.detail.contains(name)
     }
 
     /// Returns the file that a scene refers to: beside it as named, or else the only one of that name in any folder.
@@ -105,23 +107,6 @@ fn tidy(path: &str) -> String {
     names.join("/")
 }
 
-/// Works as [`import`](crate::import) on files in memory; scenes refer to others of them, and never to the disk.
-///
-/// # Errors
-///
-/// As [`import`](crate::import).
-pub fn import_held(files: &HeldFiles, options: &ImportOptions) -> Result<Imported, ImportError> {
-    let mut builder = Builder::new(options)?;
-    builder.hold(files);
-    for (name, bytes) in files.scenes() {
-        let path = Path::new(name);
-        builder.begin_file(path, None, files.detail.contains(name));
-        builder.add_read_bytes(bytes.len() as u64);
-        read_any(bytes, path, &mut builder)?;
-    }
-    finish(builder, options)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,17 +138,5 @@ mod tests {
         assert!(found("t.png").unwrap_err().contains("give it, too"));
         assert!(found("http://host/x.bin").is_err());
         assert!(files.reference(Path::new(""), "x.bin", 3).is_err());
-    }
-
-    #[test]
-    fn a_scene_reads_its_materials_from_memory() {
-        let obj = b"mtllib m.mtl\nusemtl red\no Wall\nv 0 0 0\nv 4 0 0\nv 4 3 0\nf 1 2 3\n";
-        let files = [("a.obj", &obj[..]), ("m.mtl", b"newmtl red\nKd 1 0 0\n")];
-        let files = files.map(|(name, bytes)| (name.to_owned(), bytes.to_vec()));
-        let read = import_held(&HeldFiles::from_iter(files), &ImportOptions::default()).unwrap();
-        assert_eq!(read.scene.objects.len(), 1);
-        assert!(read.scene.materials.iter().any(|m| m.name == "red"));
-        let alone = import_held(&held(&["m.mtl"]), &ImportOptions::default());
-        assert!(alone.is_err());
     }
 }

@@ -60,7 +60,7 @@ pub use enfilade_prepare::{
 };
 pub use error::ImportError;
 pub use export::export_glb;
-pub use held::{HeldFiles, import_held};
+pub use held::HeldFiles;
 pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
@@ -75,6 +75,7 @@ use enfilade_geom::scene::Scene;
 pub use enfilade_source::AirSide;
 pub use enfilade_source::HeightOptions;
 use enfilade_source::{FreeformScene, HeightMap, ImplicitScene, Volume};
+use files::Beside;
 use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -156,18 +157,38 @@ pub fn import_sources<'a>(
     let mut builder = Builder::new(options)?;
     for source in sources {
         let (path, limit) = (&source.path, options.limits.max_file_bytes);
-        let (from, folder): (Box<dyn Read>, _) = match source.stream {
-            None => (Box::new(files::open_file(path, limit)?), path.parent()),
-            Some(stream) => (stream, None),
+        let (from, beside): (Box<dyn Read>, _) = match source.stream {
+            None => {
+                let folder = path.parent().map(Path::to_path_buf);
+                let beside = folder.map_or(Beside::Nothing, Beside::Folder);
+                (Box::new(files::open_file(path, limit)?), beside)
+            }
+            Some(stream) => (stream, Beside::Nothing),
         };
         let length = |head: &[u8], is_all| {
             let format = format_of(head, path, if is_all { 0 } else { limit })?;
             Ok(format.length(head, &options.limits))
         };
         let bytes = files::read_headed(from, path, limit, length)?;
-        builder.begin_file(path, folder, source.is_detail);
+        builder.begin_file(path, beside, source.is_detail);
         builder.add_read_bytes(bytes.len() as u64);
         read_any(&bytes, path, &mut builder)?;
+    }
+    finish(builder, options)
+}
+
+/// Works as [`import`] on files in memory; scenes refer to others of them, and never to the disk.
+///
+/// # Errors
+///
+/// As [`import`].
+pub fn import_held(files: &HeldFiles, options: &ImportOptions) -> Result<Imported, ImportError> {
+    let mut builder = Builder::new(options)?;
+    for (name, bytes) in files.scenes() {
+        let path = Path::new(name);
+        builder.begin_file(path, Beside::Held(files), files.is_detail(name));
+        builder.add_read_bytes(bytes.len() as u64);
+        read_any(bytes, path, &mut builder)?;
     }
     finish(builder, options)
 }
@@ -413,7 +434,7 @@ fn decode(
     read: impl Fn(&[u8], &mut Builder<'_>) -> Result<(), ImportError>,
 ) -> Result<Imported, ImportError> {
     let mut builder = Builder::new(options)?;
-    builder.begin_file(Path::new(name), None, false);
+    builder.begin_file(Path::new(name), Beside::Nothing, false);
     builder.add_read_bytes(bytes.len() as u64);
     read(bytes, &mut builder)?;
     finish(builder, options)

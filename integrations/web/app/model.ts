@@ -100,7 +100,7 @@ export class ModelView {
     const far = 0.5 * size.length() + 1;
     const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, this.camera.aspect || 1);
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).add(new Vector3(0.35, 0.95, 0.75).normalize().multiplyScalar((0.85 * far) / half));
+    this.camera.position.copy(middle).add(new Vector3(0.35, 0.95, 0.75).normalize().multiplyScalar((1.05 * far) / half));
     this.camera.near = far / 500;
     this.camera.far = far * 20;
     this.camera.updateProjectionMatrix();

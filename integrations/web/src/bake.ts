@@ -1,5 +1,5 @@
 /** The whole bake without a server: files in, a world, its plan and its rooms out. */
-import { bytesOf, type WasmSource } from './wasm.js';
+import { bytesOf, type WasmSource } from './bytes.js';
 import { runModule, type ModuleAnswer, type ModuleFile, type Question, type Refusal } from './bake-module.js';
 
 export type { Question, Refusal } from './bake-module.js';

@@ -1,4 +1,7 @@
 /** The WebAssembly module: its functions, and access to its memory. */
+import { bytesOf, type WasmSource } from './bytes.js';
+
+export { bytesOf, type WasmSource } from './bytes.js';
 
 /** Functions that the module exports; `integrations/abi` describes each. */
 export interface Exports {
@@ -38,9 +41,6 @@ export interface Exports {
 
 /** Version of the C interface that this package is written for. */
 const ABI_VERSION = 1;
-
-/** Something to make the module of: its bytes, an address, or the compiled module. */
-export type WasmSource = BufferSource | URL | string | WebAssembly.Module;
 
 /** An instance of the module. Worlds of one instance share its memory. */
 export class Runtime {
@@ -126,23 +126,6 @@ export class Runtime {
       this.refresh();
     }
   }
-}
-
-/** Reads bytes from an address; also from files, in node. */
-export async function bytesOf(source: BufferSource | URL | string): Promise<Uint8Array<ArrayBuffer>> {
-  if (source instanceof ArrayBuffer) return new Uint8Array(source);
-  if (ArrayBuffer.isView(source)) {
-    return new Uint8Array(source.buffer as ArrayBuffer, source.byteOffset, source.byteLength);
-  }
-  const address = String(source);
-  // Not imported: browsers have no such module, and bundlers would look for it.
-  const fs = address.startsWith('file:') ? globalThis.process?.getBuiltinModule?.('fs') : undefined;
-  if (fs) return new Uint8Array(await fs.promises.readFile(new URL(address)));
-  const answer = await fetch(address).catch((why: Error) => {
-    throw new Error(`${address}: ${why.message}`);
-  });
-  if (!answer.ok) throw new Error(`${address}: ${answer.status} ${answer.statusText}`);
-  return new Uint8Array(await answer.arrayBuffer());
 }
 
 /** Compiles the module that lies at an address; says what to do if there is none. */

@@ -90,16 +90,24 @@ function map() {
 /** The building in each format: the files of each. */
 export const formats = { gltf: gltf(), obj: obj(), ply: ply(), stl: stl(), map: map() };
 
-/** The building in another unit, as an STL: its numbers are `factor` times meters. */
-export function scaled(factor) {
+/** The building as an STL with each point moved. */
+function moved(move) {
   const [{ name, bytes }] = stl();
   const own = bytes.slice();
   const view = new DataView(own.buffer);
-  for (let i = 0; i < triangles.length; i++) {
-    for (let k = 0; k < 9; k++) {
-      const at = 84 + 50 * i + 12 + 4 * k;
-      view.setFloat32(at, factor * view.getFloat32(at, true), true);
-    }
+  for (let k = 0; k < 3 * triangles.length; k++) {
+    const at = 84 + 50 * Math.floor(k / 3) + 12 + 12 * (k % 3);
+    const point = [0, 4, 8].map((axis) => view.getFloat32(at + axis, true));
+    move(point).forEach((value, axis) => view.setFloat32(at + 4 * axis, value, true));
   }
   return [{ name, bytes: own }];
+}
+
+/** The building in another unit: its numbers are `factor` times meters. */
+export const scaled = (factor) => moved((point) => point.map((value) => factor * value));
+
+/** The building turned by an angle. [Units: degrees] */
+export function turned(degrees) {
+  const [sin, cos] = [Math.sin, Math.cos].map((of) => of((degrees * Math.PI) / 180));
+  return moved(([x, y, z]) => [cos * x - sin * z, y, sin * x + cos * z]);
 }

@@ -1,4 +1,4 @@
-//! What a bake returns: bytes, a drawing, and data for the page.
+//! The result of a bake: bytes, a drawing, and data for the page.
 
 use enfilade_cpg::{Cell, World};
 use enfilade_import::ImportReport;
@@ -22,7 +22,7 @@ pub struct Failure {
     pub kind: &'static str,
     /// The reason and the remedy.
     pub text: String,
-    /// What to ask the person for, if that would help.
+    /// Questions to the person, if answers would help.
     pub questions: Vec<Question>,
 }
 

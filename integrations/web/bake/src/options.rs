@@ -1,4 +1,4 @@
-//! What a caller asks for, as JSON.
+//! Requests of callers, as JSON.
 
 use std::time::Duration;
 
