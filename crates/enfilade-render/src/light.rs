@@ -23,7 +23,7 @@ pub(crate) use balance::sun_of;
 /// Texels in a row of a table; `light.wgsl` uses the same number.
 const ROW: u32 = 1024;
 /// Mean brightness of a room in its pictures, relative to the outdoors.
-const MIDDLE: f32 = 0.75;
+const MIDDLE: f32 = 0.9;
 /// The longest exposure, relative to that of the outdoors.
 const LONGEST: f32 = 8.0;
 /// … and the shortest: of a court with white walls, in the sun.

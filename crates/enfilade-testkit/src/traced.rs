@@ -454,11 +454,16 @@ fn emitted(material: &Material) -> [u8; 3] {
     })
 }
 
-/// Returns the linear color of a surface that emits a color, as the renderer compresses bright values.
+/// Exponent of the contrast of the renderer's pictures.
+const CONTRAST: f64 = 1.35;
+
+/// Returns the linear color of a surface that emits a color, as the renderer compresses bright values and adds contrast.
 fn toned(color: [u8; 3]) -> [f64; 3] {
     let c = color.map(|x| f64::from(x) / 255.0);
     let most = c[0].max(c[1]).max(c[2]);
-    c.map(|x| x / (1.0 + most.powi(3)).cbrt())
+    let fitted = 1.0 / (1.0 + most.powi(3)).cbrt();
+    let contrast = (most * fitted).max(1e-6).powf(CONTRAST - 1.0);
+    c.map(|x| x * fitted * contrast)
 }
 
 fn encoded(x: f64) -> u8 {
