@@ -15,6 +15,7 @@ mod costs;
 mod doorless;
 mod evidence;
 mod export;
+mod facts;
 mod habits;
 mod jobs;
 mod kits;
