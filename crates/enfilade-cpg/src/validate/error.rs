@@ -68,7 +68,9 @@ pub enum GraphError {
         owner: String,
     },
     /// Facts of a room contradict each other or the graph.
-    #[error("facts of the rooms, at cell {cell}: {problem}")]
+    #[error(
+        "facts of the rooms, at cell {cell}: {problem}; who changes rooms or portals drops `room_facts`"
+    )]
     RoomFacts {
         /// The room.
         cell: u32,
