@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 
 use enfilade_geom::DVec3;
 
-use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, World};
+use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, World};
 
 /// A portal seen from one of its cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,6 +65,15 @@ impl CellPortalGraph {
     /// Returns the rooms: all cells but the outdoors, voids and open land, ascending. O(cells).
     pub fn rooms(&self) -> impl Iterator<Item = (CellId, &Cell)> + Clone {
         self.indoor_cells().filter(|(_, cell)| cell.is_room())
+    }
+
+    /// Returns the number of portals of a kind of a cell.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn n_portals(&self, cell: CellId, kind: PortalKind) -> usize {
+        // A graph that is not checked yet may list portals that it lacks.
+        let portals = (self[cell].portals.iter()).filter_map(|p| self.portals.get(p.idx()));
+        portals.filter(|p| p.kind == kind).count()
     }
 
     /// Returns rooms and open land, all cells that maps show, ascending. O(cells).

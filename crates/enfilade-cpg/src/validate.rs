@@ -6,6 +6,7 @@
 
 mod error;
 mod extent;
+mod facts;
 mod fitting;
 mod geometry;
 mod locator;
@@ -16,7 +17,7 @@ mod special_error;
 
 use std::collections::HashMap;
 
-use crate::{CellPortalGraph, PartNumbers, PortalId, RoomFacts, Why, World};
+use crate::{CellPortalGraph, PartNumbers, PortalId, Why, World};
 use error::Findings;
 use extent::{check_boxes_around_geometry, check_cells_in_locator};
 use geometry::{check_cell_list, check_detail, check_mesh, check_primitive};
@@ -108,7 +109,7 @@ impl World {
         {
             found.push(GraphError::PvsPair { cells, problem });
         }
-        let facts = (self.room_facts.as_ref()).and_then(|f| RoomFacts::problem(f, &self.graph));
+        let facts = (self.room_facts.as_ref()).and_then(|f| facts::problem(f, &self.graph));
         if let Some((cell, problem)) = facts {
             found.push(GraphError::RoomFacts {
                 cell: cell.0,

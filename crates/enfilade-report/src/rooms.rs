@@ -70,7 +70,7 @@ fn measured(world: &World, samples: &Samples, storeys: &[&Storey]) -> Vec<RoomFa
     for level in find_levels(world, samples, BAND) {
         levels.entry(level.cell).or_default().push(level);
     }
-    let n_portals = |id, kind| RoomFacts::n_portals(&world.graph, id, kind);
+    let n_portals = |id, kind| world.graph.n_portals(id, kind);
     let rounded = |measure: f64| (1000.0 * measure).round() / 1000.0;
     let rooms = world.graph.rooms();
     rooms

@@ -1,5 +1,6 @@
 //! An open world with the state of its doors and the buffers of its answers.
 
+mod rooms;
 mod whys;
 
 use enfilade_cpg::wire::decode_glb;
@@ -10,8 +11,8 @@ use enfilade_runtime::{
 };
 
 use crate::answers::{
-    EnfBatch, EnfCell, EnfChunk, EnfDetail, EnfFact, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfRoom,
-    EnfSeen, EnfStart, EnfStep, EnfVisit,
+    EnfBatch, EnfChunk, EnfDetail, EnfFact, EnfHit, EnfLeaf, EnfList, EnfPortal, EnfSeen, EnfStart,
+    EnfStep, EnfVisit,
 };
 use crate::status as s;
 use crate::status::Failure;
@@ -141,54 +142,6 @@ impl EnfWorld {
             s::ENF_PLACES => self.world.graph.places.len(),
             _ => return Err(Failure::argument(format!("no count has the number {what}"))),
         })
-    }
-
-    /// Describes a cell.
-    ///
-    /// # Errors
-    ///
-    /// If it does not exist.
-    pub fn cell(&mut self, cell: u32) -> Result<EnfCell, Failure> {
-        let c = item(&self.world.graph.cells, cell, "cell")?;
-        refill(&mut self.cell_portals, &c.portals, |p| p.0);
-        Ok(EnfCell {
-            name: c.name.as_ptr().cast(),
-            portals: self.cell_portals.as_ptr(),
-            name_length: c.name.len() as u32,
-            n_portals: self.cell_portals.len() as u32,
-            kind: match (c.outdoor, c.is_void) {
-                (true, _) => s::ENF_OUTDOORS,
-                (false, true) => s::ENF_VOID,
-                (false, false) => s::ENF_ROOM,
-            },
-            aabb: six(c.aabb),
-            volume: c.volume,
-        })
-    }
-
-    /// Returns the facts of a cell; `None` if it is no room, or the file has no facts.
-    ///
-    /// # Errors
-    ///
-    /// If it does not exist.
-    pub fn room(&mut self, cell: u32) -> Result<Option<EnfRoom>, Failure> {
-        item(&self.world.graph.cells, cell, "cell")?;
-        let facts = self.world.room_facts.as_deref().unwrap_or_default();
-        let Ok(at) = facts.binary_search_by_key(&CellId(cell), |room| room.cell) else {
-            return Ok(None);
-        };
-        let room = &facts[at];
-        self.storeys = room.storeys.join(" ");
-        Ok(Some(EnfRoom {
-            storeys: self.storeys.as_ptr().cast(),
-            storeys_length: self.storeys.len() as u32,
-            floor_area: room.floor_area as f32,
-            area_above_1_5: room.area_above_1_5 as f32,
-            area_above_2_3: room.area_above_2_3 as f32,
-            height: room.height as f32,
-            n_doors: room.n_doors as u32,
-            n_windows: room.n_windows as u32,
-        }))
     }
 
     /// Describes a portal and its state.

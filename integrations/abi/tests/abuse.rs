@@ -25,7 +25,7 @@ fn file() -> Vec<u8> {
         Why::compared(Reason::Narrow, 0.7, &facts),
     ];
     let facts = world.graph.rooms().map(|(cell, _)| {
-        let n = |kind| RoomFacts::n_portals(&world.graph, cell, kind);
+        let n = |kind| world.graph.n_portals(cell, kind);
         RoomFacts {
             cell,
             storeys: vec!["1".into(), "2".into()],

@@ -227,7 +227,7 @@ impl<'a> Reader<'a> {
                     format!("no cell {}", room.cell),
                 ));
             }
-            let n = |kind| RoomFacts::n_portals(graph, cell, kind);
+            let n = |kind| graph.n_portals(cell, kind);
             Ok(RoomFacts {
                 cell,
                 storeys: room.storeys.clone(),

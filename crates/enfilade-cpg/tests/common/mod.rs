@@ -510,7 +510,7 @@ pub(crate) fn nasty_rooms() -> World {
 
 /// Facts of the rooms of a world: some numbers, each other.
 pub(crate) fn room_facts(world: &World) -> Vec<RoomFacts> {
-    let n = |cell, kind| RoomFacts::n_portals(&world.graph, cell, kind);
+    let n = |cell, kind| world.graph.n_portals(cell, kind);
     let facts = world.graph.rooms().map(|(cell, _)| RoomFacts {
         cell,
         storeys: vec!["1".into(), "2a".into()],

@@ -33,7 +33,7 @@ const BETWEEN_LAMPS: f32 = 4.0;
 const LAMP_HEIGHT: f32 = 0.85;
 /// Share of a lamp's light that comes straight from it; the rest is spread by its shade and the ceiling.
 const STRAIGHT: f32 = 0.6;
-/// Size of a lamp: nearer to it, it is no point. [Units: wu]
+/// Size of a lamp: nearer to it, it is not a point. [Units: wu]
 const LAMP_SIZE: f32 = 0.8;
 /// Brightness of a surface under the open sky.
 const BRIGHTEST: f32 = 1.0;
@@ -389,7 +389,7 @@ impl Probes {
             spread_into_gaps(n, &mut values);
             let lights = || values.iter().flatten().flatten();
             let sum: f32 = lights().map(|&light| luminance(light)).sum();
-            // What a camera measures is what walls reflect: white rooms look no brighter than others.
+            // Cameras measure what walls reflect: white rooms look no brighter than others.
             let reflected = balance.whiteness[cell.idx()].clamp(DARKEST, 1.0) / USUAL;
             brightness[cell.idx()] = reflected * sum / lights().count().max(1) as f32;
             // Without any probe in air, use the light of the walls.

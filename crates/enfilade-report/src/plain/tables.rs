@@ -9,7 +9,7 @@ use super::{cell_kind, portal_kind};
 use crate::room_facts;
 
 /// Returns the cells of a world as a table: `id,name,kind,storey,floor_area,area_above_1_5,area_above_2_3,height,doors,windows,volume` and
-/// the box. What is no room has no storey, areas, height, doors or windows.
+/// the box. Other cells than rooms have no storey, areas, height, doors or windows.
 #[must_use]
 pub fn cells_csv(world: &World) -> String {
     let rooms = room_facts(world);

@@ -30,7 +30,7 @@ pub struct AskedWalk<'a> {
     /// `true` to make the maps of other walkers, too, which takes as long as that of this one: they tell whether an obstacle is
     /// an object, low or narrow.
     pub has_others: bool,
-    /// What messages call its settings.
+    /// Names of its settings, for messages.
     pub words: WalkWords<'a>,
 }
 
@@ -45,7 +45,7 @@ pub struct WalkWords<'a> {
     pub height: &'a str,
     /// Its radius.
     pub radius: &'a str,
-    /// What lets it walk through objects.
+    /// The setting that lets it walk through objects.
     pub no_objects: &'a str,
 }
 
