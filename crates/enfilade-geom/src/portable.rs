@@ -29,8 +29,12 @@ pub fn angle(sin: f64, cos: f64) -> f64 {
     sin.atan2(cos)
 }
 
+/// Returns the angle of a direction in the first quadrant, as `f64::atan2` does on Linux. [Units: rad]
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]
-pub use twice::angle;
+#[must_use]
+pub fn angle(sin: f64, cos: f64) -> f64 {
+    twice::angle(sin, cos)
+}
 
 /// Numbers of twice the precision, as sums of two: what WebAssembly needs to round an angle as the C library of Linux does, but
 /// for one in a thousand.
@@ -60,7 +64,6 @@ mod twice {
     }
 
     /// Returns the angle of a direction in the first quadrant. [Units: rad]
-    #[must_use]
     pub(super) fn angle(sin: f64, cos: f64) -> f64 {
         let rough = sin.atan2(cos);
         // The series of the cosine and the sine of the rough angle.
