@@ -113,8 +113,11 @@ fn floor_of(world: &World, cell: CellId, levels: &[Level]) -> Floor {
         for part in without(floor, &recesses) {
             let under = footprint.under(&part);
             heights.push((footprint.over(&part) + under, part.area()));
-            out.above_1_5 += footprint.area_over(&part, 1.5 - under);
-            out.above_2_3 += footprint.area_over(&part, 2.3 - under);
+            // What is free at 2.3 m over a beam lower than 1.5 m is not high.
+            let high = footprint.lifted(&part, 1.5 - ROUNDING - under);
+            let higher = high.iter().flat_map(|p| footprint.lifted(p, 2.3 - 1.5));
+            out.above_2_3 += higher.map(|p| p.area()).sum::<f64>();
+            out.above_1_5 += high.iter().map(Winding::area).sum::<f64>();
         }
     };
     for k in 0..footprint.heights.len() {
@@ -124,6 +127,9 @@ fn floor_of(world: &World, cell: CellId, levels: &[Level]) -> Floor {
         footprint.upper(level.height).into_iter().for_each(&mut add);
     }
     out.area = heights.iter().map(|h| h.1).sum();
+    // Each is part of the one before; sums of pieces differ by rounding.
+    out.above_1_5 = out.above_1_5.min(out.area);
+    out.above_2_3 = out.above_2_3.min(out.above_1_5);
     heights.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut below = 0.0;
     let middle = heights.iter().find(|h| {
@@ -203,21 +209,20 @@ impl<'w> Footprint<'w> {
         end.distance(middle) * locator.share_in(self.cell, middle, end)
     }
 
-    /// Returns the area of a part of a section over which the cell is there, at this height above the part. [Units: wu²]
-    fn area_over(&self, part: &Winding, up: f64) -> f64 {
-        let y = part.points[0].y + up - ROUNDING;
-        if y > self.bounds.max.y {
-            return 0.0;
-        }
+    /// Returns a part of a section moved up, as far as it is in the cell there.
+    fn lifted(&self, part: &Winding, up: f64) -> Vec<Winding> {
         let mut moved = part.clone();
-        moved.points.iter_mut().for_each(|p| p.y = y);
-        let mut area = 0.0;
+        moved.points.iter_mut().for_each(|p| p.y += up);
+        let mut own = Vec::new();
+        if moved.points[0].y > self.bounds.max.y {
+            return own;
+        }
         self.world.graph.locator.for_parts(moved, |cell, part| {
             if cell == Some(self.cell) {
-                area += part.area();
+                own.push(part);
             }
         });
-        area
+        own
     }
 
     /// Returns the parts of a floor under which the cell goes on, a person's height below or more.
@@ -422,6 +427,17 @@ mod tests {
         near_all(areas(&level), [20.0, 20.0, 20.0]);
         let low = self::world(&[[[0.0; 3], [5.0, 1.4, 4.0]]]);
         near_all(areas(&low), [20.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn air_over_a_low_beam_is_not_high() {
+        let beside = [[5.0, 0.0, 0.0], [6.0, 3.0, 4.0]];
+        let [under, over] = [[0.0, 1.2], [1.8, 3.0]].map(|[a, b]| [[0.0, a, 0.0], [5.0, b, 4.0]]);
+        let world = world(&[beside, under, over]);
+        let facts = facts_of_rooms(&world, &floor_samples(&world), &[]);
+        let room = &facts[0];
+        let areas = [room.floor_area, room.area_above_1_5, room.area_above_2_3];
+        near_all(areas, [24.0, 4.0, 4.0]);
     }
 
     fn near_all(found: [f64; 3], expected: [f64; 3]) {

@@ -257,7 +257,7 @@ fn a_killed_session_goes_on_where_it_was_and_loses_at_most_one_operation() {
         let mut child = Command::new(&program)
             .args([
                 "--exact",
-                "child_that_edits_until_it_is_killed",
+                "sessions::child_that_edits_until_it_is_killed",
                 "--nocapture",
             ])
             .env(CHILD, &path)
