@@ -113,7 +113,7 @@ fn floor_of(world: &World, cell: CellId, levels: &[Level]) -> Floor {
         for part in without(floor, &recesses) {
             let under = footprint.under(&part);
             heights.push((footprint.over(&part) + under, part.area()));
-            // What is free at 2.3 m over a beam lower than 1.5 m is not high.
+            // Air at 2.3 m over a beam lower than 1.5 m is not high.
             let high = footprint.lifted(&part, 1.5 - ROUNDING - under);
             let higher = high.iter().flat_map(|p| footprint.lifted(p, 2.3 - 1.5));
             out.above_2_3 += higher.map(|p| p.area()).sum::<f64>();
