@@ -46,9 +46,9 @@
 //!
 //! ```
 //! use enfilade::CellId;
-//! use enfilade::stream::{Catalog, Piece, PieceId};
+//! use enfilade::stream::{Catalog, PieceId, PieceSizes};
 //!
-//! let piece = |n_bytes| Piece { n_resident: n_bytes, n_packed: n_bytes / 2 };
+//! let piece = |n_bytes| PieceSizes { n_resident: n_bytes, n_packed: n_bytes / 2 };
 //! let rows = [vec![PieceId(0)], vec![PieceId(0), PieceId(1)]]; // the pieces that each cell needs
 //! let catalog = Catalog::new(vec![piece(1000), piece(50)], &rows);
 //! assert_eq!(catalog.pieces_of(CellId(1)), [PieceId(0), PieceId(1)]);
