@@ -47,7 +47,7 @@ pub enum WalkProgress {
 /// use enfilade_cpg::{CellId, PortalId};
 /// use enfilade_geom::DVec3;
 /// use enfilade_testkit::{GridParams, room_grid, with_doors};
-/// use enfilade_world::{Agent, PartId, Path, PathFollower, PathSearch, Progress, Space, WalkMap, Walker};
+/// use enfilade_world::{Agent, PartId, Path, PathFollower, PathSearch, Space, WalkMap, WalkProgress, Walker};
 ///
 /// let world = with_doors(room_grid(&GridParams::two_rooms()), |_| false);
 /// let mut space = Space::new(world)?;
@@ -63,11 +63,11 @@ pub enum WalkProgress {
 /// let start = path.points[0];
 /// let mut walker = Walker::new(agent, start.part, start.at + DVec3::Y * agent.eye);
 /// let mut follower = PathFollower::new(&space, path, 1.4);
-/// let mut progress = Progress::Walking;
-/// while progress == Progress::Walking {
+/// let mut progress = WalkProgress::Walking;
+/// while progress == WalkProgress::Walking {
 ///     progress = follower.step(&mut walker, &mut space, 1.0 / 60.0);
 /// }
-/// assert_eq!(progress, Progress::Arrived);
+/// assert_eq!(progress, WalkProgress::Arrived);
 /// assert_eq!(space.state(PartId::ROOT).leaves(PortalId(0)), Some(1.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
