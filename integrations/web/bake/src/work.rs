@@ -7,7 +7,7 @@ use enfilade_cpg::wire::{decode_glb, encode_glb};
 use enfilade_geom::Instant;
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_import::{HeldFiles, ImportReport, Imported, import_held};
-use enfilade_report::{PlanOptions, Plans, Verdict, is_empty};
+use enfilade_report::{PlanOptions, Plans, Verdict, is_empty, measured_room_facts};
 
 use crate::answer::{Facts, input_doubts, questions, rooms, storeys};
 use crate::{Answer, BakeRequest, Failure, Steps};
@@ -59,6 +59,7 @@ pub fn baked(
         )
     };
     steps.begin_plan();
+    baked.world.room_facts = Some(measured_room_facts(&baked.world));
     let bytes = encode_glb(&baked.world).map_err(|e| defect(e.to_string()))?;
     let world = decode_glb(&bytes).map_err(|e| defect(e.to_string()))?;
     let seconds = baked.times.iter().map(|(s, t)| (s.name(), t.as_secs_f64()));
