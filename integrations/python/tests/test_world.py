@@ -179,7 +179,7 @@ def test_walks_pass_doors_but_not_shut_ones(world):
     np.testing.assert_allclose(walk.points[[0, -1]], [BEDROOM, BATH], atol=0.2)
     assert len(walk.cells) == len(walk.portals) + 1
     assert walk.cells[0] == world.locate(BEDROOM)
-    with pytest.raises(enfilade.NoPathError, match=r"no way: portal-\d+, .* is closed; one gets \d+\.\d\d m far"):
+    with pytest.raises(enfilade.NoPathError, match=r"no way that a walker can go: portal-\d+, .* is closed; one gets \d+\.\d\d m far"):
         world.path(BEDROOM, BATH, closed=walk.portals)
     with pytest.raises(enfilade.NoPathError, match="no floor"):
         world.path(BEDROOM, [2, 500, 2])

@@ -364,10 +364,14 @@ class World:
         for one, other in ((0, 1), (1, 0)):
             counts = is_window & is_out[portals.cells[:, other]]
             np.add.at(glass, portals.cells[counts, one], portals.areas[counts])
-        return [
-            Room(id, cells.names[id], tuple(on), *measures, *n, float(cells.volumes[id]), float(glass[id]))
-            for id, on, measures, n in self._native.rooms()
-        ]
+        rooms = []
+        for id, on, measures, (doors, windows) in self._native.rooms():
+            area, above_1_5, above_2_3, height = measures
+            volume = float(cells.volumes[id])
+            rooms.append(
+                Room(id, cells.names[id], tuple(on), area, above_1_5, above_2_3, height, doors, windows, volume, float(glass[id]))
+            )
+        return rooms
 
     def outlines(self, *, height: float = 1.2) -> Dict[int, List[np.ndarray]]:
         """Returns the outlines of rooms on the plans, by the ids of their cells.
