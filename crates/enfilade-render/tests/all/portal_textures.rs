@@ -135,8 +135,8 @@ fn warped_textures_show_what_is_behind() {
     let [error, n, holes] = sum;
     assert!(n > 2_000 && n_fewer > 4, "{n} pixels, {n_fewer} views");
     let mean = error as f64 / 3.0 / n as f64;
-    // Errors of edges, and of the noise of ambient occlusion, which lies elsewhere in the texture: as large as the contrast of tones
-    // and the reach of the occlusion make them; 2.6 when this was written.
+    // Errors of edges, and of the noise of ambient occlusion, which lies elsewhere in the texture: 2.6 when this was written, and 2.7
+    // without the contrast of tones, which is not their cause.
     assert!(mean < 3.0, "mean error {mean:.2} of 255 in {n} pixels");
     assert!(holes * 1000 <= n, "{holes} holes of {n} pixels");
 }
