@@ -52,14 +52,13 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
         run_to_end(&mut cargo(&["fmt", "--all", "--check"]))
     })?;
     steps.step("features", features::run)?;
-    steps.step("lint", || {
-        let args = ["--workspace", "--all-targets", "--", "-D", "warnings"];
-        run_to_end(&mut GATE.cargo("clippy", &args))?;
-        // Without features, as a server that only bakes builds it.
+    // Builds what the steps below run, too: a build without the features of tests compiles half of all once more.
+    steps.step("lint and tests", suites::run)?;
+    steps.step("lint without features", || {
+        // As a server that only bakes builds it.
         let args = ["--package=enfilade-cli", "--no-default-features"];
         run_to_end(GATE.cargo("clippy", &args).args(["--", "-D", "warnings"]))
     })?;
-    steps.step("tests", suites::run)?;
     steps.step("docs", || {
         run_to_end(
             GATE.cargo("doc", &api::DOC)
@@ -67,9 +66,6 @@ fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
         )
     })?;
     steps.step("api", || api::run(false))?;
-    steps.step("build", || {
-        run_to_end(&mut GATE.cargo("build", &["--workspace"]))
-    })?;
     steps.step("fuzz", || {
         // A separate workspace, which no step above builds.
         let mut check = cargo(&[
@@ -104,6 +100,7 @@ fn run_engines(steps: &mut Steps) -> anyhow::Result<()> {
     })?;
     steps.step("demo", demo)?;
     engines::run_steps(steps)?;
+    engines::lint_page(steps)?;
     engines::test_bevy(steps)
 }
 

@@ -79,19 +79,29 @@ pub(crate) fn run_steps(steps: &mut Steps) -> anyhow::Result<()> {
     steps.step("readers", || run_to_end(&mut readers(GATE, &worlds)))?;
     steps.step("abi", || abi(&worlds))?;
     steps.step("web", || {
-        build_web()?;
+        build_web(GATE.0)?;
         run_to_end(&mut web("npm", GATE, &["test"]))
     })?;
-    steps.step("python", || python::test(&worlds))?;
-    // Compiles all of it; to build the engine and to run the tests takes longer than the gate may.
-    steps.step("lint of bevy", || {
-        let clippy = ["--all-targets", "--", "-D", "warnings"];
-        run_to_end(bevy("clippy").args(clippy))
+    steps.step("python", || python::test(&worlds))
+}
+
+/// Lints the page's module that bakes, which checks the bake once more.
+pub(crate) fn lint_page(steps: &mut Steps) -> anyhow::Result<()> {
+    steps.step("lint of the page's module", || {
+        let clippy = ["clippy", "--locked", "--all-targets"];
+        let mut lint = in_workspace("web", &clippy);
+        lint.args(["--", "-D", "warnings"]);
+        run_to_end(lint.current_dir(integration("web").join("bake")))
     })
 }
 
-/// Runs the tests of the plugin for Bevy, on whatever card or software driver there is, and builds its documentation.
+/// Lints the plugin for Bevy, runs its tests, on whatever card or software driver there is, and builds its documentation. To compile
+/// the engine takes longer than the gate may.
 pub(crate) fn test_bevy(steps: &mut Steps) -> anyhow::Result<()> {
+    steps.step("lint of bevy", || {
+        let clippy = ["--all-targets", "--", "-D", "warnings"];
+        run_to_end(bevy("clippy").args(clippy))
+    })?;
     steps.step("tests of bevy", || {
         let test = ["--all-targets", "--", "--test-threads", "2"];
         run_to_end(bevy("test").args(test))
@@ -120,7 +130,7 @@ pub(crate) fn bench(args: &[String]) -> anyhow::Result<()> {
     }
     run_to_end(RELEASE.cargo("build", &["-p", "enfilade-cli"]).arg("-q"))?;
     let worlds = fresh_worlds()?;
-    build_web()?;
+    build_web("gate")?;
     // The institute, by the order of names.
     let last = &worlds[worlds.len() - 1..];
     let measured = [
@@ -129,11 +139,31 @@ pub(crate) fn bench(args: &[String]) -> anyhow::Result<()> {
         bevy_figures(&["--views", "25"], &worlds),
         bevy_figures(&["--views", "5", "--no-sun", "--furnish", "820000"], last),
     ];
+    print_rows(measured, args.is_empty())
+}
+
+/// Prints the figures of the page that bakes; a name chooses rows.
+pub(crate) fn bench_web(args: &[String]) -> anyhow::Result<()> {
+    let is_option = |arg: &&String| arg.starts_with('-');
+    if let Some(unknown) = args.iter().filter(is_option).find(|arg| *arg != "--json") {
+        anyhow::bail!("unknown {unknown}; usage: cargo xtask bench web [--json] [ROW...]");
+    }
+    if cfg!(target_os = "linux") {
+        tools()?;
+    }
+    run_to_end(RELEASE.cargo("build", &["-p", "enfilade-cli"]).arg("-q"))?;
+    build_web("release")?;
+    let mut measured = web("node", RELEASE, &["measure-bake.mjs"]);
+    measured.args(args.iter().filter(|arg| !is_option(arg)));
+    print_rows([measured], !args.iter().any(|arg| arg == "--json"))
+}
+
+fn print_rows(measured: impl IntoIterator<Item = Command>, is_table: bool) -> anyhow::Result<()> {
     for mut command in measured {
         // Short rows end with a status, but are rows.
         let said = command.stderr(Stdio::inherit()).output()?;
         for line in String::from_utf8_lossy(&said.stdout).lines() {
-            print_row(line, args.is_empty())?;
+            print_row(line, is_table)?;
         }
     }
     Ok(())
@@ -227,7 +257,8 @@ fn bevy_figures(args: &[&str], worlds: &[PathBuf]) -> Command {
 }
 
 /// Installs the packages of the browser's package, and builds it anew: module, code, walk.
-fn build_web() -> anyhow::Result<()> {
+/// The module that bakes is built with a profile of its own.
+fn build_web(profile: &str) -> anyhow::Result<()> {
     // Worlds of an earlier build.
     let _ = std::fs::remove_dir_all(integration("web").join("dist"));
     for args in [
@@ -238,7 +269,7 @@ fn build_web() -> anyhow::Result<()> {
     ] {
         // Rows alone go to standard output.
         let mut npm = web("npm", GATE, args);
-        npm.env("BAKE_PROFILE", GATE.0);
+        npm.env("BAKE_PROFILE", profile);
         run_to_end(npm.stdout(std::io::stderr()))?;
     }
     Ok(())

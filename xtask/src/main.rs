@@ -33,9 +33,10 @@ usage: cargo xtask test [--engines]
        cargo xtask bench [--write] [--peers DIR]
        cargo xtask bench NAME [--json] [OPTION...]
        cargo xtask bench engines [--json]
+       cargo xtask bench web [--json] [ROW...]
 
   test    checks tools, format, lints, tests, docs; bakes, validates and verifies scenes; tests the integrations with
-          engines, of which Bevy is compiled only; with --engines, the integrations only, and all of Bevy's tests
+          engines, but for Bevy; with --engines, the integrations only, and Bevy
   tidy    the checks of these that need no build: dependencies between crates, lengths, wording, links,
           licenses and versions of dependencies, features that tests name
   api     compares the façade with crates/enfilade/api.txt, the list of all that users may build on; --write writes it
@@ -61,6 +62,7 @@ fn main() -> ExitCode {
             .and_then(|()| features::run()),
         Task::Api { is_write } => api::run(is_write),
         Task::BenchEngines(args) => engines::bench(&args),
+        Task::BenchWeb(args) => engines::bench_web(&args),
         Task::Bench(args) => return bench(&args),
     };
     match result {
@@ -82,6 +84,8 @@ enum Task {
     },
     /// Arguments after `bench engines`.
     BenchEngines(Vec<String>),
+    /// Arguments after `bench web`.
+    BenchWeb(Vec<String>),
     /// Arguments of `enfilade-bench`.
     Bench(Vec<String>),
 }
@@ -103,6 +107,7 @@ impl Task {
                 Some(Self::Bench([&["growth".to_owned()], rest].concat()))
             }
             ("bench", Some("engines")) => Some(Self::BenchEngines(rest[1..].to_vec())),
+            ("bench", Some("web")) => Some(Self::BenchWeb(rest[1..].to_vec())),
             ("bench", _) => Some(Self::Bench(rest.to_vec())),
             _ => None,
         }
@@ -194,6 +199,13 @@ impl Profile {
         cargo(&[&[command, "--profile", self.0], args].concat())
     }
 
+    /// Returns `cargo COMMAND --profile SELF ARGS`, which lints what it compiles of ours; a warning is an error.
+    fn linted(self, command: &str, args: &[&str]) -> Command {
+        let mut command = self.cargo(command, args);
+        lint(&mut command);
+        command
+    }
+
     /// Returns the bake of a scene folder with default settings.
     fn bake_command(self, scene: &Path, world: &Path) -> Command {
         let mut command = Command::new(self.binary("enfilade"));
@@ -242,6 +254,13 @@ fn cargo(args: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root()).args(args);
     command
+}
+
+/// Makes a build lint what it compiles of ours, as `cargo clippy -- -D warnings` does: that would check everything, the code of
+/// others, too, before the build compiles it once more.
+fn lint(build: &mut Command) {
+    build.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    build.env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
 }
 
 /// Runs a command to its end; an error contains the command.

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, bail};
 
 use crate::apt::Need;
-use crate::{GATE, engine_builds, integration, output_of, run_to_end, tools_dir};
+use crate::{GATE, engine_builds, integration, lint, output_of, run_to_end, tools_dir};
 
 /// The language itself.
 pub(crate) const NEED: Need = Need {
@@ -89,9 +89,7 @@ fn build(python: &Path) -> anyhow::Result<PathBuf> {
     ]);
     maturin.arg("--out").arg(&dir);
     maturin.env("CARGO_TARGET_DIR", engine_builds());
-    // As `cargo clippy -- -D warnings` does, which would check all crates below once more.
-    maturin.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
-    maturin.env("CLIPPY_ARGS", "-Dwarnings__CLIPPY_HACKERY__");
+    lint(&mut maturin);
     // Its progress is of interest only if it fails.
     output_of(&mut maturin)?;
     let found = std::fs::read_dir(&dir)?.next();

@@ -36,7 +36,7 @@ const RAW: &[&str] = &[
 /// Parsers of formats and front ends, which have their own crates.
 const FORMATS: &[&str] = &["serde_json", "toml", "base64", "png", "clap", "anyhow"];
 
-const FENCES: [Fence; 24] = [
+const FENCES: [Fence; 25] = [
     Fence {
         name: "enfilade-geom",
         siblings: &[],
@@ -163,6 +163,12 @@ const FENCES: [Fence; 24] = [
         words: &["std::fs", "std::thread"],
     },
     Fence {
+        name: "enfilade-export",
+        siblings: &["enfilade-geom", "enfilade-cpg"],
+        not: &["rayon", "anyhow", "clap"],
+        words: &["std::fs", "std::thread"],
+    },
+    Fence {
         name: "enfilade",
         siblings: &[
             "enfilade-geom",
@@ -198,6 +204,7 @@ const FENCES: [Fence; 24] = [
         siblings: &[
             "enfilade",
             "enfilade-demo",
+            "enfilade-export",
             "enfilade-render",
             "enfilade-report",
             "enfilade-verify",
@@ -211,7 +218,9 @@ const FENCES: [Fence; 24] = [
         siblings: &[
             "enfilade",
             "enfilade-cli",
+            "enfilade-export",
             "enfilade-render",
+            "enfilade-report",
             "enfilade-verify",
             "enfilade-testkit",
         ],

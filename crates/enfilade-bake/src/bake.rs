@@ -7,6 +7,7 @@ use enfilade_geom::scene::Scene;
 
 use crate::bound::keep_costs;
 use crate::budget::n_structural;
+use crate::decided::keep_decisions;
 use crate::delaunay::Session;
 use crate::given::keep_given;
 use crate::marked::make_marked;
@@ -89,6 +90,7 @@ fn finish(baked: &mut BakeOutput, scene: &Scene, config: &BakeConfig) {
     let (world, notes) = (&mut baked.world, &mut baked.notes);
     keep_costs(world, notes, &config.costs);
     let given = config.keeps_given.then(|| keep_given(world, scene));
+    keep_decisions(world, notes, &config.decisions);
     name_cells(world, notes, &scene.rooms);
     if let Some(given) = given {
         given.tell(world, scene, notes);

@@ -1,6 +1,7 @@
 //! Settings of a bake, and the resolved form that the stages use.
 
 mod bsp;
+mod decisions;
 mod delaunay;
 mod merge;
 
@@ -13,6 +14,7 @@ use crate::voxel::Grid;
 use crate::{BakeError, Budget, Method};
 
 pub use bsp::{BspConfig, Guide, Heuristic, Rooms};
+pub use decisions::{RoomAnswer, RoomDecision};
 pub use delaunay::{Choices, DelaunayConfig, Weight};
 pub use merge::MergeSettings;
 
@@ -33,6 +35,8 @@ pub struct BakeConfig {
     pub outdoors: Outdoors,
     /// Openings that the scene marks become portals where they are marked ([`Scene::given_portals`](enfilade_geom::scene::Scene::given_portals)).
     pub keeps_given: bool,
+    /// Decisions of people about rooms, which win over those of the bake; kept in their order.
+    pub decisions: Vec<RoomDecision>,
     /// Bounds on the cost of cells, and the model of costs; no bounds by default.
     pub costs: SimplifySettings,
     /// Watershed, and BSP in buildings: edge of a voxel; `None` chooses it from `min_opening`, `max_voxels` and the scene's size. An edge
@@ -60,6 +64,7 @@ impl Default for BakeConfig {
             merge: MergeSettings::default(),
             outdoors: Outdoors::default(),
             keeps_given: false,
+            decisions: Vec::new(),
             costs: SimplifySettings::default(),
             voxel: None,
             max_voxels: 1_600_000_000,

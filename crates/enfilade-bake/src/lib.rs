@@ -24,6 +24,7 @@ mod budget;
 pub use enfilade_complex as complex;
 mod config;
 mod context;
+mod decided;
 pub mod delaunay;
 pub mod edit;
 mod error;
@@ -56,7 +57,7 @@ pub mod watershed;
 
 pub use bake::{bake, bake_session};
 pub use budget::Budget;
-pub use config::{BakeConfig, MergeSettings, Outdoors, SmallestHole};
+pub use config::{BakeConfig, MergeSettings, Outdoors, RoomAnswer, RoomDecision, SmallestHole};
 pub use context::{BakeContext, Progress, Silent};
 pub use error::BakeError;
 pub use method::Method;

@@ -104,6 +104,8 @@ enum What {
         #[arg(long)]
         csv: bool,
     },
+    /// Rooms for other trades: a row per figure, with the value that it must reach. Rows: open rooms, neighbors, spaces, map labels.
+    Exports(Chosen),
     /// Things, paths, sound, contacts and moving rooms: a row per figure, with the value that it must reach.
     Living(Chosen),
     /// Special portals, such as mirrors: a row per figure, with the value that it must reach.
@@ -279,6 +281,7 @@ fn rows_of(what: &What) -> Option<(&Chosen, &'static [&'static [Row]])> {
         What::Constructive(chosen) => (chosen, &[size::levels::ROWS]),
         What::Bring(chosen) => (chosen, &[sight::VALUE]),
         What::Judge(chosen) => (chosen, &[rooms::DECISIONS]),
+        What::Exports(chosen) => (chosen, &[rooms::EXPORTS]),
         What::Living(chosen) => (
             chosen,
             &[paths::MOVING, render::LAMPS, paths::WALKING, sound::ROWS],

@@ -22,7 +22,7 @@ use enfilade::cpg::wire::decode_glb;
 use enfilade::cpg::{PortalKind, World};
 use enfilade::geom::scene::Scene;
 use enfilade::geom::shown;
-use enfilade::import::{ImportReport, RepairOptions};
+use enfilade::import::ImportReport;
 use enfilade::internals::bake::delaunay::LEAST_BALL;
 use enfilade::world::{Space, WalkMapKey};
 use serde::Serialize;
@@ -85,7 +85,6 @@ pub(crate) struct Readied {
     /// Other files that the scene refers to.
     pub(crate) references: Vec<PathBuf>,
     report: ImportReport,
-    repair: Option<RepairOptions>,
 }
 
 /// Reads the scene and the settings.
@@ -108,7 +107,6 @@ pub(crate) fn readied(args: &Bake) -> anyhow::Result<Readied> {
     config.costs.cost.check(&scene.materials)?;
     Ok(Readied {
         references: report.references.clone(),
-        repair: settings.import.repair,
         scene,
         config,
         report,
@@ -135,7 +133,6 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
         config,
         references,
         report,
-        repair,
     } = readied;
     outputs.read(references)?;
     found::refuse(report)?;
@@ -168,7 +165,7 @@ pub(crate) fn run_with(args: &Bake, kept: Option<&PieceFolder>) -> anyhow::Resul
         leak_path = Some(leak_path::look_unasked(scene, config, options.threads)?);
     }
     let told = &mut baked.world.graph.provenance.settings;
-    told.extend(found::settings_of(report, *repair));
+    told.extend(report.settings.clone());
     let verdict = advice::verdict(args, readied, &baked.world, began.elapsed())?;
     if is_empty(&baked.world) {
         let why = verdict.why();

@@ -27,6 +27,8 @@ pub(crate) enum Format {
     Packed,
     PortalTextures,
     PlainData,
+    FloorMap,
+    Ifc,
 }
 
 struct Row {
@@ -45,12 +47,15 @@ const fn row(format: Format, name: &'static str, extensions: &'static [&'static 
         name,
         extensions,
         // These are read again.
-        is_streamed: !matches!(format, Format::Search | Format::Walk | Format::Packed),
+        is_streamed: !matches!(
+            format,
+            Format::Search | Format::Walk | Format::Packed | Format::FloorMap
+        ),
     }
 }
 
 /// The outputs of all commands.
-const TABLE: [Row; 20] = [
+const TABLE: [Row; 22] = [
     row(Format::World, "a world, one GLB", &["glb"]),
     row(Format::PortalFile, "a Quake portal file", &["prt"]),
     row(
@@ -80,25 +85,29 @@ const TABLE: [Row; 20] = [
     row(Format::Manual, "a manual page", &["1"]),
     row(
         Format::PlainData,
-        "plain data as JSON, GraphML, DOT, CSV or OBJ",
-        &["json", "graphml", "dot", "gv", "csv", "obj"],
+        "plain data as JSON, GraphML, DOT, CSV, OBJ, gbXML, HBJSON or IndoorGML",
+        &[
+            "json", "graphml", "dot", "gv", "csv", "obj", "gbxml", "hbjson", "gml",
+        ],
     ),
+    row(Format::FloorMap, "a map for robots as PGM", &["pgm"]),
+    row(Format::Ifc, "a model as IFC", &["ifc"]),
 ];
 
 /// Extensions of formats that no command writes: pictures, models, sounds, films, documents, archives, programs.
-const FOREIGN: [&str; 152] = [
+const FOREIGN: [&str; 150] = [
     "3ds", "3mf", "7z", "aac", "abc", "ac3", "aif", "aiff", "amr", "ape", "au", "avi", "avif",
     "bam", "blend", "bmp", "bsp", "bz2", "c", "cpp", "css", "cub", "dae", "dds", "dll", "doc",
     "docx", "dwg", "dxf", "e57", "eps", "epub", "exe", "exr", "fbx", "flac", "flv", "gif", "gltf",
-    "gz", "h", "hdr", "heic", "ico", "ifc", "ini", "jar", "jfif", "jpeg", "jpg", "js", "jxl",
-    "ktx", "ktx2", "las", "laz", "lwo", "lz4", "m4a", "m4v", "map", "md", "mdl", "mid", "midi",
-    "mkv", "mov", "mp2", "mp3", "mp4", "mpeg", "mpg", "mtl", "odp", "ods", "odt", "off", "oga",
-    "ogg", "ogv", "opus", "pak", "pbm", "pcd", "pcx", "pgm", "php", "pk3", "ply", "pnm", "ppm",
-    "ppt", "pptx", "ps", "psd", "py", "rar", "raw", "rm", "rs", "rst", "rtf", "sh", "skp",
-    "sldprt", "so", "spx", "sql", "step", "stl", "stp", "svgz", "swf", "tar", "tex", "tga", "tgz",
-    "tif", "tiff", "ts", "tsv", "tta", "usd", "usda", "usdc", "usdz", "vmf", "vox", "vrml", "vtk",
-    "wad", "wasm", "webm", "webp", "wma", "wmv", "woff", "woff2", "wrl", "wv", "x3d", "xcf",
-    "xhtml", "xls", "xlsx", "xml", "xyz", "xz", "yaml", "yml", "zip", "zst",
+    "gz", "h", "hdr", "heic", "ico", "ini", "jar", "jfif", "jpeg", "jpg", "js", "jxl", "ktx",
+    "ktx2", "las", "laz", "lwo", "lz4", "m4a", "m4v", "map", "md", "mdl", "mid", "midi", "mkv",
+    "mov", "mp2", "mp3", "mp4", "mpeg", "mpg", "mtl", "odp", "ods", "odt", "off", "oga", "ogg",
+    "ogv", "opus", "pak", "pbm", "pcd", "pcx", "php", "pk3", "ply", "pnm", "ppm", "ppt", "pptx",
+    "ps", "psd", "py", "rar", "raw", "rm", "rs", "rst", "rtf", "sh", "skp", "sldprt", "so", "spx",
+    "sql", "step", "stl", "stp", "svgz", "swf", "tar", "tex", "tga", "tgz", "tif", "tiff", "ts",
+    "tsv", "tta", "usd", "usda", "usdc", "usdz", "vmf", "vox", "vrml", "vtk", "wad", "wasm",
+    "webm", "webp", "wma", "wmv", "woff", "woff2", "wrl", "wv", "x3d", "xcf", "xhtml", "xls",
+    "xlsx", "xml", "xyz", "xz", "yaml", "yml", "zip", "zst",
 ];
 
 impl Format {

@@ -253,14 +253,14 @@ pub(crate) fn make_folder(option: &str, path: &Path) -> anyhow::Result<()> {
 }
 
 /// Refuses to replace a folder of something else: one that has files, but not `mark`.
-pub(crate) fn check_folder(path: &Path, mark: &str) -> anyhow::Result<()> {
+pub(crate) fn check_folder(option: &str, path: &Path, mark: &str) -> anyhow::Result<()> {
     if path.is_file() {
-        bail!("{} is a file; give -o a folder", path.display());
+        bail!("{} is a file; give {option} a folder", path.display());
     }
     let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
     if path.exists() && !path.join(mark).is_file() && !is_empty() {
         bail!(
-            "{} is a folder with other contents; choose another name with -o",
+            "{} is a folder with other contents; choose another name with {option}",
             path.display()
         );
     }

@@ -1,7 +1,7 @@
 //! `enfilade pack` and `enfilade unpack`: a world in pieces, for loading what comes into view.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use enfilade::cpg::wire::decode_glb;
@@ -12,7 +12,7 @@ use enfilade::whole;
 use enfilade_report::WalkPage;
 
 use crate::formats::Format;
-use crate::output::{Outputs, Written, check_folder, write_whole};
+use crate::output::{Outputs, Written, check_folder, refuse_stream, write_whole};
 use crate::report::title_of;
 use crate::screen::print_json;
 use crate::walk_page;
@@ -25,8 +25,13 @@ pub(crate) struct Pack {
     /// World written by `enfilade bake`; `-` for standard input.
     input: PathBuf,
     /// Folder for the packed world, or its file with --one-file. A packed world that is there is replaced.
-    #[arg(short, long, value_name = "OUT.enf")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "OUT.enf", required_unless_present = "app")]
+    output: Option<PathBuf>,
+    /// Write a folder for any host of static files instead: index.html, the walk, with its parts, and the packed world,
+    /// world.enf. The page opens other packed worlds, too: index.html#world=ADDRESS. A folder of this kind that is there is
+    /// replaced.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["output", "one_file", "walk"])]
+    app: Option<PathBuf>,
     /// Write one file instead of a folder, for servers of ranges.
     #[arg(long)]
     one_file: bool,
@@ -63,44 +68,100 @@ struct PackReport {
     largest_piece: u64,
 }
 
+/// Name of the packed world beside the page of `--app`.
+const WORLD: &str = "world.enf";
+/// File by which a folder of `--app` is known.
+const APP: &str = "walk-code.bin";
+
 pub(crate) fn pack(args: &Pack) -> anyhow::Result<()> {
     let mut outputs = Outputs::reading([&args.input])?;
-    if args.one_file {
-        outputs.write("-o", Format::Packed, &args.output)?;
-        if args.walk {
-            let page = walk_page::beside(&args.output)?;
-            outputs.write("--walk", Format::Page, &page)?;
-        }
-    } else {
-        Format::Packed.check("-o", &args.output)?;
-        check_folder(&args.output, HEAD)?;
+    let place = args.app.as_ref().or(args.output.as_ref());
+    let place = place.context("give -o or --app")?;
+    let packed = match &args.app {
+        Some(folder) => pack_app(args, folder)?,
+        None if args.one_file => pack_file(args, place, &mut outputs)?,
+        None => pack_folder(args, place)?,
+    };
+    report(args, place, &packed, &outputs)
+}
+
+/// A packed world and the file of which it was made.
+struct Packing {
+    packed: PackedWorld,
+    glb: Vec<u8>,
+}
+
+impl Packing {
+    fn of(args: &Pack) -> anyhow::Result<Self> {
+        let glb = read(&args.input)?;
+        let packed = PackedWorld::pack(&glb).with_context(|| name_of(&args.input))?;
+        Ok(Self { packed, glb })
     }
-    let glb = read(&args.input)?;
-    let packed = PackedWorld::pack(&glb).with_context(|| name_of(&args.input))?;
-    if args.one_file {
-        write_whole(&args.output, &packed.one_file()?)?;
-        if args.walk {
-            let page = walk_page::beside(&args.output)?;
-            let walk = walk(args, walk_page::address(&page, &args.output)?, &glb)?;
-            write_whole(&page, walk.html().as_bytes())?;
-        }
-    } else {
-        let mut files = packed.files()?.to_vec();
-        if args.walk {
-            // The page is in the folder of its world.
-            files.extend(walk(args, "./".into(), &glb)?.files());
-        }
-        whole::write_folder(&args.output, files).with_context(|| {
-            format!(
-                "cannot write {}; choose another place, or free space there",
-                args.output.display()
-            )
-        })?;
+}
+
+/// Writes the page of the walk and the packed world into one folder.
+fn pack_app(args: &Pack, folder: &Path) -> anyhow::Result<Packing> {
+    refuse_stream("--app", folder, "a folder")?;
+    check_folder("--app", folder, APP)?;
+    let Packing { packed, glb } = Packing::of(args)?;
+    let pieces = packed.files()?.to_vec().into_iter();
+    let mut files: Vec<(PathBuf, Vec<u8>)> = pieces
+        .map(|(name, bytes)| (Path::new(WORLD).join(name), bytes))
+        .collect();
+    let page = walk(args, format!("{WORLD}/"), &glb)?.files();
+    files.extend(page.into_iter().map(|(name, bytes)| (name.into(), bytes)));
+    write_folder(folder, files)?;
+    Ok(Packing { packed, glb })
+}
+
+fn pack_file(args: &Pack, place: &Path, outputs: &mut Outputs) -> anyhow::Result<Packing> {
+    outputs.write("-o", Format::Packed, place)?;
+    if args.walk {
+        let page = walk_page::beside(place)?;
+        outputs.write("--walk", Format::Page, &page)?;
     }
+    let Packing { packed, glb } = Packing::of(args)?;
+    write_whole(place, &packed.one_file()?)?;
+    if args.walk {
+        let page = walk_page::beside(place)?;
+        let walk = walk(args, walk_page::address(&page, place)?, &glb)?;
+        write_whole(&page, walk.html().as_bytes())?;
+    }
+    Ok(Packing { packed, glb })
+}
+
+fn pack_folder(args: &Pack, place: &Path) -> anyhow::Result<Packing> {
+    Format::Packed.check("-o", place)?;
+    check_folder("-o", place, HEAD)?;
+    let Packing { packed, glb } = Packing::of(args)?;
+    let mut files = packed.files()?.to_vec();
+    if args.walk {
+        // The page is in the folder of its world.
+        files.extend(walk(args, "./".into(), &glb)?.files());
+    }
+    write_folder(place, files)?;
+    Ok(Packing { packed, glb })
+}
+
+fn write_folder<P: AsRef<Path>>(place: &Path, files: Vec<(P, Vec<u8>)>) -> anyhow::Result<()> {
+    whole::write_folder(place, files).with_context(|| {
+        format!(
+            "cannot write {}; choose another place, or free space there",
+            place.display()
+        )
+    })
+}
+
+fn report(
+    args: &Pack,
+    place: &Path,
+    Packing { packed, glb }: &Packing,
+    outputs: &Outputs,
+) -> anyhow::Result<()> {
     let head = packed.head.encode()?.len() as u64;
     let sizes = packed.head.catalog.pieces();
     let report = PackReport {
-        file: args.output.display().to_string(),
+        file: place.display().to_string(),
         original: glb.len() as u64,
         packed: head + packed.body().len() as u64,
         head,

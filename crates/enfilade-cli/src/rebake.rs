@@ -74,7 +74,7 @@ pub(crate) fn run(args: &Rebake) -> anyhow::Result<()> {
     let mut rebaked = rebaked.with_context(|| names_of(&args.source))?;
     drop(bar);
     let told = &mut rebaked.world.graph.provenance.settings;
-    told.extend(found::settings_of(&imported.report, settings.import.repair));
+    told.extend(imported.report.settings.clone());
     let bytes =
         encode_whole(&mut rebaked.world).context("the new world breaks an invariant (a bug)")?;
     write_whole(&args.output, &bytes)?;

@@ -11,6 +11,7 @@ use anyhow::{Context, bail};
 use enfilade::geom::shown;
 use enfilade::stream::PackedFiles;
 use hyper::Method;
+use hyper::header::{HeaderName, HeaderValue};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
@@ -20,6 +21,7 @@ use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Pr
 use tower_http::cors::{Any, Cors};
 use tower_http::services::ServeDir;
 use tower_http::services::fs::{Backend, TokioBackend};
+use tower_http::set_header::SetResponseHeader;
 
 use crate::screen::printed;
 
@@ -139,6 +141,24 @@ async fn serve(listener: TcpListener, root: PathBuf) {
         .allow_methods([Method::GET, Method::HEAD])
         .allow_headers(Any)
         .expose_headers(Any);
+    // Pages that are isolated from others have threads; these, and pages of others that are isolated, may read all files here.
+    let header = HeaderName::from_static;
+    let value = HeaderValue::from_static;
+    let files = SetResponseHeader::overriding(
+        files,
+        header("cross-origin-opener-policy"),
+        value("same-origin"),
+    );
+    let files = SetResponseHeader::overriding(
+        files,
+        header("cross-origin-embedder-policy"),
+        value("require-corp"),
+    );
+    let files = SetResponseHeader::overriding(
+        files,
+        header("cross-origin-resource-policy"),
+        value("cross-origin"),
+    );
     let service = TowerToHyperService::new(files);
     loop {
         let Ok((stream, _)) = listener.accept().await else {

@@ -12,7 +12,7 @@ use enfilade::geom::DVec3;
 use enfilade::internals::geom::Allowance;
 use enfilade::internals::world::{AUDIO_BLOCK, AudioBlock, Auralizer, at_ears, test_sound};
 use enfilade::world::{
-    Acoustics, DecayLaw, DiffuseFields, Listener, PartId, Reverb, Space, Transmission,
+    Acoustics, DecayLaw, DiffuseFields, Listener, OCTAVES, PartId, Reverb, Space, Transmission,
 };
 
 use self::materials::{Absorption, Absorptions, Given, given, tell};
@@ -74,6 +74,8 @@ const MOST_SAMPLES: usize = 1 << 26;
 const RATE: u32 = 44100;
 /// Work of a block, in units of [`Allowance`]: mostly the search for paths.
 const WORK_A_BLOCK: u64 = 500;
+
+const N_OCTAVES: usize = OCTAVES.len();
 
 /// A line of the report.
 #[derive(serde::Serialize)]
@@ -236,15 +238,16 @@ impl HeardWalk<'_> {
             // Too faint, it keeps its delay.
             let way = ears.shortest(&acoustics, 0, source_cell, source);
             let (toward, gain) = heard.map_or((DVec3::ZERO, 0.0), |h| (h.direction, h.gain));
-            let (room, rt60) = (fields.gain(cell), fields.rt60(cell));
-            let follow = |of: fn(&AudioBlock) -> f64, now| {
-                follow(before.as_ref().map(of), now, self.seconds_of_block)
+            let follow = |before: Option<[f64; N_OCTAVES]>, now: [f64; N_OCTAVES]| {
+                let before = before.unwrap_or(now);
+                std::array::from_fn(|k| follow(before[k], now[k], self.seconds_of_block))
             };
             let block = AudioBlock {
                 length: way.map_or(0.0, |w| w.0),
-                ears: at_ears(toward, ahead, DVec3::Y).map(|(g, late)| (g * gain, late)),
-                room: follow(|b| b.room, room),
-                rt60: follow(|b| b.rt60, rt60),
+                bands: heard.map_or([0.0; N_OCTAVES], |h| h.bands),
+                ears: at_ears(toward, ahead, DVec3::Y),
+                room: follow(before.map(|b| b.room), fields.gain_bands(cell)),
+                rt60: follow(before.map(|b| b.rt60), fields.rt60_bands(cell)),
             };
             each(&block)?;
             before = Some(block);
@@ -257,8 +260,8 @@ impl HeardWalk<'_> {
                     length: heard.map(|h| h.length),
                     direction: toward.to_array(),
                     gain_db: decibels(gain),
-                    room_db: decibels(room),
-                    rt60,
+                    room_db: decibels(fields.gain(cell)),
+                    rt60: fields.rt60(cell),
                 });
             }
         }
@@ -287,9 +290,8 @@ fn opened(names: &[String], n: usize) -> anyhow::Result<Vec<PortalId>> {
 }
 
 /// Moves a value towards another with a time constant of a fifth of a second: leaving and entering a room is gradual.
-fn follow(before: Option<f64>, now: f64, seconds: f64) -> f64 {
-    let share = 1.0 - (-seconds / 0.2).exp();
-    before.map_or(now, |b| b + (now - b) * share)
+fn follow(before: f64, now: f64, seconds: f64) -> f64 {
+    before + (now - before) * (1.0 - (-seconds / 0.2).exp())
 }
 
 fn exact(p: [f32; 3]) -> DVec3 {

@@ -2,7 +2,7 @@
 
 use std::ops::{Index, IndexMut};
 
-use enfilade_geom::DVec3;
+use enfilade_geom::{DVec3, closest_point_on_segment};
 
 use crate::{Batch, Cell, CellId, CellPortalGraph, Portal, PortalId, PortalKind, World};
 
@@ -28,6 +28,23 @@ impl Portal {
     pub fn beyond(&self, cell: CellId) -> CellId {
         debug_assert!(self.cells.contains(&cell), "{cell} is not at this portal");
         self.cells[usize::from(self.cells[0] == cell)]
+    }
+
+    /// Returns the distance of a point from the outline, infinite if that has no vertices. Linear in its vertices. [Units: wu]
+    #[must_use]
+    pub fn distance(&self, at: DVec3) -> f64 {
+        let point = |p: &[f32; 3]| DVec3::from(p.map(f64::from));
+        let outline: Vec<DVec3> = self.outline.iter().map(point).collect();
+        let normal = point(&self.normal);
+        let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
+        let sides = || edges().map(|(a, b)| normal.dot((*b - *a).cross(at - *a)));
+        if sides().all(|s| s >= 0.0) || sides().all(|s| s <= 0.0) {
+            return outline.first().map_or(f64::INFINITY, |a| {
+                normal.dot(at - *a).abs() / normal.length().max(1e-9)
+            });
+        }
+        let to_edge = edges().map(|(&a, &b)| at.distance(closest_point_on_segment(at, a, b)));
+        to_edge.fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -218,38 +218,17 @@ fn in_air(world: &World, at: DVec3, what: &'static str) -> Result<CellId, HandEd
 
 /// Returns `true` if a point is in a portal.
 pub(crate) fn is_portal_at(graph: &CellPortalGraph, portal: PortalId, at: DVec3) -> bool {
-    distance(graph, portal, at) <= AT
+    graph[portal].distance(at) <= AT
 }
 
 /// Returns the portal that a point is in.
 fn portal_at(graph: &CellPortalGraph, at: DVec3) -> Result<PortalId, HandEditError> {
-    let distances = graph.portal_ids().map(|id| (id, distance(graph, id, at)));
+    let distances = graph.portal_ids().map(|id| (id, graph[id].distance(at)));
     let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
     match nearest {
         Some((id, by)) if by <= AT => Ok(id),
         _ => Err(HandEditError::NoPortalAt { at, nearest }),
     }
-}
-
-/// Returns the distance of a point from a portal's outline, which is convex. [Units: wu]
-fn distance(graph: &CellPortalGraph, portal: PortalId, at: DVec3) -> f64 {
-    let portal = &graph[portal];
-    let point = |p: &[f32; 3]| DVec3::from(p.map(f64::from));
-    let outline: Vec<DVec3> = portal.outline.iter().map(point).collect();
-    let normal = point(&portal.normal);
-    let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
-    let sides = || edges().map(|(a, b)| normal.dot((*b - *a).cross(at - *a)));
-    if sides().all(|s| s >= 0.0) || sides().all(|s| s <= 0.0) {
-        return outline.first().map_or(f64::INFINITY, |a| {
-            normal.dot(at - *a).abs() / normal.length().max(1e-9)
-        });
-    }
-    let to_edge = edges().map(|(a, b)| {
-        let along = *b - *a;
-        let t = (at - *a).dot(along) / along.length_squared().max(1e-30);
-        at.distance(*a + along * t.clamp(0.0, 1.0))
-    });
-    to_edge.fold(f64::INFINITY, f64::min)
 }
 
 /// Adds a crate that stands on a point.

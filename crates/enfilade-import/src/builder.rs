@@ -26,7 +26,7 @@ pub(crate) struct Builder<'a> {
     /// The file being read.
     pub(crate) path: PathBuf,
     /// The files to which it may refer.
-    beside: Beside<'a>,
+    pub(crate) beside: Beside<'a>,
     pub(crate) base: DMat4,
     scene: Scene,
     pub(crate) is_detail_file: bool,

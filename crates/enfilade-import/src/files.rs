@@ -1,7 +1,7 @@
 //! Files on disk, read with a size limit, and detection of picture formats.
 
 use crate::ImportError;
-use crate::held::HeldFiles;
+use crate::held::{ConvertedIfc, HeldFiles};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -117,7 +117,15 @@ pub(crate) enum Beside<'a> {
     Held(&'a HeldFiles),
 }
 
-impl Beside<'_> {
+impl<'a> Beside<'a> {
+    /// Returns what a reader made of an IFC file in memory.
+    pub(crate) fn converted(&self, scene: &Path) -> Option<&'a ConvertedIfc> {
+        match self {
+            Self::Held(held) => held.converted(scene),
+            Self::Nothing | Self::Folder(_) => None,
+        }
+    }
+
     /// Reads a file of at most `limit` bytes to which a scene refers. Returns its path and bytes, or the reason for refusal.
     pub(crate) fn read(
         &self,

@@ -15,13 +15,24 @@ pub struct HeldFiles {
     files: BTreeMap<String, Vec<u8>>,
     /// Names of files of which all objects are detail.
     detail: BTreeSet<String>,
+    /// IFC files as a reader of the program read them, by their names.
+    ifc: BTreeMap<String, ConvertedIfc>,
+}
+
+/// An IFC file as a program read it, by the reader of the command: `ifc/ifc_model.mjs` with web-ifc.
+#[derive(Clone, Debug, Default)]
+pub struct ConvertedIfc {
+    /// The GLB.
+    pub glb: Vec<u8>,
+    /// Notes for the user.
+    pub notes: Vec<String>,
 }
 
 impl FromIterator<(String, Vec<u8>)> for HeldFiles {
     fn from_iter<T: IntoIterator<Item = (String, Vec<u8>)>>(files: T) -> Self {
         Self {
             files: files.into_iter().collect(),
-            detail: BTreeSet::new(),
+            ..Self::default()
         }
     }
 }
@@ -33,6 +44,16 @@ impl HeldFiles {
             self.detail.insert(name.clone());
         }
         self.files.insert(name, bytes);
+    }
+
+    /// Adds what a reader made of an IFC file, which is one of these files itself.
+    pub fn add_converted(&mut self, name: String, converted: ConvertedIfc) {
+        self.ifc.insert(name, converted);
+    }
+
+    /// Returns what a reader made of an IFC file.
+    pub(crate) fn converted(&self, scene: &Path) -> Option<&ConvertedIfc> {
+        self.ifc.get(&*scene.to_string_lossy())
     }
 
     /// Iterates over the scenes: all files but those that scenes refer to. If there are only such files, over all of them.

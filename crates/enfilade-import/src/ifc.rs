@@ -9,12 +9,14 @@ mod folder;
 mod group;
 mod programs;
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::builder::Builder;
+use crate::held::ConvertedIfc;
 use crate::options::IfcConverter;
 use crate::{ImportError, files, gltf};
 pub(crate) use classes::is_guid;
@@ -64,6 +66,10 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         let problem = "the file is cut off: its last line should be END-ISO-10303-21; copy or export it again";
         return Err(builder.malformed("end", problem));
     }
+    if let Some(ConvertedIfc { glb, notes }) = builder.beside.converted(&builder.path) {
+        let notes = notes.iter().map(String::as_str);
+        return add(glb, notes, IfcProgram::Node, None, builder);
+    }
     let Some(converter) = &builder.options.ifc else {
         return Err(unsupported(builder, &[]));
     };
@@ -91,20 +97,33 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
         let glb = files::read_file(&glb, run.most)?;
         let said = tail(&run.said()).unwrap_or_default();
         drop(folder);
-        builder.add_read_bytes(glb.len() as u64);
-        for note in said.lines().filter_map(|line| line.strip_prefix(NOTE)) {
-            builder.note(kind.package(), note);
-        }
-        if kind == IfcProgram::IfcConvert {
-            let classes = classes::classes(bytes);
-            gltf::read_renamed(&glb, builder, &|name| classes::renamed(name, &classes))?;
-        } else {
-            gltf::read(&glb, builder)?;
-        }
-        builder.set_format("IFC");
-        return Ok(());
+        let notes = said.lines().filter_map(|line| line.strip_prefix(NOTE));
+        let classes = (kind == IfcProgram::IfcConvert).then(|| classes::classes(bytes));
+        return add(&glb, notes, kind, classes.as_ref(), builder);
     }
     Err(unsupported(builder, &converter.programs))
+}
+
+/// Reads the GLB that a program made; classes are those of the IFC file where the GLB lacks them.
+fn add<'n>(
+    glb: &[u8],
+    notes: impl Iterator<Item = &'n str>,
+    kind: IfcProgram,
+    classes: Option<&HashMap<String, String>>,
+    builder: &mut Builder<'_>,
+) -> Result<(), ImportError> {
+    builder.add_read_bytes(glb.len() as u64);
+    for note in notes {
+        builder.note(kind.package(), note);
+    }
+    match classes {
+        Some(classes) => {
+            gltf::read_renamed(glb, builder, &|name| classes::renamed(name, classes))?;
+        }
+        None => gltf::read(glb, builder)?,
+    }
+    builder.set_format("IFC");
+    Ok(())
 }
 
 /// Returns the error where no program has what it needs.

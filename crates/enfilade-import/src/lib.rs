@@ -60,7 +60,7 @@ pub use enfilade_prepare::{
 };
 pub use error::ImportError;
 pub use export::export_glb;
-pub use held::HeldFiles;
+pub use held::{ConvertedIfc, HeldFiles};
 pub use options::{IfcConverter, ImportOptions, Limits, Up, VolumeOptions};
 pub use order::sort_scene;
 pub use prt::{PrtError, PrtFace, PrtFile, PrtFormat, PrtPortal, read_prt, write_prt};
@@ -477,5 +477,6 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
     if !options.ignores_marks {
         scene.marks = marks::of_scene(&scene);
     }
+    report.settings = report.told(options);
     Ok(Imported { scene, report })
 }

@@ -3,6 +3,7 @@
 use enfilade_geom::scene::Scene;
 use enfilade_geom::shown;
 use enfilade_prepare::{BadOption, CleaningOptions, CleaningReport, Finding, RepairReport};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -50,6 +51,9 @@ pub struct ImportReport {
     pub put_back: Finding,
     /// Changes of the repair, if one was requested.
     pub repair: Option<RepairReport>,
+    /// Facts of the input that a world tells, as settings by name: of surfaces that were extracted, the largest step and the largest
+    /// distance from the source; the repair; and the point that became the origin, unless it was that before.
+    pub settings: BTreeMap<String, String>,
 }
 
 /// Evidence that another axis points up than the one that was taken to.

@@ -11,7 +11,7 @@ use enfilade_source::{
 };
 
 use crate::builder::{Builder, Placement};
-use crate::{ImportError, ImportReport, SurfaceReport, Up, soup};
+use crate::{ImportError, ImportOptions, ImportReport, SurfaceReport, Up, soup};
 
 /// Reads a scene of implicit shapes.
 pub(crate) fn read_implicit(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), ImportError> {
@@ -339,10 +339,8 @@ pub(crate) fn add(
 }
 
 impl ImportReport {
-    /// Returns what a world tells about surfaces that were extracted from its input, as settings by name: the largest
-    /// step, and the largest distance of a surface from its source. Empty without such input.
-    #[must_use]
-    pub fn surface_settings(&self) -> BTreeMap<String, String> {
+    /// Returns what a world tells about its input, as settings by name.
+    pub(crate) fn told(&self, options: &ImportOptions) -> BTreeMap<String, String> {
         let all = || self.files.iter().filter_map(|f| f.surface.as_ref());
         let steps = all().filter_map(|s| s.step).reduce(f64::max);
         let distances = all().map(|s| s.distance).reduce(f64::max);
@@ -352,6 +350,14 @@ impl ImportReport {
             .collect();
         if let Some(factor) = all().find_map(|s| s.enlarged) {
             told.insert("surface.enlarged".into(), factor.to_string());
+        }
+        if let Some(repair) = &options.repair {
+            told.insert("repair.weld".into(), repair.weld.to_string());
+            told.insert("repair.hole".into(), repair.hole.to_string());
+        }
+        if options.origin != DVec3::ZERO {
+            let [x, y, z] = options.origin.to_array();
+            told.insert("origin".into(), format!("{x} {y} {z}"));
         }
         told
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use enfilade_cpg::{CellPortalGraph, DecidedPlace, Doubt, Reason as Decision, World};
+use enfilade_cpg::{CellPortalGraph, DecidedPlace, Doubt, Reason as Decision, Why, World};
 use serde::Serialize;
 
 /// A foot. [Units: wu]
@@ -41,10 +41,40 @@ struct Close {
     position: [f32; 3],
     /// Chance that the decision is wrong, 0.5 at most.
     chance: f32,
+    /// The outcome.
+    is: Made,
     text: String,
     /// The text without the facts that did not decide; `None` if a reason names the place.
     #[serde(skip)]
     short: Option<String>,
+}
+
+/// The outcome at a place, as far as people can decide otherwise.
+#[derive(Clone, Copy, Debug, Serialize)]
+enum Made {
+    /// An opening within one room.
+    #[serde(rename = "one room")]
+    OneRoom,
+    /// A portal.
+    #[serde(rename = "two rooms")]
+    TwoRooms,
+    /// A whole cell, or none.
+    #[serde(rename = "space")]
+    Space,
+}
+
+impl Made {
+    fn of(why: &Why) -> Self {
+        match why.reason {
+            Decision::Wide | Decision::Unframed => Self::OneRoom,
+            Decision::Narrow
+            | Decision::Neck
+            | Decision::Mouth
+            | Decision::Shut
+            | Decision::Unjoined => Self::TwoRooms,
+            _ => Self::Space,
+        }
+    }
 }
 
 /// A doubt about the input that was reported before the bake.
@@ -115,6 +145,7 @@ impl Verdict {
         let close = of_rooms.close.iter().take(NAMED).map(|close| Close {
             position: close.at,
             chance: close.chance,
+            is: Made::of(&close.why),
             text: close.why.to_string(),
             short: (!is_taken(close.at)).then(|| format!("{:#}", close.why)),
         });

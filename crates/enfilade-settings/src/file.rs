@@ -4,9 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use enfilade_bake::RoomAnswer;
 use enfilade_import::TextureMatter;
 
-use crate::values::{amount, amounts, hole, length, matters, named_points, unit, voxels, weld};
+use crate::values::{
+    amount, amounts, hole, length, matters, named_points, point, room_answer, unit, voxels, weld,
+};
 
 /// Settings by their names in the settings file, `docs/settings.md`. Options of a command overwrite its fields.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -64,6 +67,20 @@ pub struct Settings {
     /// Names of rooms, each with a point in its room. [Units: wu]
     #[serde(deserialize_with = "named_points")]
     pub names: BTreeMap<String, [f64; 3]>,
+    /// Decisions about rooms, in their order.
+    pub decisions: Vec<DecisionTable>,
+}
+
+/// An entry of `[[decisions]]`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DecisionTable {
+    /// A point of the opening, or of where one should be. [Units: wu]
+    #[serde(deserialize_with = "point")]
+    pub at: [f64; 3],
+    /// The decision.
+    #[serde(deserialize_with = "room_answer")]
+    pub is: RoomAnswer,
 }
 
 /// Axes that may point up in an input.
@@ -201,6 +218,17 @@ mod tests {
         of_line("[names]\nHall = \"1,2,3\"", 2, "three numbers");
         of_line("[names]\nHall = [1,2,3]\nHall = [4,5,6]", 3, "duplicate");
         of_line("[names]\n\" \" = [1,2,3]", 1, "empty");
+        of_line(
+            "[[decisions]]\nat = [1,2,3]\nis = \"a gate\"",
+            3,
+            "'a door'",
+        );
+        of_line(
+            "[[decisions]]\nat = [1,2]\nis = \"a door\"",
+            2,
+            "three numbers",
+        );
+        of_line("[[decisions]]\nat = [1,2,3]", 1, "is");
     }
 
     #[test]
@@ -214,7 +242,9 @@ mod tests {
             let (_, known) = problem.split_once("expected one of").unwrap();
             for key in known.split('`').skip(1).step_by(2) {
                 let is_table = ["merge", "bsp", "names", "textures"].contains(&key);
-                let name = if is_table {
+                let name = if key == "decisions" {
+                    "`[[decisions]]`".to_owned()
+                } else if is_table {
                     format!("`[{key}]`")
                 } else {
                     format!("`{key}`")
@@ -223,7 +253,7 @@ mod tests {
                 n += 1;
             }
         }
-        assert_eq!(n, 45);
+        assert_eq!(n, 46);
         let example = DOCS.split("```").nth(1).unwrap();
         let file: Settings = parse_toml(example.strip_prefix("toml").unwrap()).unwrap();
         assert_eq!(file.bsp.max_portals, Some(20));

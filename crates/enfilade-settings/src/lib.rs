@@ -17,7 +17,7 @@ mod file;
 mod resolve;
 mod values;
 
-pub use file::{BspTable, Given, MergeTable, Settings, SplitHeuristic, UpAxis};
+pub use file::{BspTable, DecisionTable, Given, MergeTable, Settings, SplitHeuristic, UpAxis};
 pub use resolve::Resolved;
 pub use values::{parse_hole, parse_length, parse_point, parse_toml, parse_unit, parse_weld};
 

@@ -2,12 +2,12 @@
 
 use enfilade_bake::bsp::{BspConfig, Guide, Heuristic, Rooms};
 use enfilade_bake::simplify::{CostModel, SimplifySettings};
-use enfilade_bake::{BakeConfig, Method, SmallestHole};
+use enfilade_bake::{BakeConfig, Method, RoomDecision, SmallestHole};
 use enfilade_geom::scene::{RoomName, Scene};
 use enfilade_geom::{Aabb, DVec3, Plane};
 use enfilade_import::{ImportOptions, RepairOptions, RoleRules, Up};
 
-use crate::{BspTable, Settings, SettingsError, SplitHeuristic, UpAxis};
+use crate::{BspTable, DecisionTable, Settings, SettingsError, SplitHeuristic, UpAxis};
 
 /// Default bound below which cells are merged with a neighbor, in triangles: the merging threshold of Lefebvre &
 /// Hornus 2003, table 2.
@@ -77,6 +77,11 @@ impl Settings {
             *field = given.unwrap_or(*field);
         }
         config.keeps_given = self.given.is_some();
+        let decided = |DecisionTable { at, is }: DecisionTable| RoomDecision {
+            at: DVec3::from_array(at),
+            is,
+        };
+        config.decisions = self.decisions.into_iter().map(decided).collect();
         config.bsp = self.bsp.config()?;
         let named = self.names.into_iter();
         let named = named.map(|(name, at)| RoomName::at(name, DVec3::from_array(at)));

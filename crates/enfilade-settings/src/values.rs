@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use enfilade_bake::RoomAnswer;
 use enfilade_geom::DVec3;
 use enfilade_import::TextureMatter;
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error, SeqAccess, Visitor};
@@ -220,6 +221,21 @@ pub(crate) fn named_points<'de, D: Deserializer<'de>>(
     }
     let points = read.into_iter();
     Ok(points.map(|(name, SettingsPoint(p))| (name, p)).collect())
+}
+
+/// Reads a point, with serde. [Units: wu]
+pub(crate) fn point<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
+    SettingsPoint::deserialize(from).map(|p| p.0)
+}
+
+/// Reads a decision about rooms, with serde.
+pub(crate) fn room_answer<'de, D: Deserializer<'de>>(from: D) -> Result<RoomAnswer, D::Error> {
+    let name = String::deserialize(from)?;
+    let known = RoomAnswer::ALL.into_iter().find(|a| a.name() == name);
+    known.ok_or_else(|| {
+        let [a, b, c] = RoomAnswer::ALL.map(RoomAnswer::name);
+        D::Error::custom(format!("'{name}' is none of '{a}', '{b}', '{c}'"))
+    })
 }
 
 /// A point, `[x, y, z]`. [Units: wu]

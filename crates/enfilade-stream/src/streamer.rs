@@ -218,7 +218,8 @@ impl Streamer {
         let is_ahead = match self.options.policy {
             Policy::Prefetch { .. } => {
                 let sweep = &self.sweep;
-                sweep.is_past_visible && sweep.pending.is_empty() && sweep.again.is_empty()
+                let is_met = sweep.is_past_visible && !sweep.may_regain;
+                is_met && sweep.pending.is_empty() && sweep.again.is_empty()
             }
             _ => true,
         };

@@ -2,11 +2,11 @@
 //!
 //! In every world, a crack is narrow and a door stands upright. In a bake of this version, sill and height, unless the name
 //! of what fills them speaks for another kind, also determine which portals are windows, doors or openings, unless portals were cut
-//! since. `fittings` judges the kinds that leaves determine.
+//! since; a person who asked for a portal said its kind. `fittings` judges the kinds that leaves determine.
 //!
 //! Sills are measured anew from the triangles of the file; values within rounding of another kind are not judged.
 
-use enfilade_cpg::{DetailObject, Fact, Portal, PortalKind, World};
+use enfilade_cpg::{DetailObject, Fact, Portal, PortalKind, Reason, World};
 use enfilade_geom::{Aabb, Bvh, DVec3, Plane, Ray, Triangle, Winding};
 
 use crate::details::triangles_of;
@@ -38,7 +38,8 @@ pub(crate) fn check(world: &World, own: &[Triangle]) -> Vec<String> {
         .filter_map(|(i, p)| {
             let of_shape = shape_problem(p);
             let what = of_shape.or_else(|| {
-                let ground = ground.as_ref()?;
+                let is_asked = p.why.iter().any(|why| why.reason == Reason::Asked);
+                let ground = ground.as_ref().filter(|_| !is_asked)?;
                 match said(world, p) {
                     Said::Kind(kind) if kind == p.kind => None,
                     Said::Nothing | Said::Kind(_) => stance_problem(world, p, ground),

@@ -24,6 +24,7 @@ mod bands;
 mod blocks;
 mod ears;
 mod edge;
+mod equalizer;
 mod graph;
 mod listener;
 mod materials;
@@ -33,6 +34,7 @@ mod reverb;
 mod route;
 mod starts;
 mod taut;
+mod walls;
 
 pub use acoustics::{Acoustics, Heard, Transmission};
 pub use auralize::{AUDIO_BLOCK, AudioBlock, Auralizer, test_sound};

@@ -45,7 +45,7 @@
 pub use enfilade_bake::complex::Leak;
 pub use enfilade_bake::{
     BakeConfig, BakeContext, BakeError, BakeOutput, Budget, MergeSettings, Method, Outdoors,
-    Pieces, Progress, Resolution, Silent, SmallestHole, Stage, bake,
+    Pieces, Progress, Resolution, RoomAnswer, RoomDecision, Silent, SmallestHole, Stage, bake,
 };
 
 pub mod bsp {

@@ -152,7 +152,7 @@ fn work(
         other => of_bake(&other),
     })?;
     let told = &mut baked.world.graph.provenance.settings;
-    told.extend(report.surface_settings());
+    told.extend(report.settings.clone());
     warnings.extend(baked.notes);
     if is_empty(&baked.world) {
         let why = format!("no room was found: {}", why_empty(&baked.world));

@@ -8,6 +8,7 @@ mod arrays;
 mod bake;
 mod demo;
 mod errors;
+mod export;
 mod plan;
 mod see;
 mod walk;

@@ -1,11 +1,16 @@
 // The page: files in, rooms out. What happens in which order is in `start`.
-import { BakeFailure, bake, loadBake, type BakeOptions, type Baked, type Question } from '../src/bake.js';
-import { areOfCommand, dropped, listed, sorted, type Given } from './files.js';
+import { BakeFailure, bake, loadBake, possibleThreads, type BakeOptions, type Baked, type Question } from '../src/bake.js';
+import { answers, decided, openingsOf, partedAt, type Decision } from './decide.js';
+import { readIfc } from './ifc.js';
+import { arePacked, dropped, listed, sorted, type Given } from './files.js';
+import { Left } from './left.js';
 import { fillDoubts, fillRooms, markRow, roomsOf, sentence } from './lists.js';
 import { ModelView } from './model.js';
-import { $, make, show } from './page.js';
+import { $, make, pause, show } from './page.js';
 import { PlanView, type Pointing } from './plan.js';
 import { csvOf, save, tomlOf } from './save.js';
+import { Reserve } from './threads.js';
+import { Walk } from './walking.js';
 import { currentLanguage, meters, number, reason, speak, squareMeters, step, text, type Language } from './texts.js';
 
 /** What the person gave. */
@@ -13,6 +18,7 @@ interface Job {
   files: Given[];
   name: string;
   settings: Record<string, string>;
+  decisions: Decision[];
   toml?: string;
 }
 
@@ -24,15 +30,24 @@ let chosen: number | undefined;
 let hovered: number | undefined;
 let ending: AbortController | undefined;
 let failure: Error | undefined;
+let isParting = false;
+let warming: AbortController | undefined;
 
 // All that is needed later is fetched now: the page then works without a network.
-const module = loadBake(new URL('enfilade-bake.wasm', document.baseURI));
+const moduleNamed = (name: string): Promise<WebAssembly.Module> => loadBake(new URL(name, document.baseURI));
+const alone = (): Promise<WebAssembly.Module> => moduleNamed('enfilade-bake.wasm');
+const module = possibleThreads() > 1 ? moduleNamed('enfilade-bake-threads.wasm').catch(alone) : alone();
 const fetched = async (name: string): Promise<Blob> => {
   const answer = await fetch(name);
   if (!answer.ok) throw new Error(`${name}: ${answer.status} ${answer.statusText}`);
   return answer.blob();
 };
-const workerCode = fetched('bake-worker.js').then((code) => URL.createObjectURL(new Blob([code], { type: 'text/javascript' })));
+const script = (name: string): Promise<string> =>
+  fetched(name).then((code) => URL.createObjectURL(new Blob([code], { type: 'text/javascript' })));
+// With threads, one more waits for the others.
+const nThreads = possibleThreads() > 1 ? possibleThreads() + 1 : 1;
+const threads = script('bake-worker.js').then((code) => new Reserve(code, nThreads));
+let walk: Walk | undefined;
 const examples = new Map<string, Promise<Blob>>();
 const example = (name: string): Promise<Blob> => {
   const known = examples.get(name) ?? fetched(`examples/${name}.glb`);
@@ -42,6 +57,7 @@ const example = (name: string): Promise<Blob> => {
 };
 
 const model = new ModelView($<HTMLCanvasElement>('canvas'));
+const drawing = script('model-worker.js').then((code) => model.start(code));
 
 const pointing: Pointing = {
   name: (cell) => {
@@ -54,7 +70,12 @@ const pointing: Pointing = {
     hovered = cell;
     mark();
   },
-  choose: (cell) => {
+  choose: (cell, at) => {
+    const decision = isParting && baked && cell !== undefined && at ? partedAt(baked, cell, at[0], at[1]) : undefined;
+    if (decision) {
+      add(decision);
+      return;
+    }
     chosen = cell === chosen ? undefined : cell;
     const room = baked?.rooms.find((other) => other.cell === chosen);
     if (room && !room.storeys.includes(storey) && room.storeys[0]) showStorey(room.storeys[0]);
@@ -70,6 +91,7 @@ function mark(): void {
   markRow('hover', hovered);
   markRow('chosen', chosen);
   const room = baked?.rooms.find((other) => other.cell === (hovered ?? chosen));
+  fillChosen();
   $('told').textContent = room
     ? text('chosen', {
         name: pointing.name(room.cell),
@@ -78,6 +100,32 @@ function mark(): void {
         storey: room.storeys.join(', '),
       })
     : '';
+}
+
+/** Bakes again with other decisions; a room that is there then stays chosen. */
+function decide(decisions: Decision[]): void {
+  if (job) void start({ ...job, decisions });
+}
+
+const add = (decision: Decision): void => decide([...(job?.decisions ?? []), decision]);
+
+/** Fills in what the chosen room can become. */
+function fillChosen(): void {
+  const place = $('chosen');
+  const isShown = baked !== undefined && chosen !== undefined;
+  place.hidden = !isShown;
+  if (!isShown || place.dataset.cell === String(chosen)) return;
+  place.dataset.cell = String(chosen);
+  isParting = false;
+  const part = make('button', { type: 'button', id: 'part' }, text('part'));
+  part.addEventListener('click', () => {
+    isParting = !isParting;
+    part.setAttribute('aria-pressed', String(isParting));
+    $('told').textContent = isParting ? text('partHint') : '';
+    if (isParting) $('plan').scrollIntoView({ block: 'center' });
+  });
+  const head = make('h2', {}, text('openings', { name: pointing.name(chosen!) }));
+  place.replaceChildren(head, openingsOf(baked!, chosen!, pointing.name, add), part);
 }
 
 function showStorey(name: string): void {
@@ -94,6 +142,7 @@ function showStorey(name: string): void {
 /** Bakes: the model at once, then progress, then rooms or the reason why there are none. */
 async function start(next: Job): Promise<void> {
   ending?.abort();
+  warming?.abort();
   const own = (ending = new AbortController());
   job = next;
   [baked, chosen, hovered, failure] = [undefined, undefined, undefined, undefined];
@@ -103,22 +152,27 @@ async function start(next: Job): Promise<void> {
   $('name').textContent = next.name;
   show('work');
   const began = performance.now();
-  const clock = setInterval(() => tellTime(began), 200);
+  const left = new Left();
+  const clock = setInterval(() => tellTime(began, left), 200);
   tellStep('reading', 0);
-  tellTime(began);
+  tellTime(began, left);
   const glb = next.files.length === 1 && /\.glb$/i.test(next.name) ? next.files[0]!.bytes : undefined;
-  const picture = glb ? glb.arrayBuffer().then((bytes) => model.load(bytes)) : Promise.resolve(false);
-  picture.then((isShown) => isShown && !own.signal.aborted && !baked && !failure && show('work', 'model'), () => undefined);
+  if (glb) model.load(glb, () => !own.signal.aborted && !baked && !failure && show('work', 'model')).catch(() => undefined);
   try {
-    const code = await workerCode;
+    const reserve = await threads;
     const options: BakeOptions = {
-      settings: next.settings,
+      settings: { ...next.settings, decisions: next.decisions },
       toml: next.toml,
       allowLeak: $<HTMLInputElement>('leaks').checked,
       signal: own.signal,
       wasm: await module,
-      worker: () => new Worker(code),
-      onProgress: ({ stage, index, count }) => tellStep(stage, (index + 0.5) / count),
+      worker: () => reserve.take(),
+      wasmAll: new URL('enfilade-bake-all.wasm', document.baseURI),
+      ifc: readIfc(script, fetched),
+      onProgress: ({ stage, index, count }) => {
+        left.begin(stage);
+        tellStep(stage, (index + 0.5) / count);
+      },
     };
     const found = await bake(next.files, options);
     if (own.signal.aborted) return;
@@ -128,7 +182,19 @@ async function start(next: Job): Promise<void> {
     fail(why as Error);
   } finally {
     clearInterval(clock);
+    void threads.then((reserve) => reserve.fill());
   }
+}
+
+/** Bakes an example while nobody waits: browsers make the code fast that has been used, for all threads that use it later. */
+async function warm(): Promise<void> {
+  const [bytes, wasm, reserve] = await Promise.all([example('house'), module, threads]);
+  if (job) return;
+  warming = new AbortController();
+  const options = { wasm, worker: () => reserve.take(), signal: warming.signal };
+  await bake([{ name: 'house.glb', bytes }], options).catch(() => undefined);
+  document.documentElement.dataset.warm = 'true';
+  reserve.fill();
 }
 
 function tellStep(stage: string, share: number): void {
@@ -136,20 +202,32 @@ function tellStep(stage: string, share: number): void {
   $<HTMLProgressElement>('bar').value = share;
 }
 
-const tellTime = (began: number): void => {
-  $('time').textContent = text('seconds', { n: number((performance.now() - began) / 1000, 0) });
+const tellTime = (began: number, left: Left): void => {
+  const more = left.seconds();
+  const n = number((performance.now() - began) / 1000, 0);
+  $('time').textContent = more === undefined ? text('seconds', { n }) : text('secondsLeft', { n, left: number(Math.ceil(more), 0) });
 };
 
 async function finish(found: Baked, seconds: number): Promise<void> {
   baked = found;
   $('title').dataset.seconds = String(seconds);
-  show('done', 'plan', 'model', 'told', 'results');
-  plan = new PlanView($('plan'), found, pointing);
-  fillResults();
-  showStorey(mainStorey(found));
-  $('title').focus();
+  // Who decides about one storey goes on there.
+  const isKept = job?.decisions.length && found.storeys.some(({ name }) => name === storey);
+  // Each step is a task of its own: the page answers between them.
+  const steps = [
+    () => (plan = new PlanView($('plan'), found, pointing)),
+    ...results,
+    () => show('done', 'plan', 'model', 'told', 'results'),
+    () => showStorey(isKept ? storey : mainStorey(found)),
+    () => $('title').focus(),
+  ];
+  for (const step of steps) {
+    await pause();
+    if (baked !== found) return;
+    step();
+  }
   // The world has all triangles of the model, whatever its format was.
-  await model.load(found.world.slice().buffer);
+  await model.load(new Blob([found.world]));
   model.aimAt(roomsOf(found));
   showStorey(storey);
 }
@@ -159,6 +237,13 @@ const mainStorey = (found: Baked): string => found.storeys.reduce((a, b) => (b.a
 
 /** Fills in all that has words. */
 function fillResults(): void {
+  for (const step of results) step();
+}
+
+/** The steps that fill in all that has words. */
+const results = [fillHead, fillTable, fillRest];
+
+function fillHead(): void {
   if (!baked || !job || !plan) return;
   const n = roomsOf(baked).length;
   $('title').textContent = `${job.name}: ${n === 1 ? text('roomFound') : text('roomsFound', { n })}`;
@@ -174,12 +259,27 @@ function fillResults(): void {
     button.addEventListener('click', () => showStorey(name));
     $('storeys').append(button);
   }
+}
+
+function fillTable(): void {
+  if (!baked || !plan) return;
   const colors = new Map<number, string>();
   for (const { name } of baked.storeys) for (const { cell, color } of plan.rooms(name)) colors.set(cell, color);
   fillRooms(baked, colors, pointing);
-  fillDoubts(baked, showPlace);
+}
+
+function fillRest(): void {
+  if (!baked || !job) return;
+  fillDoubts(baked, showPlace, (close) => answers(close, add));
   const questions = $('doubts');
   for (const question of baked.questions) questions.append(ask(question));
+  const { decisions } = job;
+  $('decisions').hidden = decisions.length === 0;
+  $('decisions').replaceChildren(
+    make('h2', {}, text('decisions')),
+    decided(decisions, showPlace, (index) => decide(decisions.filter((_, i) => i !== index))),
+  );
+  delete $('chosen').dataset.cell;
   fillDownloads(baked, job);
 }
 
@@ -197,7 +297,8 @@ function fillDownloads(found: Baked, of: Job): void {
     ['world', () => save(`${base}-world.glb`, 'model/gltf-binary', found.world)],
     ['planSvg', () => save(`${base}-plan.svg`, 'image/svg+xml', found.plan)],
     ['csv', () => save(`${base}-rooms.csv`, 'text/csv', csvOf(roomsOf(found)))],
-    ['settings', () => save('settings.toml', 'text/plain', tomlOf(of.settings, of.toml))],
+    ['report', () => print()],
+    ['settings', () => save('settings.toml', 'text/plain', tomlOf({ ...of.settings, decisions: of.decisions }, of.toml))],
   ] as const;
   $('downloads').replaceChildren(
     ...entries.map(([key, get]) => {
@@ -207,6 +308,15 @@ function fillDownloads(found: Baked, of: Job): void {
       return button;
     }),
   );
+}
+
+/** Draws the plans of all storeys, which only paper shows. */
+function fillSheets(): void {
+  for (const { name } of baked?.storeys ?? []) {
+    const sheet = make('div', {});
+    $('sheets').append(make('h2', {}, text('storey', { name })), sheet);
+    plan?.draw(name, sheet);
+  }
 }
 
 /** Makes the controls that answer a question of the bake, and bake again. */
@@ -237,13 +347,13 @@ function fail(why: Error): void {
 function given(files: Given[]): void {
   const found = sorted(files);
   if (!found) {
-    fail(new Error(text(areOfCommand(files) ? 'ifc' : 'noFiles')));
+    fail(new Error(text(arePacked(files) ? 'packed' : 'noFiles')));
     return;
   }
   const settings = Object.fromEntries(
     (['unit', 'up'] as const).map((name) => [name, $<HTMLSelectElement>(name).value]).filter(([, value]) => value),
   ) as Record<string, string>;
-  const begin = async (): Promise<void> => start({ files: found.scenes, name: found.name, settings, toml: await found.settings?.text() });
+  const begin = async (): Promise<void> => start({ files: found.scenes, name: found.name, settings, decisions: [], toml: await found.settings?.text() });
   void begin();
 }
 
@@ -278,12 +388,15 @@ function listen(): void {
     button.addEventListener('click', () => {
       const name = button.dataset.example!;
       example(name).then(
-        (bytes) => start({ files: [{ name: `${name}.glb`, bytes }], name: `${name}.glb`, settings: {} }),
+        (bytes) => start({ files: [{ name: `${name}.glb`, bytes }], name: `${name}.glb`, settings: {}, decisions: [] }),
         fail,
       );
     });
   }
+  addEventListener('beforeprint', fillSheets);
+  addEventListener('afterprint', () => $('sheets').replaceChildren());
   $('cancel').addEventListener('click', again);
+  $('walk').addEventListener('click', () => baked && job && void (walk ??= new Walk(fetched)).open(baked.world, job.name));
   for (const button of document.querySelectorAll('[data-again]')) button.addEventListener('click', again);
   $<HTMLInputElement>('whole').addEventListener('change', (event) => model.showWhole((event.target as HTMLInputElement).checked));
   for (const button of document.querySelectorAll<HTMLElement>('[data-language]')) {
@@ -299,7 +412,9 @@ function listen(): void {
 speak(currentLanguage());
 listen();
 module.catch(fail);
-module.then(() => {
+Promise.all([module, drawing, threads]).then(() => {
   for (const name of ['house', 'tower', 'office']) example(name).catch(() => undefined);
+  walk ??= new Walk(fetched);
+  setTimeout(() => void warm(), 500);
   document.documentElement.dataset.ready = 'true';
 }, () => undefined);

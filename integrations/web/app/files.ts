@@ -6,12 +6,16 @@ export interface Given {
   bytes: Blob;
 }
 
-const READ = /\.(glb|gltf|obj|ply|stl|map|bin|mtl|png|jpe?g|webp|ktx2|bmp|tga|gif|avif|dds|wad)$/i;
-const SCENE = /\.(glb|gltf|obj|ply|stl|map)$/i;
+const READ = /\.(ifc|glb|gltf|obj|ply|stl|map|vox|nii|nrrd|e57|las|laz|tiff?|bin|mtl|png|jpe?g|webp|ktx2|bmp|tga|gif|avif|dds|wad)$/i;
+const SCENE = /\.(ifc|glb|gltf|obj|ply|stl|map|vox|nii|nrrd|e57|las|laz|tiff?)$/i;
 
 /** Returns the files that can be read, and the settings among them; `undefined` if there is no scene. */
 export function sorted(files: Given[]): { scenes: Given[]; settings?: Blob; name: string } | undefined {
-  const scenes = files.filter(({ name }) => READ.test(name));
+  const read = files.filter(({ name }) => READ.test(name));
+  // Beside a model, they are its pictures, which are not read.
+  const isHeights = ({ name }: Given): boolean => /\.tiff?$/i.test(name);
+  const hasModel = read.some((file) => SCENE.test(file.name) && !isHeights(file));
+  const scenes = read.filter((file) => !hasModel || !isHeights(file));
   const first = scenes.find(({ name }) => SCENE.test(name));
   if (!first) return undefined;
   const settings = files.find(({ name }) => /\.toml$/i.test(name))?.bytes;
@@ -20,8 +24,8 @@ export function sorted(files: Given[]): { scenes: Given[]; settings?: Blob; name
   return { scenes, settings, name: n > 1 ? `${name} + ${n - 1}` : name };
 }
 
-/** Returns `true` if there are files that only the command reads. */
-export const areOfCommand = (files: Given[]): boolean => files.some(({ name }) => /\.(ifc|ifczip|e57|las|laz)$/i.test(name));
+/** Returns `true` if there are files that must be unpacked. */
+export const arePacked = (files: Given[]): boolean => files.some(({ name }) => /\.(ifczip|zip|7z|gz)$/i.test(name));
 
 /** Returns all files of a list. */
 export const listed = (files: FileList): Given[] => [...files].map((file) => ({ name: file.webkitRelativePath || file.name, bytes: file }));

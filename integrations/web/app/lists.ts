@@ -1,5 +1,5 @@
 // The table of rooms, and what is in doubt.
-import type { Baked, BakedRoom } from '../src/bake.js';
+import type { Baked, BakedRoom, CloseDecision } from '../src/bake.js';
 import { $, make } from './page.js';
 import type { Pointing } from './plan.js';
 import { meters, number, reason, squareMeters, text } from './texts.js';
@@ -53,7 +53,11 @@ export function sentence(said: string): HTMLElement {
 }
 
 /** Fills in what is in doubt. */
-export function fillDoubts(baked: Baked, show: (position: [number, number, number]) => void): void {
+export function fillDoubts(
+  baked: Baked,
+  show: (position: [number, number, number]) => void,
+  answers: (close: CloseDecision) => HTMLElement[],
+): void {
   const { reasons, close } = baked.verdict;
   const place = $('doubts');
   place.replaceChildren();
@@ -65,11 +69,12 @@ export function fillDoubts(baked: Baked, show: (position: [number, number, numbe
   place.append(list.childElementCount > 0 ? list : make('p', {}, text('noDoubt')));
   if (close.length === 0) return;
   const closest = make('ul');
-  for (const { position, chance, text: said } of close) {
+  for (const decision of close) {
+    const { position, chance, text: said } = decision;
     const button = make('button', { type: 'button' }, text('show'));
     button.addEventListener('click', () => show(position));
     const percent = number(100 * chance, 0);
-    closest.append(make('li', {}, sentence(said), ` (${text('chance', { percent })}) `, button));
+    closest.append(make('li', {}, sentence(said), ` (${text('chance', { percent })}) `, button, ...answers(decision)));
   }
   place.append(make('p', {}, text('closest')), closest);
 }

@@ -1,101 +1,124 @@
-// The model in three dimensions, cut open above the floor of a storey, with its rooms in color.
-import {
-  AmbientLight, Box3, Color, DirectionalLight, DoubleSide, Group, HemisphereLight, Mesh, MeshBasicMaterial, PerspectiveCamera, Plane,
-  Raycaster, Scene, ShaderChunk, ShapeGeometry, Vector2, Vector3, WebGLRenderer, type Material, type Object3D,
-} from 'three';
+// The model in three dimensions, cut open above the floor of a storey, with its rooms in color. Another thread draws it
+// (model-worker.ts): here are the camera and what the person does.
+import { Box3, PerspectiveCamera, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import type { Baked, BakedRoom } from '../src/bake.js';
+import type { Asked, Told } from './model-worker.js';
 import type { Pointing } from './plan.js';
-import { shapesOf } from './shapes.js';
-
-// There is nothing for metals to mirror: they would be black, as would all that an exporter left at glTF's default, a metal.
-ShaderChunk.metalnessmap_fragment += '\nmetalnessFactor = 0.0;';
 
 /** Height above a floor at which walls are cut. [Units: m] */
 const CUT = 1.4;
-/** Height of the color above the floor. [Units: m] */
-const ABOVE = 0.03;
+/** Height of a cut that cuts nothing. [Units: m] */
+const NO_CUT = 1e9;
 /** Pointers that move less between down and up have clicked. [Units: pixels] */
 const STILL = 5;
 
 type Paths = { cell: number; color: string; data: string }[];
 
+interface Loading {
+  id: number;
+  begin: () => void;
+  end: (isShown: boolean) => void;
+  fail: (why: Error) => void;
+}
+
 /** The drawn model. */
 export class ModelView {
-  private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(45, 1, 0.1, 5000);
-  private readonly renderer: WebGLRenderer;
   private readonly controls: OrbitControls;
-  private readonly cut = new Plane(new Vector3(0, -1, 0), Infinity);
-  private readonly floors = new Group();
   private readonly box = new Box3();
-  private model: Object3D | undefined;
-  private isAsked = false;
-  private loading = 0;
-  private down: Vector2 | undefined;
+  private worker: Worker | undefined;
+  private loading: Loading | undefined;
+  private asked = 0;
+  private readonly picking = new Map<number, (cell: number | undefined, at?: [number, number]) => void>();
+  private down: [x: number, y: number] | undefined;
   private isWhole = false;
   private height = Infinity;
+  private ready = (): void => undefined;
   /** Who hears of the pointer. */
   pointing: Pointing | undefined;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true });
-    this.renderer.localClippingEnabled = true;
-    this.scene.background = new Color(0xdfe4ea);
-    const lamp = new DirectionalLight(0xffffff, 1.4);
-    lamp.position.set(0.4, 1, 0.6);
-    this.scene.add(new HemisphereLight(0xffffff, 0x9a9086, 1.5), new AmbientLight(0xffffff, 0.4), lamp, this.floors);
     this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.addEventListener('change', () => this.ask());
+    this.controls.addEventListener('change', () => this.tellCamera());
     this.controls.maxPolarAngle = Math.PI / 2;
     new ResizeObserver(() => this.resize()).observe(canvas);
-    canvas.addEventListener('pointermove', (event) => event.buttons === 0 && this.pointing?.hover(this.cellAt(event)));
-    canvas.addEventListener('pointerleave', () => this.pointing?.hover(undefined));
-    canvas.addEventListener('pointerdown', (event) => (this.down = new Vector2(event.clientX, event.clientY)));
+    canvas.addEventListener('pointermove', (event) => event.buttons === 0 && this.pick(event, (cell) => this.pointing?.hover(cell)));
+    canvas.addEventListener('pointerleave', () => {
+      this.picking.clear();
+      this.pointing?.hover(undefined);
+    });
+    canvas.addEventListener('pointerdown', ({ clientX, clientY }) => (this.down = [clientX, clientY]));
     canvas.addEventListener('pointerup', (event) => {
-      const isStill = this.down && this.down.distanceTo(new Vector2(event.clientX, event.clientY)) < STILL;
-      if (isStill) this.pointing?.choose(this.cellAt(event));
+      const [x, y] = this.down ?? [Infinity, 0];
+      if (Math.hypot(event.clientX - x, event.clientY - y) < STILL) this.pick(event, (cell, at) => this.pointing?.choose(cell, at));
     });
     canvas.addEventListener('keydown', (event) => this.hear(event));
   }
 
-  /** Shows a GLB, from above at a slant; a later one takes its place. Returns `false` if another was asked for meanwhile. */
-  async load(bytes: ArrayBuffer): Promise<boolean> {
-    const own = ++this.loading;
-    const { scene } = await new GLTFLoader().parseAsync(bytes, '');
-    if (own !== this.loading) return false;
-    this.clear();
-    this.model = scene;
-    scene.traverse((object) => {
-      if (!(object instanceof Mesh)) return;
-      for (const material of [object.material].flat() as Material[]) {
-        material.side = DoubleSide;
-        material.clippingPlanes = [this.cut];
-      }
+  /** Starts the thread that draws, by the address of its script; resolves when the next model can be drawn. */
+  async start(code: string): Promise<void> {
+    // A browser that cannot draw on another thread shows plan and rooms alone.
+    if (!('transferControlToOffscreen' in this.canvas)) return;
+    this.worker = new Worker(code);
+    this.worker.addEventListener('message', (event: MessageEvent<Told>) => this.heed(event.data));
+    const isReady = new Promise<void>((done) => {
+      this.ready = done;
+      // Without a graphics card there is no picture, which is no reason to wait.
+      this.worker!.addEventListener('error', () => done());
     });
-    this.scene.add(scene);
-    this.box.setFromObject(scene);
-    this.aim();
-    return true;
+    const canvas = this.canvas.transferControlToOffscreen();
+    this.worker.postMessage({ ask: 'canvas', canvas } satisfies Asked, [canvas]);
+    await isReady;
   }
 
-  /** Takes the model away. */
-  clear(): void {
-    if (this.model) this.scene.remove(this.model);
-    this.model?.traverse((object) => {
-      if (!(object instanceof Mesh)) return;
-      object.geometry.dispose();
-      for (const material of [object.material].flat() as Material[]) material.dispose();
+  /**
+   * Shows a GLB, from above at a slant; a later one takes its place. `begin` is called before it is drawn. Returns `false` if
+   * another was asked for meanwhile. Throws if it cannot be read.
+   */
+  load(model: Blob, begin: () => void = () => undefined): Promise<boolean> {
+    if (!this.worker) return Promise.resolve(false);
+    this.loading?.end(false);
+    const id = ++this.asked;
+    return new Promise((end, fail) => {
+      this.loading = { id, begin, end, fail };
+      this.post({ ask: 'load', id, model });
     });
-    this.model = undefined;
-    this.showRooms([], undefined);
+  }
+
+  /** Takes the model away, and one that is on its way. */
+  clear(): void {
+    this.loading?.end(false);
+    this.loading = undefined;
     this.height = Infinity;
-    this.recut();
+    this.post({ ask: 'clear', id: ++this.asked });
+  }
+
+  private post(asked: Asked): void {
+    this.worker?.postMessage(asked);
+  }
+
+  private heed(told: Told): void {
+    if (told.tell === 'ready') this.ready();
+    else if (told.tell === 'picked') {
+      this.picking.get(told.id)?.(told.cell, told.at);
+      this.picking.delete(told.id);
+    } else if (told.id === this.loading?.id) {
+      if (told.tell === 'box') {
+        const [low, high] = told.box;
+        this.box.set(new Vector3(...low), new Vector3(...high));
+        this.aim();
+        this.loading.begin();
+      } else if (told.tell === 'drawn') {
+        this.canvas.dataset.drawn = String(told.pieces);
+        this.loading.end(true);
+      } else this.loading.fail(new Error(told.text));
+    }
   }
 
   /** Looks at all of it, or at all rooms if some are known: a building may stand in a wide country. */
   private aim(): void {
+    if (this.box.isEmpty()) return;
     const [middle, size] = [this.box.getCenter(new Vector3()), this.box.getSize(new Vector3())];
     const far = 0.5 * size.length() + 1;
     const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, this.camera.aspect || 1);
@@ -103,9 +126,13 @@ export class ModelView {
     this.camera.position.copy(middle).add(new Vector3(0.35, 0.95, 0.75).normalize().multiplyScalar((1.05 * far) / half));
     this.camera.near = far / 500;
     this.camera.far = far * 20;
-    this.camera.updateProjectionMatrix();
     this.controls.update();
-    this.ask();
+    this.tellCamera();
+  }
+
+  private tellCamera(): void {
+    const { near, far, position } = this.camera;
+    this.post({ ask: 'camera', position: position.toArray(), target: this.controls.target.toArray(), near, far });
   }
 
   /** Looks at all rooms of a world. */
@@ -120,30 +147,14 @@ export class ModelView {
   showStorey(baked: Baked, storey: string, paths: Paths): void {
     const of = baked.storeys.find(({ name }) => name === storey);
     this.height = of ? Math.min(of.floor + CUT, of.top) : Infinity;
-    this.showRooms(paths, (cell) => {
-      const low = baked.rooms.find((room) => room.cell === cell)?.aabb[0][1];
-      const floor = of?.floor ?? 0;
+    const floor = of?.floor ?? 0;
+    const floors = paths.map((path) => {
+      const low = baked.rooms.find((room) => room.cell === path.cell)?.aabb[0][1];
       // Split levels lie beside the floor of the storey; the lowest floor of a stair does not count.
-      return low !== undefined && Math.abs(low - floor) < 1.2 ? low : floor;
+      return { ...path, y: low !== undefined && Math.abs(low - floor) < 1.2 ? low : floor };
     });
+    this.post({ ask: 'floors', floors });
     this.recut();
-  }
-
-  private showRooms(paths: Paths, floor: ((cell: number) => number) | undefined): void {
-    for (const mesh of this.floors.children as Mesh[]) {
-      mesh.geometry.dispose();
-      (mesh.material as Material).dispose();
-    }
-    this.floors.clear();
-    for (const { cell, color, data } of paths) {
-      const geometry = new ShapeGeometry(shapesOf(data)).rotateX(Math.PI / 2);
-      const material = new MeshBasicMaterial({ color, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -2 });
-      const mesh = new Mesh(geometry, material);
-      mesh.position.y = (floor?.(cell) ?? 0) + ABOVE;
-      mesh.userData = { cell, color };
-      this.floors.add(mesh);
-    }
-    this.ask();
   }
 
   /** Shows the whole building, or the cut. */
@@ -153,19 +164,12 @@ export class ModelView {
   }
 
   private recut(): void {
-    this.cut.constant = this.isWhole || this.height === Infinity ? 1e9 : this.height;
-    this.ask();
+    this.post({ ask: 'cut', height: this.isWhole || this.height === Infinity ? NO_CUT : this.height });
   }
 
   /** Marks rooms. */
   mark(hovered: number | undefined, chosen: number | undefined): void {
-    for (const mesh of this.floors.children as Mesh[]) {
-      const { cell, color } = mesh.userData as { cell: number; color: string };
-      const own = (mesh.material as MeshBasicMaterial).color.set(color);
-      if (cell === chosen) own.set(0x7db8f0);
-      else if (cell === hovered) own.multiplyScalar(0.85);
-    }
-    this.ask();
+    this.post({ ask: 'mark', hovered, chosen });
   }
 
   /** Turns to a point. */
@@ -174,15 +178,16 @@ export class ModelView {
     this.controls.target.add(move);
     this.camera.position.add(move);
     this.controls.update();
-    this.ask();
+    this.tellCamera();
   }
 
-  private cellAt(event: PointerEvent): number | undefined {
+  /** Finds the room below a pointer; of several questions on their way, the last is answered. */
+  private pick({ clientX, clientY }: PointerEvent, hear: (cell: number | undefined, at?: [number, number]) => void): void {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
-    const at = new Vector2((2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height);
-    const ray = new Raycaster();
-    ray.setFromCamera(at, this.camera);
-    return ray.intersectObject(this.floors)[0]?.object.userData.cell as number | undefined;
+    const id = ++this.asked;
+    this.picking.clear();
+    this.picking.set(id, hear);
+    this.post({ ask: 'pick', id, x: (2 * (clientX - left)) / width - 1, y: 1 - (2 * (clientY - top)) / height });
   }
 
   private hear(event: KeyboardEvent): void {
@@ -200,28 +205,16 @@ export class ModelView {
     }
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
-    this.ask();
+    this.tellCamera();
   }
 
   private resize(): void {
-    const { clientWidth, clientHeight } = this.canvas;
-    if (clientWidth === 0 || clientHeight === 0) return;
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
     const isFirst = this.camera.aspect === 1;
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-    this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    if (isFirst && this.model) this.aim();
-    this.ask();
-  }
-
-  /** Draws soon, once. */
-  private ask(): void {
-    if (this.isAsked) return;
-    this.isAsked = true;
-    requestAnimationFrame(() => {
-      this.isAsked = false;
-      this.renderer.render(this.scene, this.camera);
-    });
+    this.post({ ask: 'size', width, height, ratio: Math.min(2, devicePixelRatio) });
+    if (isFirst) this.aim();
   }
 }

@@ -24,3 +24,6 @@ export function show(...ids: string[]): void {
   // A model that is not cut has no choice of it.
   $('cut').hidden = !ids.includes('plan');
 }
+
+/** Ends a task: what the person does is heard before the next. */
+export const pause = (): Promise<void> => new Promise((done) => setTimeout(done));

@@ -9,7 +9,8 @@ const MARGIN = 60;
 /** What a plan and a model tell of the pointer. */
 export interface Pointing {
   hover(cell: number | undefined): void;
-  choose(cell: number | undefined): void;
+  /** Hears of a click, with x and z where it was, if that is known. [Units: m] */
+  choose(cell: number | undefined, at?: [number, number]): void;
   name(cell: number): string;
 }
 
@@ -51,6 +52,11 @@ export class PlanView {
 
   /** Shows a storey. */
   show(storey: string): void {
+    this.draw(storey, this.place);
+  }
+
+  /** Draws a storey as all of a place, which is part of the page: only then has a drawing a size. */
+  draw(storey: string, place: HTMLElement): void {
     const svg = document.createElementNS(SVG, 'svg');
     const style = this.whole.querySelector('style');
     const group = this.whole.querySelector(`g.storey[data-storey="${CSS.escape(storey)}"]`)?.cloneNode(true) as SVGGElement | undefined;
@@ -72,7 +78,7 @@ export class PlanView {
     }
     svg.setAttribute('font-family', 'sans-serif');
     svg.append(group);
-    this.place.replaceChildren(svg);
+    place.replaceChildren(svg);
     const { x, y, width, height } = group.getBBox();
     svg.setAttribute('viewBox', [x - MARGIN, y - MARGIN, width + 2 * MARGIN, height + 2 * MARGIN].join(' '));
   }
@@ -95,12 +101,18 @@ export class PlanView {
     this.place.querySelector('svg g')?.append(ring);
   }
 
+  private placeOf({ clientX, clientY }: MouseEvent): [number, number] | undefined {
+    const group = this.place.querySelector<SVGGElement>('svg g.storey');
+    const point = group?.getScreenCTM() && new DOMPoint(clientX, clientY).matrixTransform(group.getScreenCTM()!.inverse());
+    return point ? [point.x / PLAN_SCALE, point.y / PLAN_SCALE] : undefined;
+  }
+
   private hear(event: Event): void {
     const path = (event.target as Element).closest?.<SVGElement>('.cell[data-cell]');
     const cell = path && this.isRoom.has(Number(path.dataset.cell)) ? Number(path.dataset.cell) : undefined;
     if (event.type === 'mouseover' || event.type === 'focusin') this.pointing.hover(cell);
     else if (event.type === 'mouseout') this.pointing.hover(undefined);
-    else if (event.type === 'click') this.pointing.choose(cell);
+    else if (event.type === 'click') this.pointing.choose(cell, this.placeOf(event as MouseEvent));
     else if (cell !== undefined && ['Enter', ' '].includes((event as KeyboardEvent).key)) {
       event.preventDefault();
       this.pointing.choose(cell);

@@ -1,5 +1,6 @@
 // What can be taken along.
 import type { BakedRoom } from '../src/bake.js';
+import type { Decision } from './decide.js';
 
 /** Lets the person save bytes or text. */
 export function save(name: string, type: string, content: BlobPart): void {
@@ -24,8 +25,14 @@ export function csvOf(rooms: BakedRoom[]): string {
   return ['cell,name,kind,storeys,floor_area_m2,height_m,volume_m3,doors,windows', ...lines, ''].join('\r\n');
 }
 
-/** Returns settings as the command's settings file. */
+/** Returns settings as the command's settings file: those of a file `before`, with the page's own in their place. */
 export function tomlOf(settings: Record<string, unknown>, before = ''): string {
-  const lines = Object.entries(settings).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
-  return `# Settings of enfilade bake: enfilade bake FILE --config settings.toml -o world.glb\n${lines.join('\n')}\n${before}`;
+  const { decisions, ...values } = settings as { decisions?: Decision[] };
+  const isOwn = (line: string): boolean => Object.keys(values).some((name) => line.startsWith(`${name} =`));
+  const lines = Object.entries(values).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
+  const kept = before.split('\n').filter((line) => !isOwn(line) && line !== HEAD);
+  const own = decisions?.map(({ at, is }) => `\n[[decisions]]\nat = ${JSON.stringify(at)}\nis = ${JSON.stringify(is)}\n`) ?? [];
+  return `${[HEAD, ...lines, ...kept].join('\n').trimEnd()}\n${own.join('')}`;
 }
+
+const HEAD = '# Settings of enfilade bake: enfilade bake FILE --config settings.toml -o world.glb';

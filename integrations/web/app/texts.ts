@@ -32,9 +32,15 @@ export function reason(said: string): { said: string; in: Language } {
   return { said, in: 'en' };
 }
 
+const formats = new Map<string, Intl.NumberFormat>();
+
 /** Returns a number with digits behind the point, as people write it. */
 export function number(value: number, digits: number): string {
-  return value.toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  // Making a format takes long, the first one most.
+  const key = `${language}${digits}`;
+  const known = formats.get(key) ?? new Intl.NumberFormat(language, { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  formats.set(key, known);
+  return known.format(value);
 }
 
 /** Returns an area with its unit. */
@@ -45,6 +51,7 @@ export const meters = (value: number): string => `${number(value, 2)} m`;
 /** Speaks another language, in all marked elements, too. */
 export function speak(next: Language): void {
   language = next;
+  for (const digits of [0, 1, 2]) number(0, digits);
   document.documentElement.lang = next;
   document.title = `enfilade · ${text('tagline')}`;
   for (const element of document.querySelectorAll<HTMLElement>('[data-text]')) element.textContent = text(element.dataset.text as Key);

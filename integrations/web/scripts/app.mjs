@@ -1,18 +1,33 @@
 // Builds dist/app: the page that bakes, static files for any host. Its examples are made by the command, ENFILADE.
 import { build } from 'esbuild';
-import { copyFileSync, existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
+import { createHash } from 'node:crypto';
+import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { execFileSync } from 'node:child_process';
 import { fileURLToPath } from 'node:url';
-import { brotliCompressSync } from 'node:zlib';
+import { PAGE, brotli } from './sizes.mjs';
 import { command } from './worlds.mjs';
 
 const at = (path) => fileURLToPath(new URL(`../${path}`, import.meta.url));
 const shared = { bundle: true, minify: true, target: 'es2022', legalComments: 'none', logLevel: 'error' };
 mkdirSync(at('dist/app/examples'), { recursive: true });
 await build({ ...shared, entryPoints: [at('app/app.ts')], format: 'esm', outfile: at('dist/app/app.js') });
-await build({ ...shared, entryPoints: [at('src/bake-worker.ts')], format: 'iife', outfile: at('dist/app/bake-worker.js') });
-for (const name of ['index.html', 'app.css']) copyFileSync(at(`app/${name}`), at(`dist/app/${name}`));
-if (existsSync(at('dist/enfilade-bake.wasm'))) copyFileSync(at('dist/enfilade-bake.wasm'), at('dist/app/enfilade-bake.wasm'));
+for (const worker of ['src/bake-worker.ts', 'app/model-worker.ts', 'app/ifc-worker.ts']) {
+  await build({ ...shared, entryPoints: [at(worker)], format: 'iife', outdir: at('dist/app') });
+}
+copyFileSync(at('app/app.css'), at('dist/app/app.css'));
+// The page allows the one script that the walk has inside, by its hash.
+const walkFolder = at('../../crates/enfilade-report/src/walk');
+const walk = readFileSync(`${walkFolder}/index.html`, 'utf8');
+const inside = /<script>([^]*?)<\/script>/.exec(walk)[1];
+const hash = createHash('sha256').update(inside).digest('base64');
+writeFileSync(at('dist/app/index.html'), readFileSync(at('app/index.html'), 'utf8').replace('sha256-WALK', `sha256-${hash}`));
+cpSync(walkFolder, at('dist/app/walk'), { recursive: true });
+for (const name of ['enfilade-bake.wasm', 'enfilade-bake-threads.wasm', 'enfilade-bake-all.wasm']) {
+  if (existsSync(at(`dist/${name}`))) copyFileSync(at(`dist/${name}`), at(`dist/app/${name}`));
+}
+// Loaded when an IFC file comes.
+copyFileSync(at('node_modules/web-ifc/web-ifc.wasm'), at('dist/app/web-ifc.wasm'));
+copyFileSync(at('node_modules/web-ifc/LICENSE.md'), at('dist/app/web-ifc-license.md'));
 if (existsSync(command)) {
   const run = (...args) => execFileSync(command, ['-q', ...args], { stdio: ['ignore', 'ignore', 'inherit'] });
   const example = (name) => at(`dist/app/examples/${name}.glb`);
@@ -25,6 +40,4 @@ if (existsSync(command)) {
   run('generate', 'office', '--rooms', '14', '--seed', '3', '-o', example('office'));
   rmSync(folder, { recursive: true, force: true });
 } else console.log(`no examples: ${command} is missing`);
-const parts = ['index.html', 'app.css', 'app.js', 'bake-worker.js'].map((name) => readFileSync(at(`dist/app/${name}`)));
-const sizes = parts.map((bytes) => brotliCompressSync(bytes).length);
-console.log(`app: ${sizes.reduce((a, b) => a + b)} bytes in brotli, without the module`);
+console.log(`app: ${brotli(PAGE)} bytes in brotli, without the module`);

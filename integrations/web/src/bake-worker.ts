@@ -1,12 +1,8 @@
 /** The thread on which `bake` works: a worker of a page, or of node. */
-import { runModule, type ModuleFile } from './bake-module.js';
+import { runModule, runThread, type ModuleFile, type ModuleThread } from './bake-module.js';
 
-/** What the worker is sent, once. */
-export interface WorkerTask {
-  module: WebAssembly.Module;
-  files: ModuleFile[];
-  request: string;
-}
+/** What the worker is sent, once: a bake, with the number of threads that help it, or the part of one. */
+export type WorkerTask = { module: WebAssembly.Module; files: ModuleFile[]; request: string; helpers: number } | { thread: ModuleThread };
 
 interface Port {
   postMessage(message: unknown, transfer?: ArrayBuffer[]): void;
@@ -15,9 +11,16 @@ interface Port {
 const threads = globalThis.process?.getBuiltinModule?.('worker_threads');
 const port = (threads?.parentPort ?? globalThis) as unknown as Port;
 
-async function work({ module, files, request }: WorkerTask): Promise<void> {
+async function work(task: WorkerTask): Promise<void> {
+  const step = (name: string, at: number, of: number): void => port.postMessage({ step: { name, at, of } });
   try {
-    const answer = await runModule(module, files, request, (name, at, of) => port.postMessage({ step: { name, at, of } }));
+    if ('thread' in task) {
+      await runThread(task.thread, step, (panic) => port.postMessage({ panic }));
+      return;
+    }
+    const { module, files, request, helpers } = task;
+    const others = { n: helpers, start: (thread: ModuleThread): void => port.postMessage({ thread }) };
+    const answer = await runModule(module, files, request, step, helpers > 0 ? others : undefined);
     const transfer = 'world' in answer ? [answer.world.buffer] : [];
     port.postMessage({ answer }, transfer);
   } catch (why) {

@@ -1,8 +1,11 @@
 /** The whole bake without a server: files in, a world, its plan and its rooms out. */
 import { bytesOf, type WasmSource } from './bytes.js';
-import { runModule, type ModuleAnswer, type ModuleFile, type Question, type Refusal } from './bake-module.js';
+import { convertIfc, type IfcReader } from './ifc-files.js';
+import { needsSecond } from './second-module.js';
+import { defect, isThreaded, runModule, type ModuleAnswer, type ModuleFile, type ModuleThread, type Question, type Refusal } from './bake-module.js';
 
 export type { Question, Refusal } from './bake-module.js';
+export type { IfcReader } from './ifc-files.js';
 
 /** A file: one of a page, or a name and bytes. Names have folders, with `/`, if scenes refer to files by them. */
 export type BakeInput = File | { name: string; bytes: Uint8Array | ArrayBuffer | Blob };
@@ -34,13 +37,19 @@ export interface BakeOptions {
   allowEmpty?: boolean;
   /** Returns worlds of maps that leak. */
   allowLeak?: boolean;
+  /** Reads IFC files: `ifcReader` of `enfilade/ifc`. */
+  ifc?: IfcReader;
   onProgress?: (step: BakeStep) => void;
   /** Ends the bake at once: its thread ends. */
   signal?: AbortSignal;
   /** Where the module is, if it moved. */
   wasm?: WasmSource;
-  /** Makes the thread, if its script moved; `false` bakes on the thread that calls, which waits. */
+  /** Where the second module is, if it moved: for E57, LAS, TIFF, and glTF compressed by Draco. */
+  wasmAll?: WasmSource;
+  /** Makes a thread, if its script moved; `false` bakes on the thread that calls, which waits. */
   worker?: false | (() => Worker);
+  /** Most threads; as many as the machine has cores, 8 at most, where pages may share memory, and else 1. */
+  threads?: number;
 }
 
 /** A room, or a cell of another kind. Lengths are in meters. */
@@ -60,6 +69,17 @@ export interface BakedRoom {
   why: string[];
 }
 
+/** An opening between two cells. Lengths are in meters. */
+export interface BakedOpening {
+  cells: [number, number];
+  kind: 'open' | 'door' | 'window';
+  at: [number, number, number];
+  width: number;
+  height: number;
+  /** A person asked for it. */
+  asked: boolean;
+}
+
 /** A storey. */
 export interface BakedStorey {
   name: string;
@@ -69,6 +89,16 @@ export interface BakedStorey {
   cells: number[];
 }
 
+/** A decision that the bake nearly made otherwise. */
+export interface CloseDecision {
+  position: [number, number, number];
+  /** Chance that it is wrong, 0.5 at most. */
+  chance: number;
+  /** What the bake made of the place; `space` is a whole cell, or none. */
+  is: 'one room' | 'two rooms' | 'space';
+  text: string;
+}
+
 /** How far to trust a world. */
 export interface Verdict {
   trust: 'good' | 'fair' | 'low' | 'none';
@@ -76,7 +106,7 @@ export interface Verdict {
   /** Share of the rooms that are expected to be wrong. */
   doubt: number;
   /** The places most in doubt. */
-  close: { position: [number, number, number]; chance: number; text: string }[];
+  close: CloseDecision[];
   /** Reasons for less trust, with options of the command. */
   reasons: { text: string; options: string[] }[];
 }
@@ -89,6 +119,8 @@ export interface Baked {
   plan: string;
   rooms: BakedRoom[];
   storeys: BakedStorey[];
+  /** All openings but cracks. */
+  openings: BakedOpening[];
   verdict: Verdict;
   /** The verdict as the command prints it. */
   text: string;
@@ -117,10 +149,21 @@ export class BakeFailure extends Error {
   }
 }
 
+/** Most threads unless more are asked for: the rest of a bake works alone. */
+const MOST_THREADS = 8;
+
+/** Returns the number of threads that a bake can have here: 1 in a page that is not isolated from others. */
+export function possibleThreads(most = MOST_THREADS): number {
+  const isShared = typeof SharedArrayBuffer !== 'undefined' && (globalThis.crossOriginIsolated ?? true);
+  const cores = globalThis.process?.getBuiltinModule?.('os').availableParallelism() ?? globalThis.navigator?.hardwareConcurrency ?? 1;
+  return isShared ? Math.max(1, Math.min(most, cores)) : 1;
+}
+
 const modules = new Map<string, Promise<WebAssembly.Module>>();
 
-/** Loads the module that bakes, once from each address, so that a page can do so before it is needed. */
-export function loadBake(source?: WasmSource): Promise<WebAssembly.Module> {
+/** Loads the module that bakes, once from each address, so that a page can do so before it is needed: that with threads if there can be several. */
+export function loadBake(source?: WasmSource, threads = possibleThreads()): Promise<WebAssembly.Module> {
+  if (!source && threads > 1) return loadBake(new URL('./enfilade-bake-threads.wasm', import.meta.url)).catch(() => loadBake(undefined, 1));
   const from = source ?? new URL('./enfilade-bake.wasm', import.meta.url);
   if (from instanceof WebAssembly.Module) return Promise.resolve(from);
   if (typeof from !== 'string' && !(from instanceof URL)) return WebAssembly.compile(from);
@@ -137,30 +180,37 @@ async function compiled(address: string): Promise<WebAssembly.Module> {
     return await WebAssembly.compile(await bytesOf(address));
   } catch (why) {
     throw new Error(
-      `enfilade-bake.wasm did not load (${(why as Error).message}). Copy it there from the package's folder dist, ` +
-        `or give its address or its bytes as \`wasm\``,
+      `${address.split('/').pop()} did not load (${(why as Error).message}). Copy it there from the package's folder dist, ` +
+        `or give its address or its bytes as \`wasm\` or \`wasmAll\``,
     );
   }
 }
+
+/** Steps of a bake by the usual method. */
+const STEPS = 12;
 
 /** Bakes files into a world. Throws a `BakeFailure` if there is none, and the signal's reason if that ended it. */
 export async function bake(files: Iterable<BakeInput>, options: BakeOptions = {}): Promise<Baked> {
   const { settings, toml, method, maxMemory, maxTime, allowEmpty, allowLeak, signal } = options;
   signal?.throwIfAborted();
+  const isInline = options.worker === false;
+  const threads = isInline ? 1 : possibleThreads(options.threads);
   const request = JSON.stringify({ settings, toml, method, maxMemory, maxTime, allowEmpty, allowLeak });
-  const [module, own, detail] = await Promise.all([
-    loadBake(options.wasm),
-    held(files, false),
-    held(options.detail ?? [], true),
-  ]);
+  const [own, detail] = await Promise.all([held(files, false), held(options.detail ?? [], true)]);
+  const isSecond = [...own, ...detail].some(needsSecond);
+  const second = (): WasmSource => options.wasmAll ?? new URL('./enfilade-bake-all.wasm', import.meta.url);
+  const module = await loadBake(isSecond ? second() : options.wasm, threads);
   signal?.throwIfAborted();
   const began = performance.now();
   const onStep = (stage: string, index: number, count: number): void => {
     signal?.throwIfAborted();
     options.onProgress?.({ stage, index, count, seconds: (performance.now() - began) / 1000 });
   };
-  const task = { module, files: [...own, ...detail], request };
-  const isInline = options.worker === false;
+  const task = { module, files: [...own, ...detail], request, helpers: isThreaded(module) ? threads : 0 };
+  const fail = (text: string): never => {
+    throw new BakeFailure({ kind: 'files', text, questions: [] });
+  };
+  await convertIfc(task.files, options.ifc, signal, () => onStep('reading', 0, STEPS), fail);
   const answer = isInline ? await runModule(module, task.files, request, onStep) : await onThread(task, onStep, options);
   if ('refusal' in answer) throw new BakeFailure(answer.refusal);
   const { world, plan, facts, memory } = answer;
@@ -186,6 +236,10 @@ interface Thread {
 }
 
 interface Told {
+  /** A thread that is to help. */
+  thread?: ModuleThread;
+  /** The defect that ended a helping thread. */
+  panic?: string;
   step?: { name: string; at: number; of: number };
   answer?: ModuleAnswer;
   failed?: string;
@@ -208,7 +262,7 @@ function started(make: BakeOptions['worker'], hear: (told: Told) => void, fail: 
 }
 
 function onThread(
-  task: { module: WebAssembly.Module; files: ModuleFile[]; request: string },
+  task: { module: WebAssembly.Module; files: ModuleFile[]; request: string; helpers: number },
   onStep: (stage: string, index: number, count: number) => void,
   { signal, worker }: BakeOptions,
 ): Promise<ModuleAnswer> {
@@ -219,13 +273,15 @@ function onThread(
       if (isOver) return;
       isOver = true;
       signal?.removeEventListener('abort', abort);
-      thread.end();
+      for (const thread of all) thread.end();
       then();
     };
     const abort = (): void => finish(() => reject(signal!.reason as Error));
-    const hear = ({ step, answer, failed }: Told): void => {
+    const hear = ({ step, answer, failed, thread, panic }: Told): void => {
       if (isOver) return;
-      if (step) {
+      if (thread) begin({ thread });
+      else if (panic !== undefined) finish(() => reject(new BakeFailure(defect(panic, last))));
+      else if (step) {
         last = step.name;
         try {
           onStep(step.name, step.at, step.of);
@@ -240,8 +296,13 @@ function onThread(
       const text = `the bake stopped${where}: ${why}; perhaps its memory did not suffice`;
       finish(() => reject(new BakeFailure({ kind: 'memory', text, questions: [] })));
     };
-    const thread = started(worker, hear, fail);
+    const all: Thread[] = [];
+    const begin = (what: unknown): void => {
+      const thread = started(worker, hear, fail);
+      all.push(thread);
+      thread.post(what);
+    };
     signal?.addEventListener('abort', abort);
-    thread.post(task);
+    begin(task);
   });
 }

@@ -1,16 +1,35 @@
 #!/usr/bin/env node
 /** `npx enfilade bake`: the bake for those who have no binary. */
 import { readFileSync, readdirSync, writeFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { basename, dirname, join } from 'node:path';
 import { parseArgs } from 'node:util';
-import { BakeFailure, bake, type BakeInput } from './bake.js';
+import { BakeFailure, bake, type BakeInput, type IfcReader } from './bake.js';
+import { ifcReader } from './ifc.js';
 
 const USAGE = `usage: enfilade bake FILE... -o WORLD.glb [--plan PLAN.svg] [--detail FILE]... [--config SETTINGS.toml]
                      [--unit UNIT] [--up y|z] [--method METHOD] [--max-memory BYTES] [--max-time SECONDS]
                      [--allow-empty] [--allow-leak] [--json]
 
-Finds the rooms and doorways of GLB, glTF, OBJ, PLY, STL and .map files, in WebAssembly. The binary of enfilade is faster,
-reads more formats and has more commands.`;
+Finds the rooms and doorways of GLB, glTF, OBJ, PLY, STL, .map and IFC files, in WebAssembly; IFC by the package web-ifc:
+npx -p enfilade -p web-ifc enfilade bake FILE.ifc -o WORLD.glb. The binary of enfilade is faster, reads more formats and has
+more commands.`;
+
+/** Reads IFC by the package web-ifc, which is loaded when there is such a file. */
+const readIfc: IfcReader = async (bytes) => {
+  const load = (): object => {
+    // From the project in which this runs, or beside this package.
+    for (const place of [join(process.cwd(), 'here.js'), import.meta.url]) {
+      try {
+        return createRequire(place)('web-ifc') as object;
+      } catch (why) {
+        if ((why as { code?: string }).code !== 'MODULE_NOT_FOUND') throw why;
+      }
+    }
+    throw new Error('the package is missing: npm install web-ifc');
+  };
+  return ifcReader(load())(bytes);
+};
 
 /** Reads a file, and those beside it that its text names: buffers, materials, pictures. */
 function read(path: string, known: Map<string, BakeInput>): void {
@@ -71,6 +90,7 @@ async function main(args: string[]): Promise<number> {
     maxTime: number(values['max-time']),
     allowEmpty: values['allow-empty'],
     allowLeak: values['allow-leak'],
+    ifc: readIfc,
     onProgress: ({ stage, index, count }) => isWatched && process.stderr.write(`\r\x1b[K${index + 1}/${count} ${stage}`),
   });
   if (isWatched) process.stderr.write('\r\x1b[K');

@@ -1,7 +1,7 @@
 // The page that bakes, in a browser: files in, rooms out, without a network, by keyboard, in two languages, on a phone.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { readFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { after, test } from 'node:test';
 import { command } from '../scripts/worlds.mjs';
 import { at, browser } from './browser.mjs';
@@ -63,9 +63,72 @@ test('a house becomes rooms without a network, and they are the rooms of the com
   assert.ok((await saved('world')).equals(native), 'the world has other bytes');
   assert.equal((await saved('csv')).toString().trim().split('\r\n').length, 13);
   assert.match((await saved('planSvg')).toString(), /^<\?xml/);
+  // On paper: each storey with rooms, the table whole, no controls; then the page is as it was.
+  await tab.evaluate(() => {
+    addEventListener('beforeprint', () => {
+      globalThis.sheets = [...document.querySelectorAll('#sheets svg')].map((svg) => svg.viewBox.baseVal.width);
+    });
+  });
+  const paper = await tab.pdf();
+  assert.match(paper.subarray(0, 8).toString(), /^%PDF-/);
+  if (process.env.PAPER) writeFileSync(process.env.PAPER, paper);
+  const sheets = await tab.evaluate(() => globalThis.sheets);
+  assert.equal(sheets.length, await tab.locator('#storeys button').count());
+  assert.ok(sheets.every((width) => width > 500), `${sheets}`);
+  assert.equal(await tab.locator('#sheets svg').count(), 0);
+  // The walk through it, in a frame, from what is in memory.
+  await tab.click('#walk');
+  const frame = tab.frameLocator('dialog.walk iframe');
+  await frame.locator('#room').waitFor(WAIT);
+  await frame.locator('#room:not(:empty)').waitFor(WAIT);
+  assert.match(await frame.locator('#help').textContent(), /W A S D/);
+  if (process.env.SHOT) await tab.screenshot({ path: process.env.SHOT });
+  await tab.click('dialog.walk > button');
+  await tab.locator('dialog').waitFor({ state: 'detached' });
   await tab.click('[data-language=de]');
   assert.match(await tab.textContent('#title'), /12 Räume/);
   assert.deepEqual(requests.slice(before).filter((url) => !url.startsWith('blob:')), []);
+  assert.deepEqual(errors, []);
+  await context.close();
+});
+
+test('a person decides where rooms end, and the command bakes the same by the settings', async () => {
+  const { context, tab, errors, done } = await open({ acceptDownloads: true });
+  const rooms = async () => Number(/(\d+) rooms/.exec(await tab.textContent('#title'))[1]);
+  const decided = async (press) => {
+    const began = tab.waitForSelector('#work:not([hidden])', WAIT);
+    await press();
+    await began;
+    await done();
+    assert.equal(await tab.textContent('#why'), '');
+  };
+  await tab.click('[data-example=house]');
+  await done();
+  const before = await rooms();
+  await tab.locator('#rooms tbody button').first().click();
+  assert.match(await tab.textContent('#chosen'), /wide, .* high/);
+  await decided(() => tab.locator('#chosen [data-decide="one room"]').first().click());
+  assert.equal(await rooms(), before - 1);
+  // The largest room is parted across its middle.
+  await tab.locator('#rooms tbody button').first().click();
+  await tab.click('#part');
+  assert.match(await tab.textContent('#told'), /Click in the plan/);
+  const box = await tab.locator('#plan .cell.chosen').boundingBox();
+  await decided(() => tab.mouse.click(box.x + box.width * 0.4, box.y + box.height * 0.4));
+  assert.equal(await rooms(), before);
+  assert.equal(await tab.locator('#decisions li').count(), 2);
+  const saved = async (key) => {
+    const [download] = await Promise.all([tab.waitForEvent('download'), tab.click(`[data-save=${key}]`)]);
+    return { path: await download.path(), bytes: readFileSync(await download.path()) };
+  };
+  const [world, settings] = [await saved('world'), await saved('settings')];
+  assert.match(settings.bytes.toString(), /\[\[decisions\]\]\nat = \[.*\]\nis = "two rooms"/);
+  const args = ['-q', 'bake', at('dist/app/examples/house.glb'), '--config', settings.path, '-o', '-'];
+  const native = execFileSync(command, args, { maxBuffer: 1e8, stdio: ['ignore', 'pipe', 'ignore'] });
+  assert.ok(world.bytes.equals(native), 'the world has other bytes');
+  await decided(() => tab.click('[data-back="1"]'));
+  await decided(() => tab.click('[data-back="0"]'));
+  assert.equal(await rooms(), before);
   assert.deepEqual(errors, []);
   await context.close();
 });
@@ -97,9 +160,9 @@ test('the page can connect to nobody else', async () => {
 
 test('what is wrong is said, a question is answered, and a bake is cancelled', async () => {
   const { context, tab, errors, done } = await open();
-  await tab.setInputFiles('#files', upload([{ name: 'a.ifc', bytes: new Uint8Array(4) }]));
+  await tab.setInputFiles('#files', upload([{ name: 'a.ifczip', bytes: new Uint8Array(4) }]));
   await done();
-  assert.match(await tab.textContent('#why'), /command/);
+  assert.match(await tab.textContent('#why'), /Unpack/);
   await tab.click('#failed [data-again]');
   await tab.setInputFiles('#files', upload([{ name: 'a.glb', bytes: new TextEncoder().encode('glTF and no more') }]));
   await done();

@@ -13,6 +13,15 @@ const TYPES = {
   '.glb': 'model/gltf-binary',
 };
 
+const known = new Map();
+
+/** Packs a file, once. */
+function packed(path, body) {
+  const key = `${path} ${statSync(path).mtimeMs}`;
+  if (!known.has(key)) known.set(key, gzipSync(body, { level: body.length > 1e6 ? 1 : 9 }));
+  return known.get(key);
+}
+
 /** Serves `folders` (by first name of the path); `pace` is in bytes a second, `latency` in milliseconds; with or without ranges. */
 export async function serve(folders, { pace = Infinity, latency = 0, ranges = true } = {}) {
   let busyUntil = 0;
@@ -39,7 +48,7 @@ export async function serve(folders, { pace = Infinity, latency = 0, ranges = tr
     // As static hosts do for code.
     if (/\.(js|html|wasm)$/.test(path) && /gzip/.test(request.headers['accept-encoding'] ?? '')) {
       headers['Content-Encoding'] = 'gzip';
-      body = gzipSync(body, { level: 9 });
+      body = packed(path, body);
     }
     headers['Content-Length'] = body.length;
     counts.requests++;

@@ -340,7 +340,7 @@ fn winding(points: &[[f32; 3]]) -> Winding {
 }
 
 /// Returns the structural triangles that a cell sees: batch, place in the batch, vertices.
-fn triangles_of(world: &World, cell: CellId) -> Vec<(u32, u32, Triangle)> {
+pub(crate) fn triangles_of(world: &World, cell: CellId) -> Vec<(u32, u32, Triangle)> {
     let mut out = Vec::new();
     for (b, batch) in world.batches.iter().enumerate() {
         if batch.cells.binary_search(&cell).is_ok() {

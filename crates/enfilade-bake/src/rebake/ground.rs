@@ -8,6 +8,7 @@ use enfilade_geom::{Aabb, Bvh, Triangle};
 
 use super::diff::{Diff, NEW};
 use super::outcome::{RebakeError, WholeBecause};
+use crate::decided::in_words;
 use crate::rooms::WholeAir;
 use crate::simplify::SimplifySettings;
 use crate::structure::{Frame, SceneStructure, Site, Structure, bounds_of, sites, slabs_of};
@@ -65,6 +66,7 @@ pub(super) fn check(old: &World, config: &BakeConfig) -> Result<(), RebakeError>
     if config.smallest_hole != SmallestHole::Auto {
         now.insert("smallest_hole".to_owned(), config.smallest_hole.to_string());
     }
+    now.insert("decisions".to_owned(), in_words(&config.decisions));
     for (name, now) in now {
         let was = was.settings.get(&name).cloned().unwrap_or_default();
         if was != now {
@@ -91,6 +93,8 @@ pub(super) fn why_whole(old: &World, scene: &Scene, config: &BakeConfig) -> Opti
         Some(WholeBecause::Method)
     } else if asks_for_costs(config) {
         Some(WholeBecause::Costs)
+    } else if !config.decisions.is_empty() {
+        Some(WholeBecause::Decisions)
     } else if !scene.marks.is_empty() || !old.graph.specials.is_empty() {
         Some(WholeBecause::Specials)
     } else if config.outdoors != Outdoors::Whole || old.graph.cells.iter().any(|c| c.is_land) {

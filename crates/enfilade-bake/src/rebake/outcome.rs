@@ -36,6 +36,8 @@ pub enum WholeBecause {
     Method,
     /// Bounds on costs apply to the whole world.
     Costs,
+    /// People decided about its rooms.
+    Decisions,
     /// The scene or the world has special portals.
     Specials,
     /// The outdoors is or was several cells.
@@ -65,6 +67,7 @@ impl fmt::Display for WholeBecause {
         f.write_str(match self {
             Self::Method => "only worlds of the watershed are baked in parts",
             Self::Costs => "bounds on costs apply to the whole world",
+            Self::Decisions => "people decided about its rooms, as the whole bake made them",
             Self::Specials => "it has special portals",
             Self::Land => "its outdoors is divided by the lie of all the land",
             Self::Kind => "it has a single room, or is made of brushes",

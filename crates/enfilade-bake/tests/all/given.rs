@@ -34,7 +34,7 @@ fn block(scene: &mut Scene, min: [f64; 3], max: [f64; 3]) {
 }
 
 /// A house of 8 x 3 x 5 m, with a wall from x = 3.75 to 4.25, and a doorway between two z in it, 2.1 m high.
-fn house(doorway: [f64; 2]) -> Scene {
+pub(crate) fn house(doorway: [f64; 2]) -> Scene {
     let mut scene = Scene::default();
     let walls = [
         ([-0.3, -0.3, -0.3], [8.3, 0.0, 5.3]),

@@ -4,6 +4,7 @@ mod bound;
 mod branches;
 mod conformance;
 mod corridors;
+mod decided;
 mod delaunay;
 mod doors;
 mod edit;

@@ -9,6 +9,7 @@ pub(crate) mod builders;
 mod cases;
 mod code;
 mod disturbed;
+mod exports;
 pub(crate) mod facts;
 mod figures;
 mod floors;
@@ -58,6 +59,17 @@ pub(crate) const FOREIGN: &[Row] = &[
     Row::part("kinds", kinds::run),
     Row::part("merged", merged::run),
     Row::part("verdict", trust::run),
+];
+
+/// Buildings whose rooms are exported: a house, a large building, sheets and solids, metric and imperial.
+const EXPORTED: &[&str] = &["duplex", "fzk-haus", "institute", "samplehouse4", "kit-edc"];
+
+/// Rooms for other trades.
+pub(crate) const EXPORTS: &[Row] = &[
+    Row::baked("open rooms", EXPORTED, exports::open),
+    Row::baked("neighbors", EXPORTED, exports::neighbors),
+    Row::named("spaces", EXPORTED, exports::spaces),
+    Row::baked("map labels", EXPORTED, exports::labels),
 ];
 
 /// Disturbed models.

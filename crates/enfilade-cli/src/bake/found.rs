@@ -1,13 +1,13 @@
 //! Report on the scene before the work: files, role of each object, faults of the model.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::Write;
 
 use anyhow::bail;
 use enfilade::geom::scene::{Role, Scene};
 use enfilade::geom::shown;
-use enfilade::import::{CleaningOptions, ImportReport, RepairOptions};
+use enfilade::import::{CleaningOptions, ImportReport};
 use enfilade::internals::import::cleaning_report;
 
 use enfilade_report::InputDoubt;
@@ -82,19 +82,6 @@ pub(crate) fn report_import(
         )?;
     }
     Ok(())
-}
-
-/// Returns what the world tells about its input: surfaces extracted from sources, and repairs.
-pub(crate) fn settings_of(
-    report: &ImportReport,
-    repair: Option<RepairOptions>,
-) -> BTreeMap<String, String> {
-    let mut told = report.surface_settings();
-    if let Some(repair) = repair {
-        told.insert("repair.weld".into(), repair.weld.to_string());
-        told.insert("repair.hole".into(), repair.hole.to_string());
-    }
-    told
 }
 
 /// Ends the bake if the files state neither unit nor axis, and their numbers speak against those that are assumed.

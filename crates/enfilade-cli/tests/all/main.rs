@@ -47,5 +47,6 @@ mod streamed_walk;
 mod streams;
 mod tables;
 mod textured_pictures;
+mod trades;
 mod verdict;
 mod verify;

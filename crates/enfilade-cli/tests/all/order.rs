@@ -46,7 +46,9 @@ fn any_order_of_triangles_vertices_nodes_and_files_gives_the_same_bytes() {
             write("a.glb", &halves[0]);
             write("b.glb", &halves[1]);
             let plain = baked(&dir, &["a.glb", "b.glb"], method);
-            for seed in 0..2 {
+            // Another half a minute of tetrahedra would tell little.
+            let n_orders = if method == "delaunay" { 1 } else { 2 };
+            for seed in 0..n_orders {
                 write("a.glb", &shuffled_glb(&halves[0], seed));
                 write("b.glb", &shuffled_glb(&halves[1], seed));
                 let other = baked(&dir, &["b.glb", "a.glb"], method);

@@ -131,3 +131,35 @@ fn what_is_no_packed_world_is_neither_replaced_nor_read() {
     assert_eq!(fs::read(dir.join("other/thing")).unwrap(), b"mine");
     assert!(!dir.join("x.enf").exists() && !dir.join("x.glb").exists());
 }
+
+#[test]
+fn an_app_is_the_walk_and_the_packed_world_in_one_folder() {
+    let dir = folder("app");
+    let glb = fs::read(dir.join("w.glb")).unwrap();
+    // The second time, the folder is replaced.
+    for _ in 0..2 {
+        let (is_done, out, err) = run(&dir, "pack w.glb --app site");
+        assert!(is_done, "{err}");
+        assert!(out.contains("wrote site"), "{out}");
+    }
+    let page = fs::read_to_string(dir.join("site/index.html")).unwrap();
+    assert!(page.contains("&quot;world&quot;:&quot;world.enf/&quot;"));
+    // A link names a world on another host.
+    assert!(page.contains("#world="));
+    for part in ["walk-code.bin", "walk-module.bin"] {
+        assert!(dir.join("site").join(part).is_file(), "{part}");
+    }
+    let (is_done, _, err) = run(&dir, "unpack site/world.enf -o back.glb");
+    assert!(is_done, "{err}");
+    assert!(fs::read(dir.join("back.glb")).unwrap() == glb);
+    // Nothing else is replaced, and one place is enough.
+    fs::create_dir(dir.join("mine")).unwrap();
+    fs::write(dir.join("mine/a.txt"), "mine").unwrap();
+    let (is_done, _, err) = run(&dir, "pack w.glb --app mine");
+    assert!(
+        !is_done && err.contains("choose another name with --app"),
+        "{err}"
+    );
+    assert!(!run(&dir, "pack w.glb --app site -o w.enf").0);
+    assert!(!run(&dir, "pack w.glb").0);
+}

@@ -10,6 +10,8 @@ pub(super) const NOT_INSTALLED: i32 = 127;
 
 const PYTHON_SCRIPT: &str = include_str!("read_ifc.py");
 const NODE_SCRIPT: &str = include_str!("read_ifc.mjs");
+/// The part of the script of node that pages use, too, and its name.
+const NODE_MODEL: (&str, &str) = ("ifc_model.mjs", include_str!("ifc_model.mjs"));
 
 /// Kind of a program, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +46,7 @@ impl IfcProgram {
         }
     }
 
-    /// Returns the arguments before input and output; writes the script into the folder.
+    /// Returns the arguments before input and output; writes the scripts into the folder.
     pub(super) fn arguments(self, folder: &Path) -> std::io::Result<Vec<OsString>> {
         let (name, script) = match self {
             Self::Python => ("read_ifc.py", PYTHON_SCRIPT),
@@ -53,6 +55,9 @@ impl IfcProgram {
         };
         let path = folder.join(name);
         std::fs::write(&path, script)?;
+        if self == Self::Node {
+            std::fs::write(folder.join(NODE_MODEL.0), NODE_MODEL.1)?;
+        }
         // The folder of the script is where Python looks for modules first: the current one, which may be anybody's,
         // is not searched.
         Ok(vec![path.into()])

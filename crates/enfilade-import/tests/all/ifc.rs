@@ -8,7 +8,10 @@ use std::time::Duration;
 
 use common::{glb, triangle_bin, triangle_json};
 use enfilade_geom::scene::Role;
-use enfilade_import::{IfcConverter, ImportError, ImportOptions, Imported, import};
+use enfilade_import::{
+    ConvertedIfc, HeldFiles, IfcConverter, ImportError, ImportOptions, Imported, import,
+    import_held,
+};
 
 const IFC: &str = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n\
     #7=IFCWALLSTANDARDCASE('0iEHWY1$XA8eQeeULq4jE6',#2,'north',$);\n\
@@ -193,4 +196,33 @@ fn folders_of_killed_runs_go_and_those_in_use_stay() {
     import(&[folder.join("-house.ifc")], &[], &options).unwrap();
     assert!(!left.exists() && used.exists() && young.exists());
     assert_eq!(std::fs::read_dir(&temporary).unwrap().count(), 2);
+}
+
+#[test]
+fn a_file_in_memory_is_what_the_reader_of_its_program_made() {
+    let nodes = r#""nodes":[{"mesh":0,"name":"IfcWall/0iEHWY1$XA8eQeeULq4jE6"}]"#;
+    let converted = ConvertedIfc {
+        glb: glb(&triangle_json(nodes), &triangle_bin()),
+        notes: vec!["a stair: left out".into()],
+    };
+    let held = |ifc: &str, has_it: bool| {
+        let mut files = HeldFiles::default();
+        files.add("a/house.ifc".into(), ifc.into(), false);
+        if has_it {
+            files.add_converted("a/house.ifc".into(), converted.clone());
+        }
+        import_held(&files, &ImportOptions::default())
+    };
+    let imported = held(IFC, true).unwrap();
+    let objects = &imported.scene.objects;
+    assert_eq!(objects[0].name, "IfcWall/0iEHWY1$XA8eQeeULq4jE6");
+    assert_eq!(objects[0].role, Role::Structural);
+    assert_eq!(imported.report.files[0].format, "IFC");
+    let notes = &imported.report.notes;
+    assert!(notes.iter().any(|n| n.place == "web-ifc"), "{notes:?}");
+    // Without one, and cut off.
+    let missing = held(IFC, false).unwrap_err().to_string();
+    assert!(missing.contains("IFC without a package"), "{missing}");
+    let cut = held(&IFC[..100], true).unwrap_err().to_string();
+    assert!(cut.contains("cut off"), "{cut}");
 }

@@ -43,7 +43,7 @@ fn patches_of_obj_are_faces_of_their_object_beside_others() {
         "{surface:?}"
     );
     assert_eq!(surface.step, None);
-    let told = imported.report.surface_settings();
+    let told = &imported.report.settings;
     assert_eq!(told.keys().collect::<Vec<_>>(), ["surface.distance"]);
     // The conic with weight 1/2 through (0, 2), (4, 2) below (2, 5), by a formula of its own.
     let at = |t: f64| {

@@ -30,7 +30,7 @@ fn an_implicit_scene_is_one_structural_object_in_meters_with_its_distance() {
     );
     let step = surface.step.unwrap();
     assert!((step - 4.0 / 128.0).abs() < 1e-6, "{surface:?}");
-    let told = imported.report.surface_settings();
+    let told = &imported.report.settings;
     assert_eq!(
         told.keys().collect::<Vec<_>>(),
         ["surface.distance", "surface.step"]
@@ -62,7 +62,7 @@ fn sources_and_models_are_read_in_one_call() {
     assert_eq!(formats, ["implicit", "OBJ"]);
     // A model alone tells nothing of surfaces.
     let alone = import_sources([source("annex.obj", annex)], &ImportOptions::default()).unwrap();
-    assert!(alone.report.surface_settings().is_empty());
+    assert!(alone.report.settings.is_empty());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-use enfilade_cpg::{RoomFacts, World};
+use enfilade_cpg::{FittingPart, Portal, RoomFacts, World};
 
 use super::{cell_kind, portal_kind};
 use crate::room_facts;
@@ -46,21 +46,37 @@ pub(crate) fn cells_table(
 }
 
 /// Returns the portals of a world as a table: the two cells, the size, the middle and the normal, which points from the
-/// first cell to the second.
+/// first cell to the second; the names of the cells, and of the object that fills it: `IfcDoor/GlobalId` in models from IFC.
 #[must_use]
 pub fn portals_csv(world: &World) -> String {
-    let mut out = String::from("id,kind,cell_a,cell_b,width,height,area,x,y,z,nx,ny,nz\r\n");
+    let mut out = String::from(
+        "id,kind,cell_a,cell_b,width,height,area,x,y,z,nx,ny,nz,name_a,name_b,object\r\n",
+    );
     for (id, portal) in world.graph.portals.iter().enumerate() {
         let [a, b] = portal.cells.map(|c| c.0);
         let (kind, [width, height]) = (portal_kind(portal.kind), portal.size());
         let ([x, y, z], [nx, ny, nz]) = (portal.center(), portal.normal);
         let area = portal.area;
+        let [name_a, name_b] = portal.cells.map(|c| field(&world.graph[c].name));
+        let object = field(filler(world, portal).unwrap_or_default());
         let _ = write!(
             out,
-            "{id},{kind},{a},{b},{width},{height},{area},{x},{y},{z},{nx},{ny},{nz}\r\n"
+            "{id},{kind},{a},{b},{width},{height},{area},{x},{y},{z},{nx},{ny},{nz},{name_a},{name_b},{object}\r\n"
         );
     }
     out
+}
+
+/// Returns the name of the object that fills a portal: a leaf rather than a frame; that of the whole object if it was parted.
+fn filler<'w>(world: &'w World, portal: &Portal) -> Option<&'w str> {
+    let leaves = portal
+        .fittings
+        .iter()
+        .filter(|f| f.part == FittingPart::Leaf);
+    let first = leaves.chain(&portal.fittings).next()?;
+    let object = world.details.get(first.detail as usize)?;
+    let whole = object.part_of.and_then(|i| world.details.get(i as usize));
+    Some(&whole.unwrap_or(object).name)
 }
 
 /// Returns text as one field.

@@ -383,7 +383,7 @@ impl Streamer {
         let is_free = self.sweep.is_over || self.sweep.is_waiting;
         self.sweep.may_regain |= self.sweep.has_lost && !is_same;
         if self.search.follow(eye.cell, eye.position, step, is_free)
-            || (self.sweep.may_regain && self.sweep.is_over)
+            || (self.sweep.may_regain && is_free)
         {
             self.sweep.begin();
             self.slots.begin_sweep();

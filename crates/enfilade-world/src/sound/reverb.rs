@@ -12,10 +12,9 @@
 use std::collections::BTreeMap;
 
 use enfilade_cpg::{CellId, PortalId};
-use enfilade_geom::{Triangle, triangle_area_normal};
 
-use crate::layout::Layout;
 use crate::sound::bands::N_BANDS;
+use crate::sound::walls::Surfaces;
 use crate::space::{Joined, PartId, Place, Space};
 
 /// Speed of sound in air at 20 °C. [Units: wu/s]
@@ -44,7 +43,7 @@ pub struct Reverb {
     /// Per part, the index of its first cell.
     first_cell: Vec<u32>,
     law: DecayLaw,
-    /// Per part and material, the area of walls indoors.
+    /// Per part and material, the area of walls and objects indoors.
     surfaces: BTreeMap<(PartId, Option<u32>), f64>,
 }
 
@@ -55,6 +54,8 @@ struct Room {
     area: f64,
     /// Sum of area times coefficient, in octave bands.
     absorbed: [f64; N_BANDS],
+    /// The same of the objects in it, which are not walls.
+    objects: [f64; N_BANDS],
 }
 
 /// Two cells, and the clear area between them.
@@ -66,9 +67,9 @@ struct Coupling {
 
 impl Reverb {
     /// Computes the rooms of the structure of all parts. `absorption` returns the coefficients of a material of a part in
-    /// [octave bands](crate::OCTAVES), such as [those assumed](crate::Assumed) for its name; `None` for triangles without one. A
-    /// wall seen from several cells counts in those in front of its triangles; outdoors absorbs everything.
-    /// O(area) in pieces of a quarter of a meter, at most some thousands a triangle.
+    /// [octave bands](crate::OCTAVES), such as [those assumed](crate::Assumed) for its name; `None` for triangles without one. Objects
+    /// absorb beside the walls (EN 12354-6); leaves and panes count as openings; outdoors absorbs everything. O(cells · log triangles),
+    /// some milliseconds a cell.
     #[must_use]
     pub fn new(
         space: &Space,
@@ -92,42 +93,38 @@ impl Reverb {
                     ..Room::default()
                 });
             }
-            reverb.add_walls(space, part, first, &absorption);
-            for (i, room) in reverb.rooms[first..].iter_mut().enumerate() {
-                if layout.cell(CellId(i as u32)).is_outdoor {
-                    room.absorbed = [OPEN_AIR; N_BANDS];
-                }
-            }
+            reverb.add_surfaces(space, part, first, &absorption);
         }
         reverb
     }
 
-    fn add_walls(
+    fn add_surfaces(
         &mut self,
         space: &Space,
         part: PartId,
         first: usize,
         absorption: &impl Fn(PartId, Option<u32>) -> [f64; N_BANDS],
     ) {
-        let (layout, world) = (space.layout(part), space.world(part));
-        let rooms = &mut self.rooms[first..];
-        for batch in world.batches.iter().filter(|b| !b.cells.is_empty()) {
-            let material = batch.primitive.material;
-            let alpha = absorption(part, material).map(|a| a.clamp(0.0, 1.0));
-            let mut indoors = 0.0;
-            for triangle in batch.primitive.triangles() {
-                each_piece(layout, &batch.cells, triangle, |cell, area| {
-                    let room = &mut rooms[cell.idx()];
-                    room.area += area;
-                    for (sum, a) in room.absorbed.iter_mut().zip(alpha) {
-                        *sum += area * a;
-                    }
-                    if !layout.cell(cell).is_outdoor {
-                        indoors += area;
-                    }
-                });
+        let (layout, surfaces) = (space.layout(part), Surfaces::new(space, part));
+        for cell in (0..layout.n_cells() as u32).map(CellId) {
+            let room = &mut self.rooms[first + cell.idx()];
+            if layout.cell(cell).is_outdoor {
+                room.absorbed = [OPEN_AIR; N_BANDS];
+                continue;
             }
-            *self.surfaces.entry((part, material)).or_insert(0.0) += indoors;
+            surfaces.each_piece(cell, |piece| {
+                let alpha = absorption(part, piece.material).map(|a| a.clamp(0.0, 1.0));
+                let sums = match piece.is_object {
+                    true => &mut room.objects,
+                    false => &mut room.absorbed,
+                };
+                for (sum, a) in sums.iter_mut().zip(alpha) {
+                    *sum += piece.area * a;
+                }
+                room.area += if piece.is_object { 0.0 } else { piece.area };
+                let of = self.surfaces.entry((part, piece.material));
+                *of.or_insert(0.0) += piece.area;
+            });
         }
     }
 
@@ -151,6 +148,7 @@ impl Reverb {
                 volume,
                 area,
                 absorbed: [area * alpha; N_BANDS],
+                objects: [0.0; N_BANDS],
             };
         }
         reverb
@@ -171,7 +169,7 @@ impl Reverb {
         self.first_cell[place.part.idx()] as usize + place.cell.idx()
     }
 
-    /// Returns the area of walls indoors of each part and material, `None` for those without one. [Units: wu²]
+    /// Returns the area of walls and objects indoors of each part and material, `None` for those without one. [Units: wu²]
     #[doc(hidden)]
     pub fn surfaces(&self) -> impl Iterator<Item = (PartId, Option<u32>, f64)> {
         self.surfaces
@@ -179,7 +177,7 @@ impl Reverb {
             .map(|((part, material), area)| (*part, *material, *area))
     }
 
-    /// Returns the fully absorbing area equivalent to the cell's walls, in octave bands. [Units: wu²]
+    /// Returns the fully absorbing area equivalent to the cell's walls and objects, in octave bands. [Units: wu²]
     ///
     /// # Panics
     ///
@@ -191,10 +189,11 @@ impl Reverb {
 
     fn absorbing(&self, room: &Room) -> [f64; N_BANDS] {
         let least = room.area.max(1e-9);
-        room.absorbed.map(|absorbed| {
+        std::array::from_fn(|k| {
+            let absorbed = room.absorbed[k];
             let mean = (absorbed / least).clamp(1e-3, 0.999);
-            match self.law {
-                _ if absorbed >= OPEN_AIR => OPEN_AIR,
+            let walls = match self.law {
+                _ if absorbed >= OPEN_AIR => return OPEN_AIR,
                 DecayLaw::Sabine => mean * least,
                 DecayLaw::Eyring => -(1.0 - mean).ln() * least,
                 DecayLaw::Kuttruff => {
@@ -202,7 +201,8 @@ impl Reverb {
                     let exponent = -(1.0 - mean).ln();
                     exponent / (1.0 + HALF_VARIANCE * exponent) * least
                 }
-            }
+            };
+            walls + room.objects[k]
         })
     }
 
@@ -227,52 +227,6 @@ impl Reverb {
     }
 }
 
-/// Calls `add` with the area of a triangle in front of each of the cells: cut into halves as small as [`PIECE`], or a share of its
-/// longest edge, [`FINEST`], each judged by its middle. O(pieces).
-fn each_piece(
-    layout: &Layout,
-    cells: &[CellId],
-    triangle: Triangle,
-    mut add: impl FnMut(CellId, f64),
-) {
-    let [a, b, c] = triangle;
-    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-    let piece = PIECE.max(longest / FINEST);
-    let mut stack = vec![triangle];
-    while let Some([a, b, c]) = stack.pop() {
-        // Halved at the longest edge, which comes first.
-        let lengths = [a.distance(b), b.distance(c), c.distance(a)];
-        let longest = (0..3)
-            .max_by(|i, k| lengths[*i].total_cmp(&lengths[*k]))
-            .unwrap_or(0);
-        let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][longest];
-        if lengths[longest] > piece {
-            let middle = a.midpoint(b);
-            stack.extend([[c, a, middle], [b, c, middle]]);
-            continue;
-        }
-        let normal = triangle_area_normal(&[a, b, c]);
-        let area = 0.5 * normal.length();
-        let off = normal.normalize_or_zero() * OFF;
-        let middle = (a + b + c) / 3.0;
-        // A wall without thickness has a cell on either side.
-        let sides = [middle + off, middle - off].map(|p| layout.locate(p));
-        for (k, cell) in sides.into_iter().enumerate() {
-            let is_other = k == 0 || sides[0] != sides[1];
-            if let Some(cell) = cell.filter(|c| is_other && cells.contains(c)) {
-                add(cell, area);
-            }
-        }
-    }
-}
-
-/// Edge of a piece of wall: a room of 2 m has 200 or more, and their cut at its edges is off by some percent at most, both ways.
-/// [Units: wu]
-const PIECE: f64 = 0.25;
-/// Most pieces along the longest edge of a triangle, some thousands in all: terrain has triangles of square kilometers.
-const FINEST: f64 = 64.0;
-/// Distance by which points are moved off a wall. [Units: wu]
-const OFF: f64 = 0.02;
 /// Absorbing area of the outdoors, which returns nothing. [Units: wu²]
 const OPEN_AIR: f64 = 1e6;
 
@@ -504,6 +458,17 @@ impl DiffuseFields {
     #[must_use]
     pub fn gain(&self, place: Place) -> f64 {
         (16.0 * std::f64::consts::PI * self.density(place).max(0.0)).sqrt()
+    }
+
+    /// Returns the same in each [octave band](crate::OCTAVES).
+    ///
+    /// # Panics
+    ///
+    /// If there is no such place, or nothing was solved.
+    #[must_use]
+    pub fn gain_bands(&self, place: Place) -> [f64; N_BANDS] {
+        let density = self.steady[self.index(place)];
+        density.map(|d| (16.0 * std::f64::consts::PI * d).sqrt())
     }
 
     /// Returns the energy density divided by 4 / c times the source's power, the mean over the bands. [Units: 1/wu²]

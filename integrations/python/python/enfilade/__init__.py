@@ -15,7 +15,23 @@ without Python's global lock, and an interrupt ends it.
 
 from ._bake import BakeWarning, Mesh, bake, bake_file, demo_house
 from ._native import BakeError, EnfiladeError, NoPathError, SceneError, WorldError
-from ._world import Cell, Cells, Path, Place, Portal, Portals, Pvs, Room, Storey, View, Why, World, open
+from ._world import (
+    Cell,
+    Cells,
+    IfcReport,
+    Path,
+    Place,
+    Portal,
+    Portals,
+    Pvs,
+    Room,
+    Storey,
+    Surface,
+    View,
+    Why,
+    World,
+    open,
+)
 
 __version__ = "0.1.0"
 
@@ -25,6 +41,7 @@ __all__ = [
     "Cell",
     "Cells",
     "EnfiladeError",
+    "IfcReport",
     "Mesh",
     "NoPathError",
     "Path",
@@ -35,6 +52,7 @@ __all__ = [
     "Room",
     "SceneError",
     "Storey",
+    "Surface",
     "View",
     "Why",
     "World",

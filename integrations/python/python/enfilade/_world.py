@@ -1,5 +1,6 @@
 """Worlds, and the answers to questions about them."""
 
+import builtins
 import os
 from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union, overload
@@ -35,6 +36,47 @@ class Place:
     at: Tuple[float, float, float]
     """A point of it."""
     why: Why
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A planar piece of the boundary of a room."""
+
+    loops: Tuple[np.ndarray, ...]
+    """Closed lines, (n, 3) float64: the outer one, counter-clockwise seen from outside of the room, then holes."""
+    normal: Tuple[float, float, float]
+    """Out of the room."""
+    area: float
+    """In square meters, without the holes."""
+    behind: str
+    """``"room"``, ``"outdoors"``, ``"ground"``, or ``"matter"``, where there is no air as far as a construction reaches."""
+    cell: Optional[int]
+    """The id of the cell behind."""
+    thickness: float
+    """That of the construction, in meters; 0 for openings and sheets."""
+    pair: Optional[int]
+    """The surface of the room behind that answers this one, as an index into its list."""
+    host: Optional[int]
+    """For an opening, the wall, floor or roof around it, as an index into the same list."""
+    portal: Optional[int]
+    """The id of the opening, if it is one."""
+    object: Optional[str]
+    """The name of what it is made of: ``IfcWall/GlobalId`` in models from IFC."""
+
+
+@dataclass(frozen=True)
+class IfcReport:
+    """What was written into an IFC file."""
+
+    added: int
+    """Spaces that are new."""
+    replaced: int
+    """Spaces of the file that have the bodies of rooms now."""
+    kept: int
+    """Spaces of the file that stay as they were."""
+    boundaries: int
+    without_element: int
+    """Surfaces that have no boundary, since nothing in the file makes them."""
 
 
 @dataclass(frozen=True)
@@ -400,6 +442,53 @@ class World:
             out[cell] = whole
         return out
 
+    def surfaces(self, *, level: str = "second") -> Dict[int, List[Surface]]:
+        """Returns the boundary surfaces of rooms, by the ids of their cells. Those of a room close.
+
+        level: ``"first"`` has one surface for each plane and object; ``"second"`` cuts them where what lies behind changes.
+        """
+        rooms = self._native.surfaces(_is_first(level))
+        return {cell: [_surface(row) for row in own] for cell, own in rooms}
+
+    def to_ifc(
+        self,
+        model: "os.PathLike[str] | str",
+        path: "os.PathLike[str] | str",
+        *,
+        replace_spaces: bool = False,
+        level: str = "second",
+    ) -> IfcReport:
+        """Writes the rooms as spaces, with quantities and boundaries, into a copy of the IFC file that was baked.
+
+        replace_spaces: give spaces that are there, and are rooms, the bodies and boundaries that were found.
+        level: of the boundaries, as in ``surfaces``.
+        """
+        with builtins.open(model, "rb") as file:
+            data = file.read()
+        out, counts = self._native.ifc(data, replace_spaces, _is_first(level))
+        # Whole or not at all.
+        part = f"{os.fspath(path)}.part"
+        with builtins.open(part, "wb") as file:
+            file.write(out)
+        os.replace(part, path)
+        return IfcReport(*counts)
+
+    def to_gbxml(self) -> str:
+        """Returns the rooms as gbXML 6.01, for programs that calculate energy."""
+        return self._native.gbxml()
+
+    def to_hbjson(self) -> str:
+        """Returns the rooms as a Honeybee model in JSON, for Ladybug Tools, OpenStudio and EnergyPlus.
+
+        Rooms are simpler than in the world: small details vanish. ``user_data`` of each has the volume there, and a note if it is
+        now another by more than 3 %.
+        """
+        return self._native.hbjson()
+
+    def to_indoorgml(self) -> str:
+        """Returns the rooms as IndoorGML 1.1, for indoor navigation."""
+        return self._native.indoor_gml()
+
     def to_dataframe(self, of: str = "rooms") -> Any:
         """Returns a ``pandas.DataFrame`` of ``"rooms"``, ``"portals"`` or ``"visibility"``.
 
@@ -621,3 +710,14 @@ def _lazily(name: str) -> Any:
     except ImportError:
         package = name.split(".")[0]
         raise ImportError(f"this needs {package}: pip install {package}", name=package) from None
+
+
+def _is_first(level: str) -> bool:
+    if level not in ("first", "second"):
+        raise ValueError(f"level is {level!r}: expected 'first' or 'second'")
+    return level == "first"
+
+
+def _surface(row: Tuple[Any, ...]) -> Surface:
+    loops, normal, area, behind, cell, thickness, (pair, host), portal, name = row
+    return Surface(tuple(loops), tuple(normal), area, behind, cell, thickness, pair, host, portal, name)

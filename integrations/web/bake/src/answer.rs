@@ -1,6 +1,6 @@
 //! The result of a bake: bytes, a drawing, and data for the page.
 
-use enfilade_cpg::{Cell, World};
+use enfilade_cpg::{Cell, Portal, PortalKind, Reason, World};
 use enfilade_import::ImportReport;
 use enfilade_report::{InputDoubt, Plans, Verdict};
 use serde::Serialize;
@@ -117,6 +117,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) triangles: usize,
     pub(crate) rooms: Vec<Room>,
     pub(crate) storeys: Vec<Floor>,
+    pub(crate) openings: Vec<Opening>,
     /// Seconds of each stage.
     pub(crate) seconds: Vec<(&'static str, f64)>,
 }
@@ -137,6 +138,40 @@ pub(crate) struct Room {
     aabb: [[f32; 3]; 2],
     /// Why it is a cell, each reason a sentence.
     why: Vec<String>,
+}
+
+/// An opening to walk through, or to look through, between two cells.
+#[derive(Serialize)]
+pub(crate) struct Opening {
+    cells: [u32; 2],
+    kind: &'static str,
+    at: [f32; 3],
+    width: f32,
+    height: f32,
+    /// A person asked for it.
+    asked: bool,
+}
+
+/// Returns all portals but cracks.
+pub(crate) fn openings(world: &World) -> Vec<Opening> {
+    let kinds = |kind| match kind {
+        PortalKind::Open => Some("open"),
+        PortalKind::Door => Some("door"),
+        PortalKind::Window => Some("window"),
+        PortalKind::Crack => None,
+    };
+    let opening = |portal: &Portal| {
+        let [width, height] = portal.size();
+        Some(Opening {
+            cells: portal.cells.map(|cell| cell.0),
+            kind: kinds(portal.kind)?,
+            at: portal.center(),
+            width,
+            height,
+            asked: portal.why.iter().any(|why| why.reason == Reason::Asked),
+        })
+    };
+    world.graph.portals.iter().filter_map(opening).collect()
 }
 
 /// A storey.

@@ -9,7 +9,7 @@ use std::cell::RefCell;
 use std::sync::Once;
 use std::time::Duration;
 
-use enfilade_import::HeldFiles;
+use enfilade_import::{ConvertedIfc, HeldFiles};
 
 use crate::{BakeRequest, Failure, Steps, baked};
 
@@ -105,6 +105,28 @@ pub unsafe extern "C" fn enf_bake_file(
     let [name, bytes] = unsafe { [taken(name, n_name), taken(bytes, n)] };
     let name = String::from_utf8_lossy(&name).into_owned();
     MODULE.with_borrow_mut(|module| module.files.add(name, bytes, is_detail != 0));
+}
+
+/// Adds what a reader made of an IFC file that was added by this name: a GLB, and notes for the user, a line each.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn enf_bake_ifc(
+    name: *mut u8,
+    n_name: usize,
+    glb: *mut u8,
+    n: usize,
+    notes: *mut u8,
+    n_notes: usize,
+) {
+    begin();
+    // SAFETY: all are handed over by the caller.
+    let [name, glb, notes] = unsafe { [taken(name, n_name), taken(glb, n), taken(notes, n_notes)] };
+    let [name, notes] = [name, notes].map(|text| String::from_utf8_lossy(&text).into_owned());
+    let notes = notes.lines().map(str::to_owned).collect();
+    MODULE.with_borrow_mut(|module| {
+        module
+            .files
+            .add_converted(name, ConvertedIfc { glb, notes });
+    });
 }
 
 /// Bakes the files as a request in JSON says, and forgets them. Returns 1, or 0 if there is no world.

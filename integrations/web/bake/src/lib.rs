@@ -9,6 +9,8 @@ mod answer;
 pub mod ffi;
 mod options;
 mod steps;
+#[cfg(all(target_arch = "wasm32", target_feature = "atomics"))]
+pub mod threads;
 mod work;
 
 pub use answer::{Answer, Failure, Question};

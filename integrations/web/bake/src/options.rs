@@ -105,5 +105,6 @@ fn over(file: Settings, own: Settings) -> Settings {
     all.detail_names.extend(own.detail_names);
     all.structural_names.extend(own.structural_names);
     all.names.extend(own.names);
+    all.decisions.extend(own.decisions);
     all
 }

@@ -2,14 +2,13 @@
 
 use enfilade_bake::bsp::find_leak;
 use enfilade_bake::{BakeConfig, BakeContext, BakeError, BakeOutput, bake};
-use enfilade_cpg::World;
 use enfilade_cpg::wire::{decode_glb, encode_glb};
 use enfilade_geom::Instant;
 use enfilade_geom::scene::{Role, Scene};
 use enfilade_import::{HeldFiles, ImportReport, Imported, import_held};
 use enfilade_report::{PlanOptions, Plans, Verdict, is_empty, measured_room_facts};
 
-use crate::answer::{Facts, input_doubts, questions, rooms, storeys};
+use crate::answer::{Facts, input_doubts, openings, questions, rooms, storeys};
 use crate::{Answer, BakeRequest, Failure, Steps};
 
 /// Bakes files: the world is that of the command, byte for byte, and so is the plan.
@@ -50,7 +49,8 @@ pub fn baked(
     }
     let mut baked = bake(&scene, &config, &context).map_err(|e| of_bake(&e, &report))?;
     drop(scene);
-    told(&mut baked.world, &report, &import);
+    let told = &mut baked.world.graph.provenance.settings;
+    told.extend(report.settings.clone());
     // Readers of its file get it rounded, and so do the plan and the facts.
     let defect = |e: String| {
         Failure::new(
@@ -83,6 +83,7 @@ pub fn baked(
         triangles: triangles.copied().unwrap_or(0.0) as usize,
         rooms: rooms(&world, &plans),
         storeys: storeys(&plans),
+        openings: openings(&world),
         seconds,
     };
     Ok(Answer {
@@ -90,16 +91,6 @@ pub fn baked(
         facts: serde_json::to_string(&facts).map_err(|e| defect(e.to_string()))?,
         world: bytes,
     })
-}
-
-/// Adds to a world what it tells about its input, as the command does.
-fn told(world: &mut World, report: &ImportReport, import: &enfilade_import::ImportOptions) {
-    let settings = &mut world.graph.provenance.settings;
-    settings.extend(report.surface_settings());
-    if let Some(repair) = &import.repair {
-        settings.insert("repair.weld".into(), repair.weld.to_string());
-        settings.insert("repair.hole".into(), repair.hole.to_string());
-    }
 }
 
 /// Returns the reason to read a map as a world open to the sky.

@@ -1,6 +1,8 @@
 //! Reverberation in simple rooms.
 
 use super::*;
+use enfilade_cpg::World;
+use enfilade_geom::Aabb;
 use enfilade_testkit::{GridParams, room_grid};
 
 fn two_rooms() -> (Space, f64) {
@@ -115,4 +117,47 @@ fn a_rooms_walls_are_its_box_less_its_doors() {
         let eyring = -0.8f64.ln() * reverb.area(c);
         assert!((reverb.absorbing_area(c)[2] - eyring).abs() < 1e-6 * eyring);
     }
+}
+
+/// W11: furniture absorbs by its surface, but not more than the box around it, to 5 %: few lines cross small things.
+#[test]
+fn furniture_absorbs_in_its_room() {
+    let mut world = room_grid(&GridParams {
+        furniture: 3,
+        ..GridParams::two_rooms()
+    });
+    assert!(!world.details.is_empty());
+    let reverb = |world: &World| {
+        let space = Space::new(world.clone()).unwrap();
+        let reverb = Reverb::new(&space, DecayLaw::Eyring, |_, _| [0.2; N_BANDS]);
+        [at(0), at(1)]
+            .map(|c| reverb.absorbing_area(c)[2])
+            .iter()
+            .sum::<f64>()
+    };
+    let with = reverb(&world);
+    // As many triangles again within the same box change nothing.
+    for mesh in &mut world.detail_meshes {
+        let again = mesh.primitives.clone();
+        mesh.primitives
+            .extend(again.iter().cloned().chain(again.clone()));
+    }
+    assert!((reverb(&world) - with).abs() < 1e-3 * with);
+    let boxes: f64 = world
+        .details
+        .iter()
+        .map(|object| {
+            let primitives = &world.detail_meshes[object.mesh as usize].primitives;
+            let triangles = primitives
+                .iter()
+                .flat_map(|p| p.placed_triangles(object.placement()));
+            Aabb::of_points(&triangles.flatten().collect::<Vec<_>>()).surface_area()
+        })
+        .sum();
+    world.details.clear();
+    let without = reverb(&world);
+    assert!(
+        with > without && with - without <= 0.2 * boxes * 1.05,
+        "{with} {without} {boxes}"
+    );
 }
