@@ -36,7 +36,9 @@ let warming: AbortController | undefined;
 // All that is needed later is fetched now: the page then works without a network.
 const moduleNamed = (name: string): Promise<WebAssembly.Module> => loadBake(new URL(name, document.baseURI));
 const alone = (): Promise<WebAssembly.Module> => moduleNamed('enfilade-bake.wasm');
-const module = possibleThreads() > 1 ? moduleNamed('enfilade-bake-threads.wasm').catch(alone) : alone();
+// A page without the module with threads does not ask for it.
+const hasThreads = possibleThreads() > 1 && document.documentElement.dataset.threads === 'true';
+const module = hasThreads ? moduleNamed('enfilade-bake-threads.wasm').catch(alone) : alone();
 const fetched = async (name: string): Promise<Blob> => {
   const answer = await fetch(name);
   if (!answer.ok) throw new Error(`${name}: ${answer.status} ${answer.statusText}`);
@@ -45,7 +47,7 @@ const fetched = async (name: string): Promise<Blob> => {
 const script = (name: string): Promise<string> =>
   fetched(name).then((code) => URL.createObjectURL(new Blob([code], { type: 'text/javascript' })));
 // With threads, one more waits for the others.
-const nThreads = possibleThreads() > 1 ? possibleThreads() + 1 : 1;
+const nThreads = hasThreads ? possibleThreads() + 1 : 1;
 const threads = script('bake-worker.js').then((code) => new Reserve(code, nThreads));
 let walk: Walk | undefined;
 const examples = new Map<string, Promise<Blob>>();

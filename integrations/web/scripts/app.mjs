@@ -20,7 +20,9 @@ const walkFolder = at('../../crates/enfilade-report/src/walk');
 const walk = readFileSync(`${walkFolder}/index.html`, 'utf8');
 const inside = /<script>([^]*?)<\/script>/.exec(walk)[1];
 const hash = createHash('sha256').update(inside).digest('base64');
-writeFileSync(at('dist/app/index.html'), readFileSync(at('app/index.html'), 'utf8').replace('sha256-WALK', `sha256-${hash}`));
+const hasThreads = existsSync(at('dist/enfilade-bake-threads.wasm'));
+const page = readFileSync(at('app/index.html'), 'utf8').replace('sha256-WALK', `sha256-${hash}`).replace('THREADS', `${hasThreads}`);
+writeFileSync(at('dist/app/index.html'), page);
 cpSync(walkFolder, at('dist/app/walk'), { recursive: true });
 for (const name of ['enfilade-bake.wasm', 'enfilade-bake-threads.wasm', 'enfilade-bake-all.wasm']) {
   if (existsSync(at(`dist/${name}`))) copyFileSync(at(`dist/${name}`), at(`dist/app/${name}`));
