@@ -4,7 +4,6 @@ use enfilade_geom::scene::{Role, Scene};
 use enfilade_geom::{Aabb, DVec3, MOST_FLIGHT_PLAN, Triangle, is_flight, triangle_area_normal};
 use enfilade_prepare::{Upward, find_up};
 
-use crate::map::MAPS;
 use crate::report::UpDoubt;
 use crate::vox::VOX;
 use crate::{FileReport, ImportError, ImportOptions, ImportReport, Up};
@@ -232,7 +231,7 @@ pub(crate) fn unit_doubt(
     report: &ImportReport,
     options: &ImportOptions,
 ) -> Option<String> {
-    if options.unit.is_some() || report.files.iter().any(|f| MAPS.contains(&f.format)) {
+    if options.unit.is_some() || report.files.iter().any(FileReport::tells_unit) {
         return None;
     }
     let structural = |i: &usize| scene.objects[*i].role == Role::Structural;
@@ -271,7 +270,7 @@ pub(crate) fn feet_hint(
     report: &ImportReport,
     options: &ImportOptions,
 ) -> Option<String> {
-    let tells_nothing = |f: &FileReport| MAPS.contains(&f.format) || f.surface.is_some();
+    let tells_nothing = |f: &FileReport| f.tells_unit() || f.surface.is_some();
     let is_known = options.unit.is_some() || report.files.iter().any(tells_nothing);
     if is_known || report.unit_doubt.is_some() {
         return None;
@@ -325,7 +324,7 @@ pub(crate) fn up_doubt(
         Upward::Unknown => return None,
     };
     // Some formats are read with z up, so that across z here is across y there.
-    let is_z_up = |f: &FileReport| MAPS.contains(&f.format) || f.format == VOX;
+    let is_z_up = |f: &FileReport| f.tells_unit() || f.format == VOX;
     let (other, turned) = match report.files.iter().any(is_z_up) {
         false => ("z", Up::Z),
         true => ("y", Up::Y),

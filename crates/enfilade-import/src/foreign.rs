@@ -130,10 +130,10 @@ const FOREIGN: [Foreign; 20] = [
         advice: "in Rhino: File > Export Selected, as .glb",
     },
     Foreign {
-        name: "an energy model (HBJSON)",
+        name: "an energy model",
         magic: &[],
-        endings: &["hbjson"],
-        advice: "export its geometry from the program that made it, as IFC or OBJ",
+        endings: &["gbxml", "hbjson"],
+        advice: "it is neither HBJSON nor gbXML that can be read here: export it again, or its geometry as IFC or OBJ",
     },
 ];
 
@@ -208,7 +208,7 @@ mod tests {
             (b"[gd_scene load_steps=2", "a.txt", "Godot", "Export As"),
             (b"%YAML 1.1\n%TAG !u! tag", "a.txt", "Unity", "glTFast"),
             (b"\x1f\x8b", "a.schem", "Minecraft", "Mineways"),
-            (b"{", "a.hbjson", "HBJSON", "IFC or OBJ"),
+            (b"[", "a.hbjson", "energy model", "IFC or OBJ"),
         ] {
             let error = unsupported(bytes, Path::new(path)).unwrap().to_string();
             assert!(error.contains(name) && error.contains(command), "{error}");

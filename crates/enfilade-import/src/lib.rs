@@ -1,4 +1,4 @@
-//! Reads glTF, GLB, OBJ, PLY, STL, IFC, Quake maps, and sources that are not triangles into one [`Scene`].
+//! Reads glTF, GLB, OBJ, PLY, STL, IFC, gbXML, HBJSON, Quake maps, and sources that are not triangles into one [`Scene`].
 //!
 //! [`import`] reads any number of files into one scene, in meters and +Y up, with a role for each object and a report
 //! of everything skipped or repaired. Input is not trusted: each count, offset and index is checked before use,
@@ -22,6 +22,7 @@
 mod arrays;
 mod builder;
 mod caught;
+mod energy;
 mod error;
 mod export;
 mod extent;
@@ -201,6 +202,8 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
         Format::Map => map::read(bytes, builder),
         Format::Stl => stl::read(bytes, builder),
         Format::Ifc => ifc::read(bytes, builder),
+        Format::GbXml => energy::read_gbxml(bytes, builder),
+        Format::HbJson => energy::read_hbjson(bytes, builder),
         Format::Implicit => sources::read_implicit(bytes, builder),
         Format::Patches => sources::read_patches(bytes, builder),
         Format::Volume => sources::read_volume(bytes, builder),
@@ -212,7 +215,7 @@ fn read_any(bytes: &[u8], path: &Path, builder: &mut Builder<'_>) -> Result<(), 
 }
 
 /// The problem of a file whose reader was left out of the build.
-#[cfg(not(all(feature = "draco", feature = "scans")))]
+#[cfg(not(all(feature = "draco", feature = "energy", feature = "scans")))]
 fn not_built(format: &str, feature: &str) -> String {
     format!("is {format}, which this build cannot read: build it with the feature `{feature}`")
 }
@@ -226,6 +229,8 @@ enum Format {
     Map,
     Stl,
     Ifc,
+    GbXml,
+    HbJson,
     Implicit,
     Patches,
     Volume,
@@ -242,17 +247,7 @@ impl Format {
             // One byte more than allowed shows that the input is too large.
             Self::Gltf => gltf::length(head).unwrap_or(limits.max_json_bytes.saturating_add(1)),
             Self::Stl => stl::length(head).unwrap_or(u64::MAX),
-            Self::Ply
-            | Self::Obj
-            | Self::Map
-            | Self::Ifc
-            | Self::Implicit
-            | Self::Patches
-            | Self::Volume
-            | Self::E57
-            | Self::Las
-            | Self::Heights
-            | Self::Vox => u64::MAX,
+            _ => u64::MAX,
         }
     }
 }
@@ -289,6 +284,10 @@ fn format_of(bytes: &[u8], path: &Path, most: u64) -> Result<Format, ImportError
             Format::Stl
         } else if ifc::is_ifc(bytes) {
             Format::Ifc
+        } else if energy::is_gbxml(bytes) {
+            Format::GbXml
+        } else if energy::is_hbjson(bytes, &ending) {
+            Format::HbJson
         } else if let Some(error) = foreign::unsupported(bytes, path) {
             return Err(error);
         } else if bytes.starts_with(b"ASTM-E57") {

@@ -76,7 +76,7 @@ pub struct UpDoubt {
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `Quake map`, `VMF`, `MagicaVoxel`, `implicit`, `patches`, `NIfTI`, `NRRD`, `raw volume`, `E57` or `LAS`.
+    /// `glTF`, `OBJ`, `PLY`, `STL`, `IFC`, `gbXML`, `HBJSON`, `Quake map`, `VMF`, `MagicaVoxel`, `implicit`, `patches`, `NIfTI`, `NRRD`, `raw volume`, `E57` or `LAS`.
     pub format: &'static str,
     /// Objects read from it.
     pub n_objects: u64,
@@ -84,6 +84,15 @@ pub struct FileReport {
     pub n_triangles: u64,
     /// The surface made of it, or of its patches, if it has more than triangles of its own.
     pub surface: Option<SurfaceReport>,
+}
+
+impl FileReport {
+    /// Returns `true` for a format with a unit that all its writers know, and with Z up.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn tells_unit(&self) -> bool {
+        matches!(self.format, "Quake map" | "VMF" | "gbXML" | "HBJSON")
+    }
 }
 
 /// A surface made of a source that is not triangles. All promises hold for the surface.

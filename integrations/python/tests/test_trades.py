@@ -15,7 +15,11 @@ import ifcopenshell.validate
 import numpy as np
 import pyroomacoustics as pra
 import pytest
+from honeybee.door import Door
+from honeybee.facetype import face_types
 from honeybee.model import Model
+from honeybee.room import Room
+from ladybug_geometry.geometry3d import Face3D, Point3D
 
 import enfilade
 
@@ -294,3 +298,40 @@ def test_the_sound_of_a_room_is_simulated(written, command, tmp_path):
         simulated = pra.Room(walls, fs=16000, max_order=0, ray_tracing=True)
         assert simulated.get_volume() == pytest.approx(solid["volume"], rel=1e-4)
         assert absorbing > 0.0
+
+
+def test_a_model_by_honeybee_becomes_its_rooms(tmp_path):
+    """Two rooms of boxes with a door between them and a window, and a gallery behind a wall of air; all by Honeybee's own functions."""
+    names = ["101 Office", "102 Office", "Gallery"]
+    boxes = [((0, 0, 0), (4, 5, 3)), ((4, 0, 0), (5, 5, 3)), ((0, 5, 0), (9, 3, 3))]
+    rooms = []
+    for i, ((x, y, z), size) in enumerate(boxes):
+        room = Room.from_box(f"room{i}", *size, origin=Point3D(x, y, z))
+        room.display_name = names[i]
+        rooms.append(room)
+    wall = next(f for f in rooms[0].faces if f.normal.x > 0.9)
+    opening = [Point3D(4, y, z) for y, z in ((1, 0), (2, 0), (2, 2), (1, 2))]
+    wall.add_door(Door("door0", Face3D(opening)))
+    other = next(f for f in rooms[1].faces if f.normal.x < -0.9)
+    other.add_door(Door("door1", Face3D(opening[::-1])))
+    next(f for f in rooms[1].faces if f.normal.x > 0.9).apertures_by_ratio(0.2)
+    rooms = Room.intersect_adjacency(rooms, 0.01, 1)
+    Room.solve_adjacency(rooms, 0.01)
+    for room in rooms:
+        for face in room.faces:
+            if face.boundary_condition.name == "Surface" and len({"room0", "room2"} & ends(face)) == 2:
+                face.type = face_types.air_boundary
+    path = tmp_path / "house.hbjson"
+    path.write_text(json.dumps(Model("house", rooms, units="Meters").to_dict()))
+    world = enfilade.bake(str(path))
+    found = {room.name: room.floor_area for room in world.rooms}
+    # The wall of air between the first room and the gallery is nothing, so they are one.
+    assert len(found) == 2 and found["102 Office"] == pytest.approx(25.0, rel=0.01)
+    assert sum(found.values()) == pytest.approx(20.0 + 25.0 + 27.0, rel=0.01)
+    kinds = sorted(p.kind for p in world.portals if p.kind != "crack")
+    assert kinds == ["door", "window"]
+
+
+def ends(face):
+    """Names of the rooms on both sides of a face."""
+    return {face.parent.identifier, face.boundary_condition.boundary_condition_objects[-1]}

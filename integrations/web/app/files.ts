@@ -6,8 +6,8 @@ export interface Given {
   bytes: Blob;
 }
 
-const READ = /\.(ifc|glb|gltf|obj|ply|stl|map|vox|nii|nrrd|e57|las|laz|tiff?|bin|mtl|png|jpe?g|webp|ktx2|bmp|tga|gif|avif|dds|wad)$/i;
-const SCENE = /\.(ifc|glb|gltf|obj|ply|stl|map|vox|nii|nrrd|e57|las|laz|tiff?)$/i;
+const READ = /\.(ifc|gbxml|xml|hbjson|glb|gltf|obj|ply|stl|map|vox|nii|nrrd|e57|las|laz|tiff?|bin|mtl|png|jpe?g|webp|ktx2|bmp|tga|gif|avif|dds|wad)$/i;
+const SCENE = /\.(ifc|gbxml|xml|hbjson|glb|gltf|obj|ply|stl|map|vox|nii|nrrd|e57|las|laz|tiff?)$/i;
 
 /** Returns the files that can be read, and the settings among them; `undefined` if there is no scene. */
 export function sorted(files: Given[]): { scenes: Given[]; settings?: Blob; name: string } | undefined {

@@ -44,7 +44,7 @@ export interface BakeOptions {
   signal?: AbortSignal;
   /** Where the module is, if it moved. */
   wasm?: WasmSource;
-  /** Where the second module is, if it moved: for E57, LAS, TIFF, and glTF compressed by Draco. */
+  /** Where the second module is, if it moved: for E57, LAS, gbXML, HBJSON, TIFF, and glTF compressed by Draco. */
   wasmAll?: WasmSource;
   /** Makes a thread, if its script moved; `false` bakes on the thread that calls, which waits. */
   worker?: false | (() => Worker);

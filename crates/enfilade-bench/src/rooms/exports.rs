@@ -8,7 +8,7 @@ use enfilade::geom::DVec3;
 use enfilade_export::{
     Behind, BoundarySurface, FloorMap, FloorMapOptions, SurfaceLevel, SurfaceOptions, room_surfaces,
 };
-use enfilade_report::{find_storeys, room_facts};
+use enfilade_report::{find_storeys, portals_csv, room_facts};
 use serde_json::Value;
 
 use super::score::{list, text, vec3};
@@ -119,10 +119,7 @@ fn marched(world: &World, from: DVec3, normal: DVec3) -> Option<CellId> {
 /// Measures the share of the rooms found whose floor area or volume, without the recesses of openings, is off by more than 3 %. A room
 /// is found if most of its points are in a cell that has none of another room.
 pub(super) fn spaces(world: &World, scene: &str) -> anyhow::Result<Figure> {
-    let dir = folder_of(scene).context("no such scene")?;
-    let truth = std::fs::read_to_string(dir.join("truth.json"))?;
-    let truth: Value =
-        serde_json::from_str(&truth).with_context(|| format!("{scene}/truth.json"))?;
+    let truth = truth_of(scene)?;
     let options = SurfaceOptions {
         level: SurfaceLevel::First,
         by_object: false,
@@ -134,19 +131,7 @@ pub(super) fn spaces(world: &World, scene: &str) -> anyhow::Result<Figure> {
     let facts = room_facts(world);
     let mut by_cell: BTreeMap<CellId, Vec<&Value>> = BTreeMap::new();
     for room in list(&truth["rooms"]) {
-        let points: Vec<_> = list(&room["sample_points"])
-            .iter()
-            .filter_map(vec3)
-            .collect();
-        let mut counts: BTreeMap<CellId, usize> = BTreeMap::new();
-        for p in &points {
-            if let Some(cell) = world.graph.locator.locate(DVec3::from(*p)) {
-                *counts.entry(cell).or_default() += 1;
-            }
-        }
-        if let Some((&cell, &most)) = counts.iter().max_by_key(|c| c.1)
-            && 2 * most > points.len()
-        {
+        if let Some(cell) = cell_of(world, room) {
             by_cell.entry(cell).or_default().push(room);
         }
     }
@@ -169,6 +154,74 @@ pub(super) fn spaces(world: &World, scene: &str) -> anyhow::Result<Figure> {
     let share = off.len() as f64 / f64::from(n.max(1));
     let note = format!("of {n} rooms; off by % of area, volume: {}", off.join(", "));
     Ok(Figure::new(share, 0.05, note))
+}
+
+fn truth_of(scene: &str) -> anyhow::Result<Value> {
+    let path = folder_of(scene)
+        .context("no such scene")?
+        .join("truth.json");
+    let text = std::fs::read_to_string(&path)?;
+    serde_json::from_str(&text).with_context(|| path.display().to_string())
+}
+
+/// Returns the cell that has most of a room's points.
+fn cell_of(world: &World, room: &Value) -> Option<CellId> {
+    let points: Vec<_> = list(&room["sample_points"])
+        .iter()
+        .filter_map(vec3)
+        .collect();
+    let mut counts: BTreeMap<CellId, usize> = BTreeMap::new();
+    for p in &points {
+        if let Some(cell) = world.graph.locator.locate(DVec3::from(*p)) {
+            *counts.entry(cell).or_default() += 1;
+        }
+    }
+    let (cell, most) = counts.into_iter().max_by_key(|c| c.1)?;
+    (2 * most > points.len()).then_some(cell)
+}
+
+/// Measures the share of the usable doors of an IFC model, by GlobalId, whose line in the table of openings is not there or does not
+/// have the architects' two rooms.
+pub(super) fn doors(world: &World, scene: &str) -> anyhow::Result<Figure> {
+    let truth = truth_of(scene)?;
+    let rooms: BTreeMap<String, Option<CellId>> = (list(&truth["rooms"]).iter())
+        .map(|room| (text(&room["id"]), cell_of(world, room)))
+        .collect();
+    let table = portals_csv(world);
+    let rows: Vec<Vec<&str>> = table.lines().map(|l| l.split(',').collect()).collect();
+    let (mut n, mut off) = (0, Vec::new());
+    for door in list(&truth["openings"]) {
+        if text(&door["kind"]) != "door" || door["usable"] == false {
+            continue;
+        }
+        n += 1;
+        let id = text(&door["id"]);
+        let is_right = |row: &Vec<&str>| {
+            let cells = [row[2], row[3]].map(|c| c.parse().ok().map(CellId));
+            let sides = list(&door["rooms"]).iter().map(text);
+            let mut sides = sides.map(|side| {
+                let is_side = |cell: &Option<CellId>| match side.as_str() {
+                    "outside" => cell.is_some_and(|c| !world.graph[c].is_indoors()),
+                    side => cell.is_some() && rooms.get(side) == Some(cell),
+                };
+                [0, 1].map(|k| is_side(&cells[k]))
+            });
+            let (a, b) = (sides.next(), sides.next());
+            let (Some(a), Some(b)) = (a, b) else {
+                return false;
+            };
+            (a[0] && b[1]) || (a[1] && b[0])
+        };
+        let mut own = rows
+            .iter()
+            .filter(|r| r.last().is_some_and(|o| o.ends_with(&id)));
+        if !own.any(is_right) {
+            off.push(text(&door["name"]));
+        }
+    }
+    let share = off.len() as f64 / f64::from(n.max(1));
+    let note = format!("of {n} doors: {}", off.join(", "));
+    Ok(Figure::new(share, 0.02, note))
 }
 
 /// Counts the pixels of maps of all storeys, 10,000 of each, whose label in the picture is not the cell that `locate` finds at

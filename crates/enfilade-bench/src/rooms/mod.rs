@@ -9,6 +9,7 @@ pub(crate) mod builders;
 mod cases;
 mod code;
 mod disturbed;
+mod energy;
 mod exports;
 pub(crate) mod facts;
 mod figures;
@@ -69,7 +70,11 @@ pub(crate) const EXPORTS: &[Row] = &[
     Row::baked("open rooms", EXPORTED, exports::open),
     Row::baked("neighbors", EXPORTED, exports::neighbors),
     Row::named("spaces", EXPORTED, exports::spaces),
+    Row::named("doors by id", EXPORTED, exports::doors),
     Row::baked("map labels", EXPORTED, exports::labels),
+    Row::baked("honeybee errors", EXPORTED, energy::errors),
+    Row::baked("honeybee adjacency", EXPORTED, energy::adjacency),
+    Row::baked("hbjson again", EXPORTED, energy::again),
 ];
 
 /// Disturbed models.

@@ -6,11 +6,11 @@ use anyhow::Context;
 use enfilade::geom::DVec3;
 use enfilade::internals::world::TautString;
 use enfilade::world::{
-    Acoustics, DecayLaw, DiffuseFields, Layout, Listener, PartId, Place, Reverb, Space,
-    Transmission,
+    Acoustics, Agent, DecayLaw, DiffuseFields, Layout, Listener, PartId, Path, PathSearch, Place,
+    Reverb, Space, Transmission, WalkMap,
 };
 use enfilade::{CellId, PortalId, World};
-use enfilade_testkit::{GridParams, Rng, room_grid, with_doors};
+use enfilade_testkit::{GridParams, Rng, room_grid};
 
 use crate::rows::Figure;
 
@@ -208,75 +208,78 @@ pub(super) fn reverb(_: &str) -> anyhow::Result<Figure> {
     Ok(Figure::new(value, 0.1, note))
 }
 
-/// Measures the time per source on a walk in steps of 2 cm, searches included. [Units: µs]
-pub(super) fn cost(_: &str) -> anyhow::Result<Figure> {
-    walk(false, 5.0)
+/// Sources of a walk.
+const N_SOURCES: usize = 64;
+/// Frames of a walk: half a minute at 60 Hz.
+const N_FRAMES: usize = 1800;
+/// Way of a walker in a frame. [Units: wu]
+const PACE: f64 = 1.4 / 60.0;
+
+/// Measures the time of a source and frame on a walk through a building, its doors open: the mean of all frames. [Units: µs]
+pub(super) fn mean_cost(world: &World) -> anyhow::Result<Figure> {
+    let (micros, note) = walked(world)?;
+    let mean = micros.iter().sum::<f64>() / micros.len() as f64;
+    Ok(Figure::new(mean, 20.0, note))
 }
 
-/// As [`cost`], while the door next to the one that the walk leads through swings, by 1.5 % of its way a frame at most.
-pub(super) fn cost_of_door(_: &str) -> anyhow::Result<Figure> {
-    walk(true, 10.0)
+/// As [`mean_cost`], the 99th percentile.
+pub(super) fn most_cost(world: &World) -> anyhow::Result<Figure> {
+    let (mut micros, note) = walked(world)?;
+    micros.sort_by(f64::total_cmp);
+    Ok(Figure::new(micros[micros.len() * 99 / 100], 60.0, note))
 }
 
-fn walk(is_door_moving: bool, most: f64) -> anyhow::Result<Figure> {
-    let mut site = Office::new(&with_doors(office_grid(1000, 7), |_| false))?;
+/// Walks from room to room; returns the time of a source in each frame, the first included. [Units: µs]
+fn walked(world: &World) -> anyhow::Result<(Vec<f64>, String)> {
+    let mut site = Office::new(world)?;
     site.open_all();
     let mut rng = Rng::new(3);
-    let sources: Vec<_> = (0..64).filter_map(|_| site.place(&mut rng)).collect();
-    let portals = (0..site.layout().n_portals() as u32).map(PortalId);
-    let middle = PortalId((site.layout().n_portals() / 2) as u32);
-    let opening = site.layout().opening(middle);
-    let (center, normal) = (opening.center(), opening.normal());
-    let far = |p: &PortalId| site.layout().opening(*p).center().distance(center);
-    let others =
-        portals.filter(|p| *p != middle && site.space.state(PartId::ROOT).leaves(*p).is_some());
-    let door = others
-        .min_by(|a, b| far(a).total_cmp(&far(b)))
-        .context("no door")?;
+    let sources: Vec<_> = (0..N_SOURCES)
+        .filter_map(|_| site.place(&mut rng))
+        .collect();
+    let map = WalkMap::new(&site.space, Agent::default());
+    let (mut search, mut path) = (PathSearch::new(), Path::default());
     let mut ears = Listener::new();
-    let (mut kept, mut searched, mut total, mut n) = (Vec::new(), Vec::new(), 0.0, 0);
-    let (mut first, mut n_heard) = (0.0, 0);
-    for k in -100..100 {
-        let at = center + normal * (f64::from(k) + 0.5) * 0.02;
-        let Some(place) = site.locate(at) else {
-            continue;
-        };
-        if is_door_moving {
-            let share = 0.5 + 0.5 * (f64::from(k) * 0.03).sin();
-            site.space.set_leaves(PartId::ROOT, door, share as f32);
-        }
-        let before = ears.n_searches();
-        let start = Instant::now();
-        ears.listen(&site.acoustics, &site.space, place, at);
-        n_heard = 0;
-        for (id, source) in sources.iter().enumerate() {
-            let heard = ears.hear(&site.acoustics, id, source.0, source.1);
-            n_heard += usize::from(std::hint::black_box(heard).is_some());
-        }
-        let micros = start.elapsed().as_secs_f64() * 1e6 / sources.len() as f64;
-        if before == 0 {
-            first = micros;
+    let (mut micros, mut n_heard) = (Vec::new(), 0);
+    let mut from = site.place(&mut rng).context("no place")?.1;
+    for _ in 0..1000 {
+        let to = site.place(&mut rng).context("no place")?.1;
+        let ends = [(PartId::ROOT, from), (PartId::ROOT, to)];
+        if (search.find(&map, &site.space, ends, |_, _| true, &mut path)).is_err() {
+            from = to;
             continue;
         }
-        let list = if ears.n_searches() == before {
-            &mut kept
-        } else {
-            &mut searched
-        };
-        list.push(micros);
-        total += micros;
-        n += 1;
+        let up = DVec3::Y * Agent::default().eye;
+        for leg in path.points.windows(2) {
+            let [a, b] = [leg[0].at + up, leg[1].at + up];
+            let n = (a.distance(b) / PACE).ceil() as usize;
+            for k in 0..n {
+                let at = a.lerp(b, k as f64 / n as f64);
+                let Some(place) = site.locate(at) else {
+                    continue;
+                };
+                let start = Instant::now();
+                ears.listen(&site.acoustics, &site.space, place, at);
+                for (id, source) in sources.iter().enumerate() {
+                    let heard = ears.hear(&site.acoustics, id, source.0, source.1);
+                    n_heard += usize::from(std::hint::black_box(heard).is_some());
+                }
+                micros.push(start.elapsed().as_secs_f64() * 1e6 / sources.len() as f64);
+            }
+        }
+        if micros.len() >= N_FRAMES {
+            break;
+        }
+        from = to;
     }
-    let median = |list: &mut Vec<f64>| {
-        list.sort_by(f64::total_cmp);
-        list.get(list.len() / 2).copied().unwrap_or_default()
-    };
+    anyhow::ensure!(!micros.is_empty(), "no two places with a path between them");
+    let share = n_heard as f64 / (micros.len() * sources.len()) as f64;
     let note = format!(
-        "µs a source, median of frames without a search, {n_heard} of {} loud enough to be heard; {:.1} with one ({} of {n} frames), {:.1} on the mean of all, {first:.0} in the first frame",
-        sources.len(),
-        median(&mut searched),
-        searched.len(),
-        total / f64::from(n)
+        "{} frames, {} searches, {:.0} of {} sources heard on the mean",
+        micros.len(),
+        ears.n_searches(),
+        share * sources.len() as f64,
+        sources.len()
     );
-    Ok(Figure::new(median(&mut kept), most, note))
+    Ok((micros, note))
 }

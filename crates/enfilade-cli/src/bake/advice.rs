@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use enfilade::bake::{BakeContext, Silent, bake};
 use enfilade::cpg::World;
 use enfilade::geom::scene::Scene;
-use enfilade::import::{ImportReport, LeftOut};
+use enfilade::import::{FileReport, ImportReport, LeftOut};
 use enfilade::internals::import::unnamed_helpers;
 use enfilade_cli::input::{import_scene, is_stream};
 use enfilade_cli::memory::held_memory;
@@ -65,10 +65,10 @@ struct Trials<'a> {
 impl<'a> Trials<'a> {
     /// Prepares trials beside a bake that took a time.
     fn new(args: &'a Bake, report: &ImportReport, is_open_world: bool, time: Duration) -> Self {
-        let is_known = |format| matches!(format, "Quake map" | "VMF" | "IFC");
+        let is_known = |f: &FileReport| f.tells_unit() || f.format == "IFC";
         Self {
             args,
-            is_known: report.files.iter().all(|f| is_known(f.format)),
+            is_known: report.files.iter().all(is_known),
             is_open_world,
             time: time.max(LEAST),
             tried: BTreeMap::new(),

@@ -34,8 +34,6 @@ use parse::Place;
 use parse::{Brush, MAX_COORDINATE, RawEntity};
 use patch::Tessellation;
 
-/// Formats read here, all with a known unit and axis.
-pub(crate) const MAPS: [&str; 2] = ["Quake map", "VMF"];
 /// Default length of a map's unit. [Units: m]
 const UNIT: f64 = 1.0 / 32.0;
 /// … and of that of Source: three quarters of an inch, so that 16 are a foot. [Units: m]
@@ -152,7 +150,7 @@ pub(crate) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<(), Import
     // Maps are Latin-1 or UTF-8; only names and texts depend on it.
     let text = String::from_utf8_lossy(bytes);
     let is_vmf = vmf::is_vmf(&text);
-    builder.set_format(if is_vmf { MAPS[1] } else { MAPS[0] });
+    builder.set_format(if is_vmf { "VMF" } else { "Quake map" });
     let failed =
         |builder: &Builder<'_>, p: parse::Problem| builder.malformed(p.place.to_string(), p.text);
     let parse = if is_vmf { vmf::parse_vmf } else { parse::parse };

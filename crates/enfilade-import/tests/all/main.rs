@@ -4,6 +4,7 @@
 mod common;
 
 mod compressed;
+mod energy;
 mod formats;
 mod gltf;
 mod ifc;

@@ -141,7 +141,7 @@ def bake_file(
 ) -> World:
     """Finds the rooms and doorways of a scene in files, as ``enfilade bake`` does.
 
-    files: a path, or several that make one scene: GLB, glTF, OBJ, PLY, STL, Quake ``.map``, or IFC, which needs the
+    files: a path, or several that make one scene: GLB, glTF, OBJ, PLY, STL, gbXML, HBJSON, Quake ``.map``, or IFC, which needs the
     package ifcopenshell.
     detail: files whose objects bound no room.
     scene: the scene to read of a glTF file with several, by its name or its number from 0; its default scene if not given.

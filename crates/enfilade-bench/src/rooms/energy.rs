@@ -1,0 +1,149 @@
+//! Energy models: what Honeybee says of ours, which rooms it takes for neighbors, and what is left when they are read again.
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use anyhow::Context;
+use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
+use enfilade::cpg::{CellId, World};
+use enfilade::import::{ImportOptions, import};
+use enfilade_export::{Behind, SurfaceOptions, hbjson, room_surfaces};
+use enfilade_report::room_facts;
+use serde_json::Value;
+
+use super::score::{list, text};
+use crate::process::output_of;
+use crate::rows::Figure;
+
+/// Largest difference of areas, as a share.
+const ALIKE: f64 = 0.03;
+
+/// Areas by the names of two rooms. [Units: m²]
+type Areas = BTreeMap<[String; 2], f64>;
+
+/// Prints, of a model on standard input, a line for each error that Honeybee finds, and the area of each face that has another room
+/// behind it.
+const HONEYBEE: &str = "
+import json, sys
+import honeybee_energy
+from honeybee.model import Model
+model = Model.from_dict(json.load(sys.stdin))
+errors = model.check_all(raise_exception=False).splitlines()
+names = {room.identifier: room.display_name for room in model.rooms}
+pairs = []
+for room in model.rooms:
+    for face in room.faces:
+        if face.boundary_condition.name == 'Surface':
+            other = face.boundary_condition.boundary_condition_objects[-1]
+            pairs.append([room.display_name, names[other], face.area])
+print(json.dumps({'errors': errors, 'pairs': pairs}))
+";
+
+/// Returns what Honeybee says of a world's model. `ENFILADE_PYTHON` names a Python that has it.
+fn said_by_honeybee(world: &World) -> anyhow::Result<Value> {
+    let python = std::env::var("ENFILADE_PYTHON").unwrap_or_else(|_| "python3".into());
+    let said = output_of(
+        Command::new(python).args(["-c", HONEYBEE]),
+        Some(&hbjson(world)),
+    );
+    let said = said.context("needs `pip install honeybee-energy`, in $ENFILADE_PYTHON")?;
+    let last = said.lines().last().unwrap_or_default();
+    serde_json::from_str(last).context("Honeybee's answer")
+}
+
+/// Counts the errors of `check_all`.
+pub(super) fn errors(world: &World) -> anyhow::Result<Figure> {
+    let said = said_by_honeybee(world)?;
+    let errors = list(&said["errors"]);
+    let first = errors.first().map_or_else(String::new, text);
+    Ok(Figure::new(errors.len() as f64, 0.0, first))
+}
+
+/// Measures the share of the area between rooms, by their surfaces of second level, that Honeybee has not between the same two.
+pub(super) fn adjacency(world: &World) -> anyhow::Result<Figure> {
+    let mut exact = Areas::new();
+    let graph = &world.graph;
+    for room in room_surfaces(world, &SurfaceOptions::default()) {
+        for surface in &room.surfaces {
+            if let Behind::Cell(other) = surface.behind
+                && other != room.cell
+                && graph[room.cell].is_room()
+                && graph[other].is_room()
+            {
+                let names = [room.cell, other].map(|c| graph[c].name.clone());
+                *exact.entry(names).or_default() += surface.area;
+            }
+        }
+    }
+    let said = said_by_honeybee(world)?;
+    let mut written = Areas::new();
+    for pair in list(&said["pairs"]) {
+        let names = [&pair[0], &pair[1]].map(text);
+        *written.entry(names).or_default() += pair[2].as_f64().unwrap_or_default();
+    }
+    let whole: f64 = exact.values().sum();
+    let lost = exact.iter().map(|(names, &area)| {
+        let lost = area - written.get(names).copied().unwrap_or_default();
+        (lost.max(0.0), names)
+    });
+    let lost: Vec<_> = lost.collect();
+    let share = lost.iter().map(|l| l.0).sum::<f64>() / whole.max(f64::MIN_POSITIVE);
+    let worst = lost.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    let worst = worst.map_or(String::new(), |(area, [a, b])| {
+        format!(", most between {a} and {b}: {area:.1}")
+    });
+    Ok(Figure::new(share, 0.02, format!("of {whole:.0} m²{worst}")))
+}
+
+/// Measures the share of the rooms that are not there again once the model is written as HBJSON, read and baked: a room with most of
+/// its points to itself, and a floor area within 3 %.
+pub(super) fn again(world: &World) -> anyhow::Result<Figure> {
+    let path = std::env::temp_dir().join(format!("enfilade-{}.hbjson", std::process::id()));
+    std::fs::write(&path, hbjson(world))?;
+    let imported = import(std::slice::from_ref(&path), &[], &ImportOptions::default());
+    std::fs::remove_file(&path)?;
+    let scene = imported?.scene;
+    let context = BakeContext::new(&Silent, None);
+    let again = bake(&scene, &BakeConfig::default(), &context)?.world;
+    let mut in_cell: BTreeMap<CellId, Vec<&str>> = BTreeMap::new();
+    for room in &scene.rooms {
+        let cells = room.points.iter().map(|&p| again.graph.locator.locate(p));
+        let mut counts: BTreeMap<CellId, usize> = BTreeMap::new();
+        cells
+            .flatten()
+            .for_each(|c| *counts.entry(c).or_default() += 1);
+        if let Some((&cell, &most)) = counts.iter().max_by_key(|c| c.1)
+            && 2 * most > room.points.len()
+            && again.graph[cell].is_room()
+        {
+            in_cell.entry(cell).or_default().push(&room.name);
+        }
+    }
+    let again_facts = room_facts(&again);
+    let found = again_facts.iter().filter_map(|facts| {
+        let names = in_cell.get(&facts.cell)?;
+        (names.len() == 1).then(|| (names[0], facts.floor_area))
+    });
+    let found: BTreeMap<&str, f64> = found.collect();
+    let mut off = Vec::new();
+    let mut n = 0;
+    for facts in room_facts(world).iter() {
+        let room = &world.graph[facts.cell];
+        if !room.is_room() {
+            continue;
+        }
+        n += 1;
+        match found.get(&*room.name) {
+            None => off.push(format!("{} is gone", room.name)),
+            Some(area) => {
+                let share = area / facts.floor_area - 1.0;
+                if share.abs() > ALIKE {
+                    off.push(format!("{} {:+.1} %", room.name, 100.0 * share));
+                }
+            }
+        }
+    }
+    let share = off.len() as f64 / f64::from(n.max(1));
+    let note = format!("of {n} rooms: {}", off.join(", "));
+    Ok(Figure::new(share, 0.08, note))
+}
