@@ -1,6 +1,6 @@
 //! HBJSON, the JSON of Honeybee (schema of Ladybug Tools).
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use enfilade_geom::DVec3;
 use serde::Deserialize;
@@ -53,11 +53,13 @@ struct Face {
 struct Piece {
     identifier: String,
     geometry: Geometry,
+    #[serde(default)]
+    boundary_condition: Option<Boundary>,
 }
 
 #[derive(Deserialize)]
 struct Boundary {
-    /// The face on the other side, and the room there.
+    /// The face or opening on the other side, and what it belongs to.
     #[serde(default)]
     boundary_condition_objects: Vec<String>,
 }
@@ -101,13 +103,21 @@ pub(super) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<EnergyMode
             return Err(builder.malformed("units", problem));
         }
     };
-    let mut sheets = Vec::new();
+    let mut walls = Walls::default();
     let mut spaces = Vec::new();
-    let mut is_there = HashSet::new();
-    for room in &model.rooms {
-        for face in &room.faces {
-            add_face(face, &mut sheets, &mut is_there);
+    let faces = model.rooms.iter().flat_map(|room| &room.faces);
+    let faces: Vec<&Face> = faces.chain(&model.orphaned_faces).collect();
+    for face in &faces {
+        walls.know(&face.identifier, &face.geometry);
+        for piece in face.apertures.iter().chain(&face.doors) {
+            walls.know(&piece.identifier, &piece.geometry);
         }
+    }
+    for face in faces {
+        walls.add(face);
+    }
+    let Walls { mut sheets, .. } = walls;
+    for room in &model.rooms {
         let name = room.display_name.as_deref().map(str::trim);
         let name = name.filter(|n| !n.is_empty()).unwrap_or(&room.identifier);
         spaces.push(Space {
@@ -115,9 +125,6 @@ pub(super) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<EnergyMode
             name: name.to_owned(),
             shell: room.faces.iter().map(|f| f.geometry.outline()).collect(),
         });
-    }
-    for face in &model.orphaned_faces {
-        add_face(face, &mut sheets, &mut is_there);
     }
     let alone = [
         (&model.orphaned_shades, Class::Shade),
@@ -144,29 +151,112 @@ fn sheet(piece: &Piece, class: Class) -> Sheet {
     }
 }
 
-/// Adds a face and its openings, unless the same wall is there from its other side.
-fn add_face<'m>(face: &'m Face, sheets: &mut Vec<Sheet>, is_there: &mut HashSet<&'m str>) {
-    is_there.insert(&face.identifier);
-    let behind = face.boundary_condition.as_ref();
-    let behind = behind.and_then(|b| b.boundary_condition_objects.first());
-    if behind.is_some_and(|other| is_there.contains(other.as_str())) {
-        return;
+/// What lies on the other side of a face or an opening.
+enum Behind<'m> {
+    /// Nothing that the model has.
+    None,
+    /// The same, seen from there.
+    Same,
+    /// Another, through a wall as thick as they are apart.
+    Apart(&'m Loop),
+}
+
+/// Faces as sheets. Where two rooms have a wall, they have a face each, in one place or at both sides of it.
+#[derive(Default)]
+struct Walls<'m> {
+    /// Of faces and openings, by their identifiers.
+    outlines: HashMap<&'m str, Loop>,
+    sheets: Vec<Sheet>,
+}
+
+impl<'m> Walls<'m> {
+    fn know(&mut self, id: &'m str, geometry: &Geometry) {
+        self.outlines.insert(id, geometry.outline());
     }
-    let openings = [(&face.apertures, Class::Window), (&face.doors, Class::Door)];
-    let mut holes = face.geometry.holes();
-    for (pieces, class) in openings {
-        holes.extend(pieces.iter().map(|p| p.geometry.outline()));
-        sheets.extend(pieces.iter().map(|p| sheet(p, class)));
+
+    /// Returns what is behind, and `true` for the first of two by their identifiers.
+    fn behind(&self, id: &str, boundary: Option<&Boundary>) -> (Behind<'_>, bool) {
+        let other = boundary.and_then(|b| b.boundary_condition_objects.first());
+        let Some((other, far)) = other.and_then(|o| self.outlines.get_key_value(o.as_str())) else {
+            return (Behind::None, true);
+        };
+        let near = &self.outlines[id];
+        let away = |p: &DVec3| nearest(*p, far).map_or(0.0, |q| q.distance(*p));
+        let most = near.iter().map(away).fold(0.0, f64::max);
+        let size = near.iter().map(|p| p.distance(near[0])).fold(0.0, f64::max);
+        let behind = if most > ONE_PLACE * size {
+            Behind::Apart(far)
+        } else {
+            Behind::Same
+        };
+        (behind, id < *other)
     }
-    sheets.push(Sheet {
-        id: face.identifier.clone(),
-        class: match face.face_type.as_str() {
+
+    /// Adds a face and its openings; not those that are there from the other side.
+    fn add(&mut self, face: &'m Face) {
+        let class = match face.face_type.as_str() {
             "AirBoundary" => Class::Air,
             "Floor" => Class::Slab,
             "RoofCeiling" => Class::Roof,
             _ => Class::Wall,
-        },
-        outline: face.geometry.outline(),
-        holes,
-    });
+        };
+        let own = face.boundary_condition.as_ref();
+        let (behind, is_first) = self.behind(&face.identifier, own);
+        if matches!(behind, Behind::Same) && !is_first {
+            return;
+        }
+        let mut made = Vec::new();
+        let outline = face.geometry.outline();
+        if let (Behind::Apart(far), true, Class::Air) = (&behind, is_first, class) {
+            made.extend(reveal(&face.identifier, &outline, far));
+        }
+        let mut holes = face.geometry.holes();
+        for (pieces, class) in [(&face.apertures, Class::Window), (&face.doors, Class::Door)] {
+            for piece in pieces {
+                let outline = piece.geometry.outline();
+                let own = piece.boundary_condition.as_ref();
+                let (behind, is_first) = self.behind(&piece.identifier, own);
+                if is_first {
+                    made.push(sheet(piece, class));
+                    if let Behind::Apart(far) = behind {
+                        made.extend(reveal(&piece.identifier, &outline, far));
+                    }
+                }
+                holes.push(outline);
+            }
+        }
+        made.push(Sheet {
+            id: face.identifier.clone(),
+            class,
+            outline,
+            holes,
+        });
+        self.sheets.extend(made);
+    }
+}
+
+/// Greatest distance of the vertices of two outlines in one place, as a share of their size. Tolerances of models are 1 cm and less,
+/// walls are thicker.
+const ONE_PLACE: f64 = 2e-3;
+
+fn nearest(p: DVec3, outline: &Loop) -> Option<DVec3> {
+    let away = |q: &DVec3| q.distance_squared(p);
+    let all = outline.iter().copied();
+    all.min_by(|a, b| away(a).total_cmp(&away(b)))
+}
+
+/// Returns the sides of an opening through a wall, from one face of it to the other.
+fn reveal<'l>(id: &'l str, near: &'l Loop, far: &'l Loop) -> impl Iterator<Item = Sheet> + 'l {
+    let next = near.iter().cycle().skip(1);
+    near.iter()
+        .zip(next)
+        .enumerate()
+        .filter_map(move |(i, (&p, &q))| {
+            Some(Sheet {
+                id: format!("{id}-reveal-{i}"),
+                class: Class::Wall,
+                outline: vec![p, q, nearest(q, far)?, nearest(p, far)?],
+                holes: Vec::new(),
+            })
+        })
 }

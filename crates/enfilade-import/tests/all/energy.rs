@@ -114,19 +114,26 @@ fn gbxml() -> String {
     out + "</Campus></gbXML>"
 }
 
-fn hbjson() -> String {
+/// `wall` is the thickness of the wall between the rooms.
+fn hbjson(wall: f64) -> String {
     let rooms = ROOMS.iter().enumerate().map(|(i, room)| {
-        let faces = sides(*room).into_iter().enumerate().map(|(k, side)| {
-            let piece = |id: &str, outline: Vec<Point>| {
-                serde_json::json!({ "type": "Aperture", "identifier": format!("{id}{i}"), "geometry": { "boundary": outline } })
+        let mut room = *room;
+        room[0][0] += wall * i as f64;
+        let faces = sides(room).into_iter().enumerate().map(|(k, side)| {
+            let piece = |id: &str, mut outline: Vec<Point>, other: &str| {
+                if id == "door" {
+                    outline.iter_mut().for_each(|p| p[0] += wall * i as f64);
+                }
+                serde_json::json!({ "type": "Aperture", "identifier": format!("{id}{i}"), "geometry": { "boundary": outline },
+                    "boundary_condition": { "boundary_condition_objects": [other] } })
             };
             let other = match (i, k) {
                 (0, 5) => vec!["f14", "r1"],
                 (1, 4) => vec!["f05", "r0"],
                 _ => Vec::new(),
             };
-            let doors: Vec<_> = other.iter().take(1).map(|_| piece("door", door())).collect();
-            let apertures: Vec<_> = (k == 2).then(|| piece("window", window(i))).into_iter().collect();
+            let doors: Vec<_> = other.iter().take(1).map(|_| piece("door", door(), ["door1", "door0"][i])).collect();
+            let apertures: Vec<_> = (k == 2).then(|| piece("window", window(i), "")).into_iter().collect();
             let kind = ["Floor", "RoofCeiling"].get(k).unwrap_or(&"Wall");
             serde_json::json!({
                 "type": "Face", "identifier": format!("f{i}{k}"), "face_type": kind,
@@ -180,9 +187,19 @@ fn both_formats_give_sheets_with_openings_and_names_of_rooms() {
         "gbXML",
     );
     holds(
-        &imported("house.hbjson", hbjson().into_bytes()).unwrap(),
+        &imported("house.hbjson", hbjson(0.0).into_bytes()).unwrap(),
         "HBJSON",
     );
+}
+
+#[test]
+fn a_wall_with_two_sides_is_thick_and_its_door_leads_through_it() {
+    let thick = imported("house.hbjson", hbjson(1.0).into_bytes()).unwrap();
+    let objects = &thick.scene.objects;
+    let n = |has: &dyn Fn(&str) -> bool| objects.iter().filter(|o| has(&o.name)).count();
+    assert_eq!(n(&|name| name.starts_with("IfcDoor/")), 1);
+    assert_eq!(n(&|name| name.contains("door0-reveal-")), 4);
+    assert_eq!(n(&|name| name == "IfcWall/f05" || name == "IfcWall/f14"), 2);
 }
 
 #[test]
@@ -213,9 +230,9 @@ fn what_is_wrong_is_said_with_its_place() {
             fact(&gbxml(), "<Coordinate>3000", "<Coordinate>NaN"),
             "three Coordinates",
         ),
-        ("a.hbjson", fact(&hbjson(), "Feet", "Cubits"), "'Cubits'"),
-        ("a.hbjson", hbjson()[..1000].to_owned(), "line 1"),
-        ("a.hbjson", fact(&hbjson(), "3000.0", "true"), "line 1"),
+        ("a.hbjson", fact(&hbjson(0.0), "Feet", "Cubits"), "'Cubits'"),
+        ("a.hbjson", hbjson(0.0)[..1000].to_owned(), "line 1"),
+        ("a.hbjson", fact(&hbjson(0.0), "3000.0", "true"), "line 1"),
         ("a.hbjson", "[]".to_owned(), "energy model"),
     ] {
         let error = imported(name, text.into_bytes()).unwrap_err();
