@@ -55,7 +55,7 @@ enum Unheeded {
     },
 }
 
-/// Does as people decided, in their order, and notes what could not be done and why.
+/// Does as people decided, in their order and by the last word on each place, and notes what could not be done and why.
 pub(crate) fn keep_decisions(
     world: &mut World,
     notes: &mut Vec<String>,
@@ -66,7 +66,12 @@ pub(crate) fn keep_decisions(
     }
     // Nobody edited this world: the bake did.
     let edits = world.graph.statistics.counts.get("edits").copied();
-    for decision in decisions {
+    for (i, decision) in decisions.iter().enumerate() {
+        // The last word on a place: what was joined would be parted where its air is narrowest, which may be elsewhere.
+        let is_revised = |later: &RoomDecision| later.at.distance(decision.at) <= AT;
+        if decisions[i + 1..].iter().any(is_revised) {
+            continue;
+        }
         if let Err(why) = keep(world, decision) {
             notes.push(format!("the decision '{decision}' changes nothing: {why}"));
         }

@@ -80,6 +80,22 @@ fn one_room_is_two_where_its_air_is_narrowest() {
 }
 
 #[test]
+fn the_last_word_on_a_place_counts() {
+    let scene = house(DOORWAY);
+    for method in METHODS {
+        let before = baked(&scene, method, &[]);
+        let revised = [(4.0, RoomAnswer::OneRoom), (4.1, RoomAnswer::TwoRooms)];
+        let out = baked(&scene, method, &revised);
+        let [a, b] = [&before, &out].map(|out| &out.world.graph.portals);
+        assert_eq!(a.len(), b.len(), "{method:?}");
+        assert_eq!(a[0].pieces, b[0].pieces, "{method:?}");
+        assert_eq!(b[0].why[0].reason, Reason::Asked);
+        let revised = [(4.0, RoomAnswer::TwoRooms), (4.0, RoomAnswer::OneRoom)];
+        assert_eq!(n_rooms(&baked(&scene, method, &revised)), 1, "{method:?}");
+    }
+}
+
+#[test]
 fn an_empty_room_is_parted_where_a_person_points() {
     let out = baked(
         &house([0.0, 5.0]),
