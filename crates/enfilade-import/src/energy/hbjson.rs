@@ -151,7 +151,7 @@ fn sheet(piece: &Piece, class: Class) -> Sheet {
     }
 }
 
-/// What lies on the other side of a face or an opening.
+/// The other side of a face or an opening.
 enum Behind<'m> {
     /// Nothing that the model has.
     None,
@@ -164,7 +164,7 @@ enum Behind<'m> {
 /// Faces as sheets. Where two rooms have a wall, they have a face each, in one place or at both sides of it.
 #[derive(Default)]
 struct Walls<'m> {
-    /// Of faces and openings, by their identifiers.
+    /// Outlines of faces and openings, by their identifiers.
     outlines: HashMap<&'m str, Loop>,
     sheets: Vec<Sheet>,
 }
