@@ -25,6 +25,11 @@ pub(crate) fn binary(name: &str) -> PathBuf {
         .with_extension(std::env::consts::EXE_EXTENSION)
 }
 
+/// Returns the Python that has the clients of exports, `ENFILADE_PYTHON`.
+pub(crate) fn python() -> String {
+    std::env::var("ENFILADE_PYTHON").unwrap_or_else(|_| "python3".into())
+}
+
 /// Returns the folder of builds.
 pub(crate) fn target_dir() -> PathBuf {
     let here = std::env::current_exe().unwrap_or_default();

@@ -122,7 +122,7 @@ pub(crate) struct Chosen {
     #[arg(long, value_delimiter = ',', value_name = "ROW,...")]
     pub(crate) rows: Vec<String>,
     /// Only scenes whose names begin with one of these. Scenes are folders of $ENFILADE_SCENES, or of
-    /// ../shared/scenes, and of scenes2 beside it.
+    /// ../shared/scenes, and of scenes2 and scenes3 beside it.
     #[arg(long, value_delimiter = ',', value_name = "SCENE,...")]
     pub(crate) scenes: Vec<String>,
 }
@@ -301,7 +301,7 @@ pub(crate) fn bench_rows<S>(
 
 /// Returns the folder of a scene, if it is there.
 pub(crate) fn folder_of(name: &str) -> Option<PathBuf> {
-    let mut all = scenes_and(&["scenes2"]).into_iter();
+    let mut all = scenes_and(&["scenes2", "scenes3"]).into_iter();
     all.find(|dir| dir.ends_with(name))
 }
 

@@ -6,14 +6,15 @@ use std::process::Command;
 use anyhow::Context;
 use enfilade::bake::{BakeConfig, BakeContext, Silent, bake};
 use enfilade::cpg::{CellId, World};
+use enfilade::geom::DVec3;
 use enfilade::import::{ImportOptions, import};
-use enfilade_export::{Behind, SurfaceOptions, hbjson, room_surfaces};
+use enfilade_export::{Behind, SurfaceOptions, gbxml, hbjson, room_surfaces};
 use enfilade_report::room_facts;
 use serde_json::Value;
 
-use super::score::{list, text};
-use crate::process::output_of;
-use crate::rows::Figure;
+use super::score::{center_and_area, list, text, vec3};
+use crate::process::{output_of, python};
+use crate::rows::{Figure, RowPrinter, folder_of};
 
 /// Largest difference of areas, as a share.
 const ALIKE: f64 = 0.03;
@@ -39,11 +40,10 @@ for room in model.rooms:
 print(json.dumps({'errors': errors, 'pairs': pairs}))
 ";
 
-/// Returns what Honeybee says of a world's model. `ENFILADE_PYTHON` names a Python that has it.
+/// Returns what Honeybee says of a world's model.
 fn said_by_honeybee(world: &World) -> anyhow::Result<Value> {
-    let python = std::env::var("ENFILADE_PYTHON").unwrap_or_else(|_| "python3".into());
     let said = output_of(
-        Command::new(python).args(["-c", HONEYBEE]),
+        Command::new(python()).args(["-c", HONEYBEE]),
         Some(&hbjson(world)),
     );
     let said = said.context("needs `pip install honeybee-energy`, in $ENFILADE_PYTHON")?;
@@ -146,4 +146,107 @@ pub(super) fn again(world: &World) -> anyhow::Result<Figure> {
     let share = off.len() as f64 / f64::from(n.max(1));
     let note = format!("of {n} rooms: {}", off.join(", "));
     Ok(Figure::new(share, 0.08, note))
+}
+
+/// Writes gbXML from the sheets and the truth of a scene, and tells what is in a file, with Python's own parser.
+const SOURCE: &str = include_str!("../../peers/gbxml_source.py");
+/// Farthest middle of an opening from that of the source. [Units: m]
+const NEAR: f64 = 0.3;
+
+/// Prints how much of an energy model is left when it is read as gbXML, baked, and written as gbXML: the shares of its spaces, usable
+/// doors and windows, and areas that are not there.
+///
+/// A space is there if one of the same name is, alone in it; its area, if that is within 3 %; an opening, if one is near its middle,
+/// in a surface between the same spaces.
+pub(super) fn round_trip(out: &mut RowPrinter<'_>, scene: &str) -> anyhow::Result<()> {
+    let names = ["gbxml: spaces", "gbxml: openings", "gbxml: areas"];
+    if !names.iter().any(|name| out.chosen.has_row(name)) || !out.chosen.has_scene(scene) {
+        return Ok(());
+    }
+    let Some(folder) = folder_of(scene) else {
+        names.iter().for_each(|name| out.missing(name, scene));
+        return Ok(());
+    };
+    let run =
+        |args: &[&str]| output_of(Command::new(python()).args(["-c", SOURCE]).args(args), None);
+    let file = std::env::temp_dir().join(format!("enfilade-{}.gbxml", std::process::id()));
+    let path = file.display().to_string();
+    run(&["write", &folder.display().to_string(), &path])?;
+    let scene_read = import(std::slice::from_ref(&file), &[], &ImportOptions::default())?.scene;
+    let context = BakeContext::new(&Silent, None);
+    let world = bake(&scene_read, &BakeConfig::default(), &context)?.world;
+    std::fs::write(&file, gbxml(&world))?;
+    let said: Value = serde_json::from_str(&run(&["read", &path])?)?;
+    std::fs::remove_file(&file)?;
+
+    let truth: Value = serde_json::from_slice(&std::fs::read(folder.join("truth.json"))?)?;
+    let found: BTreeMap<String, f64> = (list(&said["spaces"]).iter())
+        .map(|s| (text(&s["name"]), s["area"].as_f64().unwrap_or(f64::NAN)))
+        .collect();
+    let (mut gone, mut off) = (Vec::new(), Vec::new());
+    let mut of_id = BTreeMap::from([("outside".to_owned(), None)]);
+    for room in list(&truth["rooms"]) {
+        let name = text(&room["name"]);
+        match found.get(&name) {
+            None => gone.push(name.clone()),
+            Some(area) => {
+                let share = area / room["floor_area"].as_f64().unwrap_or(f64::NAN) - 1.0;
+                if share.is_nan() || share.abs() > ALIKE {
+                    off.push(format!("{name} {:+.1} %", 100.0 * share));
+                }
+            }
+        }
+        of_id.insert(text(&room["id"]), Some(name));
+    }
+    let there: Vec<(Vec<String>, DVec3)> = (list(&said["openings"]).iter())
+        .map(|o| {
+            (
+                list(&o["spaces"]).iter().map(text).collect(),
+                middle(&o["points"]),
+            )
+        })
+        .collect();
+    let (mut n, mut missed) = (0, Vec::new());
+    for opening in list(&truth["openings"]) {
+        if opening["usable"] == false
+            || !["door", "window"].contains(&text(&opening["kind"]).as_str())
+        {
+            continue;
+        }
+        n += 1;
+        let sides = list(&opening["rooms"]).iter();
+        let mut sides: Vec<String> = sides
+            .filter_map(|id| of_id.get(&text(id)).cloned()?)
+            .collect();
+        sides.sort();
+        let at = middle(&opening["corners"]);
+        if !there
+            .iter()
+            .any(|(names, p)| *names == sides && p.distance(at) <= NEAR)
+        {
+            missed.push(text(&opening["name"]));
+        }
+    }
+    let n_rooms = of_id.len() - 1;
+    for (name, list, n, most) in [
+        (names[0], &gone, n_rooms, 0.08),
+        (names[1], &missed, n, 0.05),
+        (names[2], &off, n_rooms - gone.len(), 0.0),
+    ] {
+        let share = list.len() as f64 / n.max(1) as f64;
+        out.at_most(
+            name,
+            scene,
+            share,
+            most,
+            &format!("of {n}: {}", list.join(", ")),
+        );
+    }
+    Ok(())
+}
+
+/// Returns the center of the polygon with these vertices.
+fn middle(points: &Value) -> DVec3 {
+    let points: Vec<_> = list(points).iter().filter_map(vec3).collect();
+    DVec3::from(center_and_area(&points).0)
 }

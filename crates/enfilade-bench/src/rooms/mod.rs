@@ -8,6 +8,7 @@ pub(crate) mod bsp;
 pub(crate) mod builders;
 mod cases;
 mod code;
+mod decay;
 mod disturbed;
 mod energy;
 mod exports;
@@ -65,6 +66,9 @@ pub(crate) const FOREIGN: &[Row] = &[
 /// Buildings whose rooms are exported: a house, a large building, sheets and solids, metric and imperial.
 const EXPORTED: &[&str] = &["duplex", "fzk-haus", "institute", "samplehouse4", "kit-edc"];
 
+/// Energy models: sheets without thickness.
+const ENERGY: &[&str] = &["bristol-house", "edu-school"];
+
 /// Rooms for other trades.
 pub(crate) const EXPORTS: &[Row] = &[
     Row::baked("open rooms", EXPORTED, exports::open),
@@ -75,6 +79,10 @@ pub(crate) const EXPORTS: &[Row] = &[
     Row::baked("honeybee errors", EXPORTED, energy::errors),
     Row::baked("honeybee adjacency", EXPORTED, energy::adjacency),
     Row::baked("hbjson again", EXPORTED, energy::again),
+    Row::baked("honeybee errors", ENERGY, energy::errors),
+    Row::baked("honeybee adjacency", ENERGY, energy::adjacency),
+    Row::scene("gbxml", ENERGY, energy::round_trip),
+    Row::baked("reverberation", EXPORTED, decay::traced),
 ];
 
 /// Disturbed models.

@@ -2,6 +2,10 @@
 
 use enfilade_geom::scene::{Mesh, Primitive};
 use enfilade_geom::{DMat4, DVec2, DVec3};
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::core::solver::Solver;
+use i_overlay::float::overlay::{FloatOverlay, OverlayOptions};
 
 use crate::ImportError;
 use crate::builder::{Builder, Placement};
@@ -79,11 +83,8 @@ impl EnergyModel {
         let mut cutter = Cutter::default();
         for sheet in self.sheets.iter().filter(|s| s.class != Class::Air) {
             let place = format!("surface '{}'", soup::shortened(&sheet.id));
-            let mesh = cutter.mesh(
-                [(&sheet.outline, &sheet.holes)].into_iter(),
-                &place,
-                builder,
-            )?;
+            let polygon = (&sheet.outline, &sheet.holes);
+            let mesh = cutter.mesh(std::iter::once(polygon), &place, builder)?;
             let name = format!("{}/{}", sheet.class.name(), sheet.id);
             put(builder, mesh, &name, "", base, &place)?;
         }
@@ -145,14 +146,14 @@ struct Cutter {
 }
 
 impl Cutter {
-    /// Returns one mesh of some polygons. Holes leave them also where they touch their edge, as doors do.
+    /// Returns one mesh of some polygons. Holes may touch the edge, as doors do, lie outside of it or over one another.
     fn mesh<'l>(
         &mut self,
         polygons: impl Iterator<Item = (&'l Loop, &'l Vec<Loop>)>,
         place: &str,
         builder: &mut Builder<'_>,
     ) -> Result<Draft, ImportError> {
-        let (mut positions, mut indices) = (Vec::new(), Vec::new());
+        let mut draft = Draft::default();
         for (outline, holes) in polygons {
             let n = outline.len() + holes.iter().map(Vec::len).sum::<usize>();
             if n > MAX_CORNERS {
@@ -161,42 +162,87 @@ impl Cutter {
                     format!("a polygon of {n} vertices; at most {MAX_CORNERS} are read: split it"),
                 ));
             }
-            let first = positions.len() as u32;
-            let mut loops = vec![outline];
-            loops.extend(holes.iter().filter(|h| h.len() >= 3));
-            positions.extend(loops.iter().copied().flatten().map(DVec3::to_array));
-            self.split(&loops);
-            indices.extend(self.triangles.iter().map(|i| first + i));
+            self.cut(outline, holes, &mut draft);
         }
-        Ok((positions, indices))
+        Ok(draft)
     }
 
-    /// Cuts the first loop without the others, in the plane of its area vector. Nothing is left of one without an area.
-    fn split(&mut self, loops: &[&Loop]) {
-        self.triangles.clear();
-        let Some((origin, normal)) = plane(loops[0]) else {
+    /// Adds the triangles of a polygon without its holes, in the plane of its area vector; nothing of one without an area.
+    fn cut(&mut self, outline: &Loop, holes: &[Loop], (positions, indices): &mut Draft) {
+        let Some((origin, normal)) = plane(outline) else {
             return;
         };
         let (u, v) = normal.any_orthonormal_pair();
         let flat = |p: &DVec3| DVec2::new((*p - origin).dot(u), (*p - origin).dot(v)).to_array();
-        let points: Vec<[f64; 2]> = loops.iter().copied().flatten().map(flat).collect();
-        let mut starts = Vec::new();
-        let mut n = 0;
-        for part in &loops[..loops.len() - 1] {
-            n += part.len();
-            starts.push(n as u32);
-        }
-        (self.ears).earcut(points.iter().copied(), &starts, &mut self.triangles);
-        let area = |t: &[u32]| {
-            let [a, b, c] = [t[0], t[1], t[2]].map(|i| DVec2::from_array(points[i as usize]));
-            (b - a).perp_dot(c - a)
+        let outer: Vec<[f64; 2]> = outline.iter().map(flat).collect();
+        let known: Vec<(&DVec3, [f64; 2])> = (outline.iter().chain(holes.iter().flatten()))
+            .map(|p| (p, flat(p)))
+            .collect();
+        // Vertices keep the bits that those of the next surface have; only crossings are new.
+        let placed = |p: &[f64; 2]| {
+            let is_near = |q: &[f64; 2]| (0..2).all(|k| (p[k] - q[k]).abs() < SAME);
+            let old = known.iter().find(|(_, q)| is_near(q));
+            old.map_or_else(|| origin + u * p[0] + v * p[1], |(at, _)| **at)
         };
-        for t in self.triangles.chunks_exact_mut(3) {
-            if area(t) < 0.0 {
-                t.swap(1, 2);
+        let holes: Vec<Vec<[f64; 2]>> = holes
+            .iter()
+            .map(|hole| turned_left(hole.iter().map(flat).collect()))
+            .collect();
+        let shapes = match holes.is_empty() {
+            true => vec![vec![outer]],
+            false => without(&outer, &holes),
+        };
+        for loops in shapes {
+            let (first, mut starts, mut n) = (positions.len() as u32, Vec::new(), 0);
+            for ring in &loops {
+                positions.extend(ring.iter().map(|p| placed(p).to_array()));
+                starts.push(n);
+                n += ring.len() as u32;
             }
+            let points = loops.iter().flatten().copied();
+            (self.ears).earcut(points, &starts[1..], &mut self.triangles);
+            let at = |i: u32| DVec3::from(positions[(first + i) as usize]);
+            for t in self.triangles.chunks_exact_mut(3) {
+                let [a, b, c] = [t[0], t[1], t[2]].map(at);
+                if (b - a).cross(c - a).dot(normal) < 0.0 {
+                    t.swap(1, 2);
+                }
+            }
+            indices.extend(self.triangles.iter().map(|i| first + i));
         }
     }
+}
+
+/// Distance up to which two vertices of a polygon are one. [Units: those of the file]
+const SAME: f64 = 1e-7;
+
+/// Returns a ring with its inside on the left.
+fn turned_left(mut ring: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let next = ring.iter().cycle().skip(1);
+    let area: f64 = ring
+        .iter()
+        .zip(next)
+        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
+        .sum();
+    if area < 0.0 {
+        ring.reverse();
+    }
+    ring
+}
+
+/// Returns a polygon without others, whose insides are on their left: shapes of an outline and its holes each.
+///
+/// On a grid of 2⁶² steps, so that crossings are sound. O(n log n) for n vertices.
+fn without(outline: &[[f64; 2]], holes: &[Vec<[f64; 2]>]) -> Vec<Vec<Vec<[f64; 2]>>> {
+    let mut options = OverlayOptions::default();
+    options.preserve_output_collinear = true;
+    let mut overlay = FloatOverlay::<[f64; 2], i64>::from_subj_and_clip_custom(
+        outline,
+        holes,
+        options,
+        Solver::default(),
+    );
+    overlay.overlay(OverlayRule::Difference, FillRule::NonZero)
 }
 
 /// Returns a point and the normal of a polygon's plane.
@@ -213,34 +259,56 @@ fn plane(outline: &Loop) -> Option<(DVec3, DVec3)> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_door_at_the_floor_leaves_the_rest_of_its_wall() {
-        let rectangle = |x: [f64; 2], z: [f64; 2]| -> Loop {
-            let at = |x, z| DVec3::new(x, 7.0, z);
-            vec![
-                at(x[0], z[0]),
-                at(x[1], z[0]),
-                at(x[1], z[1]),
-                at(x[0], z[1]),
-            ]
-        };
-        let mut cutter = Cutter::default();
-        let (wall, holes) = (
-            rectangle([0.0, 4.0], [0.0, 3.0]),
-            vec![
-                rectangle([1.0, 2.0], [0.0, 2.0]),
-                rectangle([2.5, 3.5], [1.0, 2.0]),
-            ],
-        );
-        let mut loops = vec![&wall];
-        loops.extend(&holes);
-        cutter.split(&loops);
-        let points: Vec<DVec3> = loops.into_iter().flatten().copied().collect();
+    fn rectangle(x: [f64; 2], z: [f64; 2]) -> Loop {
+        let corners = [[x[0], z[0]], [x[1], z[0]], [x[1], z[1]], [x[0], z[1]]];
+        corners.map(|[x, z]| DVec3::new(x, 7.0, z)).to_vec()
+    }
+
+    fn area_left(outline: &Loop, holes: &[Loop]) -> f64 {
+        let (mut cutter, mut draft) = (Cutter::default(), Draft::default());
+        cutter.cut(outline, holes, &mut draft);
+        let (points, triangles) = draft;
         let area = |t: &[u32]| {
-            let [a, b, c] = [t[0], t[1], t[2]].map(|i| points[i as usize]);
+            let [a, b, c] = [t[0], t[1], t[2]].map(|i| DVec3::from(points[i as usize]));
             0.5 * (b - a).cross(c - a).length()
         };
-        let left: f64 = cutter.triangles.chunks_exact(3).map(area).sum();
-        assert!((left - (12.0 - 2.0 - 1.0)).abs() < 1e-12, "{left}");
+        triangles.chunks_exact(3).map(area).sum()
+    }
+
+    #[test]
+    fn a_door_at_the_floor_leaves_the_rest_of_its_wall() {
+        let wall = rectangle([0.0, 4.0], [0.0, 3.0]);
+        let door = rectangle([1.0, 2.0], [0.0, 2.0]);
+        let window = rectangle([2.5, 3.5], [1.0, 2.0]);
+        let left = area_left(&wall, &[door, window]);
+        assert!((left - (12.0 - 2.0 - 1.0)).abs() < 1e-9, "{left}");
+    }
+
+    #[test]
+    fn what_lies_outside_of_a_wall_takes_nothing_from_it() {
+        // A wall around its door, which is told as well, and sticks out of the floor; a window twice; one of another wall.
+        let mut wall = rectangle([0.0, 4.0], [0.0, 3.0]);
+        let door = rectangle([1.0, 2.0], [0.0, 2.0]);
+        wall.splice(1..1, [door[0], door[3], door[2], door[1]]);
+        let low = rectangle([1.0, 2.0], [-0.1, 2.0]);
+        let window = rectangle([2.5, 3.5], [1.0, 2.0]);
+        let again = rectangle([2.6, 3.6], [1.0, 2.0]);
+        let far = rectangle([5.0, 6.0], [0.0, 2.0]);
+        let left = area_left(&wall, &[low, window, again, far]);
+        assert!((left - (12.0 - 2.0 - 1.1)).abs() < 1e-9, "{left}");
+    }
+
+    #[test]
+    fn a_line_to_a_hole_and_back_is_no_edge() {
+        let mut wall = rectangle([0.0, 4.0], [0.0, 3.0]);
+        let mut hole = rectangle([1.0, 2.0], [1.0, 2.0]);
+        hole.reverse();
+        let bridge = [hole.clone(), vec![hole[0], wall[0]]].concat();
+        wall.splice(1..1, bridge);
+        assert!((area_left(&wall, &[]) - 11.0).abs() < 1e-12);
+        // And with a door cut from it.
+        let door = rectangle([3.0, 3.5], [0.0, 2.0]);
+        let left = area_left(&wall, &[door]);
+        assert!((left - 10.0).abs() < 1e-9, "{left}");
     }
 }
