@@ -99,6 +99,10 @@ def write(scene, out):
         vertices = room["mesh"]["vertices"]
         for triangle in room["mesh"]["triangles"]:
             add_polygon(shell, [vertices[i] for i in triangle])
+    for opening in truth["openings"]:
+        if opening["kind"] == "virtual":
+            surface = ET.SubElement(campus, "Surface", id=opening["id"], surfaceType="Air")
+            add_polygon(ET.SubElement(surface, "PlanarGeometry"), opening["corners"])
     for name, triangles in meshes(f"{scene}/scene.glb"):
         kind, number = name.split("/")
         loops = rings(triangles)

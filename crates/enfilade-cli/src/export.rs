@@ -20,7 +20,7 @@ use enfilade_report::{
 use crate::formats::Format;
 use crate::limits::Limits;
 use crate::output::{Outputs, Written, check_folder, refuse_stream, write_whole};
-use crate::screen::print_json;
+use crate::screen::{Told, print_json};
 use enfilade_cli::input::{is_stream, name_of};
 use enfilade_cli::world::read_world;
 
@@ -219,7 +219,11 @@ fn writer(args: &Export) -> anyhow::Result<Writer> {
         },
         "hbjson" => |w| {
             check_rooms(w)?;
-            Ok(hbjson(w))
+            let model = hbjson(w);
+            for note in &model.notes {
+                writeln!(Told, "{note}")?;
+            }
+            Ok(model.text)
         },
         "gml" => |w| {
             check_rooms(w)?;

@@ -7,7 +7,7 @@
 
 mod openings;
 
-use enfilade_cpg::{CellId, PortalKind, World};
+use enfilade_cpg::{CellId, PortalId, PortalKind, World};
 use serde_json::{Value, json};
 
 use crate::coarse::{CoarseRoom, CoarseRooms, coarse_rooms};
@@ -27,11 +27,24 @@ const FLOOR: f64 = -0.642_787_6;
 /// Change of a room's volume, as a share, that is worth a note.
 const CHANGED: f64 = 0.03;
 
+/// Most rooms or openings that a note names.
+const MOST_NAMED: usize = 5;
+
+/// A model for Honeybee.
+#[derive(Clone, Debug)]
+pub struct HbjsonModel {
+    /// The file.
+    pub text: String,
+    /// Sentences about what is not as in the world; the file has the same in `user_data`.
+    pub notes: Vec<String>,
+}
+
 /// Returns the rooms as a Honeybee model. The world must be valid. Time is that of [`room_surfaces`](crate::room_surfaces).
 ///
-/// Rooms are simpler than in the world; `user_data` of each has the volume there, and a note if it is now another by more than 3 %.
+/// Rooms are simpler than in the world; `user_data` of each has the volume there, and a note if it is now another by more than 3 %,
+/// that of the model the rooms and openings that are left out.
 #[must_use]
-pub fn hbjson(world: &World) -> String {
+pub fn hbjson(world: &World) -> HbjsonModel {
     let coarse = coarse_rooms(world);
     let writer = HbjsonWriter {
         world,
@@ -40,9 +53,12 @@ pub fn hbjson(world: &World) -> String {
         coarse: &coarse,
     };
     let rooms: Vec<Value> = (0..coarse.rooms.len()).map(|r| writer.room(r)).collect();
-    let left_out: Vec<&str> = (world.graph.rooms())
+    let left_out: Vec<String> = (world.graph.rooms())
         .filter(|(cell, _)| !writer.has_room(*cell))
-        .map(|(_, cell)| cell.name.as_str())
+        .map(|(_, cell)| cell.name.clone())
+        .collect();
+    let without: Vec<String> = (writer.openings.left_out.iter())
+        .map(|&portal| writer.told(portal))
         .collect();
     let model = json!({
         "type": "Model",
@@ -53,10 +69,40 @@ pub fn hbjson(world: &World) -> String {
         "tolerance": TOLERANCE,
         "angle_tolerance": ANGLE_TOLERANCE,
         "rooms": rooms,
-        "user_data": { "rooms_left_out": left_out },
+        "user_data": { "rooms_left_out": left_out, "openings_left_out": without },
         "properties": { "type": "ModelProperties" },
     });
-    model.to_string() + "\n"
+    let changed = coarse.rooms.iter().filter_map(|room| {
+        let name = &world.graph[room.shell.cell].name;
+        change_of(room).map(|percent| format!("{name} by {percent:+.1} %"))
+    });
+    let listed = [
+        (
+            "rooms are left out, as too little of them is left between large walls",
+            left_out,
+        ),
+        ("openings are left out, as they fit into no face", without),
+        (
+            "rooms have another volume than in the world",
+            changed.collect(),
+        ),
+    ];
+    let listed = listed.iter().filter(|(_, names)| !names.is_empty());
+    HbjsonModel {
+        text: model.to_string() + "\n",
+        notes: listed.map(|(what, names)| note(what, names)).collect(),
+    }
+}
+
+/// Returns a sentence with the first names of a list.
+fn note(what: &str, names: &[String]) -> String {
+    let n = names.len();
+    let named = names[..n.min(MOST_NAMED)].join(", ");
+    let more = match n.saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!("{n} {what}: {named}{more}")
 }
 
 struct HbjsonWriter<'w> {
@@ -69,6 +115,18 @@ struct HbjsonWriter<'w> {
 impl HbjsonWriter<'_> {
     fn has_room(&self, cell: CellId) -> bool {
         self.coarse.rooms.iter().any(|r| r.shell.cell == cell)
+    }
+
+    /// Returns the kind and number of a portal, with the names of its rooms.
+    fn told(&self, portal: PortalId) -> String {
+        let opening = &self.world.graph[portal];
+        let [a, b] = opening.cells.map(|c| &self.world.graph[c].name);
+        let kind = match opening.kind {
+            PortalKind::Door => "door",
+            PortalKind::Window => "window",
+            PortalKind::Open | PortalKind::Crack => "way",
+        };
+        format!("{kind} portal-{} of {a} and {b}", portal.0)
     }
 
     fn room(&self, number: usize) -> Value {
@@ -209,11 +267,15 @@ fn rounded(x: f64) -> f64 {
     (x * 1e6).round() / 1e6 + 0.0
 }
 
-fn user_data(room: &CoarseRoom) -> Value {
+/// Returns the change of a room's volume, if it is worth a note. [Units: %]
+fn change_of(room: &CoarseRoom) -> Option<f64> {
     let change = room.shell.volume / room.true_volume - 1.0;
+    (change.abs() > CHANGED).then_some(100.0 * change)
+}
+
+fn user_data(room: &CoarseRoom) -> Value {
     let mut out = json!({ "volume_of_world": rounded(room.true_volume) });
-    if change.abs() > CHANGED {
-        let percent = 100.0 * change;
+    if let Some(percent) = change_of(room) {
         out["note"] = json!(format!(
             "simpler than in the world: the volume changed by {percent:+.1} %"
         ));

@@ -23,7 +23,7 @@ mod triangles;
 
 pub use floor_map::{FloorMap, FloorMapError, FloorMapOptions};
 pub use gbxml::gbxml;
-pub use hbjson::hbjson;
+pub use hbjson::{HbjsonModel, hbjson};
 pub use ifc::{IfcError, IfcOptions, IfcSpaces, ifc_with_spaces};
 pub use indoor_gml::indoor_gml;
 pub use room_solid::{RoomSolid, room_solids};

@@ -1,7 +1,7 @@
 //! Energy models: gbXML 0.37 to 7, and HBJSON of Honeybee.
 //!
 //! Their surfaces become structure: sheets without thickness, cut where their openings are. Openings become doors and windows,
-//! spaces the names of rooms, surfaces of air nothing. Both formats have a known unit, and Z up. Nodes are called by the classes
+//! spaces the names of rooms, surfaces of air openings that their author marked. Both formats have a known unit, and Z up. Nodes are called by the classes
 //! of IFC, which decide the roles: `IfcWall/su-12`.
 
 #[cfg(feature = "energy")]

@@ -105,7 +105,7 @@ impl World {
 
     /// Returns the rooms as a Honeybee model.
     fn hbjson(&self, py: Python<'_>) -> String {
-        py.detach(|| hbjson(&self.world))
+        py.detach(|| hbjson(&self.world).text)
     }
 
     /// Returns the rooms as IndoorGML.

@@ -44,7 +44,7 @@ print(json.dumps({'errors': errors, 'pairs': pairs}))
 fn said_by_honeybee(world: &World) -> anyhow::Result<Value> {
     let said = output_of(
         Command::new(python()).args(["-c", HONEYBEE]),
-        Some(&hbjson(world)),
+        Some(&hbjson(world).text),
     );
     let said = said.context("needs `pip install honeybee-energy`, in $ENFILADE_PYTHON")?;
     let last = said.lines().last().unwrap_or_default();
@@ -99,7 +99,7 @@ pub(super) fn adjacency(world: &World) -> anyhow::Result<Figure> {
 /// its points to itself, and a floor area within 3 %.
 pub(super) fn again(world: &World) -> anyhow::Result<Figure> {
     let path = std::env::temp_dir().join(format!("enfilade-{}.hbjson", std::process::id()));
-    std::fs::write(&path, hbjson(world))?;
+    std::fs::write(&path, hbjson(world).text)?;
     let imported = import(std::slice::from_ref(&path), &[], &ImportOptions::default());
     std::fs::remove_file(&path)?;
     let scene = imported?.scene;
@@ -153,8 +153,8 @@ const SOURCE: &str = include_str!("../../peers/gbxml_source.py");
 /// Farthest middle of an opening from that of the source. [Units: m]
 const NEAR: f64 = 0.3;
 
-/// Prints how much of an energy model is left when it is read as gbXML, baked, and written as gbXML: the shares of its spaces, usable
-/// doors and windows, and areas that are not there.
+/// Prints how much of an energy model is left when it is read as gbXML, baked with its surfaces of air as portals, and written as
+/// gbXML: the shares of its spaces, usable doors and windows, and areas that are not there.
 ///
 /// A space is there if one of the same name is, alone in it; its area, if that is within 3 %; an opening, if one is near its middle,
 /// in a surface between the same spaces.
@@ -174,7 +174,11 @@ pub(super) fn round_trip(out: &mut RowPrinter<'_>, scene: &str) -> anyhow::Resul
     run(&["write", &folder.display().to_string(), &path])?;
     let scene_read = import(std::slice::from_ref(&file), &[], &ImportOptions::default())?.scene;
     let context = BakeContext::new(&Silent, None);
-    let world = bake(&scene_read, &BakeConfig::default(), &context)?.world;
+    let config = BakeConfig {
+        keeps_given: true,
+        ..BakeConfig::default()
+    };
+    let world = bake(&scene_read, &config, &context)?.world;
     std::fs::write(&file, gbxml(&world))?;
     let said: Value = serde_json::from_str(&run(&["read", &path])?)?;
     std::fs::remove_file(&file)?;

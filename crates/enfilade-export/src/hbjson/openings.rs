@@ -33,6 +33,8 @@ pub(super) struct Openings {
     sub_faces: Vec<SubFace>,
     /// Room and surface of the faces that are ways without a door.
     pub(super) air: BTreeSet<[usize; 2]>,
+    /// Those of the rooms that fit into no face; cracks do not count.
+    pub(super) left_out: Vec<PortalId>,
 }
 
 /// A rectangle in the plane of a face.
@@ -160,6 +162,7 @@ impl Openings {
         let mut openings = Self {
             sub_faces: Vec::new(),
             air: BTreeSet::new(),
+            left_out: Vec::new(),
         };
         let mut order: Vec<usize> = (0..world.graph.portals.len()).collect();
         order.sort_by(|&a, &b| {
@@ -275,5 +278,6 @@ impl Openings {
             }
             return;
         }
+        self.left_out.push(id);
     }
 }

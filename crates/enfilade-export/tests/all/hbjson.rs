@@ -1,8 +1,8 @@
 //! Honeybee models, by rules of the client that need no client: shells close, and what answers is equal.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use enfilade_cpg::World;
+use enfilade_cpg::{PortalKind, World};
 use enfilade_export::hbjson;
 use enfilade_geom::DVec3;
 use enfilade_testkit::{GridParams, furnished_house, room_grid, rotated};
@@ -140,7 +140,8 @@ fn answers(rooms: &[Value]) -> usize {
 }
 
 fn check(world: &World) {
-    let model: Value = serde_json::from_str(&hbjson(world)).unwrap();
+    let whole = hbjson(world);
+    let model: Value = serde_json::from_str(&whole.text).unwrap();
     let rooms = list(&model, "rooms");
     assert_eq!(rooms.len(), world.graph.rooms().count());
     rooms.iter().for_each(closes);
@@ -148,6 +149,25 @@ fn check(world: &World) {
     assert!(faces.map(holds_openings).sum::<usize>() > 0);
     assert!(answers(rooms) > 0);
     assert!(rooms.iter().all(|r| r["user_data"]["note"].is_null()));
+    // Each opening is a door, an aperture, air, or said to be left out.
+    let ids = rooms
+        .iter()
+        .flat_map(|r| list(r, "faces"))
+        .flat_map(|face| {
+            let openings = list(face, "doors").iter().chain(list(face, "apertures"));
+            openings.map(|o| text(&o["identifier"]).rsplit("_o").next().unwrap())
+        });
+    let n_written = ids.collect::<BTreeSet<_>>().len();
+    let faces = rooms.iter().flat_map(|r| list(r, "faces"));
+    let n_air = faces.filter(|f| f["face_type"] == "AirBoundary").count() / 2;
+    let n_left_out = list(&model["user_data"], "openings_left_out").len();
+    let graph = &world.graph;
+    let openings = graph
+        .portals
+        .iter()
+        .filter(|p| p.kind != PortalKind::Crack && p.cells.iter().any(|&c| graph[c].is_room()));
+    assert_eq!(n_written + n_air + n_left_out, openings.count());
+    assert_eq!(whole.notes.len(), usize::from(n_left_out > 0));
 }
 
 #[test]
@@ -175,6 +195,6 @@ fn rooms_of_several_storeys_close_and_answer_each_other() {
 
 #[test]
 fn a_world_without_rooms_is_a_model_without_rooms() {
-    let model: Value = serde_json::from_str(&hbjson(&World::default())).unwrap();
+    let model: Value = serde_json::from_str(&hbjson(&World::default()).text).unwrap();
     assert!(list(&model, "rooms").is_empty());
 }

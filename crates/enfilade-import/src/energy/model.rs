@@ -1,6 +1,6 @@
 //! Surfaces, openings and spaces as both formats have them, and their way into the scene.
 
-use enfilade_geom::scene::{Mesh, Primitive};
+use enfilade_geom::scene::{GivenPortal, Mesh, Primitive};
 use enfilade_geom::{DMat4, DVec2, DVec3};
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay_rule::OverlayRule;
@@ -88,6 +88,9 @@ impl EnergyModel {
             let name = format!("{}/{}", sheet.class.name(), sheet.id);
             put(builder, mesh, &name, "", base, &place)?;
         }
+        let air = self.sheets.iter().filter(|s| s.class == Class::Air);
+        let given = air.filter_map(|sheet| given_portal(sheet, base));
+        builder.add_given_portals(given.collect());
         for space in &self.spaces {
             let place = format!("space '{}'", soup::shortened(&space.id));
             let loops = space.shell.iter().map(|l| (l, NO_HOLES));
@@ -98,6 +101,18 @@ impl EnergyModel {
         }
         Ok(())
     }
+}
+
+/// Returns a surface of air as an opening that its author marked.
+fn given_portal(sheet: &Sheet, base: DMat4) -> Option<GivenPortal> {
+    let (_, normal) = plane(&sheet.outline)?;
+    let outline = sheet.outline.iter().map(|&p| base.transform_point3(p));
+    Some(GivenPortal {
+        name: format!("air {}", sheet.id),
+        outline: outline.collect(),
+        normal: base.transform_vector3(normal).try_normalize()?,
+        thickness: 0.0,
+    })
 }
 
 const NO_HOLES: &Vec<Loop> = &Vec::new();

@@ -193,6 +193,18 @@ fn both_formats_give_sheets_with_openings_and_names_of_rooms() {
 }
 
 #[test]
+fn a_surface_of_air_is_an_opening_that_its_author_marked() {
+    let read = imported("house.xml", gbxml().into_bytes()).unwrap();
+    let [air] = &read.scene.given_portals[..] else {
+        panic!("{:?}", read.scene.given_portals);
+    };
+    assert_eq!(air.name, "air Air");
+    assert!((air.normal.x.abs() - 1.0).abs() < 1e-9);
+    // With Y up, in meters.
+    assert!(air.outline[2].distance(DVec3::new(0.0, 1.0, -1.0) * FOOT) < 1e-9);
+}
+
+#[test]
 fn a_wall_with_two_sides_is_thick_and_its_door_leads_through_it() {
     let thick = imported("house.hbjson", hbjson(1.0).into_bytes()).unwrap();
     let objects = &thick.scene.objects;

@@ -11,9 +11,10 @@
 
 use std::collections::BTreeMap;
 
-use enfilade_cpg::{CellId, PortalId};
+use enfilade_cpg::{CellId, Portal, PortalId, PortalKind, World};
 
 use crate::sound::bands::N_BANDS;
+use crate::sound::materials::Assumed;
 use crate::sound::walls::Surfaces;
 use crate::space::{Joined, PartId, Place, Space};
 
@@ -45,6 +46,8 @@ pub struct Reverb {
     law: DecayLaw,
     /// Per part and material, the area of walls and objects indoors.
     surfaces: BTreeMap<(PartId, Option<u32>), f64>,
+    /// Per part and portal, the absorption of what shuts it. Empty for rooms that are given.
+    closures: Vec<Vec<[f64; N_BANDS]>>,
 }
 
 /// The walls of a cell.
@@ -58,18 +61,21 @@ struct Room {
     objects: [f64; N_BANDS],
 }
 
-/// Two cells, and the clear area between them.
+/// Two cells, the clear area between them, and that of what shuts the rest of it.
 #[derive(Clone, Copy, Debug)]
 struct Coupling {
     cells: [CellId; 2],
     area: f64,
+    shut: f64,
+    /// Absorption of what shuts it, in octave bands.
+    alpha: [f64; N_BANDS],
 }
 
 impl Reverb {
     /// Computes the rooms of the structure of all parts. `absorption` returns the coefficients of a material of a part in
     /// [octave bands](crate::OCTAVES), such as [those assumed](crate::Assumed) for its name; `None` for triangles without one. Objects
-    /// absorb beside the walls (EN 12354-6); leaves and panes count as openings; outdoors absorbs everything. O(cells · log triangles),
-    /// some milliseconds a cell.
+    /// absorb beside the walls (EN 12354-6); leaves and panes absorb as far as they are shut; outdoors absorbs everything.
+    /// O(cells · log triangles), some milliseconds a cell.
     #[must_use]
     pub fn new(
         space: &Space,
@@ -81,6 +87,7 @@ impl Reverb {
             first_cell: Vec::new(),
             law,
             surfaces: BTreeMap::new(),
+            closures: Vec::new(),
         };
         for part in (0..space.n_parts() as u32).map(PartId) {
             let layout = space.layout(part);
@@ -94,6 +101,16 @@ impl Reverb {
                 });
             }
             reverb.add_surfaces(space, part, first, &absorption);
+            let world = space.world(part);
+            let closures = world.graph.portals.iter().map(|portal| {
+                let material = closure_of(world, portal);
+                let known = material.map(|m| absorption(part, Some(m)));
+                known.unwrap_or_else(|| {
+                    let is_window = portal.kind == PortalKind::Window;
+                    Assumed::of_name(if is_window { "window" } else { "door" }).bands
+                })
+            });
+            reverb.closures.push(closures.collect());
         }
         reverb
     }
@@ -142,6 +159,7 @@ impl Reverb {
             first_cell: space.parts.iter().map(|part| part.first_cell).collect(),
             law,
             surfaces: BTreeMap::new(),
+            closures: Vec::new(),
         };
         for (room, &(volume, area, alpha)) in reverb.rooms.iter_mut().zip(rooms) {
             *room = Room {
@@ -227,6 +245,15 @@ impl Reverb {
     }
 }
 
+/// Returns the material of the leaf or pane that shuts a portal.
+fn closure_of(world: &World, portal: &Portal) -> Option<u32> {
+    let detail = world
+        .details
+        .get(portal.fittings.first()?.detail as usize)?;
+    let mesh = world.detail_meshes.get(detail.mesh as usize)?;
+    mesh.primitives.iter().find_map(|p| p.material)
+}
+
 /// Absorbing area of the outdoors, which returns nothing. [Units: wu²]
 const OPEN_AIR: f64 = 1e6;
 
@@ -234,6 +261,8 @@ const OPEN_AIR: f64 = 1e6;
 #[derive(Clone, Debug, Default)]
 pub struct DiffuseFields {
     portals: Vec<Coupling>,
+    /// The cells, with what shuts their openings as walls.
+    rooms: Vec<Room>,
     /// Per part, the index of its first cell.
     first_cell: Vec<u32>,
     /// Absorbing area of each cell in the band that is solved.
@@ -277,13 +306,23 @@ impl DiffuseFields {
         self.couple(reverb, space, |part, portal| {
             open(part, portal).clamp(0.0, 1.0)
         });
+        self.rooms.clone_from(&reverb.rooms);
+        for portal in &self.portals {
+            for cell in portal.cells {
+                let room = &mut self.rooms[cell.idx()];
+                room.area += portal.shut;
+                for (sum, a) in room.absorbed.iter_mut().zip(portal.alpha) {
+                    *sum += portal.shut * a;
+                }
+            }
+        }
         for field in [&mut self.steady, &mut self.times] {
             field.clear();
             field.resize(n, [0.0; N_BANDS]);
         }
         for band in 0..N_BANDS {
             self.absorbing.clear();
-            let rooms = reverb.rooms.iter();
+            let rooms = self.rooms.iter();
             (self.absorbing).extend(rooms.map(|room| reverb.absorbing(room)[band]));
             self.inertia.clear();
             self.inertia.resize(n, 0.0);
@@ -302,14 +341,23 @@ impl DiffuseFields {
     fn couple(&mut self, reverb: &Reverb, space: &Space, open: impl Fn(PartId, PortalId) -> f64) {
         self.portals.clear();
         let n_parts = reverb.first_cell.len();
+        let coupling = |cells, whole: f64, area: f64, part: PartId, portal: PortalId| {
+            let alpha = reverb.closures.get(part.idx()).map(|c| c[portal.idx()]);
+            Coupling {
+                cells,
+                area,
+                shut: alpha.map_or(0.0, |_| whole - area),
+                alpha: alpha.unwrap_or_default(),
+            }
+        };
         if n_parts == 1 {
             let layout = space.layout(PartId::ROOT);
             for portal in (0..layout.n_portals() as u32).map(PortalId) {
-                let opening = layout.opening(portal);
-                self.portals.push(Coupling {
-                    cells: opening.cells(),
-                    area: opening.area() * open(PartId::ROOT, portal),
-                });
+                let (opening, part) = (layout.opening(portal), PartId::ROOT);
+                let (cells, whole) = (opening.cells(), opening.area());
+                let area = whole * open(part, portal);
+                self.portals
+                    .push(coupling(cells, whole, area, part, portal));
             }
             return;
         }
@@ -326,15 +374,16 @@ impl DiffuseFields {
                 if other < portal {
                     continue;
                 }
-                let (part, its) = joined.of_portal(other);
+                let (part_behind, its) = joined.of_portal(other);
                 let width = joined.layout.opening(other).area().min(opening.area());
-                area *= open(part, its) * width / opening.area().max(1e-9);
+                area *= open(part_behind, its) * width / opening.area().max(1e-9);
                 let seam = usize::from(joined.place(cells[0]).is_some());
                 cells[seam] = joined.behind(portal, cells[1 - seam]);
             }
             // A door in front of a wall leads nowhere.
             if cells.into_iter().all(is_place) {
-                self.portals.push(Coupling { cells, area });
+                let whole = opening.area();
+                self.portals.push(coupling(cells, whole, area, part, own));
             }
         }
     }

@@ -119,6 +119,30 @@ fn a_rooms_walls_are_its_box_less_its_doors() {
     }
 }
 
+/// W11: a door that is shut absorbs as doors do, and no more than a wall of its size where it is open.
+#[test]
+fn what_shuts_an_opening_absorbs() {
+    let (space, _) = two_rooms();
+    let layout = space.layout(PartId::ROOT);
+    let reverb = Reverb::new(&space, DecayLaw::Eyring, |_, _| [0.02; N_BANDS]);
+    let door = layout.opening(PortalId(0)).area();
+    let mut fields = DiffuseFields::new();
+    fields.solve(&reverb, &space, at(0), |_, _| 0.0);
+    let (walls, alpha) = (reverb.area(at(0)), Assumed::of_name("door").bands);
+    for (band, time) in fields.rt60_bands(at(0)).into_iter().enumerate() {
+        let whole = walls + door;
+        let mean = (walls * 0.02 + door * alpha[band]) / whole;
+        let volume = layout.cell(at(0).cell).volume;
+        let eyring = 55.3 * volume / (SPEED_OF_SOUND * -(1.0 - mean).ln() * whole);
+        assert!((time / eyring - 1.0).abs() < 0.01, "{time} {eyring}");
+    }
+    let shut = fields.rt60(at(0));
+    fields.solve(&reverb, &space, at(0), |_, _| 1.0);
+    // The room behind is alike, and returns what goes there.
+    let open = fields.rt60(at(0));
+    assert!(open > shut, "{open} {shut}");
+}
+
 /// W11: furniture absorbs by its surface, but not more than the box around it, to 5 %: few lines cross small things.
 #[test]
 fn furniture_absorbs_in_its_room() {
