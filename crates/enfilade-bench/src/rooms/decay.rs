@@ -72,10 +72,10 @@ pub(super) fn traced(world: &World) -> anyhow::Result<Figure> {
     };
     let mut closed: Vec<_> = solids.iter().filter(|s| !is_open(s.cell)).collect();
     closed.sort_by(|a, b| a.volume.total_cmp(&b.volume));
-    let n = closed.len();
-    let chosen = (0..N_ROOMS.min(n)).map(|k| closed[k * n.saturating_sub(1) / (N_ROOMS - 1)]);
-    let mut chosen: Vec<_> = chosen.collect();
-    chosen.dedup_by_key(|s| s.cell);
+    let (n, n_chosen) = (closed.len(), closed.len().min(N_ROOMS));
+    let step = (n.max(1) - 1) as f64 / (n_chosen.max(2) - 1) as f64;
+    let chosen = (0..n_chosen).map(|k| closed[(k as f64 * step).round() as usize]);
+    let chosen: Vec<_> = chosen.collect();
     let mut told = Vec::new();
     for solid in &chosen {
         let room: Value = serde_json::from_str(&solid.acoustics_json())?;
