@@ -78,12 +78,12 @@ pub fn hbjson(world: &World) -> HbjsonModel {
     });
     let listed = [
         (
-            "rooms are left out, as too little of them is left between large walls",
+            "rooms left out, as too little of them is left between large walls",
             left_out,
         ),
-        ("openings are left out, as they fit into no face", without),
+        ("openings left out, as they fit into no face", without),
         (
-            "rooms have another volume than in the world",
+            "rooms of another volume than in the world",
             changed.collect(),
         ),
     ];
@@ -102,7 +102,7 @@ fn note(what: &str, names: &[String]) -> String {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
-    format!("{n} {what}: {named}{more}")
+    format!("{what}: {n}, {named}{more}")
 }
 
 struct HbjsonWriter<'w> {
