@@ -109,11 +109,12 @@ def write(scene, out):
         surface = ET.SubElement(campus, "Surface", id=number, surfaceType=kind)
         add_polygon(ET.SubElement(surface, "PlanarGeometry"), loops[0])
         own = hosted.pop(number, [])
-        # Holes in a sheet that no opening has are ways.
+        # Holes in a sheet that no opening has are ways; several panes may be in one.
         middle = lambda points: [sum(c) / len(points) for c in zip(*points)]
-        near = lambda a, b: sum((p - q) ** 2 for p, q in zip(a, b)) < 0.25
+        box = lambda points: [(min(c) - 0.01, max(c) + 0.01) for c in zip(*points)]
+        inside = lambda p, hole: all(a <= c <= b for c, (a, b) in zip(p, box(hole)))
         for i, hole in enumerate(loops[1:]):
-            if not any(near(middle(hole), middle(points)) for _, _, points in own):
+            if not any(inside(middle(points), hole) for _, _, points in own):
                 own.append((f"{number}-hole-{i}", "Air", hole))
         for number, kind, points in own:
             opening = ET.SubElement(surface, "Opening", id=number, openingType=kind)

@@ -1,6 +1,7 @@
 //! Energy models: gbXML 0.37 to 7, and HBJSON of Honeybee.
 //!
-//! Their surfaces become structure: sheets without thickness, cut where their openings are. Openings become doors and windows,
+//! Their surfaces become structure, cut where their openings are: sheets without thickness, or, where spaces of gbXML have shells, walls
+//! between these. Openings become doors and windows,
 //! spaces the names of rooms, surfaces of air openings that their author marked. Both formats have a known unit, and Z up. Nodes are called by the classes
 //! of IFC, which decide the roles: `IfcWall/su-12`.
 
@@ -10,6 +11,8 @@ mod gbxml;
 mod hbjson;
 #[cfg(feature = "energy")]
 mod model;
+#[cfg(feature = "energy")]
+mod thick;
 
 use std::borrow::Cow;
 

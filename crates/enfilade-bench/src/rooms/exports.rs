@@ -26,7 +26,7 @@ const N_PIXELS: usize = 10_000;
 /// Counts rooms, at both levels, whose surfaces do not close: an edge without an opposite, a sum of area vectors above 1e-3 m², or a
 /// volume off by more than 0.5 %.
 pub(super) fn open(world: &World) -> anyhow::Result<Figure> {
-    let (mut n, mut n_rooms) = (0, 0);
+    let (mut told, mut n_rooms) = (Vec::new(), 0);
     for level in [SurfaceLevel::First, SurfaceLevel::Second] {
         let options = SurfaceOptions {
             level,
@@ -35,15 +35,22 @@ pub(super) fn open(world: &World) -> anyhow::Result<Figure> {
         for room in room_surfaces(world, &options) {
             let off = room.volume / f64::from(world.graph[room.cell].volume) - 1.0;
             let is_closed = room.n_open_edges == 0 && room.gap <= 1e-3 && off.abs() <= 0.005;
-            n += usize::from(!is_closed);
+            if !is_closed {
+                let (open, gap) = (room.n_open_edges, room.gap);
+                told.push(format!(
+                    "cell {} at {level:?}: {open} edges, {gap:.4} m², volume off by {:.2} %",
+                    room.cell.0,
+                    100.0 * off
+                ));
+            }
             n_rooms += 1;
         }
     }
-    Ok(Figure::new(
-        n as f64,
-        0.0,
-        format!("of {n_rooms} rooms and voids at two levels"),
-    ))
+    let note = format!(
+        "of {n_rooms} rooms and voids at two levels; {}",
+        told.join("; ")
+    );
+    Ok(Figure::new(told.len() as f64, 0.0, note))
 }
 
 /// Measures the share of the surfaces behind which a march through the construction, by millimeters, finds something else.

@@ -7,6 +7,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::model::{Class, EnergyModel, Loop, Sheet, Space};
 use super::text;
+use super::thick::thicken;
 use crate::ImportError;
 use crate::builder::Builder;
 
@@ -35,15 +36,21 @@ pub(super) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<EnergyMode
         add_surface(surface, &mut sheets, &mut around, builder)?;
     }
     let mut spaces = Vec::new();
+    let mut has_shells = true;
     for space in root.descendants().filter(|n| is(*n, "Space")) {
+        has_shells &= child(space, "ShellGeometry").is_some();
         spaces.push(read_space(space, &mut around, builder)?);
     }
-    Ok(EnergyModel {
+    let mut model = EnergyModel {
         format: "gbXML",
         unit,
         sheets,
         spaces,
-    })
+    };
+    if has_shells {
+        thicken(&mut model);
+    }
+    Ok(model)
 }
 
 fn is(node: Node<'_, '_>, name: &str) -> bool {
@@ -106,7 +113,14 @@ fn add_surface<'a>(
         builder.note(format!("surface '{id}'"), "has no PlanarGeometry; left out");
         return Ok(());
     };
-    let mut holes = Vec::new();
+    let mut spaces = Vec::new();
+    for space in surface.children().filter(|n| is(*n, "AdjacentSpaceId")) {
+        if let Some(space) = space.attribute("spaceIdRef") {
+            around.entry(space).or_default().push(outline.clone());
+            spaces.push(space.to_owned());
+        }
+    }
+    let mut openings = Vec::new();
     for opening in surface.children().filter(|n| is(*n, "Opening")) {
         let Some(hole) = planar(opening, builder)? else {
             builder.note(
@@ -120,24 +134,16 @@ fn add_surface<'a>(
             kind if kind.ends_with("Door") => Class::Door,
             _ => Class::Window,
         };
+        openings.push(sheets.len());
         sheets.push(Sheet {
-            id: id_of(opening),
-            class,
-            outline: hole.clone(),
-            holes: Vec::new(),
+            spaces: spaces.clone(),
+            ..Sheet::new(id_of(opening), class, hole)
         });
-        holes.push(hole);
-    }
-    for space in surface.children().filter(|n| is(*n, "AdjacentSpaceId")) {
-        if let Some(space) = space.attribute("spaceIdRef") {
-            around.entry(space).or_default().push(outline.clone());
-        }
     }
     sheets.push(Sheet {
-        id,
-        class: class_of(class.unwrap_or_default()),
-        outline,
-        holes,
+        openings,
+        spaces,
+        ..Sheet::new(id, class_of(class.unwrap_or_default()), outline)
     });
     Ok(())
 }
@@ -161,7 +167,12 @@ fn read_space(
     let name = child(space, "Name").and_then(|n| n.text());
     let name = name.map(str::trim).filter(|n| !n.is_empty());
     let name = name.unwrap_or(&id).to_owned();
-    Ok(Space { id, name, shell })
+    Ok(Space {
+        id,
+        name,
+        shell,
+        walls: Vec::new(),
+    })
 }
 
 /// Returns the polygon of a surface or an opening.

@@ -124,6 +124,7 @@ pub(super) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<EnergyMode
             id: room.identifier.clone(),
             name: name.to_owned(),
             shell: room.faces.iter().map(|f| f.geometry.outline()).collect(),
+            walls: Vec::new(),
         });
     }
     let alone = [
@@ -144,10 +145,8 @@ pub(super) fn read(bytes: &[u8], builder: &mut Builder<'_>) -> Result<EnergyMode
 
 fn sheet(piece: &Piece, class: Class) -> Sheet {
     Sheet {
-        id: piece.identifier.clone(),
-        class,
-        outline: piece.geometry.outline(),
         holes: piece.geometry.holes(),
+        ..Sheet::new(piece.identifier.clone(), class, piece.geometry.outline())
     }
 }
 
@@ -226,10 +225,8 @@ impl<'m> Walls<'m> {
             }
         }
         made.push(Sheet {
-            id: face.identifier.clone(),
-            class,
-            outline,
             holes,
+            ..Sheet::new(face.identifier.clone(), class, outline)
         });
         self.sheets.extend(made);
     }
@@ -252,11 +249,8 @@ fn reveal<'l>(id: &'l str, near: &'l Loop, far: &'l Loop) -> impl Iterator<Item 
         .zip(next)
         .enumerate()
         .filter_map(move |(i, (&p, &q))| {
-            Some(Sheet {
-                id: format!("{id}-reveal-{i}"),
-                class: Class::Wall,
-                outline: vec![p, q, nearest(q, far)?, nearest(p, far)?],
-                holes: Vec::new(),
-            })
+            let outline = vec![p, q, nearest(q, far)?, nearest(p, far)?];
+            let id = format!("{id}-reveal-{i}");
+            Some(Sheet::new(id, Class::Wall, outline))
         })
 }

@@ -16,6 +16,9 @@ use crate::soup;
 /// A closed line. [Units: those of the file, Z up]
 pub(super) type Loop = Vec<DVec3>;
 
+/// A closed line in a plane.
+pub(super) type Ring = Vec<[f64; 2]>;
+
 /// The class of a surface or an opening in IFC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Class {
@@ -52,6 +55,31 @@ pub(super) struct Sheet {
     pub(super) outline: Loop,
     /// Parts of it that are not there.
     pub(super) holes: Vec<Loop>,
+    /// Openings in it, which are not there either, by their place in [`EnergyModel::sheets`].
+    pub(super) openings: Vec<usize>,
+    /// Ids of the spaces at its sides, as far as the file tells.
+    pub(super) spaces: Vec<String>,
+    /// Shells of spaces take its place.
+    pub(super) is_left_out: bool,
+}
+
+impl Sheet {
+    pub(super) fn new(id: String, class: Class, outline: Loop) -> Self {
+        Self {
+            id,
+            class,
+            outline,
+            holes: Vec::new(),
+            openings: Vec::new(),
+            spaces: Vec::new(),
+            is_left_out: false,
+        }
+    }
+
+    /// Returns `true` if air or people pass, or light.
+    pub(super) fn is_opening(&self) -> bool {
+        matches!(self.class, Class::Door | Class::Window | Class::Air)
+    }
 }
 
 /// A space: a room of the truth.
@@ -60,6 +88,8 @@ pub(super) struct Space {
     pub(super) name: String,
     /// Polygons around it.
     pub(super) shell: Vec<Loop>,
+    /// Where these are its walls: what is not there of each.
+    pub(super) walls: Vec<Vec<Loop>>,
 }
 
 /// A model as both formats have it.
@@ -81,9 +111,11 @@ impl EnergyModel {
         options.up = options.up.or(Some(Up::Z));
         let base = options.base_transform()?;
         let mut cutter = Cutter::default();
-        for sheet in self.sheets.iter().filter(|s| s.class != Class::Air) {
+        for sheet in (self.sheets.iter()).filter(|s| s.class != Class::Air && !s.is_left_out) {
             let place = format!("surface '{}'", soup::shortened(&sheet.id));
-            let polygon = (&sheet.outline, &sheet.holes);
+            let openings = sheet.openings.iter().map(|&i| &self.sheets[i].outline);
+            let holes = sheet.holes.iter().chain(openings).cloned().collect();
+            let polygon = (&sheet.outline, &holes);
             let mesh = cutter.mesh(std::iter::once(polygon), &place, builder)?;
             let name = format!("{}/{}", sheet.class.name(), sheet.id);
             put(builder, mesh, &name, "", base, &place)?;
@@ -93,6 +125,14 @@ impl EnergyModel {
         builder.add_given_portals(given.collect());
         for space in &self.spaces {
             let place = format!("space '{}'", soup::shortened(&space.id));
+            let is_level = |l: &Loop| plane(l).is_some_and(|(_, normal)| normal.z.abs() > LEVEL);
+            for (class, level) in [(Class::Wall, false), (Class::Slab, true)] {
+                let polygons = space.shell.iter().zip(&space.walls);
+                let polygons = polygons.filter(|(outline, _)| is_level(outline) == level);
+                let mesh = cutter.mesh(polygons, &place, builder)?;
+                let name = format!("{}/{}", class.name(), space.id);
+                put(builder, mesh, &name, "", base, &place)?;
+            }
             let loops = space.shell.iter().map(|l| (l, NO_HOLES));
             let mesh = cutter.mesh(loops, &place, builder)?;
             let extras = serde_json::json!({ "ifc": { "Name": space.name } }).to_string();
@@ -189,7 +229,7 @@ impl Cutter {
         };
         let (u, v) = normal.any_orthonormal_pair();
         let flat = |p: &DVec3| DVec2::new((*p - origin).dot(u), (*p - origin).dot(v)).to_array();
-        let outer: Vec<[f64; 2]> = outline.iter().map(flat).collect();
+        let outer: Ring = outline.iter().map(flat).collect();
         let known: Vec<(&DVec3, [f64; 2])> = (outline.iter().chain(holes.iter().flatten()))
             .map(|p| (p, flat(p)))
             .collect();
@@ -199,13 +239,13 @@ impl Cutter {
             let old = known.iter().find(|(_, q)| is_near(q));
             old.map_or_else(|| origin + u * p[0] + v * p[1], |(at, _)| **at)
         };
-        let holes: Vec<Vec<[f64; 2]>> = holes
+        let holes: Vec<Ring> = holes
             .iter()
             .map(|hole| turned_left(hole.iter().map(flat).collect()))
             .collect();
         let shapes = match holes.is_empty() {
             true => vec![vec![outer]],
-            false => without(&outer, &holes),
+            false => overlay(&[outer], &holes, OverlayRule::Difference),
         };
         for loops in shapes {
             let (first, mut starts, mut n) = (positions.len() as u32, Vec::new(), 0);
@@ -228,40 +268,43 @@ impl Cutter {
     }
 }
 
+/// Least upward part of the normal of a floor or a ceiling, which slope by less than 45 degrees.
+const LEVEL: f64 = 0.7;
 /// Distance up to which two vertices of a polygon are one. [Units: those of the file]
 const SAME: f64 = 1e-7;
 
-/// Returns a ring with its inside on the left.
-fn turned_left(mut ring: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+/// Returns the area of a ring, negative if its inside is on the right.
+pub(super) fn area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
-    let area: f64 = ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
-        .sum();
-    if area < 0.0 {
+    let pairs = ring.iter().zip(next);
+    0.5 * pairs.map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
+}
+
+/// Returns a ring with its inside on the left.
+pub(super) fn turned_left(mut ring: Ring) -> Ring {
+    if area(&ring) < 0.0 {
         ring.reverse();
     }
     ring
 }
 
-/// Returns a polygon without others, whose insides are on their left: shapes of an outline and its holes each.
+/// Returns what a rule leaves of rings and of others, whose insides are on their left: shapes of an outline and its holes each.
 ///
 /// On a grid of 2⁶² steps, so that crossings are sound. O(n log n) for n vertices.
-fn without(outline: &[[f64; 2]], holes: &[Vec<[f64; 2]>]) -> Vec<Vec<Vec<[f64; 2]>>> {
+pub(super) fn overlay(rings: &[Ring], others: &[Ring], rule: OverlayRule) -> Vec<Vec<Ring>> {
     let mut options = OverlayOptions::default();
     options.preserve_output_collinear = true;
     let mut overlay = FloatOverlay::<[f64; 2], i64>::from_subj_and_clip_custom(
-        outline,
-        holes,
+        rings,
+        others,
         options,
         Solver::default(),
     );
-    overlay.overlay(OverlayRule::Difference, FillRule::NonZero)
+    overlay.overlay(rule, FillRule::NonZero)
 }
 
 /// Returns a point and the normal of a polygon's plane.
-fn plane(outline: &Loop) -> Option<(DVec3, DVec3)> {
+pub(super) fn plane(outline: &Loop) -> Option<(DVec3, DVec3)> {
     let origin = *outline.first()?;
     let next = outline.iter().cycle().skip(1);
     let pairs = outline.iter().zip(next);
