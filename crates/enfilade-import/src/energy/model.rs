@@ -143,13 +143,20 @@ impl EnergyModel {
     }
 }
 
+/// How far a mark reaches into the walls around it, so that nothing leads past its edge: the tolerance of most such models.
+/// [Units: m]
+const MARK_REACH: f64 = 0.01;
+
 /// Returns a surface of air as an opening that its author marked.
 fn given_portal(sheet: &Sheet, base: DMat4) -> Option<GivenPortal> {
     let (_, normal) = plane(&sheet.outline)?;
     let outline = sheet.outline.iter().map(|&p| base.transform_point3(p));
+    let outline: Vec<DVec3> = outline.collect();
+    let middle = outline.iter().sum::<DVec3>() / outline.len() as f64;
+    let reaching = |&p: &DVec3| p + (p - middle).normalize_or_zero() * MARK_REACH;
     Some(GivenPortal {
         name: format!("air {}", sheet.id),
-        outline: outline.collect(),
+        outline: outline.iter().map(reaching).collect(),
         normal: base.transform_vector3(normal).try_normalize()?,
         thickness: 0.0,
     })
