@@ -125,12 +125,11 @@ impl EnergyModel {
         builder.add_given_portals(given.collect());
         for space in &self.spaces {
             let place = format!("space '{}'", soup::shortened(&space.id));
-            let is_level = |l: &Loop| plane(l).is_some_and(|(_, normal)| normal.z.abs() > LEVEL);
-            for (class, level) in [(Class::Wall, false), (Class::Slab, true)] {
+            if !space.walls.is_empty() {
+                // As one mesh, a closed shell is one thing.
                 let polygons = space.shell.iter().zip(&space.walls);
-                let polygons = polygons.filter(|(outline, _)| is_level(outline) == level);
                 let mesh = cutter.mesh(polygons, &place, builder)?;
-                let name = format!("{}/{}", class.name(), space.id);
+                let name = format!("{}/{}", Class::Wall.name(), space.id);
                 put(builder, mesh, &name, "", base, &place)?;
             }
             let loops = space.shell.iter().map(|l| (l, NO_HOLES));
@@ -275,8 +274,6 @@ impl Cutter {
     }
 }
 
-/// Least upward part of the normal of a floor or a ceiling, which slope by less than 45 degrees.
-const LEVEL: f64 = 0.7;
 /// Distance up to which two vertices of a polygon are one. [Units: those of the file]
 const SAME: f64 = 1e-7;
 

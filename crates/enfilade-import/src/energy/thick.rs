@@ -92,7 +92,7 @@ impl Frame {
     }
 }
 
-/// Makes the shells of spaces the walls, and leads openings through them, if all are closed, and most openings are deep.
+/// Makes the shells of spaces the walls, and leads openings through them, if all are closed, and most openings between two are deep.
 /// Otherwise changes nothing. Surfaces between two spaces, and those on a shell, are then left out.
 pub(super) fn thicken(model: &mut EnergyModel) {
     if !model.spaces.iter().all(|space| closes(&space.shell)) {
@@ -117,7 +117,11 @@ pub(super) fn thicken(model: &mut EnergyModel) {
         }
     }
     let is_deep = |[from, to]: &[f64; 2]| (from - to).abs() > same;
-    if 2 * ways.iter().filter(|way| is_deep(&way.3)).count() <= openings.len() {
+    // Surfaces may lie on the middle of walls, or on one face of them.
+    let is_between = ways.iter().any(|way| way.2.len() == 2);
+    let judged = ways.iter().filter(|way| way.2.len() == 2 || !is_between);
+    let (deep, flat): (Vec<_>, Vec<_>) = judged.partition(|way| is_deep(&way.3));
+    if deep.len() <= flat.len() {
         return;
     }
     let mut holes: Vec<Vec<Vec<Loop>>> = (model.spaces.iter())

@@ -65,7 +65,7 @@ pub(super) fn join_small(shapes: Vec<Shape>) -> Vec<Shape> {
     join(shapes, &is_small, &|_, _| true)
 }
 
-/// Joins parts of merged objects that nearly touch, out of those that may be joined, if a pair is one thing.
+/// Joins parts of a merged object that nearly touch, out of those that may be joined, if a pair is one thing.
 fn join(
     shapes: Vec<Shape>,
     may_be: &dyn Fn(&Shape) -> bool,
@@ -76,7 +76,8 @@ fn join(
     let boxes: Vec<Aabb> = some.iter().map(|s| s.bounds).collect();
     let mut sets = Sets::new(some.len());
     for_near(&boxes, |a, b| {
-        if is_one(&some[a as usize], &some[b as usize]) {
+        let [one, other] = [a, b].map(|i| &some[i as usize]);
+        if one.object == other.object && is_one(one, other) {
             sets.join(a, b);
         }
     });

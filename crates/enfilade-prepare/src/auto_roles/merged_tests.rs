@@ -93,3 +93,19 @@ fn the_name_of_a_door_makes_no_detail_of_a_whole_house() {
     super::decide(&mut scene);
     assert_eq!(scene.objects[0].role, Role::Detail);
 }
+
+#[test]
+fn parts_of_two_merged_meshes_that_touch_stay_apart() {
+    // The second one's chair stands at the table of the first, and is far down in its list.
+    let mut chair = Build::default();
+    chair
+        .block("far", [60.0, 0.0, 0.0], [65.0, 3.0, 4.0])
+        .block("seat", [2.0, 0.4, 1.61], [2.4, 0.45, 2.0])
+        .block("leg", [2.0, 0.0, 1.61], [2.05, 0.4, 1.66]);
+    let scene = house().merged("").and(chair.merged("")).decided();
+    // Each with its own: the leaf, the window, the table; and the chair.
+    assert_eq!(n_triangles(&scene, Role::Detail), 12 * (9 + 2));
+    assert_eq!(n_triangles(&scene, Role::Structural), 12 * (12 + 1));
+    let details = scene.objects.iter().filter(|o| o.role == Role::Detail);
+    assert_eq!(details.count(), 4);
+}

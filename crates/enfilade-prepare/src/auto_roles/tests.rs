@@ -100,6 +100,15 @@ impl Build {
         out
     }
 
+    /// Adds the objects of another.
+    pub(super) fn and(mut self, mut other: Self) -> Self {
+        let n_meshes = self.0.meshes.len() as u32;
+        other.0.objects.iter_mut().for_each(|o| o.mesh += n_meshes);
+        self.0.meshes.append(&mut other.0.meshes);
+        self.0.objects.append(&mut other.0.objects);
+        self
+    }
+
     pub(super) fn decided(mut self) -> Scene {
         decide(&mut self.0);
         self.0
