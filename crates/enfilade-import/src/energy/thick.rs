@@ -117,9 +117,11 @@ pub(super) fn thicken(model: &mut EnergyModel) {
         }
     }
     let is_deep = |[from, to]: &[f64; 2]| (from - to).abs() > same;
-    // Surfaces may lie on the middle of walls, or on one face of them.
+    // Surfaces may lie on the middle of walls, or on one face of them; those of air between spaces are flat in all models.
     let is_between = ways.iter().any(|way| way.2.len() == 2);
-    let judged = ways.iter().filter(|way| way.2.len() == 2 || !is_between);
+    let judged = ways
+        .iter()
+        .filter(|way| model.sheets[way.0].class != Class::Air && (way.2.len() == 2 || !is_between));
     let (deep, flat): (Vec<_>, Vec<_>) = judged.partition(|way| is_deep(&way.3));
     if deep.len() <= flat.len() {
         return;

@@ -63,15 +63,17 @@ fn poly_loop(points: &[Point]) -> String {
     out + "</PolyLoop>"
 }
 
-fn gbxml() -> String {
+/// `wall` is the thickness of walls: surfaces lie on their middle, shells end at their faces.
+fn gbxml(wall: f64) -> String {
     let mut out = String::from(
         r#"<?xml version="1.0"?><gbXML xmlns="http://www.gbxml.org/schema" lengthUnit="Feet"><Campus id="c"><Building id="b">"#,
     );
+    let faces = |[from, to]: [Point; 2]| [from.map(|c| c + 0.5 * wall), to.map(|c| c - 0.5 * wall)];
     for (i, room) in ROOMS.iter().enumerate() {
         let _ = write!(
             out,
             "<Space id=\"sp{i}\"><Name>10{i} Office &amp; more</Name><ShellGeometry><ClosedShell>{}</ClosedShell></ShellGeometry></Space>",
-            sides(*room).map(|s| poly_loop(&s)).concat()
+            sides(faces(*room)).map(|s| poly_loop(&s)).concat()
         );
     }
     out += "</Building>";
@@ -84,7 +86,8 @@ fn gbxml() -> String {
             let kind = ["SlabOnGrade", "Roof"].get(k).unwrap_or(&"ExteriorWall");
             let _ = write!(
                 out,
-                "<Surface id=\"su{i}{k}\" surfaceType=\"{kind}\"><AdjacentSpaceId spaceIdRef=\"sp{i}\"/><PlanarGeometry>{}</PlanarGeometry>",
+                "<Surface id=\"su{i}{k}\" surfaceType=\"{kind}\"><AdjacentSpaceId spaceIdRef=\"sp{i}\"/>{}<PlanarGeometry>{}</PlanarGeometry>",
+                ["", "<AdjacentSpaceId spaceIdRef=\"sp1\"/>"][usize::from((i, k) == (0, 5))],
                 poly_loop(side)
             );
             let opening = match (i, k) {
@@ -183,7 +186,7 @@ fn holds(imported: &Imported, format: &str) {
 #[test]
 fn both_formats_give_sheets_with_openings_and_names_of_rooms() {
     holds(
-        &imported("house.xml", gbxml().into_bytes()).unwrap(),
+        &imported("house.xml", gbxml(0.0).into_bytes()).unwrap(),
         "gbXML",
     );
     holds(
@@ -194,14 +197,16 @@ fn both_formats_give_sheets_with_openings_and_names_of_rooms() {
 
 #[test]
 fn a_surface_of_air_is_an_opening_that_its_author_marked() {
-    let read = imported("house.xml", gbxml().into_bytes()).unwrap();
+    let read = imported("house.xml", gbxml(0.0).into_bytes()).unwrap();
     let [air] = &read.scene.given_portals[..] else {
         panic!("{:?}", read.scene.given_portals);
     };
     assert_eq!(air.name, "air Air");
     assert!((air.normal.x.abs() - 1.0).abs() < 1e-9);
     // With Y up, in meters.
-    assert!(air.outline[2].distance(DVec3::new(0.0, 1.0, -1.0) * FOOT) < 1e-9);
+    // It reaches into the walls around it by a centimeter.
+    let away = air.outline[2].distance(DVec3::new(0.0, 1.0, -1.0) * FOOT);
+    assert!((away - 0.01).abs() < 1e-9, "{away}");
 }
 
 #[test]
@@ -215,8 +220,44 @@ fn a_wall_with_two_sides_is_thick_and_its_door_leads_through_it() {
 }
 
 #[test]
+fn walls_of_gbxml_are_as_thick_as_the_shells_of_spaces_are_apart() {
+    let thick = imported("house.gbxml", gbxml(1.0).into_bytes())
+        .unwrap()
+        .scene;
+    let n = |start: &str| {
+        thick
+            .objects
+            .iter()
+            .filter(|o| o.name.starts_with(start))
+            .count()
+    };
+    // The wall between the two is there no more; those to the outdoors are.
+    assert_eq!(
+        [n("IfcWall/su05"), n("IfcWall/su04"), n("IfcWall/su15")],
+        [0, 1, 1]
+    );
+    // Door and windows lead through.
+    for id in ["op05", "op02", "op12"] {
+        assert_eq!(n(&format!("IfcWall/{id}-reveal-")), 4, "{id}");
+    }
+    let walls = thick
+        .objects
+        .iter()
+        .find(|o| o.name == "IfcWall/sp0")
+        .unwrap();
+    let triangles =
+        thick.meshes[walls.mesh as usize].primitives[0].placed_triangles(walls.transform);
+    let area: f64 = triangles
+        .map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length())
+        .sum();
+    // A box without the window, and without what is left of the door above the floor.
+    let right = 2.0 * (19.0 * 9.0 + 19.0 * 9.0 + 9.0 * 9.0) - 12.0 - 3.0 * 6.5;
+    assert!((area / FOOT / FOOT - right).abs() < 1e-3, "{area}");
+}
+
+#[test]
 fn files_in_sixteen_bits_are_read() {
-    let utf_16 = gbxml().replace("\"1.0\"?", "\"1.0\" encoding=\"utf-16\"?");
+    let utf_16 = gbxml(0.0).replace("\"1.0\"?", "\"1.0\" encoding=\"utf-16\"?");
     for to_bytes in [u16::to_le_bytes, u16::to_be_bytes] {
         let units = std::iter::once(0xfeff).chain(utf_16.encode_utf16());
         let bytes = units.flat_map(to_bytes).collect();
@@ -226,20 +267,20 @@ fn files_in_sixteen_bits_are_read() {
 
 #[test]
 fn what_is_wrong_is_said_with_its_place() {
-    let cut = gbxml();
+    let cut = gbxml(0.0);
     let cut = &cut[..cut.len() / 2];
     let fact = |text: &str, from: &str, to: &str| text.replacen(from, to, 1);
     for (name, text, said) in [
         ("a.xml", cut.to_owned(), "line 1"),
-        ("a.xml", fact(&gbxml(), "Feet", "Cubits"), "'Cubits'"),
+        ("a.xml", fact(&gbxml(0.0), "Feet", "Cubits"), "'Cubits'"),
         (
             "a.xml",
-            fact(&gbxml(), "<Coordinate>3000", "<Coordinate>x"),
+            fact(&gbxml(0.0), "<Coordinate>3000", "<Coordinate>x"),
             "three Coordinates",
         ),
         (
             "a.xml",
-            fact(&gbxml(), "<Coordinate>3000", "<Coordinate>NaN"),
+            fact(&gbxml(0.0), "<Coordinate>3000", "<Coordinate>NaN"),
             "three Coordinates",
         ),
         ("a.hbjson", fact(&hbjson(0.0), "Feet", "Cubits"), "'Cubits'"),
@@ -254,7 +295,7 @@ fn what_is_wrong_is_said_with_its_place() {
     let deep = format!("<gbXML>{}", "<Campus>".repeat(100_000));
     assert!(imported("a.xml", deep.into_bytes()).is_err());
     let many = fact(
-        &gbxml(),
+        &gbxml(0.0),
         "<PolyLoop>",
         &format!(
             "<PolyLoop>{}",
@@ -270,7 +311,7 @@ fn what_is_wrong_is_said_with_its_place() {
 
 #[test]
 fn a_surface_without_a_place_is_left_out_with_a_note() {
-    let text = gbxml().replacen("</Campus>", "<Surface id=\"odd\"/></Campus>", 1);
+    let text = gbxml(0.0).replacen("</Campus>", "<Surface id=\"odd\"/></Campus>", 1);
     let imported = imported("house.xml", text.into_bytes()).unwrap();
     let notes = imported.report.notes.iter().map(ToString::to_string);
     let notes: Vec<String> = notes.collect();
