@@ -3,6 +3,7 @@
 mod ifc;
 mod maps;
 mod solids;
+mod walkable;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -69,6 +70,10 @@ pub(crate) struct Export {
     /// For a map: side of a pixel in meters; 0.05 by default.
     #[arg(long, value_name = "METERS")]
     resolution: Option<f64>,
+    /// Write the floors where a person can stand, in groups by room, into the .obj: furniture and walls are left out by the width of
+    /// shoulders, shut doors are passed.
+    #[arg(long, conflicts_with_all = ["cells", "split", "rooms_solid", "ifc"])]
+    walkable: bool,
     /// Print a report on the file as JSON for machines; nothing else is printed.
     #[arg(long)]
     json: bool,
@@ -204,6 +209,15 @@ fn writer(args: &Export) -> anyhow::Result<Writer> {
         bail!(
             "--cells applies only to a .csv file; leave it out, or give -o a name that ends in .csv"
         );
+    }
+    if args.walkable {
+        if extension != "obj" {
+            bail!("--walkable applies only to a .obj file; give -o a name that ends in .obj");
+        }
+        return Ok(|w| {
+            check_rooms(w)?;
+            walkable::obj(w)
+        });
     }
     Ok(match extension.as_str() {
         "json" => |w| graph_json(w, &[]).context("cannot write JSON"),

@@ -454,7 +454,11 @@ fn finish(builder: Builder<'_>, options: &ImportOptions) -> Result<Imported, Imp
             ))
         };
         let advice = report.left_out.first().and_then(kept).or_else(noticed);
-        let advice = advice.unwrap_or_else(|| "export the meshes, too".into());
+        let is_energy = (report.files.iter()).any(|f| ["gbXML", "HBJSON"].contains(&f.format));
+        let advice = advice.unwrap_or_else(|| match is_energy {
+            true => "export its surfaces, too: gbXML's Surface elements, the faces of HBJSON's rooms",
+            false => "export the meshes, too",
+        }.into());
         return Err(ImportError::NoTriangles {
             paths: extent::paths_of(&report),
             advice,

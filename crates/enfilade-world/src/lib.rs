@@ -31,7 +31,7 @@ pub use lights::{Lamp, LampError, LampId, Lights};
 pub use paths::{
     Arrival, Blocked, Corner, Floors, Geodesics, Hop, Hops, KeptMapError, LengthSearch, NoPath,
     Obstacle, PassedPortal, Path, PathFollower, PathPoint, PathPortal, PathSearch, Sampling,
-    WalkMap, WalkMapKey, WalkProgress, Ways,
+    WalkMap, WalkMapKey, WalkPatch, WalkProgress, Ways,
 };
 // Messages of the command and of Python.
 #[doc(hidden)]

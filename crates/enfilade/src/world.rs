@@ -257,6 +257,6 @@ pub use enfilade_world::{
     SPEED_OF_SOUND, Sampling, SavedActor, SavedActors, SavedError, SavedPose, SavedSpace,
     SavedThing, SavedThings, SavedTie, SeenContext, SeenVia, Shape, ShapeError, SightRay, Space,
     SpaceError, SpaceSeen, SpaceViewer, SpecialImage, SpecialOptions, StoppedSpecial, ThingError,
-    ThingId, Things, Tie, TraceEnd, Traced, Transmission, WalkMap, WalkMapKey, WalkProgress,
-    Walker, WayPoint, Ways,
+    ThingId, Things, Tie, TraceEnd, Traced, Transmission, WalkMap, WalkMapKey, WalkPatch,
+    WalkProgress, Walker, WayPoint, Ways,
 };

@@ -38,6 +38,7 @@ fn the_house_is_written_for_each_trade() {
         "export house/world.glb -o house.hbjson",
         "export house/world.glb -o house.gml",
         "export house/world.glb -o house.pgm --resolution 0.1",
+        "export house/world.glb --walkable -o floors.obj",
         "export house/world.glb --rooms-solid -o solids",
         // Again, over the first.
         "export house/world.glb --rooms-solid -o solids",
@@ -61,6 +62,9 @@ fn the_house_is_written_for_each_trade() {
             assert!(dir.join(format!("solids/{file}.{ending}")).is_file());
         }
     }
+    // Where people stand: less than the floors, and in most rooms.
+    let floors = fs::read_to_string(dir.join("floors.obj")).unwrap();
+    assert!(floors.matches("\ng ").count() >= n_rooms / 2 && floors.contains("\nf -4 -3 -2 -1"));
     let yaml = fs::read_to_string(dir.join("house.yaml")).unwrap();
     assert!(yaml.contains("image: \"house.pgm\"") && yaml.contains("resolution: 0.1\n"));
     let table = json(&dir.join("house.rooms.json"));
@@ -110,6 +114,10 @@ fn what_cannot_be_written_is_refused_with_a_remedy() {
             "cannot be used with",
         ),
         ("export house/world.glb -o x.gbx", "end it in"),
+        (
+            "export house/world.glb --walkable -o x.json",
+            "only to a .obj file",
+        ),
         ("export house/scene.glb -o x.gbxml", ""),
     ] {
         let (is_done, said) = run(&dir, line);

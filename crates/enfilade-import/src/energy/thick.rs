@@ -183,21 +183,24 @@ const ASKEW: DVec3 = DVec3::new(0.5377, 0.3214, 0.7795);
 /// Distance of their starts from a polygon, as a share of its size.
 const OFF: f64 = 1e-4;
 
-/// Returns `true` if the area vectors of a shell's polygons cancel, whichever way exporters turned them, and there are some. O(n²).
+/// Greatest sum of the area vectors of a closed shell, as a share of its area.
+const CLOSED: f64 = 1e-3;
+
+/// Returns `true` if the area vectors of a shell's polygons cancel, and there are some: as they are turned, or each away from the
+/// inside, as some exporters turn them anyhow. O(n), or O(n²).
 fn closes(shell: &[Loop]) -> bool {
     let frames: Vec<Frame> = shell.iter().filter_map(Frame::of).collect();
-    let (mut sum, mut all) = (DVec3::ZERO, 0.0);
-    for frame in &frames {
-        let area = area(&frame.outline);
-        all += area;
-        let Some(inner) = inner_point(&frame.outline) else {
-            continue;
-        };
-        let from = frame.placed(&[inner], frame.plane())[0] + frame.normal * (OFF * area.sqrt());
-        let n_hit = frames.iter().filter(|f| is_hit(f, from)).count();
-        sum += frame.normal * if n_hit % 2 == 0 { area } else { -area };
-    }
-    all > 0.0 && sum.length() <= 1e-3 * all
+    let vector = |f: &Frame| f.normal * area(&f.outline);
+    let all: f64 = frames.iter().map(|f| area(&f.outline)).sum();
+    let cancels = |sum: DVec3| all > 0.0 && sum.length() <= CLOSED * all;
+    let turned = |f: &Frame| {
+        let inner = inner_point(&f.outline)?;
+        let off = f.normal * (OFF * area(&f.outline).sqrt());
+        let from = f.placed(&[inner], f.plane())[0] + off;
+        let n_hit = frames.iter().filter(|other| is_hit(other, from)).count();
+        Some(vector(f) * if n_hit % 2 == 0 { 1.0 } else { -1.0 })
+    };
+    cancels(frames.iter().map(vector).sum()) || cancels(frames.iter().filter_map(turned).sum())
 }
 
 /// Returns a point inside a ring, on the level half way in the largest step between heights of its vertices.
