@@ -92,7 +92,8 @@ impl Frame {
     }
 }
 
-/// Makes the shells of spaces the walls, and leads openings through them, if all are closed, and most openings between two are deep.
+/// Makes the shells of spaces the walls, and leads openings through them, if all are closed, and most doors and windows lie
+/// between the faces of their walls.
 /// Otherwise changes nothing. Surfaces between two spaces, and those on a shell, are then left out.
 pub(super) fn thicken(model: &mut EnergyModel) {
     if !model.spaces.iter().all(|space| closes(&space.shell)) {
@@ -117,13 +118,14 @@ pub(super) fn thicken(model: &mut EnergyModel) {
         }
     }
     let is_deep = |[from, to]: &[f64; 2]| (from - to).abs() > same;
-    // Surfaces may lie on the middle of walls, or on one face of them; those of air between spaces are flat in all models.
-    let is_between = ways.iter().any(|way| way.2.len() == 2);
+    // Where surfaces lie on one face of walls, shells may end in openings, and those of air between spaces are flat in all models.
     let judged = ways
         .iter()
-        .filter(|way| model.sheets[way.0].class != Class::Air && (way.2.len() == 2 || !is_between));
-    let (deep, flat): (Vec<_>, Vec<_>) = judged.partition(|way| is_deep(&way.3));
-    if deep.len() <= flat.len() {
+        .filter(|way| model.sheets[way.0].class != Class::Air);
+    let is_between =
+        |way: &&(usize, Frame, Vec<Mouth>, [f64; 2])| way.2.iter().all(|m| m.depth.abs() > same);
+    let (between, on_a_face): (Vec<_>, Vec<_>) = judged.partition(is_between);
+    if between.len() <= on_a_face.len() {
         return;
     }
     let mut holes: Vec<Vec<Vec<Loop>>> = (model.spaces.iter())
