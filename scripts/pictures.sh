@@ -33,3 +33,5 @@ draw world doors --eye 0.9,1.6,2.2 --look 4.35,1.15,4.2 --door 19=0.5 --size 120
 "$enfilade" plan "$work/world.glb" -o docs/images/plan.svg
 "$enfilade" plan "$work/world.glb" -o docs/images/plan.png --width 1400
 "$enfilade" plan "$work/tower.glb" -o docs/images/tower.png --width 1600
+# What other trades take away; needs `pip install pillow`.
+python3 scripts/exports_picture.py "$enfilade" "$work/world.glb" docs/images/exports.png
