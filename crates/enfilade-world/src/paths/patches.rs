@@ -74,7 +74,7 @@ impl Floors {
 /// square, and the one after the last, as x and z.
 fn rectangles(squares: &[u32], n_x: u32) -> impl Iterator<Item = [[u32; 2]; 2]> {
     let is_run = |a: &u32, b: &u32| b - a == 1 && !b.is_multiple_of(n_x);
-    // By first and last x of the rows that reach down to here: first row, and the one after the last.
+    // Rows that reach down to here, the first and the one after the last, by their first x and the one after the last.
     let mut growing: BTreeMap<[u32; 2], [u32; 2]> = BTreeMap::new();
     let mut found = Vec::new();
     for run in squares.chunk_by(is_run) {
