@@ -247,11 +247,7 @@ impl ShapeRules<'_> {
         }
         let bvh = self.bvh?;
         let is_own = |t: u32| self.owners[t as usize] == index as u32;
-        let touches = |b: &Aabb| {
-            let mut is_touched = false;
-            bvh.for_each_in_box(b, |t| is_touched |= !is_own(t));
-            is_touched
-        };
+        let touches = |b: &Aabb| bvh.any_in_box(b, |t| !is_own(t));
         let mut reason = None;
         if size.max_element() <= SMALL.min(reach) {
             reason = seen_around(&shape.bounds, &touches);
